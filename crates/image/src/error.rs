@@ -1,0 +1,46 @@
+//! The one error of this crate.
+
+use std::path::PathBuf;
+
+/// Why a picture could not be read, written or made.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file system refused.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// What was tried, as in "read" or "write".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not what it says, or breaks a limit.
+    #[error("'{}': {what}", path.display())]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What was expected and what was found.
+        what: String,
+    },
+    /// Sound, but of a kind that is not read here.
+    #[error("'{}': unsupported: {what}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what would be read.
+        what: String,
+    },
+    /// Width times height is not the number of pixels given.
+    #[error("a picture of {width}x{height} needs {expected} pixels, {found} were given")]
+    PixelCount {
+        /// Pixels in a row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// Width times height.
+        expected: usize,
+        /// What was given.
+        found: usize,
+    },
+}

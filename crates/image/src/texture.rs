@@ -1,0 +1,175 @@
+//! A texture: texels as they were stored, decoded at each lookup.
+//!
+//! uv (0, 0) is the lower left corner of the picture, v grows upwards (the OBJ convention; glTF's v is one minus this
+//! one). Lookups are bilinear between texel centres, which lie at half-integers.
+
+use crate::transfer::linear_from_srgb_byte;
+
+/// What a lookup outside 0..1 finds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The picture again.
+    #[default]
+    Repeat,
+    /// The nearest border texel.
+    Clamp,
+    /// The picture, mirrored every other time.
+    Mirror,
+}
+
+/// Texels, row by row from the top left. Bytes keep large atlases small.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Texels {
+    /// sRGB-encoded bytes.
+    Srgb8(Vec<[u8; 3]>),
+    /// Linear bytes, value = byte / 255.
+    Linear8(Vec<[u8; 3]>),
+    /// Linear scalars as bytes, value = byte / 255; all three channels the same.
+    Grey8(Vec<u8>),
+    /// Linear floats.
+    Linear(Vec<[f32; 3]>),
+    /// Linear float scalars; all three channels the same.
+    Grey(Vec<f32>),
+}
+
+impl Texels {
+    fn len(&self) -> usize {
+        match self {
+            Self::Srgb8(v) | Self::Linear8(v) => v.len(),
+            Self::Grey8(v) => v.len(),
+            Self::Linear(v) => v.len(),
+            Self::Grey(v) => v.len(),
+        }
+    }
+}
+
+/// A picture for lookups by uv; see the module for its conventions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    width: usize,
+    height: usize,
+    texels: Texels,
+    wrap: Wrap,
+}
+
+impl Texture {
+    /// Takes the texels, row by row from the top left. Fails if there are none or not `width * height` of them.
+    pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, crate::ImageError> {
+        let expected = width.saturating_mul(height);
+        if expected == 0 || texels.len() != expected {
+            return Err(crate::ImageError::PixelCount { width, height, expected, found: texels.len() });
+        }
+        Ok(Self { width, height, texels, wrap })
+    }
+
+    /// Texels in a row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The stored texels.
+    pub fn texels(&self) -> &Texels {
+        &self.texels
+    }
+
+    /// How lookups go on outside 0..1.
+    pub fn wrap(&self) -> Wrap {
+        self.wrap
+    }
+
+    /// The linear value of the texel at column `x`, row `y` from the top.
+    pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
+        let at = y * self.width + x;
+        match &self.texels {
+            Texels::Srgb8(v) => v[at].map(linear_from_srgb_byte),
+            Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
+            Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],
+            Texels::Linear(v) => v[at],
+            Texels::Grey(v) => [v[at]; 3],
+        }
+    }
+
+    /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
+    pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
+        let [(x0, x1, fx), (y0, y1, fy)] = self.footprint(uv);
+        let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
+        let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
+        std::array::from_fn(|k| {
+            let top = a[k] + fx * (b[k] - a[k]);
+            let bottom = c[k] + fx * (d[k] - c[k]);
+            top + fy * (bottom - top)
+        })
+    }
+
+    /// The two columns and the two rows around `uv`, with the weight of the second of each.
+    fn footprint(&self, uv: [f32; 2]) -> [(usize, usize, f32); 2] {
+        // Beyond 1e9 an f32 cannot tell one texel from the next.
+        let sane = |v: f32| if v.abs() < 1e9 { v } else { 0.0 };
+        let x = sane(uv[0]) * self.width as f32 - 0.5;
+        let y = (1.0 - sane(uv[1])) * self.height as f32 - 0.5;
+        [self.neighbours(x, self.width), self.neighbours(y, self.height)]
+    }
+
+    fn neighbours(&self, position: f32, size: usize) -> (usize, usize, f32) {
+        let lower = position.floor();
+        // i64 holds every f32 that a uv can give here; the cast saturates beyond.
+        let index = lower as i64;
+        (self.wrapped(index, size), self.wrapped(index.saturating_add(1), size), position - lower)
+    }
+
+    fn wrapped(&self, index: i64, size: usize) -> usize {
+        let size = size as i64;
+        let inside = match self.wrap {
+            Wrap::Repeat => index.rem_euclid(size),
+            Wrap::Clamp => index.clamp(0, size - 1),
+            Wrap::Mirror => {
+                let turn = index.rem_euclid(2 * size);
+                if turn < size { turn } else { 2 * size - 1 - turn }
+            }
+        };
+        inside as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_by_two(wrap: Wrap) -> Texture {
+        Texture::new(2, 2, Texels::Grey(vec![0.0, 1.0, 2.0, 3.0]), wrap).unwrap()
+    }
+
+    #[test]
+    fn v_grows_upwards() {
+        let texture = two_by_two(Wrap::Clamp);
+        assert_eq!(texture.sample([0.25, 0.25])[0], 2.0);
+        assert_eq!(texture.sample([0.75, 0.75])[0], 1.0);
+    }
+
+    #[test]
+    fn bilinear_in_the_middle_is_the_mean() {
+        assert_eq!(two_by_two(Wrap::Clamp).sample([0.5, 0.5]), [1.5; 3]);
+    }
+
+    #[test]
+    fn wrapping() {
+        assert_eq!(two_by_two(Wrap::Repeat).sample([1.25, 0.75]), two_by_two(Wrap::Repeat).sample([0.25, 0.75]));
+        assert_eq!(two_by_two(Wrap::Clamp).sample([7.0, 0.75])[0], 1.0);
+        assert_eq!(two_by_two(Wrap::Mirror).sample([1.25, 0.75])[0], 1.0);
+        assert_eq!(two_by_two(Wrap::Mirror).sample([1.75, 0.75])[0], 0.0);
+    }
+
+    #[test]
+    fn strange_uv_is_not_a_panic() {
+        for wrap in [Wrap::Repeat, Wrap::Clamp, Wrap::Mirror] {
+            for uv in [[f32::NAN, 0.0], [f32::INFINITY, -1e30], [1e38, -1e38]] {
+                two_by_two(wrap).sample(uv);
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! The sRGB transfer function (IEC 61966-2-1), computed with the `libm` crate so that every machine gets the same bits.
+
+use std::sync::LazyLock;
+
+/// sRGB-encoded value of a linear one; the curve is continued as it stands outside 0..1 (linear below 0).
+pub fn srgb_from_linear(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
+}
+
+/// Linear value of an sRGB-encoded one; the inverse of [`srgb_from_linear`].
+pub fn linear_from_srgb(encoded: f32) -> f32 {
+    if encoded <= 0.040_45 { encoded / 12.92 } else { libm::powf((encoded + 0.055) / 1.055, 2.4) }
+}
+
+static LINEAR_FROM_BYTE: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f32 / 255.0)));
+
+/// Linear value of an sRGB byte, from a table.
+pub fn linear_from_srgb_byte(byte: u8) -> f32 {
+    LINEAR_FROM_BYTE[usize::from(byte)]
+}
+
+/// The byte nearest to a value of 0 to 1; clipped, NaN becomes 0.
+pub fn byte_from_unit(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 188 for linear 0.5 and 0.2140 for byte 127.5: the usual published values of the curve.
+    #[test]
+    fn known_values() {
+        assert_eq!(byte_from_unit(srgb_from_linear(0.5)), 188);
+        assert!((linear_from_srgb(0.5) - 0.214_041_14).abs() < 1e-6);
+        assert_eq!(linear_from_srgb_byte(255), 1.0);
+        assert_eq!(byte_from_unit(f32::NAN), 0);
+    }
+
+    #[test]
+    fn every_byte_survives() {
+        for byte in 0..=255_u8 {
+            assert_eq!(byte_from_unit(srgb_from_linear(linear_from_srgb_byte(byte))), byte);
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The one camera model: a pinhole without distortion, one matrix for every picture of a view.
+
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Focal lengths and principal point in pixels; pixel centres at +0.5, origin at the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Intrinsics {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Horizontal focal length in pixels.
+    pub fx: f64,
+    /// Vertical focal length in pixels.
+    pub fy: f64,
+    /// Column of the principal point, in pixels from the left edge.
+    pub cx: f64,
+    /// Row of the principal point, in pixels from the top edge.
+    pub cy: f64,
+}
+
+impl Intrinsics {
+    /// Square pixels, principal point in the middle; `fov_y` in radians.
+    pub fn from_fov_y(width: u32, height: u32, fov_y: f64) -> Self {
+        let focal = f64::from(height) / 2.0 / libm::tan(fov_y / 2.0);
+        Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
+    }
+
+    /// Square pixels, principal point in the middle; `fov_x` in radians.
+    pub fn from_fov_x(width: u32, height: u32, fov_x: f64) -> Self {
+        let focal = f64::from(width) / 2.0 / libm::tan(fov_x / 2.0);
+        Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
+    }
+}
+
+/// A pinhole camera that looks along its -Z, +Y up, +X right (OpenGL's and Blender's axes).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Camera {
+    /// Row-major 4x4; a rotation and a translation in metres.
+    pub world_from_camera: [[f64; 4]; 4],
+    /// Pixels.
+    pub intrinsics: Intrinsics,
+}
+
+impl Camera {
+    /// A camera at `position` that looks at `target`, its right side level as `up` says.
+    pub fn look_at(position: DVec3, target: DVec3, up: DVec3, intrinsics: Intrinsics) -> Option<Self> {
+        let back = (position - target).try_normalize()?;
+        let right = up.cross(back).try_normalize()?;
+        let rotation = DMat3::from_cols(right, back.cross(right), back);
+        Some(Self::from_rotation(rotation, position, intrinsics))
+    }
+
+    /// A camera of the rotation world-from-camera at `position`.
+    pub fn from_rotation(rotation: DMat3, position: DVec3, intrinsics: Intrinsics) -> Self {
+        let matrix = DMat4::from_cols(
+            rotation.x_axis.extend(0.0),
+            rotation.y_axis.extend(0.0),
+            rotation.z_axis.extend(0.0),
+            position.extend(1.0),
+        );
+        Self { world_from_camera: matrix.transpose().to_cols_array_2d(), intrinsics }
+    }
+
+    /// `world_from_camera` as a matrix.
+    pub fn matrix(&self) -> DMat4 {
+        DMat4::from_cols_array_2d(&self.world_from_camera).transpose()
+    }
+
+    /// Rotation world-from-camera.
+    pub fn rotation(&self) -> DMat3 {
+        DMat3::from_mat4(self.matrix())
+    }
+
+    /// The camera's place in the world.
+    pub fn position(&self) -> DVec3 {
+        self.matrix().w_axis.truncate()
+    }
+
+    /// The camera turned by `x_deg` about its own X, then `y_deg` about its own Y: `R_new = R * Rx(dx) * Ry(dy)`, the
+    /// translation kept (the formula of the public MatEval code, see METHODS 1.1).
+    pub fn turned(&self, x_deg: f64, y_deg: f64) -> Self {
+        let turn = rotation_x(x_deg.to_radians()) * rotation_y(y_deg.to_radians());
+        Self::from_rotation(self.rotation() * turn, self.position(), self.intrinsics)
+    }
+
+    /// World direction (unit length) through the point `pixel` of the picture.
+    pub fn direction(&self, pixel: DVec2) -> DVec3 {
+        (self.rotation() * self.camera_direction(pixel)).normalize()
+    }
+
+    /// Direction in camera space through `pixel`, with z = -1: times a depth it is a point in camera space.
+    pub fn camera_direction(&self, pixel: DVec2) -> DVec3 {
+        let k = &self.intrinsics;
+        DVec3::new((pixel.x - k.cx) / k.fx, -(pixel.y - k.cy) / k.fy, -1.0)
+    }
+
+    /// The world point seen at `pixel` at `depth` metres along the camera's axis.
+    pub fn unproject(&self, pixel: DVec2, depth: f64) -> DVec3 {
+        self.matrix().transform_point3(self.camera_direction(pixel) * depth)
+    }
+
+    /// Where a world point lies in the picture, and its depth along the camera's axis in metres; none behind the camera.
+    pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
+        let camera: DVec4 = self.matrix().inverse() * world.extend(1.0);
+        let depth = -camera.z;
+        let k = &self.intrinsics;
+        (depth > 0.0).then(|| (DVec2::new(k.cx + k.fx * camera.x / depth, k.cy - k.fy * camera.y / depth), depth))
+    }
+
+    /// Whether the point `pixel` lies in the picture.
+    pub fn holds(&self, pixel: DVec2) -> bool {
+        let k = &self.intrinsics;
+        pixel.x >= 0.0 && pixel.y >= 0.0 && pixel.x < f64::from(k.width) && pixel.y < f64::from(k.height)
+    }
+}
+
+fn rotation_x(angle: f64) -> DMat3 {
+    let (sin, cos) = libm::sincos(angle);
+    DMat3::from_cols(DVec3::X, DVec3::new(0.0, cos, sin), DVec3::new(0.0, -sin, cos))
+}
+
+fn rotation_y(angle: f64) -> DMat3 {
+    let (sin, cos) = libm::sincos(angle);
+    DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        let intrinsics = Intrinsics::from_fov_x(480, 270, 1.2);
+        Camera::look_at(DVec3::new(1.0, 1.6, 2.0), DVec3::new(-1.0, 1.2, -2.0), DVec3::Y, intrinsics).unwrap()
+    }
+
+    #[test]
+    fn project_undoes_unproject() {
+        let pixel = DVec2::new(13.25, 201.5);
+        let (back, depth) = camera().project(camera().unproject(pixel, 2.5)).unwrap();
+        assert!((back - pixel).length() < 1e-9 && (depth - 2.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn behind_the_camera_is_nowhere() {
+        let camera = camera();
+        assert!(camera.project(camera.position() + camera.rotation().z_axis).is_none());
+    }
+
+    /// What the offsets' names say: +x looks up, +y looks left.
+    #[test]
+    fn plus_five_plus_five_looks_up_and_left() {
+        let level = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, Intrinsics::from_fov_x(64, 64, 1.0)).unwrap();
+        let centre = level.turned(5.0, 5.0).direction(DVec2::new(32.0, 32.0));
+        assert!(centre.y > 0.08 && centre.x < -0.08, "{centre}");
+    }
+}

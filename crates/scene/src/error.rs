@@ -1,0 +1,47 @@
+//! The one error of this crate.
+
+use std::path::PathBuf;
+
+use crate::Finding;
+
+/// Why a dataset or a part of it could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file system refused.
+    #[error("cannot {action} '{}': {source}", path.display())]
+    Io {
+        /// What was tried, as in "read" or "write".
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A file breaks the format; every fault is listed.
+    #[error("'{}' is not sound:{}", path.display(), Finding::list(findings))]
+    Invalid {
+        /// The file or folder.
+        path: PathBuf,
+        /// All that is wrong with it.
+        findings: Vec<Finding>,
+    },
+    /// Sound, but of a version or kind that is not read here.
+    #[error("'{}': unsupported: {what}", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what would be read.
+        what: String,
+    },
+    /// A picture could not be read or written.
+    #[error(transparent)]
+    Image(#[from] mateval_image::ImageError),
+}
+
+impl SceneError {
+    /// An [`SceneError::Io`]; to be used with `map_err`.
+    pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { action, path, source }
+    }
+}

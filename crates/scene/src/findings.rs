@@ -1,0 +1,62 @@
+//! Findings: what was wrong with an input, where, and what was done instead.
+
+use std::fmt::Write as _;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How much a finding weighs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Severity {
+    /// The input cannot be used as it stands.
+    Error,
+    /// Something was left out or replaced.
+    Warning,
+    /// Something was repaired without loss.
+    Note,
+}
+
+/// One thing that was wrong with an input. Findings sort by severity, then code, file and place.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Finding {
+    /// How much it weighs.
+    pub severity: Severity,
+    /// A stable word for the kind of fault, as in `missing_file`; snake_case.
+    pub code: String,
+    /// The file, relative to the root of what was read, with forward slashes.
+    pub file: String,
+    /// Where in the file: a JSON pointer, `line 12`, or an element as in `shape 'Mesh206'`. Empty for the whole file.
+    pub place: String,
+    /// What was expected and what was found.
+    pub message: String,
+    /// What was done instead, or what to do.
+    pub action: String,
+}
+
+impl Finding {
+    /// All findings, one a line, each on a line of its own beneath the text before.
+    pub fn list(findings: &[Self]) -> String {
+        findings.iter().fold(String::new(), |mut text, finding| {
+            // Writing to a String cannot fail.
+            let _ = write!(text, "\n  {finding}");
+            text
+        })
+    }
+}
+
+impl std::fmt::Display for Finding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let severity = match self.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
+        write!(f, "{severity} [{}] '{}'", self.code, self.file)?;
+        if !self.place.is_empty() {
+            write!(f, " {}", self.place)?;
+        }
+        write!(f, ": {}; {}", self.message, self.action)
+    }
+}

@@ -1,0 +1,140 @@
+//! Names of scenes, instances, parts and views; numbers of instances and parts in pictures.
+
+use std::borrow::Cow;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+/// What every id matches: `[a-z0-9][a-z0-9_-]{0,63}`. Such a name is safe as a folder on every system.
+pub const ID_PATTERN: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
+
+/// A text that is not an id.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{}' is not an id: expected {ID_PATTERN}", .0.chars().take(80).collect::<String>().escape_debug())]
+pub struct BadId(pub String);
+
+fn is_id(text: &str) -> bool {
+    let bytes = text.as_bytes();
+    let word = |b: &u8| b.is_ascii_lowercase() || b.is_ascii_digit();
+    (1..=64).contains(&bytes.len()) && word(&bytes[0]) && bytes.iter().all(|b| word(b) || matches!(b, b'_' | b'-'))
+}
+
+/// A text turned into an id: lower case, anything else than letters, digits, `_` and `-` becomes `-`, at most 48
+/// characters (so that a number can be appended). `fallback` where nothing is left.
+pub fn id_text_from(name: &str, fallback: &str) -> String {
+    let mapped: String = name
+        .chars()
+        .map(|c| c.to_ascii_lowercase())
+        .map(|c| if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' { c } else { '-' })
+        .collect();
+    let trimmed: String = mapped.trim_matches(|c| c == '-' || c == '_').chars().take(48).collect();
+    if trimmed.is_empty() { fallback.to_owned() } else { trimmed }
+}
+
+macro_rules! id_type {
+    ($(#[$doc:meta])* $name:ident) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[serde(try_from = "String", into = "String")]
+        pub struct $name(String);
+
+        impl $name {
+            /// Checks the text against [`ID_PATTERN`].
+            pub fn new(text: impl Into<String>) -> Result<Self, BadId> {
+                let text = text.into();
+                if is_id(&text) { Ok(Self(text)) } else { Err(BadId(text)) }
+            }
+
+            /// The id as text.
+            pub fn as_str(&self) -> &str {
+                &self.0
+            }
+        }
+
+        impl TryFrom<String> for $name {
+            type Error = BadId;
+            fn try_from(text: String) -> Result<Self, BadId> {
+                Self::new(text)
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = BadId;
+            fn from_str(text: &str) -> Result<Self, BadId> {
+                Self::new(text)
+            }
+        }
+
+        impl From<$name> for String {
+            fn from(id: $name) -> String {
+                id.0
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(&self.0)
+            }
+        }
+
+        impl JsonSchema for $name {
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "type": "string", "pattern": ID_PATTERN })
+            }
+        }
+    };
+}
+
+id_type!(
+    /// A scene's id: its folder in the dataset and in a submission.
+    SceneId
+);
+id_type!(
+    /// An instance's id: its folder in a submission and its glTF node name.
+    InstanceId
+);
+id_type!(
+    /// A part's id, unique in its scene: its glTF node name.
+    PartId
+);
+id_type!(
+    /// A view's id, as in `input` or `up_left`.
+    ViewId
+);
+
+/// An instance's value in `instance.png`: 1 to 65535; 0 in the picture is "nothing".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct InstanceIndex(pub std::num::NonZeroU16);
+
+/// A part's value in `part.png`: 1 to 65535; 0 in the picture is "nothing".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct PartIndex(pub std::num::NonZeroU16);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accepts_ids_and_refuses_paths() {
+        for good in ["a", "0", "wall-1", "sofa_2", &"x".repeat(64)] {
+            assert!(InstanceId::new(good).is_ok(), "{good}");
+        }
+        for bad in ["", "-a", "_a", "A", "a/b", "..", "a.b", "ä", &"x".repeat(65), "a\n"] {
+            assert!(InstanceId::new(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn any_name_becomes_an_id() {
+        for (name, id) in [("Mesh 206", "mesh-206"), ("植物", "thing"), ("../x", "x"), ("-", "thing")] {
+            let text = id_text_from(name, "thing");
+            assert_eq!(text, id);
+            assert!(InstanceId::new(text).is_ok());
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! The dataset format: types, reading, writing, validation.
+//!
+//! In: what `prep` converted, or a dataset folder on disk. Out: the same on disk, or as checked Rust values.
+//!
+//! Between: [`ids`] and [`findings`] are the words that everything shares; [`camera`] is the one camera model;
+//! [`mesh`], [`material`] and [`reference`] describe a scene as its makers meant it.
+
+pub mod camera;
+pub mod error;
+pub mod findings;
+pub mod ids;
+pub mod material;
+pub mod mesh;
+pub mod reference;
+
+pub use camera::{Camera, Intrinsics};
+pub use error::SceneError;
+pub use findings::{Finding, Severity};
+pub use ids::{InstanceId, InstanceIndex, PartId, SceneId, ViewId};
+pub use mesh::TriangleMesh;

@@ -1,0 +1,305 @@
+//! Materials as their makers meant them: the parameters, not what light does with them (that is the tracer's `Bsdf`).
+
+use glam::Vec2;
+use mateval_image::Texture;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A place in [`crate::reference::ReferenceScene::textures`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct TextureIndex(pub usize);
+
+/// A colour, linear Rec. 709: the same everywhere or from a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorInput {
+    /// The same everywhere.
+    Constant([f32; 3]),
+    /// Looked up at the surface's uv.
+    Texture {
+        /// Which.
+        texture: TextureIndex,
+        /// Where in it.
+        uv: UvTransform,
+    },
+}
+
+/// A number: the same everywhere or from a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ScalarInput {
+    /// The same everywhere.
+    Constant(f32),
+    /// One channel of a texture, looked up at the surface's uv.
+    Texture {
+        /// Which.
+        texture: TextureIndex,
+        /// 0 red, 1 green, 2 blue.
+        channel: usize,
+        /// Where in it.
+        uv: UvTransform,
+    },
+}
+
+/// A texture's uv from the surface's: `uv' = rows * (u, v, 1)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct UvTransform(pub [[f32; 3]; 2]);
+
+impl Default for UvTransform {
+    fn default() -> Self {
+        Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    }
+}
+
+impl UvTransform {
+    /// The texture's uv.
+    pub fn apply(&self, uv: Vec2) -> Vec2 {
+        let row = |r: [f32; 3]| r[0] * uv.x + r[1] * uv.y + r[2];
+        Vec2::new(row(self.0[0]), row(self.0[1]))
+    }
+}
+
+impl ColorInput {
+    /// The linear colour at the surface's `uv`.
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 3] {
+        match self {
+            Self::Constant(rgb) => *rgb,
+            Self::Texture { texture, uv: transform } => textures[texture.0].sample(transform.apply(uv).to_array()),
+        }
+    }
+}
+
+impl ScalarInput {
+    /// The value at the surface's `uv`.
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> f32 {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Texture { texture, channel, uv: transform } => {
+                textures[texture.0].sample(transform.apply(uv).to_array())[*channel]
+            }
+        }
+    }
+}
+
+/// The shape of a rough surface's microfacets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Distribution {
+    /// Trowbridge-Reitz.
+    Ggx,
+    /// Beckmann.
+    Beckmann,
+}
+
+/// A rough interface. `alpha` is the distribution's own parameter; perceptual roughness is its square root.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Microfacets {
+    /// Their distribution.
+    pub distribution: Distribution,
+    /// Its width.
+    pub alpha: ScalarInput,
+}
+
+/// A conductor's index of refraction, as linear Rec. 709 values.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ConductorIor {
+    /// Reflects everything (Mitsuba's `material=none`).
+    PerfectMirror,
+    /// Complex index relative to the outside: eta + i k.
+    EtaK {
+        /// The real part.
+        eta: [f32; 3],
+        /// The imaginary part.
+        k: [f32; 3],
+    },
+}
+
+/// How light is scattered; the names are Mitsuba's, `Principled` is Disney's with our two flavours.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MaterialModel {
+    /// Lambert; with `alpha` Oren-Nayar.
+    Diffuse {
+        /// Share of light sent back.
+        reflectance: ColorInput,
+        /// Oren-Nayar's roughness, in Mitsuba's terms; none for Lambert.
+        alpha: Option<ScalarInput>,
+    },
+    /// A metal.
+    Conductor {
+        /// What it is made of.
+        ior: ConductorIor,
+        /// Multiplies what is reflected.
+        specular_reflectance: ColorInput,
+        /// None: smooth.
+        microfacets: Option<Microfacets>,
+    },
+    /// A diffuse base under a dielectric coat.
+    Plastic {
+        /// Inside over outside.
+        eta: f32,
+        /// Whether colour shifts by multiple inner reflection count (Mitsuba's `nonlinear`).
+        nonlinear: bool,
+        /// The base.
+        diffuse_reflectance: ColorInput,
+        /// Multiplies what the coat reflects.
+        specular_reflectance: ColorInput,
+        /// None: smooth.
+        microfacets: Option<Microfacets>,
+    },
+    /// A boundary between two clear media.
+    Dielectric {
+        /// Inside over outside.
+        eta: f32,
+        /// Multiplies what is reflected.
+        specular_reflectance: ColorInput,
+        /// Multiplies what is let through.
+        specular_transmittance: ColorInput,
+        /// None: smooth.
+        microfacets: Option<Microfacets>,
+    },
+    /// A clear sheet with both its boundaries.
+    ThinDielectric {
+        /// Inside over outside.
+        eta: f32,
+        /// Multiplies what is reflected.
+        specular_reflectance: ColorInput,
+        /// Multiplies what is let through.
+        specular_transmittance: ColorInput,
+    },
+    /// base_color, roughness, metallic.
+    Principled {
+        /// Linear.
+        base_color: ColorInput,
+        /// Perceptual, 0 to 1; alpha is its square.
+        roughness: ScalarInput,
+        /// 0 to 1.
+        metallic: ScalarInput,
+        /// Disney's; 0.5 is an index of 1.5.
+        specular: f32,
+        /// Whose.
+        flavour: PrincipledFlavour,
+    },
+}
+
+/// Whose `principled`: on one room they differ by 12 %.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PrincipledFlavour {
+    /// Blender 4.x.
+    Blender,
+    /// Mitsuba 3.
+    Mitsuba,
+}
+
+/// A bump map: heights in metres from a texture, times `scale`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BumpMap {
+    /// The height.
+    pub height: ScalarInput,
+    /// Multiplies it.
+    pub scale: f32,
+}
+
+/// A surface's material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Its name in the source.
+    pub name: String,
+    /// How light is scattered.
+    pub model: MaterialModel,
+    /// Whether the back looks like the front; else the back is black (of no meaning for dielectrics).
+    pub two_sided: bool,
+    /// Coverage, 0 lets light straight through; none: covered everywhere.
+    pub opacity: Option<ScalarInput>,
+    /// Bends the shading normal.
+    pub bump: Option<BumpMap>,
+}
+
+/// What a method is to recover at a point: DESIGN's "Bitterli materials as base_color, roughness, metallic".
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Appearance {
+    /// Linear.
+    pub base_color: [f32; 3],
+    /// Perceptual, 0 to 1.
+    pub roughness: f32,
+    /// 0 to 1.
+    pub metallic: f32,
+}
+
+impl Material {
+    /// Whether it is opaque, so that it has base_color, roughness and metallic (glass has not).
+    pub fn has_appearance(&self) -> bool {
+        !matches!(self.model, MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. })
+    }
+
+    /// base_color, roughness and metallic at the surface's `uv`; none for dielectrics.
+    ///
+    /// Diffuse and plastic: reflectance, metallic 0. Conductors: F0 times specular reflectance, metallic 1. Roughness is
+    /// the square root of alpha, smooth is 0, diffuse is 1.
+    pub fn appearance(&self, textures: &[Texture], uv: Vec2) -> Option<Appearance> {
+        let rough = |microfacets: &Option<Microfacets>| {
+            microfacets.map_or(0.0, |m| m.alpha.at(textures, uv).clamp(0.0, 1.0).sqrt())
+        };
+        let appearance = match &self.model {
+            MaterialModel::Diffuse { reflectance, .. } => {
+                Appearance { base_color: reflectance.at(textures, uv), roughness: 1.0, metallic: 0.0 }
+            }
+            MaterialModel::Plastic { diffuse_reflectance, microfacets, .. } => Appearance {
+                base_color: diffuse_reflectance.at(textures, uv),
+                roughness: rough(microfacets),
+                metallic: 0.0,
+            },
+            MaterialModel::Conductor { ior, specular_reflectance, microfacets } => {
+                let tint = specular_reflectance.at(textures, uv);
+                let f0 = ior.reflectance_at_normal();
+                Appearance {
+                    base_color: std::array::from_fn(|c| f0[c] * tint[c]),
+                    roughness: rough(microfacets),
+                    metallic: 1.0,
+                }
+            }
+            MaterialModel::Principled { base_color, roughness, metallic, .. } => Appearance {
+                base_color: base_color.at(textures, uv),
+                roughness: roughness.at(textures, uv),
+                metallic: metallic.at(textures, uv),
+            },
+            MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. } => return None,
+        };
+        Some(appearance)
+    }
+}
+
+impl ConductorIor {
+    /// F0: ((eta-1)^2 + k^2) / ((eta+1)^2 + k^2) a channel.
+    pub fn reflectance_at_normal(&self) -> [f32; 3] {
+        match self {
+            Self::PerfectMirror => [1.0; 3],
+            Self::EtaK { eta, k } => std::array::from_fn(|c| {
+                let k2 = k[c] * k[c];
+                ((eta[c] - 1.0) * (eta[c] - 1.0) + k2) / ((eta[c] + 1.0) * (eta[c] + 1.0) + k2)
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Copper's F0 from its published complex index (0.2004, 0.9240, 1.1022; 3.9129, 2.4528, 2.1421).
+    #[test]
+    fn copper_at_normal_incidence() {
+        let copper = ConductorIor::EtaK { eta: [0.2004, 0.9240, 1.1022], k: [3.9129, 2.4528, 2.1421] };
+        for (found, expected) in copper.reflectance_at_normal().into_iter().zip([0.9522, 0.6197, 0.5106]) {
+            assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+        }
+        assert_eq!(ConductorIor::PerfectMirror.reflectance_at_normal(), [1.0; 3]);
+    }
+}

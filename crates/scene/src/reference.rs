@@ -1,0 +1,102 @@
+//! A scene as its makers meant it: surfaces with their source materials and textures, and what emits.
+//!
+//! This is what truth is made from: the tracer renders it, `prep` bakes it.
+
+use mateval_image::Texture;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::material::{Material, TextureIndex};
+use crate::mesh::TriangleMesh;
+
+/// A place in [`ReferenceScene::materials`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct MaterialIndex(pub usize);
+
+/// A place in [`ReferenceScene::surfaces`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct SurfaceIndex(pub usize);
+
+/// A place in [`ReferenceScene::lights`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct LightIndex(pub usize);
+
+/// One source object: a mesh in world space and what it is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// Its name in the source, not necessarily unique.
+    pub name: String,
+    /// World space.
+    pub mesh: TriangleMesh,
+    /// What it is made of.
+    pub material: MaterialIndex,
+}
+
+/// A texture and the file that it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceTexture {
+    /// The file, relative to the source's root; or a word for a texture that was computed, as in `sunsky`.
+    pub name: String,
+    /// SHA-256 of the file's bytes, hex; none for a computed one.
+    pub sha256: Option<String>,
+    /// The texels.
+    pub texture: Texture,
+}
+
+/// What emits light.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Emission {
+    /// Surfaces that glow.
+    Area {
+        /// Which.
+        surfaces: Vec<SurfaceIndex>,
+        /// Linear Rec. 709 radiance, W/(m^2 sr) in the scene's own unit.
+        radiance: [f32; 3],
+        /// Whether the back glows too; Mitsuba's does not, Blender's does.
+        two_sided: bool,
+    },
+    /// A latitude-longitude picture around the scene.
+    Environment {
+        /// Linear radiance. In the map's own frame a direction d is looked up at u = atan2(d.x, -d.z) / (2 pi),
+        /// v (from the top) = acos(d.y) / pi (Mitsuba's convention).
+        texture: TextureIndex,
+        /// Multiplies it.
+        scale: f32,
+        /// Rotation of the map's frame into the world, row-major.
+        world_from_environment: [[f32; 3]; 3],
+    },
+    /// The same radiance from everywhere outside.
+    Constant {
+        /// Linear Rec. 709.
+        radiance: [f32; 3],
+    },
+}
+
+/// One group of emitters, told apart from the others in the light basis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightGroup {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// What it is.
+    pub emission: Emission,
+    /// False: camera rays see the surface as if it did not emit (or black, for an environment).
+    pub camera_visible: bool,
+}
+
+/// A scene as its makers meant it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReferenceScene {
+    /// Every object, glass and lamps included.
+    pub surfaces: Vec<Surface>,
+    /// What they are made of.
+    pub materials: Vec<Material>,
+    /// What those look up.
+    pub textures: Vec<SourceTexture>,
+    /// What emits.
+    pub lights: Vec<LightGroup>,
+}
