@@ -1,1 +1,219 @@
-//! x
+//! Float pictures as OpenEXR: one part, scan lines, ZIP, no dates and no names of software or machine.
+//!
+//! Colours are channels `R`, `G`, `B` (linear Rec. 709), vectors `X`, `Y`, `Z`, scalars `V`.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::prelude as ex;
+use exr::prelude::traits::*;
+use half::f16;
+
+use crate::limits::{check_size, read_file};
+use crate::store::write_whole;
+use crate::{ImageError, LinearRgb, Normal, Picture};
+
+/// Most channels that a layer may have.
+const MAX_CHANNELS: usize = 64;
+
+/// How a float is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 16 bits: 11 bits of mantissa, up to 65504.
+    Half,
+    /// 32 bits.
+    Float,
+}
+
+/// Writes channels `R`, `G`, `B`.
+pub fn write_linear(path: &Path, picture: &Picture<LinearRgb>, precision: Precision) -> Result<(), ImageError> {
+    write_triples(path, ["R", "G", "B"], &picture.map(|p| p.0), precision)
+}
+
+/// Writes channels `X`, `Y`, `Z`.
+pub fn write_normal(path: &Path, picture: &Picture<Normal>, precision: Precision) -> Result<(), ImageError> {
+    write_triples(path, ["X", "Y", "Z"], &picture.map(|p| p.0), precision)
+}
+
+/// Writes channel `V`.
+pub fn write_scalar(path: &Path, picture: &Picture<f32>, precision: Precision) -> Result<(), ImageError> {
+    write_channels(path, picture.width(), picture.height(), vec![("V", picture.pixels().to_vec())], precision)
+}
+
+/// Reads channels `R`, `G`, `B` of the first layer. Every value must be finite.
+pub fn read_linear(path: &Path) -> Result<Picture<LinearRgb>, ImageError> {
+    Ok(read_triples(path, ["R", "G", "B"])?.map(LinearRgb))
+}
+
+/// Reads channels `X`, `Y`, `Z` of the first layer. Every value must be finite.
+pub fn read_normal(path: &Path) -> Result<Picture<Normal>, ImageError> {
+    Ok(read_triples(path, ["X", "Y", "Z"])?.map(Normal))
+}
+
+/// Reads channel `V` (or `Y`, where others wrote a grey picture) of the first layer. Every value must be finite.
+pub fn read_scalar(path: &Path) -> Result<Picture<f32>, ImageError> {
+    let layer = read_first_layer(path)?;
+    let (width, height) = (layer.size.width(), layer.size.height());
+    let values = channel(path, &layer, "V").or_else(|error| channel(path, &layer, "Y").map_err(|_| error))?;
+    check_finite(path, width, values.iter().map(|v| v.is_finite()))?;
+    Picture::new(width, height, values)
+}
+
+fn write_triples(
+    path: &Path,
+    names: [&'static str; 3],
+    picture: &Picture<[f32; 3]>,
+    precision: Precision,
+) -> Result<(), ImageError> {
+    let plane = |c: usize| picture.pixels().iter().map(|p| p[c]).collect();
+    let channels = names.into_iter().enumerate().map(|(c, name)| (name, plane(c))).collect();
+    write_channels(path, picture.width(), picture.height(), channels, precision)
+}
+
+fn write_channels(
+    path: &Path,
+    width: usize,
+    height: usize,
+    channels: Vec<(&'static str, Vec<f32>)>,
+    precision: Precision,
+) -> Result<(), ImageError> {
+    let stored = |values: Vec<f32>| match precision {
+        Precision::Float => ex::FlatSamples::F32(values),
+        Precision::Half => ex::FlatSamples::F16(values.into_iter().map(f16::from_f32).collect()),
+    };
+    let channels = channels.into_iter().map(|(name, values)| ex::AnyChannel::new(name, stored(values))).collect();
+    let encoding = ex::Encoding {
+        compression: ex::Compression::ZIP16,
+        blocks: ex::Blocks::ScanLines,
+        line_order: ex::LineOrder::Increasing,
+    };
+    let attributes = ex::LayerAttributes::default();
+    let image =
+        ex::Image::from_layer(ex::Layer::new((width, height), attributes, encoding, ex::AnyChannels::sort(channels)));
+    let mut bytes = Cursor::new(Vec::new());
+    // One thread: the order of the blocks, and so the bytes, must not depend on how many there are.
+    image
+        .write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .map_err(|error| ImageError::Unsupported { path: path.to_owned(), what: error.to_string() })?;
+    write_whole(path, bytes.get_ref())
+}
+
+type FlatLayer = ex::Layer<ex::AnyChannels<ex::FlatSamples>>;
+
+fn read_triples(path: &Path, names: [&'static str; 3]) -> Result<Picture<[f32; 3]>, ImageError> {
+    let layer = read_first_layer(path)?;
+    let (width, height) = (layer.size.width(), layer.size.height());
+    let [a, b, c] = names.map(|name| channel(path, &layer, name));
+    let (a, b, c) = (a?, b?, c?);
+    let pixels: Vec<[f32; 3]> = a.into_iter().zip(b).zip(c).map(|((a, b), c)| [a, b, c]).collect();
+    check_finite(path, width, pixels.iter().map(|p| p.iter().all(|v| v.is_finite())))?;
+    Picture::new(width, height, pixels)
+}
+
+fn read_first_layer(path: &Path) -> Result<FlatLayer, ImageError> {
+    let image = ex::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(checked_bytes(path)?))
+        .map_err(|error| invalid(path, &error))?;
+    Ok(image.layer_data)
+}
+
+fn channel(path: &Path, layer: &FlatLayer, name: &str) -> Result<Vec<f32>, ImageError> {
+    let channels = &layer.channel_data.list;
+    let Some(found) = channels.iter().find(|channel| channel.name.eq(name)) else {
+        let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
+        let what = format!("expected a channel {name}, found {}", names.join(", "));
+        return Err(ImageError::Invalid { path: path.to_owned(), what });
+    };
+    if found.sampling != ex::Vec2(1, 1) {
+        let what = format!("channel {name} is subsampled; expected one value a pixel");
+        return Err(ImageError::Unsupported { path: path.to_owned(), what });
+    }
+    Ok(found.sample_data.values_as_f32().collect())
+}
+
+/// The file's bytes, once every layer that the header tells of is of a size that is read.
+fn checked_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
+    let bytes = read_file(path)?;
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes.as_slice()), false)
+        .map_err(|error| invalid(path, &error))?;
+    for header in &meta.headers {
+        check_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        check_channel_count(path, header.channels.list.len())?;
+    }
+    Ok(bytes)
+}
+
+fn check_channel_count(path: &Path, count: usize) -> Result<(), ImageError> {
+    if count <= MAX_CHANNELS {
+        return Ok(());
+    }
+    let what = format!("{count} channels; expected at most {MAX_CHANNELS}");
+    Err(ImageError::Invalid { path: path.to_owned(), what })
+}
+
+fn check_finite(path: &Path, width: usize, mut finite: impl Iterator<Item = bool>) -> Result<(), ImageError> {
+    match finite.position(|finite| !finite) {
+        None => Ok(()),
+        Some(at) => {
+            let what = format!("pixel ({}, {}) is NaN or infinite; expected finite numbers", at % width, at / width);
+            Err(ImageError::Invalid { path: path.to_owned(), what })
+        }
+    }
+}
+
+fn invalid(path: &Path, error: &ex::Error) -> ImageError {
+    ImageError::Invalid { path: path.to_owned(), what: format!("not a sound OpenEXR file: {error}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp() -> Picture<LinearRgb> {
+        Picture::from_fn(33, 17, |x, y| LinearRgb([x as f32 * 0.1, y as f32, -1.5]))
+    }
+
+    #[test]
+    fn float_round_trip_and_same_bytes_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.exr", "b.exr"].map(|name| folder.path().join(name));
+        write_linear(&a, &ramp(), Precision::Float).unwrap();
+        write_linear(&b, &ramp(), Precision::Float).unwrap();
+        assert_eq!(read_linear(&a).unwrap(), ramp());
+        assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+    }
+
+    #[test]
+    fn half_and_scalar_round_trips() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        write_scalar(&path, &ramp().map(|p| p.0[0]), Precision::Half).unwrap();
+        for (found, expected) in read_scalar(&path).unwrap().pixels().iter().zip(ramp().pixels()) {
+            assert!((found - expected.0[0]).abs() <= expected.0[0] / 2048.0);
+        }
+        write_normal(&path, &ramp().map(|p| Normal(p.0)), Precision::Float).unwrap();
+        assert_eq!(read_normal(&path).unwrap().get(3, 2).0, ramp().get(3, 2).0);
+    }
+
+    #[test]
+    fn nan_truncated_and_wrong_channels_are_errors_that_name_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bad.exr");
+        write_linear(&path, &Picture::filled(2, 2, LinearRgb([f32::NAN; 3])), Precision::Float).unwrap();
+        assert!(read_linear(&path).unwrap_err().to_string().contains("pixel (0, 0)"));
+        assert!(read_normal(&path).unwrap_err().to_string().contains("bad.exr"));
+        write_linear(&path, &ramp(), Precision::Float).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for length in [0, 4, 60, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(read_linear(&path).is_err(), "{length} bytes");
+        }
+    }
+}

@@ -8,9 +8,10 @@
 
 pub mod error;
 pub mod exr_io;
+pub mod limits;
 pub mod picture;
 pub mod png_io;
-pub mod preview;
+pub mod store;
 pub mod texture;
 pub mod texture_io;
 pub mod transfer;
