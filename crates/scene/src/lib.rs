@@ -6,12 +6,19 @@
 //! [`mesh`], [`material`] and [`reference`] describe a scene as its makers meant it.
 
 pub mod camera;
+pub mod dataset;
 pub mod error;
 pub mod findings;
+pub mod glb;
 pub mod ids;
+pub mod json;
+pub mod layout;
+pub mod manifest;
 pub mod material;
 pub mod mesh;
 pub mod reference;
+pub mod reference_io;
+pub mod submission;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::SceneError;

@@ -1,0 +1,181 @@
+//! The types of a dataset's JSON files; `dataset_spec/FORMAT.md` tells them to a reader who has only the files.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::camera::Camera;
+use crate::findings::Finding;
+use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, SceneId, ViewId};
+
+/// The word for this version of the format.
+pub const FORMAT: &str = "mateval/1";
+
+/// `dataset.json`: what this dataset is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DatasetFile {
+    /// Always `mateval/1`.
+    pub format: String,
+    /// The dataset's name, from its recipe.
+    pub name: String,
+    /// The dataset's own version, from its recipe.
+    pub version: String,
+    /// What made it, as in `mateval 0.1.0`.
+    pub tool: String,
+    /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
+    pub scenes: Vec<SceneId>,
+    /// The renderer whose pictures are scored against and shown as `input/rgb`; null until there is one.
+    pub scored_renderer: Option<String>,
+    /// Licence and credit of every scene.
+    pub licences: Vec<Licence>,
+    /// SHA-256 of MANIFEST.sha256, hex. The manifest holds every file but itself and this one.
+    pub manifest_sha256: String,
+}
+
+/// A scene's licence text, as it came with its source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Licence {
+    /// The scene.
+    pub scene: SceneId,
+    /// The file that it came from, relative to the source.
+    pub file: String,
+    /// The whole text.
+    pub text: String,
+}
+
+/// `targets.json`: exactly what is scored.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetsFile {
+    /// Always `mateval/1`.
+    pub format: String,
+    /// One entry a picture.
+    pub targets: Vec<Target>,
+}
+
+/// One picture that is scored.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Target {
+    /// Its scene.
+    pub scene: SceneId,
+    /// Its view.
+    pub view: ViewId,
+}
+
+/// `scenes/<scene>/scene.json`: what the scene holds and from where it is seen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Always `mateval/1`.
+    pub format: String,
+    /// The scene's id.
+    pub id: SceneId,
+    /// Where it came from.
+    pub source: SceneSource,
+    /// Multiplies every RGB picture before clipping.
+    pub exposure: f64,
+    /// The input view first, then the novel ones.
+    pub views: Vec<View>,
+    /// In the order of their index.
+    pub instances: Vec<Instance>,
+    /// In the order of their index.
+    pub parts: Vec<Part>,
+    /// What was wrong with the source and what was done instead, sorted.
+    pub findings: Vec<Finding>,
+}
+
+/// Where a scene came from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSource {
+    /// `bitterli` or `front3d`.
+    pub kind: String,
+    /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
+    pub house: String,
+    /// Every file that was read, sorted by path.
+    pub files: Vec<SourceFile>,
+}
+
+/// One file of a source.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SourceFile {
+    /// Relative to the source's folder, forward slashes.
+    pub path: String,
+    /// SHA-256 of its bytes, hex.
+    pub sha256: String,
+}
+
+/// One view: a folder in `views/` and `ground_truth/views/`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct View {
+    /// `input`, or the offset's name.
+    pub id: ViewId,
+    /// Degrees about the input camera's own X axis, up is positive.
+    pub x_deg: f64,
+    /// Degrees about the camera's own Y axis, after X; left is positive.
+    pub y_deg: f64,
+    /// The camera of every picture of the view.
+    pub camera: Camera,
+}
+
+/// One object, as methods give textures for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Instance {
+    /// Its folder in a submission and its node in `instances.glb`.
+    pub id: InstanceId,
+    /// Its value in `instance.png`.
+    pub index: InstanceIndex,
+    /// Its name in the source.
+    pub name: String,
+    /// What it is, where the source says so.
+    pub category: Option<String>,
+    /// The benchmark's broader category, where the source says so.
+    pub super_category: Option<String>,
+    /// Triangles in `instances.glb`.
+    pub triangles: usize,
+    /// Its uv atlas; null where there is none to recover (glass).
+    pub atlas: Option<Atlas>,
+}
+
+/// An instance's uv atlas.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Atlas {
+    /// Texels a side of the baked truth.
+    pub size: u32,
+    /// Charts in it.
+    pub charts: u32,
+    /// Share of the square that charts cover, 0 to 1.
+    pub coverage: f64,
+    /// Length of a texel's side on the surface, in metres (on the average over area).
+    pub texel_m: f64,
+    /// Length of half a pixel of the input view where the instance is nearest, in metres; null where it is seen in no
+    /// view. A finer texel shows nothing more.
+    pub half_pixel_m: Option<f64>,
+}
+
+/// A piece of an instance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Part {
+    /// Its node in `parts.glb`.
+    pub id: PartId,
+    /// Its value in `part.png`.
+    pub index: PartIndex,
+    /// The instance that it is of.
+    pub instance: InstanceId,
+    /// Triangles in `parts.glb`.
+    pub triangles: usize,
+}
+
+impl SceneFile {
+    /// The view of this id.
+    pub fn view(&self, id: &str) -> Option<&View> {
+        self.views.iter().find(|view| view.id.as_str() == id)
+    }
+}

@@ -1,0 +1,323 @@
+//! Geometry as binary glTF: one node and one mesh a name, world space, identity transforms, no materials.
+//!
+//! glTF counts v from the top of a picture, our meshes count it from the bottom; it is turned here and nowhere else.
+
+use std::borrow::Cow;
+use std::path::Path;
+
+use glam::{Vec2, Vec3};
+use gltf_json as json;
+use json::validation::{Checked, USize64};
+use mateval_image::store::write_whole;
+
+use crate::mesh::TriangleMesh;
+use crate::{Finding, SceneError, Severity};
+
+/// Largest file that is read, in bytes.
+pub const MAX_GLB_BYTES: u64 = 4 << 30;
+
+/// A named mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GlbNode {
+    /// The node's name.
+    pub name: String,
+    /// World space; at least one triangle.
+    pub mesh: TriangleMesh,
+}
+
+/// Writes the nodes in their order. The same nodes give the same bytes.
+pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
+    let mut file = Writer::default();
+    for node in nodes {
+        file.add_node(node);
+    }
+    write_whole(path, &file.finish())?;
+    Ok(())
+}
+
+#[derive(Default)]
+struct Writer {
+    root: json::Root,
+    blob: Vec<u8>,
+}
+
+impl Writer {
+    fn add_node(&mut self, node: &GlbNode) {
+        let mesh = &node.mesh;
+        let mut attributes = std::collections::BTreeMap::new();
+        let positions: Vec<[f32; 3]> = mesh.positions.iter().map(Vec3::to_array).collect();
+        let accessor = self.add_floats(&positions, json::accessor::Type::Vec3, true);
+        attributes.insert(Checked::Valid(json::mesh::Semantic::Positions), accessor);
+        if let Some(normals) = &mesh.normals {
+            let normals: Vec<[f32; 3]> = normals.iter().map(Vec3::to_array).collect();
+            let accessor = self.add_floats(&normals, json::accessor::Type::Vec3, false);
+            attributes.insert(Checked::Valid(json::mesh::Semantic::Normals), accessor);
+        }
+        if let Some(uvs) = &mesh.uvs {
+            let uvs: Vec<[f32; 2]> = uvs.iter().map(|uv| [uv.x, 1.0 - uv.y]).collect();
+            let accessor = self.add_floats(&uvs, json::accessor::Type::Vec2, false);
+            attributes.insert(Checked::Valid(json::mesh::Semantic::TexCoords(0)), accessor);
+        }
+        let indices = self.add_indices(mesh.triangles.as_flattened());
+        let primitive = json::mesh::Primitive {
+            attributes: attributes.into_iter().collect(),
+            extensions: None,
+            extras: None,
+            indices: Some(indices),
+            material: None,
+            mode: Checked::Valid(json::mesh::Mode::Triangles),
+            targets: None,
+        };
+        let mesh = self.root.push(json::Mesh {
+            extensions: None,
+            extras: None,
+            name: Some(node.name.clone()),
+            primitives: vec![primitive],
+            weights: None,
+        });
+        self.root.push(json::Node { mesh: Some(mesh), name: Some(node.name.clone()), ..Default::default() });
+    }
+
+    fn add_floats<const N: usize>(
+        &mut self,
+        values: &[[f32; N]],
+        kind: json::accessor::Type,
+        with_bounds: bool,
+    ) -> json::Index<json::Accessor> {
+        let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+        let view = self.add_view(&bytes, json::buffer::Target::ArrayBuffer);
+        let bound = |pick: fn(f32, f32) -> f32| {
+            let start = values.first().copied().unwrap_or([0.0; N]);
+            let all = values.iter().fold(start, |a, b| std::array::from_fn(|c| pick(a[c], b[c])));
+            json::Value::from(all.to_vec())
+        };
+        self.root.push(json::Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            component_type: Checked::Valid(json::accessor::GenericComponentType(json::accessor::ComponentType::F32)),
+            count: USize64::from(values.len()),
+            extensions: None,
+            extras: None,
+            max: with_bounds.then(|| bound(f32::max)),
+            min: with_bounds.then(|| bound(f32::min)),
+            name: None,
+            normalized: false,
+            sparse: None,
+            type_: Checked::Valid(kind),
+        })
+    }
+
+    fn add_indices(&mut self, indices: &[u32]) -> json::Index<json::Accessor> {
+        let bytes: Vec<u8> = indices.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let view = self.add_view(&bytes, json::buffer::Target::ElementArrayBuffer);
+        self.root.push(json::Accessor {
+            buffer_view: Some(view),
+            byte_offset: None,
+            component_type: Checked::Valid(json::accessor::GenericComponentType(json::accessor::ComponentType::U32)),
+            count: USize64::from(indices.len()),
+            extensions: None,
+            extras: None,
+            max: None,
+            min: None,
+            name: None,
+            normalized: false,
+            sparse: None,
+            type_: Checked::Valid(json::accessor::Type::Scalar),
+        })
+    }
+
+    fn add_view(&mut self, bytes: &[u8], target: json::buffer::Target) -> json::Index<json::buffer::View> {
+        let offset = self.blob.len();
+        self.blob.extend_from_slice(bytes);
+        self.root.push(json::buffer::View {
+            buffer: json::Index::new(0),
+            byte_length: USize64::from(bytes.len()),
+            byte_offset: Some(USize64::from(offset)),
+            byte_stride: None,
+            extensions: None,
+            extras: None,
+            name: None,
+            target: Some(Checked::Valid(target)),
+        })
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.root.push(json::Buffer {
+            byte_length: USize64::from(self.blob.len()),
+            extensions: None,
+            extras: None,
+            name: None,
+            uri: None,
+        });
+        let nodes = (0..self.root.nodes.len() as u32).map(json::Index::new).collect();
+        let scene = self.root.push(json::Scene { extensions: None, extras: None, name: None, nodes });
+        self.root.scene = Some(scene);
+        let mut text = serde_json::to_vec(&self.root).expect("glTF's own types can be written as JSON");
+        text.resize(text.len().next_multiple_of(4), b' ');
+        self.blob.resize(self.blob.len().next_multiple_of(4), 0);
+        let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
+        let glb = gltf::binary::Glb { header, json: Cow::Owned(text), bin: Some(Cow::Owned(self.blob)) };
+        glb.to_vec().expect("writing to memory cannot fail below 4 GiB")
+    }
+}
+
+/// Reads every node that has a mesh, in the file's order. Positions and uv must be finite, indices inside.
+pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
+    let length = std::fs::metadata(path).map_err(SceneError::io("read", path))?.len();
+    if length > MAX_GLB_BYTES {
+        return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
+    }
+    let bytes = std::fs::read(path).map_err(SceneError::io("read", path))?;
+    let file = gltf::Gltf::from_slice(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
+    let blob = file.blob.as_deref().unwrap_or_default();
+    file.document
+        .nodes()
+        .filter_map(|node| Some((node.clone(), node.mesh()?)))
+        .map(|(node, mesh)| {
+            let name = node.name().unwrap_or_default().to_owned();
+            read_mesh(&mesh, blob)
+                .map(|mesh| GlbNode { name: name.clone(), mesh })
+                .map_err(|what| invalid(path, &name, what))
+        })
+        .collect()
+}
+
+fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, String> {
+    let mut primitives = mesh.primitives();
+    let (Some(primitive), None) = (primitives.next(), primitives.next()) else {
+        return Err("expected one primitive".to_owned());
+    };
+    let accessor = |semantic: gltf::Semantic| primitive.get(&semantic);
+    let Some(positions) = accessor(gltf::Semantic::Positions) else {
+        return Err("expected POSITION".to_owned());
+    };
+    let positions: Vec<Vec3> = floats::<3>(&positions, blob)?.into_iter().map(Vec3::from_array).collect();
+    let normals = accessor(gltf::Semantic::Normals).map(|a| floats::<3>(&a, blob)).transpose()?;
+    let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| floats::<2>(&a, blob)).transpose()?;
+    let indices = primitive.indices().ok_or("expected indices")?;
+    let triangles = triangles(&indices, blob, positions.len())?;
+    let same_count = |count: Option<usize>| count.is_none_or(|count| count == positions.len());
+    if !same_count(normals.as_ref().map(Vec::len)) || !same_count(uvs.as_ref().map(Vec::len)) {
+        return Err("expected as many NORMAL and TEXCOORD_0 as POSITION".to_owned());
+    }
+    Ok(TriangleMesh {
+        positions,
+        normals: normals.map(|all| all.into_iter().map(Vec3::from_array).collect()),
+        uvs: uvs.map(|all| all.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()),
+        triangles,
+    })
+}
+
+fn floats<const N: usize>(accessor: &gltf::Accessor<'_>, blob: &[u8]) -> Result<Vec<[f32; N]>, String> {
+    if accessor.data_type() != gltf::accessor::DataType::F32 || accessor.dimensions().multiplicity() != N {
+        return Err(format!("accessor {}: expected {N} floats an entry", accessor.index()));
+    }
+    let entries = entries(accessor, blob, 4 * N)?;
+    let values: Vec<[f32; N]> = entries
+        .map(|entry| {
+            std::array::from_fn(|c| {
+                f32::from_le_bytes([entry[4 * c], entry[4 * c + 1], entry[4 * c + 2], entry[4 * c + 3]])
+            })
+        })
+        .collect();
+    if let Some(at) = values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {
+        return Err(format!("accessor {}: entry {at} is not finite", accessor.index()));
+    }
+    Ok(values)
+}
+
+fn triangles(accessor: &gltf::Accessor<'_>, blob: &[u8], vertices: usize) -> Result<Vec<[u32; 3]>, String> {
+    if accessor.data_type() != gltf::accessor::DataType::U32 || accessor.dimensions().multiplicity() != 1 {
+        return Err(format!("accessor {}: expected 32-bit indices", accessor.index()));
+    }
+    let indices: Vec<u32> =
+        entries(accessor, blob, 4)?.map(|entry| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3]])).collect();
+    if let Some(at) = indices.iter().position(|index| *index as usize >= vertices) {
+        return Err(format!("index {at} is {}, expected less than {vertices}", indices[at]));
+    }
+    let (triangles, rest) = indices.as_chunks::<3>();
+    if rest.is_empty() {
+        Ok(triangles.to_vec())
+    } else {
+        Err(format!("{} indices, expected three a triangle", indices.len()))
+    }
+}
+
+/// The accessor's entries of `size` bytes, once they are known to lie in the file.
+fn entries<'a>(
+    accessor: &gltf::Accessor<'_>,
+    blob: &'a [u8],
+    size: usize,
+) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, String> {
+    let outside = || format!("accessor {} reaches outside its buffer", accessor.index());
+    let view = accessor.view().filter(|_| accessor.sparse().is_none()).ok_or("sparse accessors are not read")?;
+    let start = view.offset();
+    let slice = start.checked_add(view.length()).and_then(|end| blob.get(start..end)).ok_or_else(outside)?;
+    let stride = view.stride().unwrap_or(size).max(size);
+    let count = accessor.count();
+    let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+    let end = used.and_then(|used| used.checked_add(accessor.offset())).filter(|end| *end <= slice.len());
+    let data = slice.get(accessor.offset()..end.ok_or_else(outside)?).ok_or_else(outside)?;
+    Ok((0..count).map(move |index| &data[index * stride..index * stride + size]))
+}
+
+fn invalid(path: &Path, node: &str, message: String) -> SceneError {
+    let finding = Finding {
+        severity: Severity::Error,
+        code: "bad_geometry".to_owned(),
+        file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        place: if node.is_empty() { String::new() } else { format!("node '{node}'") },
+        message,
+        action: "get the dataset anew, or build it again".to_owned(),
+    };
+    SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn nodes() -> Vec<GlbNode> {
+        let mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::new(0.1, 1.0 / 3.0, -7.5)],
+            normals: Some(vec![Vec3::Z; 4]),
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::Y, Vec2::new(0.25, 0.75)]),
+            triangles: vec![[0, 1, 2], [2, 1, 3]],
+        };
+        let plain = TriangleMesh { normals: None, uvs: None, ..mesh.clone() };
+        vec![GlbNode { name: "a".to_owned(), mesh }, GlbNode { name: "b".to_owned(), mesh: plain }]
+    }
+
+    #[test]
+    fn round_trip_and_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.glb", "b.glb"].map(|name| folder.path().join(name));
+        write(&a, &nodes()).unwrap();
+        write(&b, &nodes()).unwrap();
+        assert_eq!(read(&a).unwrap(), nodes());
+        assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+    }
+
+    #[test]
+    fn faults_are_errors_that_name_the_node() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        let mut bad = nodes();
+        bad[1].mesh.triangles[0][1] = 9;
+        write(&path, &bad).unwrap();
+        let text = read(&path).unwrap_err().to_string();
+        assert!(text.contains("node 'b'") && text.contains("is 9, expected less than 4"), "{text}");
+    }
+
+    #[test]
+    fn any_truncation_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        write(&path, &nodes()).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for length in 0..bytes.len() {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(read(&path).is_err(), "{length} of {}", bytes.len());
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! JSON files: written the same on every machine, read with the path and pointer of what is wrong.
+
+use std::path::Path;
+
+use mateval_image::store::write_whole;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::{Finding, SceneError, Severity};
+
+/// Largest JSON file that is read, in bytes.
+pub const MAX_JSON_BYTES: u64 = 256 << 20;
+
+/// Pretty JSON with a closing newline.
+pub fn to_text<T: Serialize>(value: &T) -> String {
+    // Our own types hold neither maps with keys that are no texts nor numbers that JSON lacks in key position.
+    let mut text = serde_json::to_string_pretty(value).expect("our types can be written as JSON");
+    text.push('\n');
+    text
+}
+
+/// Writes the file whole.
+pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
+    Ok(write_whole(path, to_text(value).as_bytes())?)
+}
+
+/// Reads a file; what does not fit is an error with the line and column.
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
+    let length = std::fs::metadata(path).map_err(SceneError::io("read", path))?.len();
+    if length > MAX_JSON_BYTES {
+        return Err(invalid(path, String::new(), format!("{length} bytes; expected at most {MAX_JSON_BYTES}")));
+    }
+    let text = std::fs::read(path).map_err(SceneError::io("read", path))?;
+    serde_json::from_slice(&text)
+        .map_err(|error| invalid(path, format!("line {} column {}", error.line(), error.column()), error.to_string()))
+}
+
+fn invalid(path: &Path, place: String, message: String) -> SceneError {
+    let finding = Finding {
+        severity: Severity::Error,
+        code: "bad_json".to_owned(),
+        file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        place,
+        message,
+        action: "mend the file; `mateval prep verify` lists every fault of a dataset".to_owned(),
+    };
+    SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_carry_path_and_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("targets.json");
+        std::fs::write(&path, "{\n \"format\": 3}").unwrap();
+        let text = read::<crate::dataset::TargetsFile>(&path).unwrap_err().to_string();
+        assert!(text.contains("targets.json") && text.contains("line 2"), "{text}");
+    }
+
+    #[test]
+    fn nesting_is_bounded() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("deep.json");
+        std::fs::write(&path, "[".repeat(100_000)).unwrap();
+        assert!(read::<serde_json::Value>(&path).is_err());
+    }
+}

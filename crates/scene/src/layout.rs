@@ -1,0 +1,85 @@
+//! Where everything lies in a dataset and in a submission.
+
+use std::path::{Path, PathBuf};
+
+use crate::ids::{InstanceId, SceneId, ViewId};
+
+/// `dataset.json`.
+pub const DATASET: &str = "dataset.json";
+/// `targets.json`.
+pub const TARGETS: &str = "targets.json";
+/// `MANIFEST.sha256`.
+pub const MANIFEST: &str = "MANIFEST.sha256";
+/// The input view's id.
+pub const INPUT: &str = "input";
+
+/// The paths of one scene.
+#[derive(Clone, Debug)]
+pub struct SceneFolder(PathBuf);
+
+impl SceneFolder {
+    /// `DATASET/scenes/<scene>`.
+    pub fn of(dataset: &Path, scene: &SceneId) -> Self {
+        Self(dataset.join("scenes").join(scene.as_str()))
+    }
+
+    /// The scene in `folder`, wherever that is.
+    pub fn at(folder: PathBuf) -> Self {
+        Self(folder)
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// `scene.json`.
+    pub fn scene_file(&self) -> PathBuf {
+        self.0.join("scene.json")
+    }
+
+    /// `geometry/instances.glb`.
+    pub fn instances(&self) -> PathBuf {
+        self.0.join("geometry/instances.glb")
+    }
+
+    /// `geometry/parts.glb`.
+    pub fn parts(&self) -> PathBuf {
+        self.0.join("geometry/parts.glb")
+    }
+
+    /// `views/<view>`: what methods may see.
+    pub fn view(&self, view: &ViewId) -> PathBuf {
+        self.0.join("views").join(view.as_str())
+    }
+
+    /// `ground_truth`: may be withheld as a whole.
+    pub fn truth(&self) -> PathBuf {
+        self.0.join("ground_truth")
+    }
+
+    /// `ground_truth/views/<view>`.
+    pub fn truth_view(&self, view: &ViewId) -> PathBuf {
+        self.truth().join("views").join(view.as_str())
+    }
+
+    /// `ground_truth/materials/<instance>`: the source materials baked to the atlas.
+    pub fn truth_material(&self, instance: &InstanceId) -> PathBuf {
+        self.truth().join("materials").join(instance.as_str())
+    }
+
+    /// `ground_truth/renders/<renderer>/<view>`.
+    pub fn render(&self, renderer: &str, view: &ViewId) -> PathBuf {
+        self.truth().join("renders").join(renderer).join(view.as_str())
+    }
+
+    /// `ground_truth/lights.json`.
+    pub fn lights(&self) -> PathBuf {
+        self.truth().join("lights.json")
+    }
+
+    /// `ground_truth/reference`: surfaces with their source uv, materials and textures.
+    pub fn reference(&self) -> PathBuf {
+        self.truth().join("reference")
+    }
+}

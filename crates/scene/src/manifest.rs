@@ -1,0 +1,149 @@
+//! `MANIFEST.sha256`: one line a file, `<sha256>  <path>`, sorted by path, as `sha256sum -c` reads it.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use mateval_image::store::write_whole;
+use sha2::{Digest as _, Sha256};
+
+use crate::layout::{DATASET, MANIFEST};
+use crate::{Finding, SceneError, Severity};
+
+/// SHA-256 of bytes, hex.
+pub fn sha256_of_bytes(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of a file's bytes, hex.
+pub fn sha256_of_file(path: &Path) -> Result<String, SceneError> {
+    let mut file = std::fs::File::open(path).map_err(SceneError::io("read", path))?;
+    let mut hash = Sha256::new();
+    let mut block = vec![0; 1 << 16];
+    loop {
+        let length = file.read(&mut block).map_err(SceneError::io("read", path))?;
+        if length == 0 {
+            return Ok(hex(&hash.finalize()));
+        }
+        hash.update(&block[..length]);
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Every file below `root` but the manifest, `dataset.json` and hidden ones at the top, relative, sorted. Links are not followed.
+pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
+    let mut files = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(folder) = folders.pop() {
+        let path = root.join(&folder);
+        for entry in std::fs::read_dir(&path).map_err(SceneError::io("list", &path))? {
+            let entry = entry.map_err(SceneError::io("list", &path))?;
+            let relative = folder.join(entry.file_name());
+            let kind = entry.file_type().map_err(SceneError::io("look at", entry.path()))?;
+            if kind.is_dir() {
+                folders.push(relative);
+            } else {
+                files.push(relative.to_string_lossy().replace('\\', "/"));
+            }
+        }
+    }
+    files.retain(|file| file != MANIFEST && file != DATASET && !file.starts_with('.'));
+    files.sort();
+    Ok(files)
+}
+
+/// Hashes every file of the dataset and writes the manifest; gives the manifest's own hash, which `dataset.json` holds.
+pub fn write(root: &Path) -> Result<String, SceneError> {
+    let mut text = String::new();
+    for file in list_files(root)? {
+        text.push_str(&format!("{}  {file}\n", sha256_of_file(&root.join(&file))?));
+    }
+    write_whole(&root.join(MANIFEST), text.as_bytes())?;
+    Ok(sha256_of_bytes(text.as_bytes()))
+}
+
+/// Holds the files against the manifest: every one that is missing, changed or not listed is a finding.
+pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
+    let path = root.join(MANIFEST);
+    let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
+    let mut findings = Vec::new();
+    let mut listed = std::collections::BTreeSet::new();
+    for (number, line) in text.lines().enumerate() {
+        let Some((hash, file)) = line.split_once("  ").filter(|(hash, file)| hash.len() == 64 && is_inside(file))
+        else {
+            let place = format!("line {}", number + 1);
+            findings.push(fault(
+                "bad_manifest_line",
+                MANIFEST,
+                place,
+                "expected '<sha256>  <path inside the dataset>'",
+            ));
+            continue;
+        };
+        listed.insert(file.to_owned());
+        match sha256_of_file(&root.join(file)) {
+            Err(_) => findings.push(fault("missing_file", file, String::new(), "listed in the manifest but not there")),
+            Ok(found) if found != hash => {
+                findings.push(fault(
+                    "changed_file",
+                    file,
+                    String::new(),
+                    &format!("SHA-256 is {found}, expected {hash}"),
+                ));
+            }
+            Ok(_) => {}
+        }
+    }
+    for file in list_files(root)? {
+        if !listed.contains(&file) {
+            findings.push(fault("unlisted_file", &file, String::new(), "not listed in the manifest"));
+        }
+    }
+    Ok(findings)
+}
+
+fn is_inside(file: &str) -> bool {
+    Path::new(file).components().all(|part| matches!(part, std::path::Component::Normal(_)))
+}
+
+fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
+    Finding {
+        severity: Severity::Error,
+        code: code.to_owned(),
+        file: file.to_owned(),
+        place,
+        message: message.to_owned(),
+        action: "get the dataset anew, or build it again".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The hash of "abc" is the example of FIPS 180-4.
+    #[test]
+    fn known_hash() {
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256_of_bytes(b"abc"), expected);
+    }
+
+    #[test]
+    fn names_missing_changed_and_unlisted() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        std::fs::create_dir(root.join("scenes")).unwrap();
+        for name in ["scenes/a", "scenes/b", "c"] {
+            std::fs::write(root.join(name), name).unwrap();
+        }
+        write(root).unwrap();
+        assert!(check(root).unwrap().is_empty());
+        std::fs::remove_file(root.join("scenes/a")).unwrap();
+        std::fs::write(root.join("scenes/b"), "other").unwrap();
+        std::fs::write(root.join("d"), "new").unwrap();
+        let codes: Vec<String> = check(root).unwrap().into_iter().map(|f| format!("{} {}", f.code, f.file)).collect();
+        assert_eq!(codes, ["missing_file scenes/a", "changed_file scenes/b", "unlisted_file d"]);
+    }
+}

@@ -1,0 +1,355 @@
+//! A reference scene on disk: `ground_truth/reference/` and `ground_truth/lights.json`.
+//!
+//! `geometry.glb` holds a node a surface with its source uv, `textures/` the texels as decoded (so that no picture
+//! decoder stands between two machines), `reference.json` what ties them together.
+
+use std::path::Path;
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap, png_io};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::glb::{self, GlbNode};
+use crate::layout::SceneFolder;
+use crate::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+use crate::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface};
+use crate::{Finding, SceneError, Severity, json};
+
+/// `reference.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ReferenceFile {
+    /// Always `mateval/1`.
+    pub format: String,
+    /// In the order of the nodes of `geometry.glb`.
+    pub surfaces: Vec<SurfaceEntry>,
+    /// What surfaces are made of.
+    pub materials: Vec<Material>,
+    /// What materials and lights look up.
+    pub textures: Vec<TextureEntry>,
+}
+
+/// One surface.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceEntry {
+    /// Its name in the source.
+    pub name: String,
+    /// Place in `materials`.
+    pub material: MaterialIndex,
+}
+
+/// One texture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TextureEntry {
+    /// The file in `textures/`.
+    pub file: String,
+    /// The file that it came from, relative to the source; or a word for a computed one.
+    pub source: String,
+    /// SHA-256 of that file, hex; null for a computed one.
+    pub source_sha256: Option<String>,
+    /// How its numbers are stored.
+    pub texels: TexelKind,
+    /// How it goes on outside 0..1: `repeat`, `clamp` or `mirror`.
+    pub wrap: WrapWord,
+}
+
+/// How a texture's numbers are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TexelKind {
+    /// 8-bit PNG, sRGB.
+    Srgb8,
+    /// 8-bit PNG, linear.
+    Linear8,
+    /// 8-bit grey PNG, linear.
+    Grey8,
+    /// Float EXR `R`, `G`, `B`.
+    Linear,
+    /// Float EXR `V`.
+    Grey,
+}
+
+/// How a texture goes on outside 0..1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum WrapWord {
+    /// The picture again.
+    Repeat,
+    /// The border texel.
+    Clamp,
+    /// Mirrored every other time.
+    Mirror,
+}
+
+/// `lights.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LightsFile {
+    /// Always `mateval/1`.
+    pub format: String,
+    /// One entry a group of emitters; surfaces and textures are places in `reference.json`.
+    pub groups: Vec<LightGroup>,
+}
+
+/// Writes the scene below the scene's `ground_truth`.
+pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneError> {
+    let reference = folder.reference();
+    let textures = reference.join("textures");
+    std::fs::create_dir_all(&textures).map_err(SceneError::io("make", &textures))?;
+    let mut entries = Vec::new();
+    for (index, source) in scene.textures.iter().enumerate() {
+        entries.push(write_texture(&textures, index, source)?);
+    }
+    let nodes: Vec<GlbNode> = scene
+        .surfaces
+        .iter()
+        .enumerate()
+        .map(|(index, surface)| GlbNode { name: format!("surface_{index:05}"), mesh: surface.mesh.clone() })
+        .collect();
+    glb::write(&reference.join("geometry.glb"), &nodes)?;
+    let surfaces = scene.surfaces.iter().map(|s| SurfaceEntry { name: s.name.clone(), material: s.material }).collect();
+    let format = crate::dataset::FORMAT.to_owned();
+    let file =
+        ReferenceFile { format: format.clone(), surfaces, materials: scene.materials.clone(), textures: entries };
+    json::write(&reference.join("reference.json"), &file)?;
+    json::write(&folder.lights(), &LightsFile { format, groups: scene.lights.clone() })
+}
+
+/// Reads what [`write`] wrote; every place that leads nowhere is a finding of the error.
+pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
+    let reference = folder.reference();
+    let path = reference.join("reference.json");
+    let file: ReferenceFile = json::read(&path)?;
+    let lights: LightsFile = json::read(&folder.lights())?;
+    let nodes = glb::read(&reference.join("geometry.glb"))?;
+    let faults = dangling(&file, &lights, nodes.len());
+    if !faults.is_empty() {
+        return Err(SceneError::Invalid { path, findings: faults });
+    }
+    let textures =
+        file.textures.iter().map(|entry| read_texture_entry(&reference, entry)).collect::<Result<Vec<_>, _>>()?;
+    let surfaces = file
+        .surfaces
+        .into_iter()
+        .zip(nodes)
+        .map(|(entry, node)| Surface { name: entry.name, mesh: node.mesh, material: entry.material })
+        .collect();
+    Ok(ReferenceScene { surfaces, materials: file.materials, textures, lights: lights.groups })
+}
+
+fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<TextureEntry, SceneError> {
+    let texture = &source.texture;
+    let (width, height) = (texture.width(), texture.height());
+    let stem = folder.join(format!("{index:04}"));
+    let (png, exr) = (stem.with_extension("png"), stem.with_extension("exr"));
+    let (file, texels) = match texture.texels() {
+        Texels::Srgb8(v) => {
+            png_io::write_rgb_bytes(&png, &Picture::new(width, height, v.clone())?)?;
+            (png, TexelKind::Srgb8)
+        }
+        Texels::Linear8(v) => {
+            png_io::write_rgb_bytes(&png, &Picture::new(width, height, v.clone())?)?;
+            (png, TexelKind::Linear8)
+        }
+        Texels::Grey8(v) => {
+            png_io::write_grey_bytes(&png, &Picture::new(width, height, v.clone())?)?;
+            (png, TexelKind::Grey8)
+        }
+        Texels::Linear(v) => {
+            let picture = Picture::new(width, height, v.iter().map(|rgb| LinearRgb(*rgb)).collect())?;
+            exr_io::write_linear(&exr, &picture, Precision::Float)?;
+            (exr, TexelKind::Linear)
+        }
+        Texels::Grey(v) => {
+            exr_io::write_scalar(&exr, &Picture::new(width, height, v.clone())?, Precision::Float)?;
+            (exr, TexelKind::Grey)
+        }
+    };
+    let wrap = match texture.wrap() {
+        Wrap::Repeat => WrapWord::Repeat,
+        Wrap::Clamp => WrapWord::Clamp,
+        Wrap::Mirror => WrapWord::Mirror,
+    };
+    let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(TextureEntry { file, source: source.name.clone(), source_sha256: source.sha256.clone(), texels, wrap })
+}
+
+fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTexture, SceneError> {
+    let path = reference.join("textures").join(&entry.file);
+    let wrap = match entry.wrap {
+        WrapWord::Repeat => Wrap::Repeat,
+        WrapWord::Clamp => Wrap::Clamp,
+        WrapWord::Mirror => Wrap::Mirror,
+    };
+    let texture = match entry.texels {
+        TexelKind::Srgb8 => read_texture(&path, Encoding::Srgb, wrap)?,
+        TexelKind::Linear8 | TexelKind::Grey8 | TexelKind::Linear => read_texture(&path, Encoding::Linear, wrap)?,
+        TexelKind::Grey => {
+            let picture = exr_io::read_scalar(&path)?;
+            Texture::new(picture.width(), picture.height(), Texels::Grey(picture.into_pixels()), wrap)?
+        }
+    };
+    Ok(SourceTexture { name: entry.source.clone(), sha256: entry.source_sha256.clone(), texture })
+}
+
+/// Every index that leads nowhere, and every file name that leads out of `textures/`.
+fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Finding> {
+    let mut faults = Vec::new();
+    let mut fault = |file: &str, place: String, message: String| {
+        faults.push(Finding {
+            severity: Severity::Error,
+            code: "dangling_reference".to_owned(),
+            file: file.to_owned(),
+            place,
+            message,
+            action: "get the dataset anew, or build it again".to_owned(),
+        });
+    };
+    if file.surfaces.len() != nodes {
+        fault("reference.json", "/surfaces".to_owned(), format!("{} surfaces, {nodes} nodes", file.surfaces.len()));
+    }
+    for (at, surface) in file.surfaces.iter().enumerate() {
+        if surface.material.0 >= file.materials.len() {
+            fault("reference.json", format!("/surfaces/{at}/material"), format!("no material {}", surface.material.0));
+        }
+    }
+    for (at, texture) in file.textures.iter().enumerate() {
+        let mut parts = Path::new(&texture.file).components();
+        if !matches!((parts.next(), parts.next()), (Some(std::path::Component::Normal(_)), None)) {
+            fault("reference.json", format!("/textures/{at}/file"), format!("'{}' is no file name", texture.file));
+        }
+    }
+    for (at, material) in file.materials.iter().enumerate() {
+        for (texture, channel) in lookups(material) {
+            if texture.0 >= file.textures.len() || channel > 2 {
+                let message = format!("no channel {channel} of texture {}", texture.0);
+                fault("reference.json", format!("/materials/{at}"), message);
+            }
+        }
+    }
+    for (at, group) in lights.groups.iter().enumerate() {
+        let sound = match &group.emission {
+            Emission::Area { surfaces, .. } => surfaces.iter().all(|surface| surface.0 < nodes),
+            Emission::Environment { texture, .. } => texture.0 < file.textures.len(),
+            Emission::Constant { .. } => true,
+        };
+        if !sound {
+            fault("lights.json", format!("/groups/{at}"), "a surface or texture that is not there".to_owned());
+        }
+    }
+    faults
+}
+
+/// Every texture that a material looks up, with the channel.
+fn lookups(material: &Material) -> Vec<(TextureIndex, usize)> {
+    let color = |input: &ColorInput| match input {
+        ColorInput::Texture { texture, .. } => Some((*texture, 0)),
+        ColorInput::Constant(_) => None,
+    };
+    let scalar = |input: &ScalarInput| match input {
+        ScalarInput::Texture { texture, channel, .. } => Some((*texture, *channel)),
+        ScalarInput::Constant(_) => None,
+    };
+    let (colors, scalars): (Vec<&ColorInput>, Vec<&ScalarInput>) = match &material.model {
+        MaterialModel::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter().collect()),
+        MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
+            (vec![specular_reflectance], microfacets.iter().map(|m| &m.alpha).collect())
+        }
+        MaterialModel::Plastic { diffuse_reflectance, specular_reflectance, microfacets, .. } => {
+            (vec![diffuse_reflectance, specular_reflectance], microfacets.iter().map(|m| &m.alpha).collect())
+        }
+        MaterialModel::Dielectric { specular_reflectance, specular_transmittance, microfacets, .. } => {
+            (vec![specular_reflectance, specular_transmittance], microfacets.iter().map(|m| &m.alpha).collect())
+        }
+        MaterialModel::ThinDielectric { specular_reflectance, specular_transmittance, .. } => {
+            (vec![specular_reflectance, specular_transmittance], Vec::new())
+        }
+        MaterialModel::Principled { base_color, roughness, metallic, .. } => {
+            (vec![base_color], vec![roughness, metallic])
+        }
+    };
+    let around = material.opacity.iter().chain(material.bump.iter().map(|bump| &bump.height));
+    colors.into_iter().filter_map(color).chain(scalars.into_iter().chain(around).filter_map(scalar)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+    use crate::mesh::TriangleMesh;
+    use crate::reference::SurfaceIndex;
+
+    fn scene() -> ReferenceScene {
+        let mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            normals: None,
+            uvs: None,
+            triangles: vec![[0, 1, 2]],
+        };
+        let texture = |name: &str, texels| SourceTexture {
+            name: name.to_owned(),
+            sha256: None,
+            texture: Texture::new(2, 1, texels, Wrap::Clamp).unwrap(),
+        };
+        let uv = Default::default();
+        ReferenceScene {
+            surfaces: vec![Surface { name: "s".to_owned(), mesh, material: MaterialIndex(0) }],
+            materials: vec![Material {
+                name: "m".to_owned(),
+                model: MaterialModel::Diffuse {
+                    reflectance: ColorInput::Texture { texture: TextureIndex(0), uv },
+                    alpha: None,
+                },
+                two_sided: true,
+                opacity: Some(ScalarInput::Texture { texture: TextureIndex(2), channel: 0, uv }),
+                bump: None,
+            }],
+            textures: vec![
+                texture("a.jpg", Texels::Srgb8(vec![[1, 2, 3], [4, 5, 6]])),
+                texture("b.png", Texels::Linear8(vec![[1, 2, 3], [4, 5, 6]])),
+                texture("c.png", Texels::Grey8(vec![7, 9])),
+                texture("d.hdr", Texels::Linear(vec![[0.1, 7.0, 1e4], [0.0, 0.0, 1.0]])),
+                texture("e.exr", Texels::Grey(vec![0.3, 0.7])),
+            ],
+            lights: vec![LightGroup {
+                name: "l".to_owned(),
+                emission: Emission::Area {
+                    surfaces: vec![SurfaceIndex(0)],
+                    radiance: [1.0, 2.0, 3.0],
+                    two_sided: false,
+                },
+                camera_visible: true,
+            }],
+        }
+    }
+
+    #[test]
+    fn round_trip() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = SceneFolder::at(folder.path().to_owned());
+        write(&folder, &scene()).unwrap();
+        assert_eq!(read(&folder).unwrap(), scene());
+    }
+
+    #[test]
+    fn all_dangling_places_are_named_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = SceneFolder::at(folder.path().to_owned());
+        let mut bad = scene();
+        bad.surfaces[0].material = MaterialIndex(4);
+        bad.materials[0].opacity =
+            Some(ScalarInput::Texture { texture: TextureIndex(9), channel: 0, uv: Default::default() });
+        bad.lights[0].emission =
+            Emission::Area { surfaces: vec![SurfaceIndex(3)], radiance: [1.0; 3], two_sided: false };
+        write(&folder, &bad).unwrap();
+        let text = read(&folder).unwrap_err().to_string();
+        for place in ["/surfaces/0/material", "/materials/0", "/groups/0"] {
+            assert!(text.contains(place), "{text}");
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! A submission: `submission.json` and `scenes/<scene>/<instance>/{base_color,roughness,metallic}.{png,exr}`.
+
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::ids::{InstanceId, SceneId};
+
+/// `submission.json`.
+pub const SUBMISSION: &str = "submission.json";
+
+/// The word for this version of a submission.
+pub const SUBMISSION_FORMAT: &str = "mateval-submission/1";
+
+/// `submission.json`: who made this, and how.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SubmissionFile {
+    /// Always `mateval-submission/1`.
+    pub format: String,
+    /// The method's name, as tables show it.
+    pub method: String,
+    /// Anything that a reader should know: settings, training data, links.
+    #[serde(default)]
+    pub description: String,
+    /// `manifest_sha256` of the dataset that it was made for.
+    pub dataset_manifest_sha256: String,
+}
+
+/// One of a material's maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Map {
+    /// sRGB where PNG, linear where EXR.
+    BaseColor,
+    /// Linear, perceptual: alpha is its square.
+    Roughness,
+    /// Linear.
+    Metallic,
+}
+
+impl Map {
+    /// All three.
+    pub const ALL: [Self; 3] = [Self::BaseColor, Self::Roughness, Self::Metallic];
+
+    /// The file's name without its ending.
+    pub fn stem(self) -> &'static str {
+        match self {
+            Self::BaseColor => "base_color",
+            Self::Roughness => "roughness",
+            Self::Metallic => "metallic",
+        }
+    }
+}
+
+/// The folder of one instance's maps.
+pub fn instance_folder(submission: &Path, scene: &SceneId, instance: &InstanceId) -> PathBuf {
+    submission.join("scenes").join(scene.as_str()).join(instance.as_str())
+}
