@@ -1,1 +1,11 @@
-//! x
+//! From source scenes to a dataset.
+//!
+//! In: a recipe and the folders that it names (Mitsuba scenes of Bitterli's resources). Out: a dataset folder as
+//! `dataset_spec/FORMAT.md` tells, or findings about one.
+//!
+//! Between: [`recipe`] is checked whole, [`bitterli`] reads each source, [`atlas`] unwraps, [`bake`] fills textures,
+//! [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth, [`verify`] doubts it all.
+
+pub mod atlas;
+pub mod bake;
+pub mod parts;

@@ -19,6 +19,7 @@ pub mod mesh;
 pub mod reference;
 pub mod reference_io;
 pub mod submission;
+pub mod uv_atlas;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::SceneError;

@@ -233,7 +233,26 @@ pub struct Appearance {
     pub metallic: f32,
 }
 
+/// One of a material's textures and how it is looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lookup {
+    /// Which.
+    pub texture: TextureIndex,
+    /// 0 red, 1 green, 2 blue; 0 for colours.
+    pub channel: usize,
+    /// Where in it.
+    pub uv: UvTransform,
+}
+
 impl Material {
+    /// Every texture that the material looks up.
+    pub fn lookups(&self) -> Vec<Lookup> {
+        let (colors, scalars) = self.model.inputs();
+        let around = self.opacity.iter().chain(self.bump.iter().map(|bump| &bump.height));
+        let colors = colors.into_iter().filter_map(ColorInput::lookup);
+        colors.chain(scalars.into_iter().chain(around).filter_map(ScalarInput::lookup)).collect()
+    }
+
     /// Whether it is opaque, so that it has base_color, roughness and metallic (glass has not).
     pub fn has_appearance(&self) -> bool {
         !matches!(self.model, MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. })
@@ -274,6 +293,50 @@ impl Material {
         };
         Some(appearance)
     }
+}
+
+impl ColorInput {
+    fn lookup(&self) -> Option<Lookup> {
+        match *self {
+            Self::Constant(_) => None,
+            Self::Texture { texture, uv } => Some(Lookup { texture, channel: 0, uv }),
+        }
+    }
+}
+
+impl ScalarInput {
+    fn lookup(&self) -> Option<Lookup> {
+        match *self {
+            Self::Constant(_) => None,
+            Self::Texture { texture, channel, uv } => Some(Lookup { texture, channel, uv }),
+        }
+    }
+}
+
+impl MaterialModel {
+    /// All of its colours and all of its numbers.
+    fn inputs(&self) -> (Vec<&ColorInput>, Vec<&ScalarInput>) {
+        match self {
+            Self::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter().collect()),
+            Self::Conductor { specular_reflectance, microfacets, .. } => {
+                (vec![specular_reflectance], rough_inputs(microfacets))
+            }
+            Self::Plastic { diffuse_reflectance, specular_reflectance, microfacets, .. } => {
+                (vec![diffuse_reflectance, specular_reflectance], rough_inputs(microfacets))
+            }
+            Self::Dielectric { specular_reflectance, specular_transmittance, microfacets, .. } => {
+                (vec![specular_reflectance, specular_transmittance], rough_inputs(microfacets))
+            }
+            Self::ThinDielectric { specular_reflectance, specular_transmittance, .. } => {
+                (vec![specular_reflectance, specular_transmittance], Vec::new())
+            }
+            Self::Principled { base_color, roughness, metallic, .. } => (vec![base_color], vec![roughness, metallic]),
+        }
+    }
+}
+
+fn rough_inputs(microfacets: &Option<Microfacets>) -> Vec<&ScalarInput> {
+    microfacets.iter().map(|m| &m.alpha).collect()
 }
 
 impl ConductorIor {

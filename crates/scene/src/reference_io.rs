@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::glb::{self, GlbNode};
 use crate::layout::SceneFolder;
-use crate::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+use crate::material::{Lookup, Material};
 use crate::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface};
 use crate::{Finding, SceneError, Severity, json};
 
@@ -224,7 +224,7 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
         }
     }
     for (at, material) in file.materials.iter().enumerate() {
-        for (texture, channel) in lookups(material) {
+        for Lookup { texture, channel, .. } in material.lookups() {
             if texture.0 >= file.textures.len() || channel > 2 {
                 let message = format!("no channel {channel} of texture {}", texture.0);
                 fault("reference.json", format!("/materials/{at}"), message);
@@ -244,43 +244,12 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
     faults
 }
 
-/// Every texture that a material looks up, with the channel.
-fn lookups(material: &Material) -> Vec<(TextureIndex, usize)> {
-    let color = |input: &ColorInput| match input {
-        ColorInput::Texture { texture, .. } => Some((*texture, 0)),
-        ColorInput::Constant(_) => None,
-    };
-    let scalar = |input: &ScalarInput| match input {
-        ScalarInput::Texture { texture, channel, .. } => Some((*texture, *channel)),
-        ScalarInput::Constant(_) => None,
-    };
-    let (colors, scalars): (Vec<&ColorInput>, Vec<&ScalarInput>) = match &material.model {
-        MaterialModel::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter().collect()),
-        MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
-            (vec![specular_reflectance], microfacets.iter().map(|m| &m.alpha).collect())
-        }
-        MaterialModel::Plastic { diffuse_reflectance, specular_reflectance, microfacets, .. } => {
-            (vec![diffuse_reflectance, specular_reflectance], microfacets.iter().map(|m| &m.alpha).collect())
-        }
-        MaterialModel::Dielectric { specular_reflectance, specular_transmittance, microfacets, .. } => {
-            (vec![specular_reflectance, specular_transmittance], microfacets.iter().map(|m| &m.alpha).collect())
-        }
-        MaterialModel::ThinDielectric { specular_reflectance, specular_transmittance, .. } => {
-            (vec![specular_reflectance, specular_transmittance], Vec::new())
-        }
-        MaterialModel::Principled { base_color, roughness, metallic, .. } => {
-            (vec![base_color], vec![roughness, metallic])
-        }
-    };
-    let around = material.opacity.iter().chain(material.bump.iter().map(|bump| &bump.height));
-    colors.into_iter().filter_map(color).chain(scalars.into_iter().chain(around).filter_map(scalar)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
 
     use super::*;
+    use crate::material::{ColorInput, MaterialModel, ScalarInput, TextureIndex};
     use crate::mesh::TriangleMesh;
     use crate::reference::SurfaceIndex;
 

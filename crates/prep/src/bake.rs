@@ -1,0 +1,228 @@
+//! Source materials baked to an atlas.
+
+use glam::{DVec2, Vec2};
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{Picture, Texture};
+use mateval_scene::TriangleMesh;
+use mateval_scene::material::{Appearance, ColorInput, Material, MaterialModel, ScalarInput};
+use mateval_scene::uv_atlas::UvAtlas;
+
+use crate::atlas::Unwrapped;
+
+/// Most lookups along a texel's side: a source that is finer still is undersampled.
+const MAX_LOOKUPS: f64 = 8.0;
+
+/// A material's three maps, as a submission holds them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakedMaterial {
+    /// sRGB bytes.
+    pub base_color: Picture<[u8; 3]>,
+    /// Perceptual roughness, linear bytes.
+    pub roughness: Picture<u8>,
+    /// Linear bytes.
+    pub metallic: Picture<u8>,
+    /// Whether some base colour was above 1 (or below 0) and had to be clipped.
+    pub clipped: bool,
+}
+
+/// Bakes `material`, laid out by the source mesh's own uv, to the atlas. Each texel is the mean over its own square;
+/// texels that no triangle owns take their neighbour's value. None for dielectrics.
+pub fn bake(
+    unwrapped: &Unwrapped,
+    source: &TriangleMesh,
+    material: &Material,
+    textures: &[Texture],
+) -> Option<BakedMaterial> {
+    if !material.has_appearance() {
+        return None;
+    }
+    let size = unwrapped.size as usize;
+    if let Some(appearance) = constant_appearance(material) {
+        return Some(encode(size, |_, _| appearance, None));
+    }
+    let atlas = UvAtlas::new(&unwrapped.mesh, size);
+    let source_uv = |triangle: usize| {
+        let uvs = source.uvs.as_deref()?;
+        Some(source.triangles[triangle].map(|vertex| uvs[vertex as usize]))
+    };
+    let texel = |x: usize, y: usize| {
+        let (triangle, _) = atlas.owner(x, y)?;
+        let corners = source_uv(triangle).unwrap_or([Vec2::ZERO; 3]);
+        let lookups = lookups_a_side(&atlas, triangle, corners, finest(material, textures));
+        Some(mean_appearance(material, textures, lookups, |place| {
+            let weights = atlas.barycentrics(triangle, DVec2::new(x as f64, y as f64) + place).as_vec3();
+            corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z
+        }))
+    };
+    let blank = Appearance { base_color: [0.0; 3], roughness: 0.0, metallic: 0.0 };
+    Some(encode(size, |x, y| texel(x, y).unwrap_or(blank), Some(&atlas)))
+}
+
+/// The material's appearance where it looks up no texture for it.
+fn constant_appearance(material: &Material) -> Option<Appearance> {
+    let constant = |color: &ColorInput| matches!(color, ColorInput::Constant(_));
+    let number = |scalar: &ScalarInput| matches!(scalar, ScalarInput::Constant(_));
+    let same_everywhere = match &material.model {
+        MaterialModel::Diffuse { reflectance, .. } => constant(reflectance),
+        MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
+            constant(specular_reflectance) && microfacets.is_none_or(|m| number(&m.alpha))
+        }
+        MaterialModel::Plastic { diffuse_reflectance, microfacets, .. } => {
+            constant(diffuse_reflectance) && microfacets.is_none_or(|m| number(&m.alpha))
+        }
+        MaterialModel::Principled { base_color, roughness, metallic, .. } => {
+            constant(base_color) && number(roughness) && number(metallic)
+        }
+        MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. } => false,
+    };
+    if same_everywhere { material.appearance(&[], Vec2::ZERO) } else { None }
+}
+
+/// The most texels that any of the material's lookups has along one unit of the surface's uv.
+fn finest(material: &Material, textures: &[Texture]) -> f64 {
+    material
+        .lookups()
+        .into_iter()
+        .filter_map(|lookup| textures.get(lookup.texture.0).map(|texture| (texture, lookup.uv)))
+        .map(|(texture, uv)| {
+            let [[a, b, _], [c, d, _]] = uv.0.map(|row| row.map(f64::from));
+            let stretch = (a * d - b * c).abs().sqrt();
+            stretch * ((texture.width() * texture.height()) as f64).sqrt()
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Lookups along a texel's side, so that neighbouring ones lie half a source texel apart.
+fn lookups_a_side(atlas: &UvAtlas, triangle: usize, corners: [Vec2; 3], source_texels: f64) -> usize {
+    let [a, b, c] = corners.map(|uv| uv.as_dvec2());
+    let uv_area = ((b - a).perp_dot(c - a) / 2.0).abs();
+    let side = source_texels * (uv_area / atlas.texel_area(triangle).max(1e-12)).sqrt();
+    (2.0 * side).ceil().clamp(1.0, MAX_LOOKUPS) as usize
+}
+
+fn mean_appearance(
+    material: &Material,
+    textures: &[Texture],
+    lookups: usize,
+    source_uv: impl Fn(DVec2) -> Vec2,
+) -> Appearance {
+    let mut sum = [0.0_f64; 5];
+    for row in 0..lookups {
+        for column in 0..lookups {
+            let place = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) / lookups as f64;
+            // `bake` has asked whether the material has an appearance.
+            let Some(seen) = material.appearance(textures, source_uv(place)) else { continue };
+            let [r, g, b] = seen.base_color;
+            for (sum, value) in sum.iter_mut().zip([r, g, b, seen.roughness, seen.metallic]) {
+                *sum += f64::from(value);
+            }
+        }
+    }
+    let [r, g, b, roughness, metallic] = sum.map(|sum| (sum / (lookups * lookups) as f64) as f32);
+    Appearance { base_color: [r, g, b], roughness, metallic }
+}
+
+fn encode(size: usize, texel: impl Fn(usize, usize) -> Appearance, atlas: Option<&UvAtlas>) -> BakedMaterial {
+    let mut clipped = false;
+    let mut baked = BakedMaterial {
+        base_color: Picture::filled(size, size, [0; 3]),
+        roughness: Picture::filled(size, size, 0),
+        metallic: Picture::filled(size, size, 0),
+        clipped: false,
+    };
+    for y in 0..size {
+        for x in 0..size {
+            let seen = texel(x, y);
+            clipped |= seen.base_color.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v));
+            let byte = |v: f32| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)));
+            baked.base_color.set(x, y, seen.base_color.map(byte));
+            baked.roughness.set(x, y, byte_from_unit(seen.roughness));
+            baked.metallic.set(x, y, byte_from_unit(seen.metallic));
+        }
+    }
+    if let Some(atlas) = atlas {
+        atlas.fill_gutters(&mut baked.base_color);
+        atlas.fill_gutters(&mut baked.roughness);
+        atlas.fill_gutters(&mut baked.metallic);
+    }
+    baked.clipped = clipped;
+    baked
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use mateval_image::{Texels, Wrap};
+    use mateval_scene::material::{TextureIndex, UvTransform};
+
+    use super::*;
+    use crate::atlas::{SizeWish, unwrap};
+
+    fn wall() -> TriangleMesh {
+        TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 1.0, 0.0), Vec3::Y],
+            normals: None,
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        }
+    }
+
+    fn material(reflectance: ColorInput) -> Material {
+        let model = MaterialModel::Diffuse { reflectance, alpha: None };
+        Material { name: "m".to_owned(), model, two_sided: true, opacity: None, bump: None }
+    }
+
+    /// Red grows with u, green with v: the baked atlas must give the same back at the same place of the surface.
+    #[test]
+    fn a_ramp_is_found_again_through_the_atlas() {
+        let ramp = (0..64 * 64).map(|at| [(at % 64) as f32 / 64.0, 1.0 - (at / 64) as f32 / 64.0, 0.5]).collect();
+        let textures = [Texture::new(64, 64, Texels::Linear(ramp), Wrap::Clamp).unwrap()];
+        let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
+        let unwrapped = unwrap(&wall(), SizeWish::Fixed(256)).unwrap();
+        let baked = bake(&unwrapped, &wall(), &material(look), &textures).unwrap();
+        let atlas = Texture::new(256, 256, Texels::Srgb8(baked.base_color.into_pixels()), Wrap::Clamp).unwrap();
+        let uvs = unwrapped.mesh.uvs.as_ref().unwrap();
+        for weights in [[0.2, 0.3, 0.5], [0.98, 0.01, 0.01], [0.0, 0.0, 1.0], [0.0, 0.5, 0.5]] {
+            for triangle in 0..2 {
+                let mix = |uvs: &[Vec2], t: [u32; 3]| (0..3).map(|k| uvs[t[k] as usize] * weights[k]).sum::<Vec2>();
+                let found = atlas.sample(mix(uvs, unwrapped.mesh.triangles[triangle]).to_array());
+                let source = mix(wall().uvs.as_ref().unwrap(), wall().triangles[triangle]);
+                let expected = textures[0].sample(source.to_array());
+                for channel in 0..3 {
+                    assert!((found[channel] - expected[channel]).abs() < 0.01, "{weights:?} {found:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_texel_is_the_mean_of_what_it_covers() {
+        let checker = (0..256 * 256).map(|at| if (at % 256 + at / 256) % 2 == 0 { 0.0 } else { 1.0 }).collect();
+        let textures = [Texture::new(256, 256, Texels::Grey(checker), Wrap::Repeat).unwrap()];
+        let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
+        let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();
+        let baked = bake(&unwrapped, &wall(), &material(look), &textures).unwrap();
+        for texel in baked.base_color.pixels() {
+            assert!(texel[0].abs_diff(188) <= 8, "{texel:?} is not the byte of linear 0.5");
+        }
+    }
+
+    #[test]
+    fn constants_and_clipping() {
+        let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();
+        let baked = bake(&unwrapped, &wall(), &material(ColorInput::Constant([0.5, 0.0, 1.5])), &[]).unwrap();
+        assert_eq!(baked.base_color.get(5, 60), [188, 0, 255]);
+        assert_eq!((baked.roughness.get(0, 0), baked.metallic.get(0, 0), baked.clipped), (255, 0, true));
+    }
+
+    #[test]
+    fn glass_has_nothing_to_bake() {
+        let model = MaterialModel::ThinDielectric {
+            eta: 1.5,
+            specular_reflectance: ColorInput::Constant([1.0; 3]),
+            specular_transmittance: ColorInput::Constant([1.0; 3]),
+        };
+        let glass = Material { model, ..material(ColorInput::Constant([0.0; 3])) };
+        assert!(bake(&unwrap(&wall(), SizeWish::Fixed(64)).unwrap(), &wall(), &glass, &[]).is_none());
+    }
+}

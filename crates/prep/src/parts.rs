@@ -1,0 +1,106 @@
+//! Parts: the connected components of an instance's mesh.
+
+use std::collections::HashMap;
+
+use mateval_scene::TriangleMesh;
+
+/// Most parts of one instance: the largest by area keep their own, all smaller ones share the last.
+pub const MAX_PARTS: usize = 64;
+
+/// The part (0, 1, ...) of each triangle, by the area of the parts, largest first.
+///
+/// Triangles belong together when they share a vertex position to the last bit.
+pub fn connected_parts(mesh: &TriangleMesh) -> Vec<usize> {
+    let roots = component_of_triangles(mesh);
+    let mut areas: HashMap<usize, f64> = HashMap::new();
+    for (triangle, root) in roots.iter().enumerate() {
+        *areas.entry(*root).or_default() += area(mesh, triangle);
+    }
+    let mut by_area: Vec<(usize, f64)> = areas.into_iter().collect();
+    // Equal areas keep the order of their first triangle, so that the hash map's order never shows.
+    by_area.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let rank: HashMap<usize, usize> =
+        by_area.iter().enumerate().map(|(rank, (root, _))| (*root, rank.min(MAX_PARTS - 1))).collect();
+    roots.iter().map(|root| rank[root]).collect()
+}
+
+/// For each triangle the first triangle of its component.
+fn component_of_triangles(mesh: &TriangleMesh) -> Vec<usize> {
+    let mut first_vertex: HashMap<[u32; 3], u32> = HashMap::new();
+    let welded: Vec<u32> = mesh
+        .positions
+        .iter()
+        .enumerate()
+        // Adding zero turns -0 into +0: they are one place.
+        .map(|(index, p)| *first_vertex.entry(p.to_array().map(|v| (v + 0.0).to_bits())).or_insert(index as u32))
+        .collect();
+    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|vertex| find(&mut parent, welded[vertex as usize]));
+        let least = a.min(b).min(c);
+        for root in [a, b, c] {
+            parent[root as usize] = least;
+        }
+    }
+    let mut first_triangle: HashMap<u32, usize> = HashMap::new();
+    (0..mesh.triangles.len())
+        .map(|index| {
+            let root = find(&mut parent, welded[mesh.triangles[index][0] as usize]);
+            *first_triangle.entry(root).or_insert(index)
+        })
+        .collect()
+}
+
+/// The component's least vertex; halves the path on the way.
+fn find(parent: &mut [u32], mut vertex: u32) -> u32 {
+    while parent[vertex as usize] != vertex {
+        parent[vertex as usize] = parent[parent[vertex as usize] as usize];
+        vertex = parent[vertex as usize];
+    }
+    vertex
+}
+
+fn area(mesh: &TriangleMesh, triangle: usize) -> f64 {
+    let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
+    (b - a).cross(c - a).length() / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    /// `count` triangles of growing size, apart from each other.
+    fn islands(count: usize) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
+        for index in 0..count {
+            let origin = Vec3::X * 100.0 * index as f32;
+            let size = 1.0 + index as f32;
+            let start = mesh.positions.len() as u32;
+            mesh.positions.extend([origin, origin + Vec3::Y * size, origin + Vec3::Z]);
+            mesh.triangles.push([start, start + 1, start + 2]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn largest_first() {
+        assert_eq!(connected_parts(&islands(3)), [2, 1, 0]);
+    }
+
+    #[test]
+    fn shared_positions_join_even_across_split_vertices() {
+        let mut mesh = islands(2);
+        mesh.positions.extend([Vec3::ZERO, Vec3::new(-0.0, 1.0, 0.0), Vec3::X * 100.0]);
+        mesh.triangles.push([6, 7, 8]);
+        assert_eq!(connected_parts(&mesh), [0, 0, 0]);
+    }
+
+    #[test]
+    fn never_more_than_the_most() {
+        let parts = connected_parts(&islands(MAX_PARTS + 10));
+        assert_eq!(parts.iter().max(), Some(&(MAX_PARTS - 1)));
+        assert_eq!(parts.iter().filter(|part| **part == MAX_PARTS - 1).count(), 11);
+    }
+}
