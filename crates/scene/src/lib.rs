@@ -16,10 +16,12 @@ pub mod layout;
 pub mod manifest;
 pub mod material;
 pub mod mesh;
+pub mod open;
 pub mod reference;
 pub mod reference_io;
 pub mod submission;
 pub mod uv_atlas;
+pub mod work_folder;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::SceneError;

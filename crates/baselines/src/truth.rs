@@ -1,0 +1,24 @@
+//! The ceiling: the truth baked to the atlas, scored like anybody's.
+
+use std::path::Path;
+
+use mateval_scene::open::Dataset;
+use mateval_scene::submission::Map;
+
+use crate::error::BaselineError;
+use crate::submission;
+
+/// Copies the baked maps of every instance. Gives the number of instances.
+pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
+    let description = "the source materials baked to the dataset's own atlases";
+    submission::write(dataset, out, force, "gt", description, |scene, instance, folder| {
+        let truth = dataset.folder(&scene.id).truth_material(&instance.id);
+        for map in Map::ALL {
+            let name = Path::new(map.stem()).with_extension("png");
+            let (from, to) = (truth.join(&name), folder.join(&name));
+            let copied = std::fs::copy(&from, &to);
+            copied.map_err(|source| BaselineError::Io { action: "copy", path: from, source })?;
+        }
+        Ok(())
+    })
+}
