@@ -3,6 +3,8 @@
 //! uv (0, 0) is the lower left corner of the picture, v grows upwards (the OBJ convention; glTF's v is one minus this
 //! one). Lookups are bilinear between texel centres, which lie at half-integers.
 
+use std::sync::Arc;
+
 use crate::transfer::linear_from_srgb_byte;
 
 /// What a lookup outside 0..1 finds.
@@ -48,7 +50,8 @@ impl Texels {
 pub struct Texture {
     width: usize,
     height: usize,
-    texels: Texels,
+    // Shared, so that a clone costs nothing.
+    texels: Arc<Texels>,
     wrap: Wrap,
 }
 
@@ -59,7 +62,7 @@ impl Texture {
         if expected == 0 || texels.len() != expected {
             return Err(crate::ImageError::PixelCount { width, height, expected, found: texels.len() });
         }
-        Ok(Self { width, height, texels, wrap })
+        Ok(Self { width, height, texels: Arc::new(texels), wrap })
     }
 
     /// Texels in a row.
@@ -85,7 +88,7 @@ impl Texture {
     /// The linear value of the texel at column `x`, row `y` from the top.
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         let at = y * self.width + x;
-        match &self.texels {
+        match self.texels.as_ref() {
             Texels::Srgb8(v) => v[at].map(linear_from_srgb_byte),
             Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
             Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],

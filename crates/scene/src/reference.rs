@@ -100,3 +100,10 @@ pub struct ReferenceScene {
     /// What emits.
     pub lights: Vec<LightGroup>,
 }
+
+impl ReferenceScene {
+    /// The textures alone, as [`Material::appearance`] wants them; texels are shared, not copied.
+    pub fn texture_list(&self) -> Vec<Texture> {
+        self.textures.iter().map(|source| source.texture.clone()).collect()
+    }
+}

@@ -1,0 +1,99 @@
+//! What can go wrong while comparing pictures.
+
+use std::path::PathBuf;
+
+/// Width and height, pixels.
+pub type Size = (usize, usize);
+
+/// Why a metric has no value. Io: the weights file; unsupported: pictures too small; invalid: everything else.
+#[derive(Debug, thiserror::Error)]
+pub enum MetricError {
+    /// Two of prediction, reference and mask are not of the same size.
+    #[error(
+        "the {what} has {}x{} pixels; expected {}x{} like the prediction",
+        found.0, found.1, prediction.0, prediction.1
+    )]
+    SizesDiffer {
+        /// The prediction's size.
+        prediction: Size,
+        /// `reference` or `mask`.
+        what: &'static str,
+        /// Its size.
+        found: Size,
+    },
+
+    /// The metric's window or network does not fit into the picture.
+    #[error("{metric} needs a picture of at least {least}x{least} pixels; found {}x{}", found.0, found.1)]
+    TooSmall {
+        /// The metric's key, as in results.
+        metric: &'static str,
+        /// Least width and height.
+        least: usize,
+        /// The picture's size.
+        found: Size,
+    },
+
+    /// A value that would count is NaN or infinite.
+    #[error("the {picture} has the value {value} at pixel ({x}, {y}), channel {channel}; expected finite values")]
+    NotFinite {
+        /// `prediction`, `reference` or `picture`.
+        picture: &'static str,
+        /// Column, from the left.
+        x: usize,
+        /// Row, from the top.
+        y: usize,
+        /// Channel, from 0.
+        channel: usize,
+        /// NaN or an infinity.
+        value: f32,
+    },
+
+    /// A mean squared error that cannot be one.
+    #[error("a mean squared error of {mse} has no PSNR; expected a finite value of at least 0")]
+    InvalidMse {
+        /// The value.
+        mse: f64,
+    },
+
+    /// Two sets of features that come from different networks or pictures of different sizes.
+    #[error("cannot compare the features of {prediction} with those of {reference}; use one network and one size")]
+    FeaturesDiffer {
+        /// Network and size of the prediction's features.
+        prediction: String,
+        /// Network and size of the reference's features.
+        reference: String,
+    },
+
+    /// The weights file is not there or cannot be read.
+    #[error(
+        "cannot read the LPIPS weights '{}': {source}; make them with tools/fetch_lpips_weights.py",
+        path.display()
+    )]
+    WeightsIo {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+
+    /// The weights file is another one.
+    #[error(
+        "'{}' has SHA-256 {found}; expected {expected}: make it anew with tools/fetch_lpips_weights.py",
+        path.display()
+    )]
+    WeightsHash {
+        /// The file.
+        path: PathBuf,
+        /// What the network's file must have.
+        expected: &'static str,
+        /// What this one has; of its first 64 MiB where it is larger.
+        found: String,
+    },
+
+    /// The weights do not fit the network.
+    #[error("the LPIPS weights are malformed: {reason}; make them anew with tools/fetch_lpips_weights.py")]
+    WeightsMalformed {
+        /// What was expected and what was found.
+        reason: String,
+    },
+}

@@ -1,0 +1,137 @@
+//! LPIPS v0.1: how far apart two pictures look to a trained network.
+//!
+//! Zhang, Isola, Efros, Shechtman, Wang: "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
+//! 2018, as their code has it in version 0.1: the picture in -1..1 is shifted and scaled per channel, runs through the
+//! convolutions of AlexNet or VGG-16, and after each of five stages the channels of every pixel are brought to unit
+//! length. The distance is the mean over a stage's pixels of the weighted squared differences, summed over the stages.
+//! Lower is better; 0 for equal pictures, rarely above 1. In: sRGB-encoded pictures in 0..1.
+//!
+//! Convolutions are products of matrices in `f32`, cut into blocks that do not depend on the number of threads: one
+//! machine gives the same bits for any of them. Processors with other vector units may differ in the last digits.
+
+mod convolution;
+mod distance;
+mod features;
+mod multiply;
+mod net;
+mod pool;
+mod tensor;
+mod weights;
+
+use std::path::Path;
+
+use mateval_image::{Mask, Picture, SrgbRgb};
+
+pub use features::Features;
+pub use net::{ALEX_FILE_NAME, ALEX_SHA256, Net, VGG_FILE_NAME, VGG_SHA256};
+
+use crate::MetricError;
+use crate::mask::{black_filled, pixel_count, reference_filled};
+use crate::pixel::check_pair;
+use net::Network;
+
+/// A network with its weights, ready to compare pictures.
+///
+/// Memory while [`Lpips::features`] runs, beside the picture: about 0.1 kB a pixel for Alex, 0.6 kB for VGG, plus a few
+/// MB a thread. What [`Features`] keep of that: 0.04 kB a pixel for Alex, 0.5 kB for VGG.
+#[derive(Debug)]
+pub struct Lpips {
+    net: Net,
+    sha256: String,
+    network: Network,
+}
+
+impl Lpips {
+    /// Reads the weights that `tools/fetch_lpips_weights.py` wrote.
+    ///
+    /// Fails if the file cannot be read, is not byte for byte the one this version knows, or does not fit the network.
+    pub fn load(net: Net, path: &Path) -> Result<Self, MetricError> {
+        let (network, sha256) = weights::load(net, path)?;
+        Ok(Self { net, sha256, network })
+    }
+
+    /// The network.
+    pub fn net(&self) -> Net {
+        self.net
+    }
+
+    /// The SHA-256 of the weights file, in lower-case hexadecimal.
+    pub fn sha256(&self) -> &str {
+        &self.sha256
+    }
+
+    /// The distance over whole pictures.
+    ///
+    /// Fails if sizes differ, a side is below [`Net::least_side`] or a value is not finite.
+    pub fn whole(&self, prediction: &Picture<SrgbRgb>, reference: &Picture<SrgbRgb>) -> Result<f64, MetricError> {
+        check_pair(prediction, reference, None)?;
+        self.distance(&self.features(prediction)?, &self.features(reference)?)
+    }
+
+    /// [`Lpips::whole`] of both pictures with black outside the mask (protocol `paper`): the larger the black part, the
+    /// nearer to 0. `None` where no pixel counts; values outside the mask are not looked at. Fails as [`Lpips::whole`].
+    pub fn black_fill(
+        &self,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Picture<SrgbRgb>,
+        mask: &Mask,
+    ) -> Result<Option<f64>, MetricError> {
+        check_pair(prediction, reference, Some(mask))?;
+        if pixel_count(mask) == 0 {
+            return Ok(None);
+        }
+        self.whole(&black_filled(prediction, mask)?, &black_filled(reference, mask)?).map(Some)
+    }
+
+    /// The distance a pixel of the mask (protocol `mateval-1`): the prediction gets the reference's pixels outside the
+    /// mask, and [`Lpips::masked_distance`] compares. `None` where no pixel counts; the prediction is not looked at
+    /// outside the mask, the reference is. Fails as [`Lpips::whole`].
+    pub fn masked(
+        &self,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Picture<SrgbRgb>,
+        mask: &Mask,
+    ) -> Result<Option<f64>, MetricError> {
+        check_pair(prediction, reference, Some(mask))?;
+        if pixel_count(mask) == 0 {
+            return Ok(None);
+        }
+        let filled = reference_filled(prediction, reference, mask)?;
+        let reference = self.features_named("reference", reference)?;
+        self.masked_distance(&self.features_named("prediction", &filled)?, &reference, pixel_count(mask))
+    }
+
+    /// What the network sees in a picture; computed once for a reference, it serves every prediction.
+    ///
+    /// Fails if a side is below [`Net::least_side`] or a value is not finite.
+    pub fn features(&self, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
+        self.features_named("picture", picture)
+    }
+
+    fn features_named(&self, name: &'static str, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
+        features::compute(self.net, &self.network, name, picture)
+    }
+
+    /// [`Lpips::whole`] of two pictures whose features are known. Fails if they are of another network or of two sizes.
+    pub fn distance(&self, prediction: &Features, reference: &Features) -> Result<f64, MetricError> {
+        features::check_pair(self.net, prediction, reference)?;
+        Ok(distance::mean(&self.network, prediction, reference))
+    }
+
+    /// [`Lpips::masked`] of a filled prediction ([`reference_filled`]) and a reference whose features are known: each
+    /// stage's map of distances is enlarged bilinearly to the picture, the maps are summed over stages and pixels, and
+    /// the sum is divided by `mask_pixels`. `None` where that is 0. Fails as [`Lpips::distance`].
+    pub fn masked_distance(
+        &self,
+        prediction: &Features,
+        reference: &Features,
+        mask_pixels: usize,
+    ) -> Result<Option<f64>, MetricError> {
+        features::check_pair(self.net, prediction, reference)?;
+        let sum = || distance::enlarged_sum(&self.network, prediction, reference);
+        Ok((mask_pixels > 0).then(|| sum() / mask_pixels as f64))
+    }
+}
+
+#[cfg(test)]
+mod tests;

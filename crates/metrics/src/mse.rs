@@ -1,0 +1,103 @@
+//! The mean squared error.
+
+use mateval_image::{Mask, Picture};
+
+use crate::MetricError;
+use crate::pixel::{Pixel, check_pair};
+
+/// The mean of (prediction - reference)² over the pixels of the mask (without one: all pixels) and their channels.
+///
+/// Lower is better; 0 for equal pictures, at most 1 where both lie in 0..1. The unit is that of the values, squared, in
+/// the colour space of the pictures' type. `None` where no pixel counts. Fails if sizes differ or a value that counts
+/// is not finite.
+pub fn mse<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: Option<&Mask>,
+) -> Result<Option<f64>, MetricError> {
+    check_pair(prediction, reference, mask)?;
+    let (mut sum, mut count) = (0.0_f64, 0_usize);
+    for (index, (p, r)) in prediction.pixels().iter().zip(reference.pixels()).enumerate() {
+        if mask.is_none_or(|mask| mask.pixels()[index]) {
+            sum += squared_difference(*p, *r);
+            count += p.channels().len();
+        }
+    }
+    Ok((count > 0).then(|| sum / count as f64))
+}
+
+fn squared_difference<P: Pixel>(p: P, r: P) -> f64 {
+    let pairs = p.channels().iter().zip(r.channels());
+    pairs.map(|(&p, &r)| (f64::from(p) - f64::from(r)).powi(2)).sum()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // tests may
+mod tests {
+    use mateval_image::{LinearRgb, SrgbRgb};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// By hand: ((0.5)² + 0 + 0 + (0.25)² + 0 + 0) / 6.
+    #[test]
+    fn a_small_number_by_hand() {
+        let p = Picture::new(2, 1, vec![LinearRgb([1.0, 0.0, 0.0]), LinearRgb([0.25, 0.5, 0.5])]).unwrap();
+        let r = Picture::new(2, 1, vec![LinearRgb([0.5, 0.0, 0.0]), LinearRgb([0.0, 0.5, 0.5])]).unwrap();
+        assert_eq!(mse(&p, &r, None).unwrap(), Some(0.3125 / 6.0));
+        let left = Picture::new(2, 1, vec![true, false]).unwrap();
+        assert_eq!(mse(&p, &r, Some(&left)).unwrap(), Some(0.25 / 3.0));
+    }
+
+    #[test]
+    fn nothing_counts_is_none() {
+        let picture = Picture::filled(2, 2, 0.5_f32);
+        assert_eq!(mse(&picture, &picture, Some(&Picture::filled(2, 2, false))).unwrap(), None);
+        let empty = Picture::filled(0, 0, 0.5_f32);
+        assert_eq!(mse(&empty, &empty, None).unwrap(), None);
+    }
+
+    #[test]
+    fn a_value_that_is_not_finite_is_an_error_where_it_counts() {
+        let good = Picture::filled(2, 1, SrgbRgb([0.5; 3]));
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut bad = good.clone();
+            bad.set(1, 0, SrgbRgb([0.5, 0.5, value]));
+            let error = mse(&bad, &good, None).unwrap_err();
+            assert!(matches!(error, MetricError::NotFinite { picture: "prediction", x: 1, y: 0, channel: 2, .. }));
+            assert!(matches!(mse(&good, &bad, None), Err(MetricError::NotFinite { picture: "reference", .. })));
+            let left = Picture::new(2, 1, vec![true, false]).unwrap();
+            assert_eq!(mse(&bad, &good, Some(&left)).unwrap(), Some(0.0));
+        }
+    }
+
+    #[test]
+    fn sizes_must_agree() {
+        let (wide, high) = (Picture::filled(2, 1, 0.5_f32), Picture::filled(1, 2, 0.5_f32));
+        let error = mse(&wide, &high, None).unwrap_err();
+        assert_eq!(error.to_string(), "the reference has 1x2 pixels; expected 2x1 like the prediction");
+    }
+
+    fn rgb(count: usize) -> impl Strategy<Value = Vec<LinearRgb>> {
+        prop::collection::vec(prop::array::uniform3(0.0_f32..4.0).prop_map(LinearRgb), count)
+    }
+
+    proptest! {
+        #[test]
+        fn identity_symmetry_full_mask_and_order(
+            (a, b) in (rgb(12), rgb(12)),
+            mask in prop::collection::vec(any::<bool>(), 12),
+        ) {
+            let mask = Picture::new(4, 3, mask).unwrap();
+            let (p, r) = (Picture::new(4, 3, a.clone()).unwrap(), Picture::new(4, 3, b.clone()).unwrap());
+            prop_assert_eq!(mse(&p, &p, None).unwrap(), Some(0.0));
+            prop_assert_eq!(mse(&p, &r, Some(&mask)).unwrap(), mse(&r, &p, Some(&mask)).unwrap());
+            let whole = mse(&p, &r, None).unwrap().unwrap();
+            prop_assert_eq!(mse(&p, &r, Some(&Picture::filled(4, 3, true))).unwrap(), Some(whole));
+            // Free of the pixels' order, up to rounding.
+            let turned = |mut pixels: Vec<LinearRgb>| { pixels.reverse(); Picture::new(4, 3, pixels).unwrap() };
+            let reversed = mse(&turned(a), &turned(b), None).unwrap().unwrap();
+            prop_assert!((reversed - whole).abs() <= 1e-14 * whole);
+        }
+    }
+}

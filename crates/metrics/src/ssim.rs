@@ -1,0 +1,299 @@
+//! The structural similarity index.
+//!
+//! Wang, Bovik, Sheikh, Simoncelli: "Image quality assessment: from error visibility to structural similarity", 2004,
+//! with their constants: an 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, dynamic range 1. Variances are
+//! those of a population; colours are the mean over channels. scikit-image computes the same with `gaussian_weights`,
+//! `sigma=1.5`, `use_sample_covariance=False`, `data_range=1`.
+//!
+//! Higher is better: 1 for equal pictures, at least -1. Meant for sRGB-encoded pictures in 0..1.
+
+use mateval_image::{Mask, Picture};
+use rayon::prelude::*;
+
+use crate::MetricError;
+use crate::mask::{black_filled, pixel_count};
+use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
+
+/// Pixels from a window's centre to its edge.
+const RADIUS: usize = 5;
+/// Width and height of the window; pictures must be at least as large.
+pub const WINDOW: usize = 2 * RADIUS + 1;
+const SIGMA: f64 = 1.5;
+const C1: f64 = 0.01 * 0.01;
+const C2: f64 = 0.03 * 0.03;
+
+/// SSIM over the windows that lie wholly inside a mask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaskedSsim {
+    /// Their mean.
+    pub ssim: f64,
+    /// Their number, at least 1.
+    pub windows: usize,
+}
+
+/// The mean over all windows inside the picture: the border of 5 pixels is the centre of none.
+///
+/// Fails if sizes differ, a side is below 11 pixels or a value is not finite.
+pub fn ssim<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<f64, MetricError> {
+    let map = ssim_map(prediction, reference)?;
+    Ok(map.pixels().iter().sum::<f64>() / map.pixels().len() as f64)
+}
+
+/// [`ssim`] of both pictures with black outside the mask, averaged over the whole picture (protocol `paper`): the
+/// larger the black part, the nearer to 1. `None` where no pixel counts. Values outside the mask are not looked at.
+/// Fails as [`ssim`] does.
+pub fn ssim_black_fill<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: &Mask,
+) -> Result<Option<f64>, MetricError> {
+    check_pair(prediction, reference, Some(mask))?;
+    let value = ssim(&black_filled(prediction, mask)?, &black_filled(reference, mask)?)?;
+    Ok((pixel_count(mask) > 0).then_some(value))
+}
+
+/// The mean over the windows that lie wholly inside picture and mask (protocol `mateval-1`); `None` where there is
+/// none. Values outside the mask are not looked at. Fails as [`ssim`] does.
+pub fn ssim_valid_windows<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: &Mask,
+) -> Result<Option<MaskedSsim>, MetricError> {
+    check_pair(prediction, reference, Some(mask))?;
+    // Valid windows do not see the filling; it keeps what must not be looked at out of the map.
+    let map = ssim_map(&black_filled(prediction, mask)?, &black_filled(reference, mask)?)?;
+    let valid = valid_windows(mask);
+    let (mut sum, mut windows) = (0.0, 0);
+    for (value, _) in map.pixels().iter().zip(valid).filter(|&(_, valid)| valid) {
+        sum += value;
+        windows += 1;
+    }
+    Ok((windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows }))
+}
+
+/// The index of every window, mean over channels. The map is 10 pixels narrower and lower than the pictures; its pixel
+/// (x, y) belongs to the window around (x + 5, y + 5). Fails as [`ssim`] does.
+pub fn ssim_map<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<Picture<f64>, MetricError> {
+    check_sizes(prediction, reference, None)?;
+    let (width, height) = size_of(prediction);
+    if width < WINDOW || height < WINDOW {
+        return Err(MetricError::TooSmall { metric: "ssim", least: WINDOW, found: (width, height) });
+    }
+    check_finite("prediction", prediction, None)?;
+    check_finite("reference", reference, None)?;
+    Ok(map_with(prediction, reference, &gaussian(SIGMA)))
+}
+
+/// The window's weights along one axis; their sum is 1.
+fn gaussian(sigma: f64) -> [f64; WINDOW] {
+    let weights: [f64; WINDOW] = std::array::from_fn(|i| {
+        let distance = i as f64 - RADIUS as f64;
+        libm::exp(-0.5 * distance * distance / (sigma * sigma))
+    });
+    let sum: f64 = weights.iter().sum();
+    weights.map(|weight| weight / sum)
+}
+
+fn map_with<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW]) -> Picture<f64> {
+    let (width, height) = (prediction.width() - 2 * RADIUS, prediction.height() - 2 * RADIUS);
+    let rows: Vec<Vec<f64>> = (0..height).into_par_iter().map(|y| map_row(prediction, reference, window, y)).collect();
+    Picture::new(width, height, rows.concat()).expect("one row of the map for each row of windows")
+}
+
+/// Row `y` of the map: mean over channels.
+fn map_row<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW], y: usize) -> Vec<f64> {
+    let channels = prediction.pixels()[0].channels().len();
+    let mut row = vec![0.0; prediction.width() - 2 * RADIUS];
+    for channel in 0..channels {
+        let moments = column_moments(prediction, reference, window, y, channel);
+        for (x, value) in row.iter_mut().enumerate() {
+            *value += index(&window_moments(&moments[x..x + WINDOW], window));
+        }
+    }
+    row.iter_mut().for_each(|value| *value /= channels as f64);
+    row
+}
+
+/// Weighted means of p, r, p², r², pr.
+type Moments = [f64; 5];
+
+/// The moments of each column of 11 pixels below row `y`.
+fn column_moments<P: Pixel>(
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    window: &[f64; WINDOW],
+    y: usize,
+    channel: usize,
+) -> Vec<Moments> {
+    let width = prediction.width();
+    let mut moments = vec![[0.0; 5]; width];
+    for (dy, weight) in window.iter().enumerate() {
+        let row = (y + dy) * width..(y + dy + 1) * width;
+        let pairs = prediction.pixels()[row.clone()].iter().zip(&reference.pixels()[row]);
+        for (sums, (p, r)) in moments.iter_mut().zip(pairs) {
+            let (p, r) = (f64::from(p.channels()[channel]), f64::from(r.channels()[channel]));
+            let terms = [p, r, p * p, r * r, p * r];
+            (0..5).for_each(|i| sums[i] += weight * terms[i]);
+        }
+    }
+    moments
+}
+
+/// The moments of a window from those of its columns.
+fn window_moments(columns: &[Moments], window: &[f64; WINDOW]) -> Moments {
+    let mut sums = [0.0; 5];
+    for (column, weight) in columns.iter().zip(window) {
+        (0..5).for_each(|i| sums[i] += weight * column[i]);
+    }
+    sums
+}
+
+/// The index of one window: equation 13 of Wang et al. 2004.
+fn index(&[p, r, pp, rr, pr]: &Moments) -> f64 {
+    let (variance_p, variance_r, covariance) = (pp - p * p, rr - r * r, pr - p * r);
+    let numerator = (2.0 * p * r + C1) * (2.0 * covariance + C2);
+    numerator / ((p * p + r * r + C1) * (variance_p + variance_r + C2))
+}
+
+/// For each window inside the picture, row by row: whether all its pixels are in the mask.
+fn valid_windows(mask: &Mask) -> Vec<bool> {
+    let (width, height) = size_of(mask);
+    let counts: Vec<usize> = (0..height).flat_map(|y| runs(&mask.pixels()[y * width..(y + 1) * width])).collect();
+    let row = width - 2 * RADIUS;
+    let full = |start: usize| (0..WINDOW).all(|dy| counts[start + dy * row] >= WINDOW);
+    (0..(height - 2 * RADIUS) * row).map(full).collect()
+}
+
+/// For each stretch of 11 pixels of a row: 11 where all of them count, else fewer.
+fn runs(row: &[bool]) -> impl Iterator<Item = usize> {
+    row.windows(WINDOW).map(|stretch| stretch.iter().filter(|&&counts| counts).count())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // tests may
+mod tests {
+    use mateval_image::SrgbRgb;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A picture of hashed values in 0..1.
+    fn noise(width: usize, height: usize, seed: u32) -> Picture<SrgbRgb> {
+        Picture::from_fn(width, height, |x, y| {
+            SrgbRgb(std::array::from_fn(|c| {
+                let mut h = seed ^ (x as u32).wrapping_mul(0x9E37_79B1) ^ (y as u32).wrapping_mul(0x85EB_CA6B);
+                h = (h ^ (h >> 15) ^ c as u32).wrapping_mul(0x2C1B_3C6D);
+                h = (h ^ (h >> 12)).wrapping_mul(0x297A_2D39);
+                (h >> 8) as f32 / (1 << 24) as f32
+            }))
+        })
+    }
+
+    /// Flat pictures have no variance, so the index is (2ab + C1) / (a² + b² + C1), from the formula by hand.
+    #[test]
+    fn flat_pictures_in_closed_form() {
+        let (a, b) = (0.25_f64, 0.5_f64);
+        let found = ssim(&Picture::filled(12, 11, a as f32), &Picture::filled(12, 11, b as f32)).unwrap();
+        assert!((found - (2.0 * a * b + 1e-4) / (a * a + b * b + 1e-4)).abs() < 1e-12);
+    }
+
+    /// The window of scipy's `gaussian_filter` (sigma 1.5, truncate 3.5), which scikit-image uses: its centre is
+    /// 0.26601172, its end 0.00102838.
+    #[test]
+    fn the_window_is_scipys() {
+        let window = gaussian(SIGMA);
+        assert!((window[RADIUS] - 0.266_011_72).abs() < 1e-8);
+        assert!((window[0] - 0.001_028_38).abs() < 1e-8);
+        assert_eq!(window[0], window[WINDOW - 1]);
+    }
+
+    /// Two passes along the axes must be what one sum over 121 pixels is; another sigma must not.
+    #[test]
+    fn a_window_summed_directly() {
+        let (p, r) = (noise(13, 12, 1), noise(13, 12, 2));
+        let direct = |x0: usize, y0: usize| {
+            let window = gaussian(SIGMA);
+            let mut sum = 0.0;
+            for c in 0..3 {
+                let mut moments = [0.0; 5];
+                for (dy, dx) in (0..WINDOW).flat_map(|dy| (0..WINDOW).map(move |dx| (dy, dx))) {
+                    let (a, b) = (f64::from(p.get(x0 + dx, y0 + dy).0[c]), f64::from(r.get(x0 + dx, y0 + dy).0[c]));
+                    let terms = [a, b, a * a, b * b, a * b];
+                    (0..5).for_each(|i| moments[i] += window[dy] * window[dx] * terms[i]);
+                }
+                sum += index(&moments);
+            }
+            sum / 3.0
+        };
+        let (map, other) = (ssim_map(&p, &r).unwrap(), map_with(&p, &r, &gaussian(1.4)));
+        assert_eq!((map.width(), map.height()), (3, 2));
+        for (x, y) in (0..2).flat_map(|y| (0..3).map(move |x| (x, y))) {
+            assert!((map.get(x, y) - direct(x, y)).abs() < 1e-12);
+            assert!((other.get(x, y) - direct(x, y)).abs() > 1e-6);
+        }
+    }
+
+    #[test]
+    fn pictures_below_the_window_are_refused() {
+        let small = Picture::filled(11, 10, 0.5_f32);
+        assert!(matches!(ssim(&small, &small), Err(MetricError::TooSmall { least: 11, found: (11, 10), .. })));
+        let least = Picture::filled(11, 11, 0.5_f32);
+        assert_eq!(ssim(&least, &least).unwrap(), 1.0);
+    }
+
+    #[test]
+    fn windows_are_valid_where_all_of_the_mask_is() {
+        let mut mask = Picture::filled(14, 12, true);
+        mask.set(1, 0, false);
+        // Rows of four windows; the missing pixel lies in the first two of the first row.
+        assert_eq!(valid_windows(&mask), [false, false, true, true, true, true, true, true]);
+        let (p, r) = (noise(14, 12, 3), noise(14, 12, 4));
+        assert_eq!(ssim_valid_windows(&p, &r, &mask).unwrap().unwrap().windows, 6);
+        mask.set(7, 6, false);
+        assert_eq!(ssim_valid_windows(&p, &r, &mask).unwrap(), None);
+        assert!(ssim_black_fill(&p, &r, &mask).unwrap().is_some());
+        assert_eq!(ssim_black_fill(&p, &r, &Picture::filled(14, 12, false)).unwrap(), None);
+    }
+
+    #[test]
+    fn what_is_outside_the_mask_is_not_looked_at() {
+        let mask = Picture::from_fn(24, 16, |x, _| x < 14);
+        let (p, r) = (noise(24, 16, 5), noise(24, 16, 6));
+        let mut spoilt = p.clone();
+        spoilt.set(20, 8, SrgbRgb([f32::NAN; 3]));
+        spoilt.set(14, 8, SrgbRgb([1e30; 3]));
+        let valid = ssim_valid_windows(&p, &r, &mask).unwrap();
+        assert_eq!(ssim_valid_windows(&spoilt, &r, &mask).unwrap(), valid);
+        assert_eq!(ssim_black_fill(&spoilt, &r, &mask).unwrap(), ssim_black_fill(&p, &r, &mask).unwrap());
+        assert!(matches!(ssim(&spoilt, &r), Err(MetricError::NotFinite { .. })));
+        spoilt.set(2, 3, SrgbRgb([f32::NAN; 3]));
+        let error = ssim_valid_windows(&spoilt, &r, &mask).unwrap_err();
+        assert!(matches!(error, MetricError::NotFinite { picture: "prediction", x: 2, y: 3, .. }));
+    }
+
+    #[test]
+    fn the_thread_count_changes_no_bit() {
+        let (p, r) = (noise(40, 33, 7), noise(40, 33, 8));
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| ssim(&p, &r).unwrap().to_bits())
+        };
+        assert_eq!(with(1), with(2));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn identity_symmetry_and_full_mask(width in 11_usize..20, height in 11_usize..20, seed: u32) {
+            let (p, r) = (noise(width, height, seed), noise(width, height, !seed));
+            let whole = ssim(&p, &r).unwrap();
+            let full = Picture::filled(width, height, true);
+            prop_assert!((ssim(&p, &p).unwrap() - 1.0).abs() < 1e-12);
+            prop_assert!((-1.0..1.0).contains(&whole));
+            prop_assert!((ssim(&r, &p).unwrap() - whole).abs() < 1e-14);
+            prop_assert_eq!(ssim_black_fill(&p, &r, &full).unwrap(), Some(whole));
+            let windows = (width - 10) * (height - 10);
+            prop_assert_eq!(ssim_valid_windows(&p, &r, &full).unwrap(), Some(MaskedSsim { ssim: whole, windows }));
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! Every value of `metrics/expected.json`, computed by scikit-image and by the LPIPS authors' code, must be met.
+//!
+//! The data lie in `$MATEVAL_DATA`, else in `../shared/data` beside the repository; the LPIPS weights in MatEval's
+//! cache folder. Where either is missing, a line on stderr says what was skipped and how to mend it.
+#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; skipped tests must say so
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::{Mask, Picture, SrgbRgb};
+use mateval_metrics::{Lpips, Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
+use serde::Deserialize;
+
+const CASES: usize = 12;
+const MASKED_CASES: usize = 10;
+/// Relative.
+const MSE_TOLERANCE: f64 = 1e-9;
+/// Relative, where the input was rounded to `f32`.
+const ROUNDED_MSE_TOLERANCE: f64 = 1e-7;
+const SSIM_TOLERANCE: f64 = 1e-6;
+const LPIPS_TOLERANCE: f64 = 2e-5;
+
+#[derive(Deserialize)]
+struct Expected {
+    cases: Vec<Case>,
+}
+
+/// A pair of pictures and its values; the pairs of the LPIPS authors have no mask and nothing but LPIPS.
+#[derive(Deserialize)]
+struct Case {
+    reference: String,
+    prediction: String,
+    mask: Option<String>,
+    mse: Option<f64>,
+    psnr: Option<f64>,
+    ssim: Option<f64>,
+    lpips_alex: f64,
+    lpips_vgg: f64,
+    masked_mse: Option<f64>,
+    masked_psnr: Option<f64>,
+    masked_ssim_valid_windows: Option<f64>,
+    valid_windows: Option<usize>,
+    blackfill_ssim: Option<f64>,
+    blackfill_lpips_alex: Option<f64>,
+    blackfill_lpips_vgg: Option<f64>,
+    masked_lpips_alex: Option<f64>,
+    masked_lpips_vgg: Option<f64>,
+}
+
+/// A case with its pictures.
+struct Loaded {
+    case: Case,
+    prediction: Picture<SrgbRgb>,
+    reference: Picture<SrgbRgb>,
+    mask: Option<Mask>,
+}
+
+/// All cases; `None`, said on stderr, where the data are absent.
+fn load_cases() -> Option<Vec<Loaded>> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join("metrics");
+    let path = folder.join("expected.json");
+    if !path.is_file() {
+        eprintln!("SKIPPED: no '{}'; set MATEVAL_DATA to the folder with the reference values", path.display());
+        return None;
+    }
+    let expected: Expected = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+    assert_eq!(expected.cases.len(), CASES);
+    assert_eq!(expected.cases.iter().filter(|case| case.mask.is_some()).count(), MASKED_CASES);
+    Some(expected.cases.into_iter().map(|case| load_case(&folder, case)).collect())
+}
+
+fn load_case(folder: &Path, case: Case) -> Loaded {
+    let picture =
+        |name: &String| read_png(&folder.join(name), |channels| SrgbRgb([channels[0], channels[1], channels[2]]));
+    Loaded {
+        prediction: picture(&case.prediction),
+        reference: picture(&case.reference),
+        mask: case.mask.as_ref().map(|name| read_png(&folder.join(name), |channels| channels[0] > 0.5)),
+        case,
+    }
+}
+
+/// An 8-bit PNG, its bytes divided by 255.
+fn read_png<T: Copy>(path: &Path, pixel: impl Fn(&[f32]) -> T) -> Picture<T> {
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut decoder = png::Decoder::new(file);
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!(info.bit_depth, png::BitDepth::Eight);
+    let values: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect();
+    let pixels = values.chunks(info.color_type.samples()).map(pixel).collect();
+    Picture::new(info.width as usize, info.height as usize, pixels).unwrap()
+}
+
+/// The network; `None`, said on stderr, where its weights are absent.
+fn load_lpips(net: Net) -> Option<Lpips> {
+    let set = |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let folder = set("MATEVAL_CACHE")
+        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
+        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))?;
+    let path = folder.join(net.file_name());
+    if !path.is_file() {
+        eprintln!("SKIPPED: no '{}'; run: python3 tools/fetch_lpips_weights.py", path.display());
+        return None;
+    }
+    let lpips = Lpips::load(net, &path).unwrap();
+    assert_eq!((lpips.net(), lpips.sha256()), (net, net.expected_sha256()));
+    Some(lpips)
+}
+
+/// Compares, and keeps the largest deviation and the number of values seen.
+struct Check {
+    what: &'static str,
+    tolerance: f64,
+    largest: f64,
+    seen: usize,
+}
+
+impl Check {
+    fn new(what: &'static str, tolerance: f64) -> Self {
+        Self { what, tolerance, largest: 0.0, seen: 0 }
+    }
+
+    fn value(&mut self, name: &str, found: f64, expected: f64) {
+        self.deviation(name, (found - expected).abs());
+    }
+
+    fn relative(&mut self, name: &str, found: f64, expected: f64) {
+        self.deviation(name, (found / expected - 1.0).abs());
+    }
+
+    fn deviation(&mut self, name: &str, deviation: f64) {
+        assert!(deviation <= self.tolerance, "{} of {name} is off by {deviation:e}", self.what);
+        self.largest = self.largest.max(deviation);
+        self.seen += 1;
+    }
+
+    fn finish(self, expected: usize) {
+        eprintln!("{}: {} values, largest deviation {:.2e}", self.what, self.seen, self.largest);
+        assert_eq!(self.seen, expected);
+    }
+}
+
+/// The expected values come from value/255 in `f64`, which a picture of `f32` rounds by up to 3e-8. So the metric
+/// itself is held to its tolerance on whole numbers, which `f32` holds exactly, and 255² is taken out of the result.
+#[test]
+fn mse_and_psnr_of_whole_numbers() {
+    check_mse_and_psnr(MSE_TOLERANCE, |value| (value * 255.0).round(), |mse| mse / (255.0 * 255.0));
+}
+
+/// As pictures are scored: value/255 in `f32`, whose rounding is all that the wider tolerance is for.
+#[test]
+fn mse_and_psnr_of_values_in_f32() {
+    check_mse_and_psnr(ROUNDED_MSE_TOLERANCE, |value| value, |mse| mse);
+}
+
+fn check_mse_and_psnr(tolerance: f64, value: impl Fn(f32) -> f32, unit: impl Fn(f64) -> f64) {
+    let Some(cases) = load_cases() else { return };
+    let (mut mses, mut psnrs) = (Check::new("mse", tolerance), Check::new("psnr", tolerance));
+    for Loaded { case, prediction, reference, mask } in cases.iter().filter(|loaded| loaded.mask.is_some()) {
+        let change = |picture: &Picture<SrgbRgb>| picture.map(|SrgbRgb(rgb)| SrgbRgb(rgb.map(&value)));
+        let (prediction, reference) = (change(prediction), change(reference));
+        let whole = unit(mse(&prediction, &reference, None).unwrap().unwrap());
+        let masked = unit(mse(&prediction, &reference, mask.as_ref()).unwrap().unwrap());
+        mses.relative(&case.prediction, whole, case.mse.unwrap());
+        mses.relative(&case.prediction, masked, case.masked_mse.unwrap());
+        psnrs.relative(&case.prediction, Psnr::from_mse(whole).unwrap().db, case.psnr.unwrap());
+        psnrs.relative(&case.prediction, Psnr::from_mse(masked).unwrap().db, case.masked_psnr.unwrap());
+        // The twin: the wrong mask is noticed.
+        assert!((whole / case.masked_mse.unwrap() - 1.0).abs() > tolerance);
+    }
+    mses.finish(2 * MASKED_CASES);
+    psnrs.finish(2 * MASKED_CASES);
+}
+
+#[test]
+fn ssim_by_all_three_rules() {
+    let Some(cases) = load_cases() else { return };
+    let mut check = Check::new("ssim", SSIM_TOLERANCE);
+    for Loaded { case, prediction, reference, mask } in &cases {
+        let Some(mask) = mask else { continue };
+        let whole = ssim(prediction, reference).unwrap();
+        let black_fill = ssim_black_fill(prediction, reference, mask).unwrap().unwrap();
+        let valid = ssim_valid_windows(prediction, reference, mask).unwrap().unwrap();
+        check.value(&case.prediction, whole, case.ssim.unwrap());
+        check.value(&case.prediction, black_fill, case.blackfill_ssim.unwrap());
+        check.value(&case.prediction, valid.ssim, case.masked_ssim_valid_windows.unwrap());
+        assert_eq!(valid.windows, case.valid_windows.unwrap());
+        // The twin: rules are not taken for each other.
+        assert!((whole - case.blackfill_ssim.unwrap()).abs() > SSIM_TOLERANCE);
+        assert!((black_fill - case.masked_ssim_valid_windows.unwrap()).abs() > SSIM_TOLERANCE);
+    }
+    check.finish(3 * MASKED_CASES);
+}
+
+#[test]
+fn lpips_alex() {
+    check_lpips(Net::Alex, |case| (case.lpips_alex, case.blackfill_lpips_alex, case.masked_lpips_alex));
+}
+
+#[test]
+fn lpips_vgg() {
+    check_lpips(Net::Vgg, |case| (case.lpips_vgg, case.blackfill_lpips_vgg, case.masked_lpips_vgg));
+}
+
+fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f64>)) {
+    let (Some(cases), Some(lpips)) = (load_cases(), load_lpips(net)) else { return };
+    let mut check = Check::new(net.key(), LPIPS_TOLERANCE);
+    for Loaded { case, prediction, reference, mask } in &cases {
+        let (whole, black_fill, masked) = expected(case);
+        check.value(&case.prediction, lpips.whole(prediction, reference).unwrap(), whole);
+        let Some(mask) = mask else { continue };
+        let found = lpips.black_fill(prediction, reference, mask).unwrap().unwrap();
+        check.value(&case.prediction, found, black_fill.unwrap());
+        let found = lpips.masked(prediction, reference, mask).unwrap().unwrap();
+        check.value(&case.prediction, found, masked.unwrap());
+    }
+    check.finish(CASES + 2 * MASKED_CASES);
+    // The twin: pictures whose channels are in the wrong order are noticed.
+    let swap = |picture: &Picture<SrgbRgb>| picture.map(|SrgbRgb([r, g, b])| SrgbRgb([b, g, r]));
+    let Loaded { case, prediction, reference, .. } = &cases[0];
+    let swapped = lpips.whole(&swap(prediction), &swap(reference)).unwrap();
+    assert!((swapped - expected(case).0).abs() > LPIPS_TOLERANCE);
+}
+
+/// One thread, two threads: the same bits, with the real weights.
+#[test]
+fn the_thread_count_changes_no_bit_of_lpips() {
+    let (Some(cases), Some(lpips)) = (load_cases(), load_lpips(Net::Alex)) else { return };
+    let Loaded { prediction, reference, .. } = &cases[0];
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| lpips.whole(prediction, reference).unwrap().to_bits())
+    };
+    assert_eq!(with(1), with(2));
+}

@@ -1,0 +1,210 @@
+//! The pictures of one view: geometry for methods, material truth for the scorer; all from one camera matrix.
+
+use glam::{DVec2, Vec2};
+use mateval_image::{LinearRgb, Mask, Normal, Picture, Texture};
+use mateval_scene::Camera;
+use mateval_scene::material::Appearance;
+use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
+use mateval_tracer::World;
+use mateval_tracer::aov::{PixelHit, hit_through, subpixels};
+use rayon::prelude::*;
+
+/// Below this roughness a surface counts as specular.
+const SPECULAR_ROUGHNESS: f32 = 0.2;
+/// From this metallic on a surface counts as metal.
+const SPECULAR_METALLIC: f32 = 0.999;
+
+/// A scene made ready for its pictures.
+pub struct ViewScene<'a> {
+    reference: &'a ReferenceScene,
+    world: &'a World,
+    textures: Vec<Texture>,
+    /// The value in `instance.png` of every surface.
+    instances: &'a [u16],
+    /// The value in `part.png` of every triangle of every surface.
+    parts: &'a [Vec<u16>],
+    glow: Vec<Glow>,
+}
+
+/// On which sides a surface glows towards the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Glow {
+    front: bool,
+    back: bool,
+}
+
+/// What methods may see of a view, RGB apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeometryPictures {
+    /// Metres along the camera's axis at pixel centres; 0 where there is nothing.
+    pub depth: Picture<f32>,
+    /// World-space shading normal towards the camera at pixel centres; 0 where there is nothing.
+    pub normal: Picture<Normal>,
+    /// Instance index at pixel centres; 0 where there is nothing.
+    pub instance: Picture<u16>,
+    /// Part index at pixel centres; 0 where there is nothing.
+    pub part: Picture<u16>,
+    /// Pixels of which every sub-pixel shows a surface that is scored.
+    pub valid: Mask,
+    /// Valid pixels whose centre the input view did not see.
+    pub unobserved: Mask,
+}
+
+/// What a view should look like without light, from the source materials: means over the sub-pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TruthPictures {
+    /// base_color, linear.
+    pub albedo: Picture<LinearRgb>,
+    /// base_color times (1 - metallic), linear.
+    pub diffuse_albedo: Picture<LinearRgb>,
+    /// Perceptual roughness.
+    pub roughness: Picture<f32>,
+    /// Metallic.
+    pub metallic: Picture<f32>,
+    /// Valid pixels whose centre is metallic or of a roughness under 0.2.
+    pub specular_region: Mask,
+}
+
+/// One pixel of all pictures.
+#[derive(Clone, Copy)]
+struct Pixel {
+    depth: f32,
+    normal: [f32; 3],
+    instance: u16,
+    part: u16,
+    valid: bool,
+    unobserved: bool,
+    truth: Truth,
+    specular: bool,
+}
+
+/// Means over a pixel.
+#[derive(Clone, Copy, Default)]
+struct Truth {
+    albedo: [f32; 3],
+    diffuse_albedo: [f32; 3],
+    roughness: f32,
+    metallic: f32,
+}
+
+impl<'a> ViewScene<'a> {
+    /// `instances` holds a number a surface, `parts` one a triangle of each surface.
+    pub fn new(reference: &'a ReferenceScene, world: &'a World, instances: &'a [u16], parts: &'a [Vec<u16>]) -> Self {
+        let textures = reference.texture_list();
+        Self { reference, world, textures, instances, parts, glow: glow_of_surfaces(reference) }
+    }
+
+    /// The pictures of the view of `camera`; what `input` did not see is unobserved (nothing, for the input view itself).
+    pub fn pictures(&self, camera: &Camera, input: &Camera) -> (GeometryPictures, TruthPictures) {
+        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+        let pixels: Vec<Pixel> = (0..height)
+            .into_par_iter()
+            .flat_map_iter(|y| (0..width).map(move |x| self.pixel(camera, input, x, y)))
+            .collect();
+        let all = Picture::new(width, height, pixels).expect("there is a pixel for every place");
+        let geometry = GeometryPictures {
+            depth: all.map(|p| p.depth),
+            normal: all.map(|p| Normal(p.normal)),
+            instance: all.map(|p| p.instance),
+            part: all.map(|p| p.part),
+            valid: all.map(|p| p.valid),
+            unobserved: all.map(|p| p.unobserved),
+        };
+        let truth = TruthPictures {
+            albedo: all.map(|p| LinearRgb(p.truth.albedo)),
+            diffuse_albedo: all.map(|p| LinearRgb(p.truth.diffuse_albedo)),
+            roughness: all.map(|p| p.truth.roughness),
+            metallic: all.map(|p| p.truth.metallic),
+            specular_region: all.map(|p| p.specular),
+        };
+        (geometry, truth)
+    }
+
+    fn pixel(&self, camera: &Camera, input: &Camera, x: usize, y: usize) -> Pixel {
+        let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+        let hit = hit_through(self.world, camera, centre);
+        let (truth, valid) = self.truth(camera, x, y);
+        let at_centre = hit.as_ref().and_then(|hit| self.scored_appearance(hit));
+        let specular = at_centre
+            .is_some_and(|seen| seen.metallic >= SPECULAR_METALLIC || seen.roughness < SPECULAR_ROUGHNESS);
+        let unobserved = valid && hit.as_ref().is_some_and(|hit| !self.is_seen_by(input, camera, centre, hit));
+        let surface = hit.as_ref().map(|hit| hit.surface.0);
+        Pixel {
+            depth: hit.as_ref().map_or(0.0, |hit| hit.depth as f32),
+            normal: hit.as_ref().map_or([0.0; 3], |hit| hit.normal.to_array()),
+            instance: surface.map_or(0, |surface| self.instances[surface]),
+            part: hit.as_ref().map_or(0, |hit| self.parts[hit.surface.0][hit.triangle]),
+            valid,
+            unobserved,
+            truth,
+            specular: valid && specular,
+        }
+    }
+
+    /// The means over the sub-pixels that show a scored surface, and whether all do.
+    fn truth(&self, camera: &Camera, x: usize, y: usize) -> (Truth, bool) {
+        let mut sum = [0.0_f64; 8];
+        let mut count = 0_usize;
+        let places = subpixels(x, y);
+        for place in places {
+            let Some(seen) = hit_through(self.world, camera, place).and_then(|hit| self.scored_appearance(&hit)) else {
+                continue;
+            };
+            let [r, g, b] = seen.base_color;
+            let rest = 1.0 - seen.metallic;
+            let values = [r, g, b, r * rest, g * rest, b * rest, seen.roughness, seen.metallic];
+            for (sum, value) in sum.iter_mut().zip(values) {
+                *sum += f64::from(value);
+            }
+            count += 1;
+        }
+        if count == 0 {
+            return (Truth::default(), false);
+        }
+        let [r, g, b, dr, dg, db, roughness, metallic] = sum.map(|sum| (sum / count as f64) as f32);
+        let truth = Truth { albedo: [r, g, b], diffuse_albedo: [dr, dg, db], roughness, metallic };
+        (truth, count == places.len())
+    }
+
+    /// base_color, roughness and metallic where the hit is on a surface that is scored: not glass, not glowing.
+    fn scored_appearance(&self, hit: &PixelHit) -> Option<Appearance> {
+        let glow = self.glow[hit.surface.0];
+        if if hit.front { glow.front } else { glow.back } {
+            return None;
+        }
+        let surface = &self.reference.surfaces[hit.surface.0];
+        let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
+        self.reference.materials[surface.material.0].appearance(&self.textures, uv)
+    }
+
+    /// Whether the surface point at `pixel` of `camera` shows in the input view: inside its frame and not hidden.
+    fn is_seen_by(&self, input: &Camera, camera: &Camera, pixel: DVec2, hit: &PixelHit) -> bool {
+        let Some((place, depth)) = input.project(camera.unproject(pixel, hit.depth)) else {
+            return false;
+        };
+        if !input.holds(place) {
+            return false;
+        }
+        // From one centre the same ray reaches the same point.
+        camera.position() == input.position()
+            || hit_through(self.world, input, place).is_some_and(|first| first.depth >= depth * (1.0 - OCCLUSION_SLACK))
+    }
+}
+
+/// A point counts as hidden where something is nearer by more than this share of its depth.
+const OCCLUSION_SLACK: f64 = 1e-3;
+
+fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
+    let mut glow = vec![Glow::default(); reference.surfaces.len()];
+    for group in reference.lights.iter().filter(|group| group.camera_visible) {
+        if let Emission::Area { surfaces, radiance, two_sided } = &group.emission
+            && radiance.iter().any(|v| *v > 0.0)
+        {
+            for SurfaceIndex(surface) in surfaces {
+                glow[*surface].front = true;
+                glow[*surface].back |= *two_sided;
+            }
+        }
+    }
+    glow
+}
