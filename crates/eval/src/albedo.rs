@@ -21,10 +21,8 @@ pub fn albedo_pictures(
     submissions: &[PredictedScene],
 ) -> Vec<Picture<LinearRgb>> {
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-    let rows: Vec<Vec<Vec<LinearRgb>>> = (0..height)
-        .into_par_iter()
-        .map(|y| albedo_row(world, atlases, camera, submissions, width, y))
-        .collect();
+    let rows: Vec<Vec<Vec<LinearRgb>>> =
+        (0..height).into_par_iter().map(|y| albedo_row(world, atlases, camera, submissions, width, y)).collect();
     (0..submissions.len())
         .map(|index| {
             let pixels = rows.iter().flat_map(|row| row[index].iter().copied()).collect();

@@ -10,6 +10,7 @@ pub mod albedo;
 pub mod alignment;
 pub mod error;
 pub mod measure;
+pub mod pair;
 pub mod prediction;
 pub mod protocol;
 pub mod result;

@@ -79,9 +79,8 @@ mod tests {
     #[test]
     fn the_protocols_differ_as_they_say() {
         let (prediction, reference, mask) = pictures();
-        let [ours, paper] = ["mateval-1", "paper"].map(|name| {
-            albedo_metrics(&Protocol::named(name).unwrap(), None, &prediction, &reference, &mask).unwrap()
-        });
+        let [ours, paper] = ["mateval-1", "paper"]
+            .map(|name| albedo_metrics(&Protocol::named(name).unwrap(), None, &prediction, &reference, &mask).unwrap());
         // Half of the frame is black in both pictures: the paper's SSIM is nearer to one.
         assert!(value(&paper, "ssim") > value(&ours, "ssim"));
         assert!(value(&paper, "mse") != value(&ours, "mse"));

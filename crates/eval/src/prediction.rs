@@ -58,13 +58,15 @@ fn read_map(
     let folder = instance_folder(submission, &scene.id, &instance.id);
     let candidates = ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending));
     let present: Vec<&std::path::PathBuf> = candidates.iter().filter(|path| path.is_file()).collect();
-    let relative = |path: &Path| {
-        path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
-    };
+    let relative = |path: &Path| path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/");
     let path = match present.as_slice() {
         [path] => *path,
         [] => {
-            read.findings.push(replaced("missing_map", &relative(&candidates[0]), "expected a PNG or an EXR, found none"));
+            read.findings.push(replaced(
+                "missing_map",
+                &relative(&candidates[0]),
+                "expected a PNG or an EXR, found none",
+            ));
             return None;
         }
         _ => {
@@ -94,7 +96,7 @@ fn read_sound(path: &Path, map: Map) -> Result<(Texture, String), String> {
         return Err(format!("{width}x{height} texels; expected a square of {least} to {most} a side"));
     }
     let hash = sha256_of_file(path).map_err(|error| error.to_string())?;
-    Ok((texture, hash))
+    Ok((texture.collapsed(), hash))
 }
 
 fn replaced(code: &str, file: &str, message: &str) -> Finding {

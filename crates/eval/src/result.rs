@@ -124,9 +124,7 @@ pub struct MissingMetric {
 
 /// Takes the means: of pictures to scenes, of scenes to the dataset. A value that is missing is left out of its mean; a
 /// scene without any value of a key is left out of that key's.
-pub fn means(
-    pictures: &[PictureValue],
-) -> (BTreeMap<SceneId, BTreeMap<String, f64>>, BTreeMap<String, f64>) {
+pub fn means(pictures: &[PictureValue]) -> (BTreeMap<SceneId, BTreeMap<String, f64>>, BTreeMap<String, f64>) {
     let mut of_scene: BTreeMap<SceneId, BTreeMap<String, Mean>> = BTreeMap::new();
     for picture in pictures {
         if let Some(value) = picture.value {

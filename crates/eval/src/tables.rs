@@ -69,7 +69,10 @@ fn check_comparable(results: &[ResultFile], protocol: &str) -> Result<(), EvalEr
     let mut faults = Vec::new();
     for result in results {
         let Some(scores) = result.protocols.get(protocol) else {
-            faults.push(format!("'{}' has no scores under protocol '{protocol}'; score it with --protocol {protocol}", result.method));
+            faults.push(format!(
+                "'{}' has no scores under protocol '{protocol}'; score it with --protocol {protocol}",
+                result.method
+            ));
             continue;
         };
         let expected = first.protocols.get(protocol).map(|scores| &scores.fingerprint);
@@ -133,10 +136,7 @@ fn ranked(values: &[Option<f64>], column: &Column) -> Vec<Cell> {
     }
     distinct.dedup();
     let rank = |value: f64| distinct.iter().position(|other| *other == value).filter(|rank| *rank < 2);
-    values
-        .iter()
-        .map(|value| Cell { value: *value, digits: column.digits, rank: value.and_then(rank) })
-        .collect()
+    values.iter().map(|value| Cell { value: *value, digits: column.digits, rank: value.and_then(rank) }).collect()
 }
 
 impl Cell {

@@ -19,12 +19,18 @@ pub fn write_rgb_bytes(path: &Path, picture: &Picture<[u8; 3]>) -> Result<(), Im
     write(path, picture.width(), picture.height(), png::ColorType::Rgb, png::BitDepth::Eight, data)
 }
 
+/// Writes 16-bit RGB from words.
+pub fn write_rgb_words(path: &Path, picture: &Picture<[u16; 3]>) -> Result<(), ImageError> {
+    let data: Vec<u8> = picture.pixels().as_flattened().iter().flat_map(|word| word.to_be_bytes()).collect();
+    write(path, picture.width(), picture.height(), png::ColorType::Rgb, png::BitDepth::Sixteen, &data)
+}
+
 /// Writes 8-bit grey from bytes.
 pub fn write_grey_bytes(path: &Path, picture: &Picture<u8>) -> Result<(), ImageError> {
     write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Eight, picture.pixels())
 }
 
-/// Writes 16-bit grey from whole numbers.
+/// Writes 16-bit grey from whole numbers (ids; or words of 65535 times a value).
 pub fn write_ids(path: &Path, picture: &Picture<u16>) -> Result<(), ImageError> {
     let data: Vec<u8> = picture.pixels().iter().flat_map(|id| id.to_be_bytes()).collect();
     write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &data)

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use crate::transfer::linear_from_srgb_byte;
+use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
 
 /// What a lookup outside 0..1 finds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub enum Wrap {
 pub enum Texels {
     /// sRGB-encoded bytes.
     Srgb8(Vec<[u8; 3]>),
+    /// sRGB-encoded 16-bit words, value = word / 65535.
+    Srgb16(Vec<[u16; 3]>),
     /// Linear bytes, value = byte / 255.
     Linear8(Vec<[u8; 3]>),
     /// Linear scalars as bytes, value = byte / 255; all three channels the same.
@@ -38,6 +40,7 @@ impl Texels {
     fn len(&self) -> usize {
         match self {
             Self::Srgb8(v) | Self::Linear8(v) => v.len(),
+            Self::Srgb16(v) => v.len(),
             Self::Grey8(v) => v.len(),
             Self::Linear(v) => v.len(),
             Self::Grey(v) => v.len(),
@@ -85,11 +88,31 @@ impl Texture {
         self.wrap
     }
 
+    /// The same texture; where all its texels are equal as one texel, which costs no memory.
+    pub fn collapsed(self) -> Self {
+        fn first<T: PartialEq + Copy>(all: &[T]) -> Option<Vec<T>> {
+            all.iter().all(|texel| *texel == all[0]).then(|| vec![all[0]])
+        }
+        let one = match self.texels.as_ref() {
+            Texels::Srgb8(v) => first(v).map(Texels::Srgb8),
+            Texels::Srgb16(v) => first(v).map(Texels::Srgb16),
+            Texels::Linear8(v) => first(v).map(Texels::Linear8),
+            Texels::Grey8(v) => first(v).map(Texels::Grey8),
+            Texels::Linear(v) => first(v).map(Texels::Linear),
+            Texels::Grey(v) => first(v).map(Texels::Grey),
+        };
+        match one {
+            Some(texels) => Self { width: 1, height: 1, texels: Arc::new(texels), wrap: self.wrap },
+            None => self,
+        }
+    }
+
     /// The linear value of the texel at column `x`, row `y` from the top.
     pub fn texel(&self, x: usize, y: usize) -> [f32; 3] {
         let at = y * self.width + x;
         match self.texels.as_ref() {
             Texels::Srgb8(v) => v[at].map(linear_from_srgb_byte),
+            Texels::Srgb16(v) => v[at].map(linear_from_srgb_word),
             Texels::Linear8(v) => v[at].map(|byte| f32::from(byte) / 255.0),
             Texels::Grey8(v) => [f32::from(v[at]) / 255.0; 3],
             Texels::Linear(v) => v[at],
@@ -165,6 +188,14 @@ mod tests {
         assert_eq!(two_by_two(Wrap::Clamp).sample([7.0, 0.75])[0], 1.0);
         assert_eq!(two_by_two(Wrap::Mirror).sample([1.25, 0.75])[0], 1.0);
         assert_eq!(two_by_two(Wrap::Mirror).sample([1.75, 0.75])[0], 0.0);
+    }
+
+    #[test]
+    fn equal_texels_collapse_and_look_the_same() {
+        let plain = Texture::new(2, 2, Texels::Srgb16(vec![[30_000, 1, 65_535]; 4]), Wrap::Clamp).unwrap();
+        let one = plain.clone().collapsed();
+        assert_eq!((one.width(), one.sample([0.3, 0.9])), (1, plain.sample([0.3, 0.9])));
+        assert_eq!(two_by_two(Wrap::Clamp).collapsed(), two_by_two(Wrap::Clamp));
     }
 
     #[test]

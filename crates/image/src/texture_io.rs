@@ -6,7 +6,6 @@ use std::path::Path;
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 
 use crate::limits::{check_size, read_file};
-use crate::transfer::linear_from_srgb;
 use crate::{ImageError, Texels, Texture, Wrap, exr_io};
 
 /// How whole numbers stand for colours. Float files (EXR, HDR) are linear whatever is said.
@@ -73,11 +72,13 @@ fn color_texels(path: &Path, decoded: DynamicImage, encoding: Encoding) -> Resul
     let texels = match decoded.color() {
         ColorType::Rgb32F | ColorType::Rgba32F => Texels::Linear(decoded.into_rgb32f().pixels().map(|p| p.0).collect()),
         ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
-            let value = |word: u16| {
-                let unit = f32::from(word) / 65535.0;
-                if encoding == Encoding::Srgb { linear_from_srgb(unit) } else { unit }
-            };
-            Texels::Linear(decoded.into_rgb16().pixels().map(|p| p.0.map(value)).collect())
+            let words = decoded.into_rgb16();
+            match encoding {
+                Encoding::Srgb => Texels::Srgb16(words.pixels().map(|p| p.0).collect()),
+                Encoding::Linear => {
+                    Texels::Linear(words.pixels().map(|p| p.0.map(|word| f32::from(word) / 65535.0)).collect())
+                }
+            }
         }
         ColorType::L8 | ColorType::La8 if encoding == Encoding::Linear => {
             Texels::Grey8(decoded.into_luma8().into_raw())

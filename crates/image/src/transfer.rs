@@ -20,6 +20,19 @@ pub fn linear_from_srgb_byte(byte: u8) -> f32 {
     LINEAR_FROM_BYTE[usize::from(byte)]
 }
 
+static LINEAR_FROM_WORD: LazyLock<Vec<f32>> =
+    LazyLock::new(|| (0..=u16::MAX).map(|word| linear_from_srgb(f32::from(word) / 65535.0)).collect());
+
+/// Linear value of an sRGB-encoded 16-bit word, from a table.
+pub fn linear_from_srgb_word(word: u16) -> f32 {
+    LINEAR_FROM_WORD[usize::from(word)]
+}
+
+/// The 16-bit word nearest to a value of 0 to 1; clipped, NaN becomes 0.
+pub fn word_from_unit(value: f32) -> u16 {
+    (value.clamp(0.0, 1.0) * 65535.0 + 0.5) as u16
+}
+
 /// The byte nearest to a value of 0 to 1; clipped, NaN becomes 0.
 pub fn byte_from_unit(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
@@ -36,6 +49,14 @@ mod tests {
         assert!((linear_from_srgb(0.5) - 0.214_041_14).abs() < 1e-6);
         assert_eq!(linear_from_srgb_byte(255), 1.0);
         assert_eq!(byte_from_unit(f32::NAN), 0);
+    }
+
+    #[test]
+    fn words_are_finer_than_bytes() {
+        let value = 0.893_289;
+        let word = linear_from_srgb_word(word_from_unit(srgb_from_linear(value)));
+        let byte = linear_from_srgb_byte(byte_from_unit(srgb_from_linear(value)));
+        assert!((word - value).abs() < 2e-5 && (byte - value).abs() > 1e-3);
     }
 
     #[test]

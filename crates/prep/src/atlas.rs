@@ -28,8 +28,6 @@ pub enum SizeWish {
 pub struct Unwrapped {
     /// The same triangles in the same order, vertices split where charts part; `uvs` are the atlas's.
     pub mesh: TriangleMesh,
-    /// For each of its vertices the vertex of the mesh that came in.
-    pub source_vertices: Vec<u32>,
     /// Texels a side.
     pub size: u32,
     /// Charts.
@@ -84,10 +82,10 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
 
 /// The positions about the middle of the box, its longest side [`XATLAS_LENGTH`]; and the factor from metres.
 fn scaled_positions(mesh: &TriangleMesh) -> Result<(Vec<f32>, f32), AtlasError> {
-    let (low, high) =
-        mesh.positions.iter().fold((glam::Vec3::INFINITY, glam::Vec3::NEG_INFINITY), |(low, high), p| {
-            (low.min(*p), high.max(*p))
-        });
+    let (low, high) = mesh
+        .positions
+        .iter()
+        .fold((glam::Vec3::INFINITY, glam::Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
     let longest = (high - low).max_element();
     if !(longest > 0.0 && longest.is_finite() && mesh.area() > 0.0) {
         return Err(AtlasError::NoArea);
@@ -149,8 +147,8 @@ fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwra
     let [packed] = packed.as_slice() else {
         return Err(AtlasError::Refused(format!("{} meshes came back, expected one", packed.len())));
     };
-    let triangles: Vec<[u32; 3]> = packed.index_array.as_chunks::<3>().0.to_vec();
-    let source_vertices: Vec<u32> = packed.vertex_array.iter().map(|vertex| vertex.xref).collect();
+    let mut triangles: Vec<[u32; 3]> = packed.index_array.as_chunks::<3>().0.to_vec();
+    let mut source_vertices: Vec<u32> = packed.vertex_array.iter().map(|vertex| vertex.xref).collect();
     let same = triangles.len() == mesh.triangles.len()
         && triangles.iter().zip(&mesh.triangles).all(|(new, old)| new.map(|v| source_vertices[v as usize]) == *old);
     if !same {
@@ -160,7 +158,7 @@ fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwra
     let mapped: Vec<bool> = packed.vertex_array.iter().map(|vertex| vertex.atlas_index >= 0).collect();
     let mut uvs: Vec<Vec2> =
         packed.vertex_array.iter().map(|vertex| Vec2::new(vertex.uv[0] / side, 1.0 - vertex.uv[1] / side)).collect();
-    let unmapped = place_unmapped(&triangles, &source_vertices, &mapped, &mut uvs);
+    let unmapped = place_unmapped(&mut triangles, &mut source_vertices, &mapped, &mut uvs);
     let pick = |from: &[glam::Vec3]| source_vertices.iter().map(|v| from[*v as usize]).collect::<Vec<_>>();
     let mesh = TriangleMesh {
         positions: pick(&mesh.positions),
@@ -170,14 +168,19 @@ fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwra
     };
     let coverage = uv_area(&mesh);
     let texel_m = (mesh.area() / (coverage * f64::from(size) * f64::from(size))).sqrt();
-    Ok(Unwrapped { mesh, source_vertices, size, charts: atlas.chart_count(), coverage, texel_m, unmapped })
+    Ok(Unwrapped { mesh, size, charts: atlas.chart_count(), coverage, texel_m, unmapped })
 }
 
-/// Gives the corners of triangles without a chart the uv of a mapped vertex: one at the same source vertex, else the
-/// first. Gives the number of such triangles.
-fn place_unmapped(triangles: &[[u32; 3]], source_vertices: &[u32], mapped: &[bool], uvs: &mut [Vec2]) -> usize {
+/// Gives triangles without a chart corners of their own, all three at one mapped place: that of one of their vertices,
+/// else the first. Gives the number of such triangles.
+fn place_unmapped(
+    triangles: &mut [[u32; 3]],
+    source_vertices: &mut Vec<u32>,
+    mapped: &[bool],
+    uvs: &mut Vec<Vec2>,
+) -> usize {
     let mut uv_of_source = std::collections::HashMap::new();
-    for vertex in (0..uvs.len()).filter(|vertex| mapped[*vertex]) {
+    for vertex in (0..mapped.len()).filter(|vertex| mapped[*vertex]) {
         uv_of_source.entry(source_vertices[vertex]).or_insert(uvs[vertex]);
     }
     let first = mapped.iter().position(|mapped| *mapped).map_or(Vec2::ZERO, |vertex| uvs[vertex]);
@@ -187,11 +190,14 @@ fn place_unmapped(triangles: &[[u32; 3]], source_vertices: &[u32], mapped: &[boo
             continue;
         }
         count += 1;
-        let known = triangle.iter().find_map(|vertex| uv_of_source.get(&source_vertices[*vertex as usize]));
+        let sources = triangle.map(|vertex| source_vertices[vertex as usize]);
+        let known = sources.iter().find_map(|source| uv_of_source.get(source));
         let place = known.copied().unwrap_or(first);
-        for vertex in triangle.iter().filter(|vertex| !mapped[**vertex as usize]) {
-            uvs[*vertex as usize] = place;
-        }
+        *triangle = sources.map(|source| {
+            source_vertices.push(source);
+            uvs.push(place);
+            (uvs.len() - 1) as u32
+        });
     }
     count
 }
@@ -238,7 +244,9 @@ mod tests {
         for triangle in 0..12 {
             assert_eq!(unwrapped.mesh.corners(triangle), mesh.corners(triangle));
         }
-        assert!(unwrapped.mesh.uvs.as_ref().unwrap().iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0));
+        assert!(
+            unwrapped.mesh.uvs.as_ref().unwrap().iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0)
+        );
         assert_eq!(unwrapped.unmapped, 0);
     }
 
@@ -284,9 +292,8 @@ mod tests {
 
     /// The least distance between the edges of two triangles, by sampling.
     fn gap(a: [Vec2; 3], b: [Vec2; 3]) -> f32 {
-        let points = |t: [Vec2; 3]| {
-            (0..3).flat_map(move |k| (0..=50).map(move |i| t[k].lerp(t[(k + 1) % 3], i as f32 / 50.0)))
-        };
+        let points =
+            |t: [Vec2; 3]| (0..3).flat_map(move |k| (0..=50).map(move |i| t[k].lerp(t[(k + 1) % 3], i as f32 / 50.0)));
         points(a).flat_map(|p| points(b).map(move |q| (p - q).length())).fold(f32::INFINITY, f32::min)
     }
 
@@ -296,6 +303,8 @@ mod tests {
         mesh.triangles.push([0, 0, 1]);
         let unwrapped = unwrap(&mesh, SizeWish::Fixed(128)).unwrap();
         assert_eq!(unwrapped.unmapped, 1);
+        let [a, b, c] = texels_of(&unwrapped, 12);
+        assert!(a == b && b == c && unwrapped.coverage < 1.0);
         assert!(texels_of(&unwrapped, 12).iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 128.0));
     }
 

@@ -1,7 +1,7 @@
 //! Source materials baked to an atlas.
 
 use glam::{DVec2, Vec2};
-use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Picture, Texture};
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::{Appearance, ColorInput, Material, MaterialModel, ScalarInput};
@@ -14,48 +14,96 @@ const MAX_LOOKUPS: f64 = 8.0;
 
 /// A material's three maps, as a submission holds them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BakedMaterial {
-    /// sRGB bytes.
-    pub base_color: Picture<[u8; 3]>,
-    /// Perceptual roughness, linear bytes.
-    pub roughness: Picture<u8>,
-    /// Linear bytes.
-    pub metallic: Picture<u8>,
-    /// Whether some base colour was above 1 (or below 0) and had to be clipped.
+pub enum BakedMaterial {
+    /// The same everywhere: 16 bits, since the rounding of one value does not average out.
+    Constant {
+        /// sRGB words.
+        base_color: [u16; 3],
+        /// Perceptual roughness, linear word.
+        roughness: u16,
+        /// Linear word.
+        metallic: u16,
+    },
+    /// From a texture: 8 bits, as the source's.
+    Textured {
+        /// sRGB bytes.
+        base_color: Picture<[u8; 3]>,
+        /// Perceptual roughness, linear bytes.
+        roughness: Picture<u8>,
+        /// Linear bytes.
+        metallic: Picture<u8>,
+    },
+}
+
+/// What came of baking.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Baked {
+    /// The maps.
+    pub material: BakedMaterial,
+    /// Whether some base colour left 0..1 and had to be clipped.
     pub clipped: bool,
 }
 
 /// Bakes `material`, laid out by the source mesh's own uv, to the atlas. Each texel is the mean over its own square;
 /// texels that no triangle owns take their neighbour's value. None for dielectrics.
-pub fn bake(
-    unwrapped: &Unwrapped,
-    source: &TriangleMesh,
-    material: &Material,
-    textures: &[Texture],
-) -> Option<BakedMaterial> {
+pub fn bake(unwrapped: &Unwrapped, source: &TriangleMesh, material: &Material, textures: &[Texture]) -> Option<Baked> {
     if !material.has_appearance() {
         return None;
     }
-    let size = unwrapped.size as usize;
     if let Some(appearance) = constant_appearance(material) {
-        return Some(encode(size, |_, _| appearance, None));
+        return Some(bake_constant(&appearance));
     }
-    let atlas = UvAtlas::new(&unwrapped.mesh, size);
+    let atlas = UvAtlas::new(&unwrapped.mesh, unwrapped.size as usize);
     let source_uv = |triangle: usize| {
         let uvs = source.uvs.as_deref()?;
         Some(source.triangles[triangle].map(|vertex| uvs[vertex as usize]))
     };
+    let source_texels = finest(material, textures);
     let texel = |x: usize, y: usize| {
         let (triangle, _) = atlas.owner(x, y)?;
         let corners = source_uv(triangle).unwrap_or([Vec2::ZERO; 3]);
-        let lookups = lookups_a_side(&atlas, triangle, corners, finest(material, textures));
+        let lookups = lookups_a_side(&atlas, triangle, corners, source_texels);
         Some(mean_appearance(material, textures, lookups, |place| {
             let weights = atlas.barycentrics(triangle, DVec2::new(x as f64, y as f64) + place).as_vec3();
             corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z
         }))
     };
-    let blank = Appearance { base_color: [0.0; 3], roughness: 0.0, metallic: 0.0 };
-    Some(encode(size, |x, y| texel(x, y).unwrap_or(blank), Some(&atlas)))
+    Some(bake_texels(&atlas, texel))
+}
+
+fn bake_constant(appearance: &Appearance) -> Baked {
+    let material = BakedMaterial::Constant {
+        base_color: appearance.base_color.map(|v| word_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)))),
+        roughness: word_from_unit(appearance.roughness),
+        metallic: word_from_unit(appearance.metallic),
+    };
+    Baked { material, clipped: leaves_unit(appearance) }
+}
+
+fn leaves_unit(appearance: &Appearance) -> bool {
+    appearance.base_color.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v))
+}
+
+fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearance>) -> Baked {
+    let size = atlas.size();
+    let mut clipped = false;
+    let mut base_color = Picture::filled(size, size, [0; 3]);
+    let mut roughness = Picture::filled(size, size, 0);
+    let mut metallic = Picture::filled(size, size, 0);
+    for y in 0..size {
+        for x in 0..size {
+            let Some(seen) = texel(x, y) else { continue };
+            clipped |= leaves_unit(&seen);
+            let byte = |v: f32| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)));
+            base_color.set(x, y, seen.base_color.map(byte));
+            roughness.set(x, y, byte_from_unit(seen.roughness));
+            metallic.set(x, y, byte_from_unit(seen.metallic));
+        }
+    }
+    atlas.fill_gutters(&mut base_color);
+    atlas.fill_gutters(&mut roughness);
+    atlas.fill_gutters(&mut metallic);
+    Baked { material: BakedMaterial::Textured { base_color, roughness, metallic }, clipped }
 }
 
 /// The material's appearance where it looks up no texture for it.
@@ -122,33 +170,6 @@ fn mean_appearance(
     Appearance { base_color: [r, g, b], roughness, metallic }
 }
 
-fn encode(size: usize, texel: impl Fn(usize, usize) -> Appearance, atlas: Option<&UvAtlas>) -> BakedMaterial {
-    let mut clipped = false;
-    let mut baked = BakedMaterial {
-        base_color: Picture::filled(size, size, [0; 3]),
-        roughness: Picture::filled(size, size, 0),
-        metallic: Picture::filled(size, size, 0),
-        clipped: false,
-    };
-    for y in 0..size {
-        for x in 0..size {
-            let seen = texel(x, y);
-            clipped |= seen.base_color.iter().any(|v| !(-1e-6..=1.0 + 1e-6).contains(v));
-            let byte = |v: f32| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)));
-            baked.base_color.set(x, y, seen.base_color.map(byte));
-            baked.roughness.set(x, y, byte_from_unit(seen.roughness));
-            baked.metallic.set(x, y, byte_from_unit(seen.metallic));
-        }
-    }
-    if let Some(atlas) = atlas {
-        atlas.fill_gutters(&mut baked.base_color);
-        atlas.fill_gutters(&mut baked.roughness);
-        atlas.fill_gutters(&mut baked.metallic);
-    }
-    baked.clipped = clipped;
-    baked
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -180,7 +201,7 @@ mod tests {
         let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
         let unwrapped = unwrap(&wall(), SizeWish::Fixed(256)).unwrap();
         let baked = bake(&unwrapped, &wall(), &material(look), &textures).unwrap();
-        let atlas = Texture::new(256, 256, Texels::Srgb8(baked.base_color.into_pixels()), Wrap::Clamp).unwrap();
+        let atlas = Texture::new(256, 256, Texels::Srgb8(base_color(baked).into_pixels()), Wrap::Clamp).unwrap();
         let uvs = unwrapped.mesh.uvs.as_ref().unwrap();
         for weights in [[0.2, 0.3, 0.5], [0.98, 0.01, 0.01], [0.0, 0.0, 1.0], [0.0, 0.5, 0.5]] {
             for triangle in 0..2 {
@@ -195,6 +216,13 @@ mod tests {
         }
     }
 
+    fn base_color(baked: Baked) -> Picture<[u8; 3]> {
+        match baked.material {
+            BakedMaterial::Textured { base_color, .. } => base_color,
+            BakedMaterial::Constant { .. } => panic!("expected a textured material"),
+        }
+    }
+
     #[test]
     fn a_texel_is_the_mean_of_what_it_covers() {
         let checker = (0..256 * 256).map(|at| if (at % 256 + at / 256) % 2 == 0 { 0.0 } else { 1.0 }).collect();
@@ -202,7 +230,7 @@ mod tests {
         let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
         let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();
         let baked = bake(&unwrapped, &wall(), &material(look), &textures).unwrap();
-        for texel in baked.base_color.pixels() {
+        for texel in base_color(baked).pixels() {
             assert!(texel[0].abs_diff(188) <= 8, "{texel:?} is not the byte of linear 0.5");
         }
     }
@@ -211,8 +239,9 @@ mod tests {
     fn constants_and_clipping() {
         let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();
         let baked = bake(&unwrapped, &wall(), &material(ColorInput::Constant([0.5, 0.0, 1.5])), &[]).unwrap();
-        assert_eq!(baked.base_color.get(5, 60), [188, 0, 255]);
-        assert_eq!((baked.roughness.get(0, 0), baked.metallic.get(0, 0), baked.clipped), (255, 0, true));
+        // 48,192 of 65,535 is linear 0.5 on the sRGB curve.
+        let material = BakedMaterial::Constant { base_color: [48_192, 0, 65_535], roughness: 65_535, metallic: 0 };
+        assert_eq!(baked, Baked { material, clipped: true });
     }
 
     #[test]

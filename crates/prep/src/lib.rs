@@ -3,9 +3,23 @@
 //! In: a recipe and the folders that it names (Mitsuba scenes of Bitterli's resources). Out: a dataset folder as
 //! `dataset_spec/FORMAT.md` tells, or findings about one.
 //!
-//! Between: [`recipe`] is checked whole, [`bitterli`] reads each source, [`atlas`] unwraps, [`bake`] fills textures,
-//! [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth, [`verify`] doubts it all.
+//! Between: [`recipe`] is checked whole, [`bitterli`] reads each source, [`instances`] numbers, [`atlas`] unwraps, [`bake`]
+//! fills textures, [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth,
+//! [`verify`] doubts it all.
 
 pub mod atlas;
 pub mod bake;
+pub mod bitterli;
+pub mod build;
+pub mod build_scene;
+pub mod error;
+pub mod instances;
 pub mod parts;
+pub mod progress;
+pub mod recipe;
+pub mod render;
+pub mod sample;
+pub mod verify;
+pub mod views;
+
+pub use error::PrepError;

@@ -154,7 +154,8 @@ impl RecipeScene {
         }
         if let Some(camera) = &self.camera {
             let finite = camera.position.iter().chain(&camera.target).all(|v| v.is_finite());
-            if !finite || !(camera.fov_y_deg > 0.0 && camera.fov_y_deg < 179.0) {
+            let field = camera.fov_y_deg > 0.0 && camera.fov_y_deg < 179.0;
+            if !finite || !field {
                 faults.push(format!("scene '{}': camera: expected finite points and 0 < fov_y_deg < 179", self.id));
             }
         }
@@ -189,7 +190,10 @@ mod tests {
     fn the_least_recipe() {
         let recipe = read_text("name = 'mini'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'").unwrap();
         assert_eq!(recipe.views.len(), 4);
-        assert_eq!((recipe.views[1].id.as_str(), recipe.views[1].x_deg, recipe.views[1].y_deg), ("up_right", 5.0, -5.0));
+        assert_eq!(
+            (recipe.views[1].id.as_str(), recipe.views[1].x_deg, recipe.views[1].y_deg),
+            ("up_right", 5.0, -5.0)
+        );
         assert_eq!((recipe.samples, recipe.scenes[0].exposure), (64, 1.0));
     }
 

@@ -44,7 +44,7 @@ pub struct GeometryPictures {
     pub instance: Picture<u16>,
     /// Part index at pixel centres; 0 where there is nothing.
     pub part: Picture<u16>,
-    /// Pixels of which every sub-pixel shows a surface that is scored.
+    /// Pixels whose centre and every sub-pixel show a surface that is scored.
     pub valid: Mask,
     /// Valid pixels whose centre the input view did not see.
     pub unobserved: Mask,
@@ -125,8 +125,9 @@ impl<'a> ViewScene<'a> {
         let hit = hit_through(self.world, camera, centre);
         let (truth, valid) = self.truth(camera, x, y);
         let at_centre = hit.as_ref().and_then(|hit| self.scored_appearance(hit));
-        let specular = at_centre
-            .is_some_and(|seen| seen.metallic >= SPECULAR_METALLIC || seen.roughness < SPECULAR_ROUGHNESS);
+        let specular =
+            at_centre.is_some_and(|seen| seen.metallic >= SPECULAR_METALLIC || seen.roughness < SPECULAR_ROUGHNESS);
+        let valid = valid && at_centre.is_some();
         let unobserved = valid && hit.as_ref().is_some_and(|hit| !self.is_seen_by(input, camera, centre, hit));
         let surface = hit.as_ref().map(|hit| hit.surface.0);
         Pixel {

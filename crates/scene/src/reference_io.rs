@@ -63,6 +63,8 @@ pub struct TextureEntry {
 pub enum TexelKind {
     /// 8-bit PNG, sRGB.
     Srgb8,
+    /// 16-bit PNG, sRGB.
+    Srgb16,
     /// 8-bit PNG, linear.
     Linear8,
     /// 8-bit grey PNG, linear.
@@ -151,6 +153,10 @@ fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<
             png_io::write_rgb_bytes(&png, &Picture::new(width, height, v.clone())?)?;
             (png, TexelKind::Srgb8)
         }
+        Texels::Srgb16(v) => {
+            png_io::write_rgb_words(&png, &Picture::new(width, height, v.clone())?)?;
+            (png, TexelKind::Srgb16)
+        }
         Texels::Linear8(v) => {
             png_io::write_rgb_bytes(&png, &Picture::new(width, height, v.clone())?)?;
             (png, TexelKind::Linear8)
@@ -186,7 +192,7 @@ fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTe
         WrapWord::Mirror => Wrap::Mirror,
     };
     let texture = match entry.texels {
-        TexelKind::Srgb8 => read_texture(&path, Encoding::Srgb, wrap)?,
+        TexelKind::Srgb8 | TexelKind::Srgb16 => read_texture(&path, Encoding::Srgb, wrap)?,
         TexelKind::Linear8 | TexelKind::Grey8 | TexelKind::Linear => read_texture(&path, Encoding::Linear, wrap)?,
         TexelKind::Grey => {
             let picture = exr_io::read_scalar(&path)?;
@@ -275,11 +281,12 @@ mod tests {
                     alpha: None,
                 },
                 two_sided: true,
-                opacity: Some(ScalarInput::Texture { texture: TextureIndex(2), channel: 0, uv }),
+                opacity: Some(ScalarInput::Texture { texture: TextureIndex(3), channel: 0, uv }),
                 bump: None,
             }],
             textures: vec![
                 texture("a.jpg", Texels::Srgb8(vec![[1, 2, 3], [4, 5, 6]])),
+                texture("w.png", Texels::Srgb16(vec![[1, 20_000, 3], [4, 5, 65_535]])),
                 texture("b.png", Texels::Linear8(vec![[1, 2, 3], [4, 5, 6]])),
                 texture("c.png", Texels::Grey8(vec![7, 9])),
                 texture("d.hdr", Texels::Linear(vec![[0.1, 7.0, 1e4], [0.0, 0.0, 1.0]])),

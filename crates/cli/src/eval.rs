@@ -1,0 +1,233 @@
+//! `mateval eval`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, bail};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
+use mateval_eval::score::{ScorePlan, score};
+use mateval_eval::tables::{TableFormat, tables};
+use mateval_metrics::{Lpips, Net};
+use mateval_scene::open::Dataset;
+use mateval_scene::{SceneId, json};
+
+use crate::TOOL;
+use crate::bars::Bars;
+use crate::outcome::{Outcome, print, say, say_findings};
+use crate::weights;
+
+/// Its subcommands.
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// The metrics of two pictures, with both mask rules.
+    Image(ImageArgs),
+    /// Scores submissions on a dataset.
+    Score(ScoreArgs),
+    /// Sets results side by side, as the paper's Tables III to V.
+    Tables(TablesArgs),
+}
+
+/// What `eval image` is given.
+#[derive(clap::Args)]
+pub struct ImageArgs {
+    /// PNG (8-bit sRGB) or EXR (linear).
+    prediction: PathBuf,
+    /// PNG (8-bit sRGB) or EXR (linear).
+    reference: PathBuf,
+    /// 8-bit grey PNG, 255 where pixels count.
+    #[arg(long)]
+    mask: Option<PathBuf>,
+    /// Networks of LPIPS.
+    #[arg(long = "net", value_enum, default_values = ["alex"])]
+    nets: Vec<NetName>,
+    /// How to print.
+    #[arg(long, value_enum, default_value = "text")]
+    format: ImageFormat,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum NetName {
+    Alex,
+    Vgg,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum ImageFormat {
+    Text,
+    Json,
+}
+
+/// What `eval score` is given.
+#[derive(clap::Args)]
+pub struct ScoreArgs {
+    /// Submission folders.
+    #[arg(required = true)]
+    pub submissions: Vec<PathBuf>,
+    /// The dataset's folder.
+    #[arg(long)]
+    pub dataset: PathBuf,
+    /// The result file; with several submissions a folder, for one file each.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Only this scene; may be given several times.
+    #[arg(long = "scene")]
+    pub scenes: Vec<SceneId>,
+    /// The rules; may be given several times.
+    #[arg(long = "protocol", default_values = ["mateval-1"])]
+    pub protocols: Vec<String>,
+    /// Replace result files that are there.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What `eval tables` is given.
+#[derive(clap::Args)]
+pub struct TablesArgs {
+    /// RESULT.json files.
+    #[arg(required = true)]
+    results: Vec<PathBuf>,
+    /// Under which rules.
+    #[arg(long, default_value = "mateval-1")]
+    protocol: String,
+    /// How to write them.
+    #[arg(long, value_enum, default_value = "markdown")]
+    format: TableName,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum TableName {
+    Markdown,
+    Latex,
+    Csv,
+}
+
+/// Runs one of them.
+pub fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Image(args) => image(args),
+        Command::Score(args) => score_submissions(args).map(|_| Outcome::Good),
+        Command::Tables(args) => print_tables(args),
+    }
+}
+
+fn image(args: &ImageArgs) -> anyhow::Result<Outcome> {
+    let mut nets: Vec<Lpips> = Vec::new();
+    let mut missing = Vec::new();
+    for name in &args.nets {
+        let net = if *name == NetName::Alex { Net::Alex } else { Net::Vgg };
+        match weights::load(net) {
+            mateval_eval::score::LpipsWeights::Loaded(lpips) => nets.push(*lpips),
+            mateval_eval::score::LpipsWeights::Missing { reason, .. } => missing.push((net.key(), reason)),
+        }
+    }
+    let values = mateval_eval::pair::compare(&args.prediction, &args.reference, args.mask.as_deref(), &nets)?;
+    match args.format {
+        ImageFormat::Json => print(&json::to_text(&serde_json::json!({
+            "format": "mateval-image/1",
+            "tool": TOOL,
+            "values": values,
+            "missing": missing
+                .iter()
+                .map(|(net, reason)| serde_json::json!({ "metric": format!("lpips_{net}"), "reason": reason, "mend": weights::MEND }))
+                .collect::<Vec<_>>(),
+        }))),
+        ImageFormat::Text => print(&image_text(&values, &missing)),
+    }
+    Ok(Outcome::Good)
+}
+
+fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)]) -> String {
+    let mut lines = Vec::new();
+    let mut line = |name: &str, value: Option<f64>| {
+        lines.push(format!("{name:24} {}", value.map_or("none".to_owned(), |value| format!("{value:.6}"))));
+    };
+    line("mse", values.mse);
+    line("psnr_db", values.psnr);
+    line("ssim", values.ssim);
+    for net in &values.lpips {
+        line(&format!("lpips_{}", net.net), net.value);
+    }
+    if let Some(masked) = &values.masked {
+        line("masked mse", masked.mse);
+        line("masked psnr_db", masked.psnr);
+        line("masked ssim inside", masked.ssim_inside);
+        line("masked ssim black_fill", masked.ssim_black_fill);
+        for (rule, nets) in [("inside", &masked.lpips_inside), ("black_fill", &masked.lpips_black_fill)] {
+            for net in nets {
+                line(&format!("masked lpips_{} {rule}", net.net), net.value);
+            }
+        }
+    }
+    lines.extend(
+        missing.iter().map(|(net, _)| format!("{:24} missing; run: {}", format!("lpips_{net}"), weights::MEND)),
+    );
+    lines.join("\n") + "\n"
+}
+
+/// Scores, writes the result files and gives their paths.
+pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
+    let protocols = args.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
+    let outs = result_paths(args)?;
+    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let plan = ScorePlan {
+        dataset: &dataset,
+        submissions: args.submissions.iter().map(PathBuf::as_path).collect(),
+        protocols,
+        scenes: args.scenes.clone(),
+        lpips: weights::load(Net::Alex),
+        tool: TOOL.to_owned(),
+    };
+    let bars = Bars::new();
+    let results = score(&plan, &|step, done, all| bars.step(step, done, all)).context("cannot score")?;
+    bars.finish();
+    for (result, out) in results.iter().zip(&outs) {
+        json::write(out, result)?;
+        say_findings(&result.method, &result.findings);
+        print(&format!("{}\n", out.display()));
+    }
+    Ok(outs)
+}
+
+/// Where each submission's result goes: `--out`, or a file named after the submission's folder in it.
+fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
+    let outs: Vec<PathBuf> = match args.submissions.as_slice() {
+        [_] => vec![args.out.clone()],
+        several => {
+            std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make '{}'", args.out.display()))?;
+            several.iter().map(|path| args.out.join(folder_name(path)).with_extension("json")).collect()
+        }
+    };
+    for (at, out) in outs.iter().enumerate() {
+        if out.exists() && !args.force {
+            bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
+        }
+        if outs[..at].contains(out) {
+            bail!("two submissions would be written to '{}'; rename one of the folders", out.display());
+        }
+    }
+    Ok(outs)
+}
+
+fn folder_name(path: &Path) -> PathBuf {
+    let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    whole.file_name().map_or_else(|| PathBuf::from("submission"), PathBuf::from)
+}
+
+fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {
+    let results = args.results.iter().map(|path| json::read(path)).collect::<Result<Vec<ResultFile>, _>>()?;
+    let format = match args.format {
+        TableName::Markdown => TableFormat::Markdown,
+        TableName::Latex => TableFormat::Latex,
+        TableName::Csv => TableFormat::Csv,
+    };
+    print(&tables(&results, &args.protocol, format)?);
+    for result in results.iter().filter(|result| !result.missing.is_empty()) {
+        for missing in &result.missing {
+            say(&format!(
+                "warning: '{}': {} is missing: {}; run: {}",
+                result.method, missing.metric, missing.reason, missing.mend
+            ));
+        }
+    }
+    Ok(Outcome::Good)
+}

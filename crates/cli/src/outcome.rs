@@ -1,0 +1,34 @@
+//! How a command ends, and the two ways to print.
+
+use std::io::Write as _;
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Done and good.
+    Good,
+    /// Done, and the answer is no.
+    No,
+}
+
+/// A result, to stdout. A reader that has gone away is no error.
+pub fn print(text: &str) {
+    let mut out = std::io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// A word about the work, to stderr.
+pub fn say(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// The findings that ask for attention, to stderr; notes are only counted.
+pub fn say_findings(title: &str, findings: &[mateval_scene::Finding]) {
+    let notes = findings.iter().filter(|finding| finding.severity == mateval_scene::Severity::Note).count();
+    for finding in findings.iter().filter(|finding| finding.severity != mateval_scene::Severity::Note) {
+        say(&format!("{title}: {finding}"));
+    }
+    if notes > 0 {
+        say(&format!("{title}: {notes} notes more"));
+    }
+}

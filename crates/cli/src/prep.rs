@@ -1,0 +1,150 @@
+//! `mateval prep`.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use mateval_prep::build::{BuildOptions, BuildReport};
+use mateval_prep::render::RenderOptions;
+use mateval_scene::{SceneId, Severity};
+
+use crate::TOOL;
+use crate::bars::Bars;
+use crate::outcome::{Outcome, print, say, say_findings};
+
+/// Its subcommands.
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Converts what a recipe lists into a dataset; goes on where it was killed.
+    Build(BuildArgs),
+    /// Renders the dataset's RGB pictures.
+    Render(RenderArgs),
+    /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
+    Verify(VerifyArgs),
+}
+
+/// What `prep build` is given.
+#[derive(clap::Args)]
+pub struct BuildArgs {
+    /// The recipe, a TOML file.
+    pub recipe: PathBuf,
+    /// Folder of the dataset.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Folder that the recipe's paths are relative to; the recipe's own if absent.
+    #[arg(long)]
+    pub source: Option<PathBuf>,
+    /// Replace a dataset that is there.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What `prep render` is given.
+#[derive(clap::Args)]
+pub struct RenderArgs {
+    /// The dataset's folder.
+    pub dataset: PathBuf,
+    /// By what.
+    #[arg(long, value_enum, default_value = "builtin")]
+    pub renderer: Renderer,
+    /// Samples a pixel of each of the two halves; the recipe's if absent.
+    #[arg(long)]
+    pub samples: Option<u32>,
+    /// Only this scene; may be given several times.
+    #[arg(long = "scene")]
+    pub scenes: Vec<SceneId>,
+    /// Render again what is there.
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// What renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Renderer {
+    /// Our own path tracer.
+    Builtin,
+}
+
+/// What `prep verify` is given.
+#[derive(clap::Args)]
+pub struct VerifyArgs {
+    /// The dataset's folder.
+    dataset: PathBuf,
+    /// How to print the findings.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Format {
+    Text,
+    Json,
+}
+
+/// Runs one of them.
+pub fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Build(args) => build(args),
+        Command::Render(args) => render(args),
+        Command::Verify(args) => verify(args),
+    }
+}
+
+/// Carries a recipe out.
+pub fn build(args: &BuildArgs) -> anyhow::Result<Outcome> {
+    let options = BuildOptions {
+        recipe: args.recipe.clone(),
+        source: args.source.clone(),
+        out: args.out.clone(),
+        force: args.force,
+    };
+    let bars = Bars::new();
+    let report = mateval_prep::build::build(&options, TOOL, &|step, done, all| bars.step(step, done, all))
+        .context("cannot build the dataset")?;
+    bars.finish();
+    tell(&report);
+    print(&format!("{}: {} scenes\n", args.out.display(), report.dataset.scenes.len()));
+    Ok(Outcome::Good)
+}
+
+fn tell(report: &BuildReport) {
+    for scene in &report.resumed {
+        say(&format!("scene '{scene}' was already made by an earlier run"));
+    }
+    for (scene, findings) in &report.findings {
+        say_findings(scene.as_str(), findings);
+    }
+}
+
+/// Renders a dataset's RGB pictures.
+pub fn render(args: &RenderArgs) -> anyhow::Result<Outcome> {
+    let Renderer::Builtin = args.renderer;
+    let options = RenderOptions { samples: args.samples, scenes: args.scenes.clone(), force: args.force };
+    let bars = Bars::new();
+    let report = mateval_prep::render::render(&args.dataset, &options, &|step, done, all| bars.step(step, done, all))
+        .context("cannot render the dataset")?;
+    bars.finish();
+    for line in &report.remarks {
+        say(line);
+    }
+    print(&format!("{}: {} views rendered, {} were there\n", args.dataset.display(), report.rendered, report.kept));
+    Ok(Outcome::Good)
+}
+
+fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
+    let bars = Bars::new();
+    let findings = mateval_prep::verify::verify(&args.dataset, &|step, done, all| bars.step(step, done, all))
+        .with_context(|| format!("cannot verify '{}'", args.dataset.display()))?;
+    bars.finish();
+    let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
+    match args.format {
+        Format::Json => print(&mateval_scene::json::to_text(&findings)),
+        Format::Text => {
+            for finding in &findings {
+                print(&format!("{finding}\n"));
+            }
+            let verdict = if errors == 0 { "sound" } else { "NOT sound" };
+            print(&format!("{}: {verdict}, {errors} errors\n", args.dataset.display()));
+        }
+    }
+    Ok(if errors == 0 { Outcome::Good } else { Outcome::No })
+}

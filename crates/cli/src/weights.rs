@@ -1,0 +1,31 @@
+//! Where LPIPS' weights are, and what to say where they are not.
+
+use std::path::PathBuf;
+
+use mateval_eval::score::LpipsWeights;
+use mateval_metrics::{Lpips, Net};
+
+use crate::outcome::say;
+
+/// The command that mends missing weights, from the project's folder.
+pub const MEND: &str = "python3 tools/fetch_lpips_weights.py";
+
+/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`: the same as `tools/fetch_lpips_weights.py`.
+pub fn cache_folder() -> PathBuf {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    set("MATEVAL_CACHE")
+        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
+        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))
+        .unwrap_or_default()
+}
+
+/// The network, or why it is not there (which is said too).
+pub fn load(net: Net) -> LpipsWeights {
+    match Lpips::load(net, &cache_folder().join(net.file_name())) {
+        Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
+        Err(error) => {
+            say(&format!("warning: lpips_{} is missing: {error}; run: {MEND}", net.key()));
+            LpipsWeights::Missing { reason: error.to_string(), mend: MEND.to_owned() }
+        }
+    }
+}

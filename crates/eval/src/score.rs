@@ -1,0 +1,260 @@
+//! Submissions scored on a dataset.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_metrics::Lpips;
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::open::Dataset;
+use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
+use mateval_scene::{Finding, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io};
+use mateval_tracer::World;
+
+use crate::albedo::albedo_pictures;
+use crate::alignment::{channel_scales, scaled};
+use crate::error::EvalError;
+use crate::measure::albedo_metrics;
+use crate::prediction::{PredictedScene, read_scene};
+use crate::protocol::Protocol;
+use crate::result::{
+    DatasetId, MissingMetric, PictureValue, ProtocolResult, RESULT_FORMAT, Region, ResultFile, SubmissionId, means,
+};
+
+/// The network that scores use, or why it is not there.
+pub enum LpipsWeights {
+    /// Loaded.
+    Loaded(Box<Lpips>),
+    /// Not to be had.
+    Missing {
+        /// Why.
+        reason: String,
+        /// The command that mends it.
+        mend: String,
+    },
+}
+
+impl LpipsWeights {
+    fn network(&self) -> Option<&Lpips> {
+        match self {
+            Self::Loaded(lpips) => Some(lpips),
+            Self::Missing { .. } => None,
+        }
+    }
+}
+
+/// What to score.
+pub struct ScorePlan<'a> {
+    /// On what.
+    pub dataset: &'a Dataset,
+    /// Submission folders.
+    pub submissions: Vec<&'a Path>,
+    /// Under which rules.
+    pub protocols: Vec<Protocol>,
+    /// Only these scenes; all where empty.
+    pub scenes: Vec<SceneId>,
+    /// The network of LPIPS.
+    pub lpips: LpipsWeights,
+    /// Name and version of the tool, for the result.
+    pub tool: String,
+}
+
+/// Called with the step's name, how much of it is done, and how much there is.
+pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
+
+/// One submission on its way to a result.
+struct Entry {
+    file: SubmissionFile,
+    findings: Vec<Finding>,
+    files: Vec<(String, String)>,
+    /// By protocol.
+    pictures: Vec<Vec<PictureValue>>,
+}
+
+/// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them.
+pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
+    let scenes = chosen_scenes(plan)?;
+    let mut entries =
+        plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
+    for (at, scene) in scenes.iter().enumerate() {
+        progress(&format!("scene {}", scene.id), at, scenes.len());
+        score_scene(plan, scene, &mut entries)?;
+    }
+    progress("scenes", scenes.len(), scenes.len());
+    Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
+}
+
+fn chosen_scenes<'a>(plan: &ScorePlan<'a>) -> Result<Vec<&'a SceneFile>, EvalError> {
+    let all = &plan.dataset.scenes;
+    let unknown: Vec<String> = plan
+        .scenes
+        .iter()
+        .filter(|id| !all.iter().any(|scene| scene.id == **id))
+        .map(|id| format!("the dataset has no scene '{id}'"))
+        .collect();
+    if !unknown.is_empty() {
+        let known: Vec<&str> = all.iter().map(|scene| scene.id.as_str()).collect();
+        return Err(EvalError::Invalid(format!("{}; it has: {}", unknown.join("; "), known.join(", "))));
+    }
+    Ok(all.iter().filter(|scene| plan.scenes.is_empty() || plan.scenes.contains(&scene.id)).collect())
+}
+
+fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
+    let file: SubmissionFile = json::read(&path.join(SUBMISSION))?;
+    if file.format != SUBMISSION_FORMAT {
+        let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", file.format);
+        return Err(SceneError::Unsupported { path: path.join(SUBMISSION), what }.into());
+    }
+    let mut findings = Vec::new();
+    let expected = &plan.dataset.file.manifest_sha256;
+    if file.dataset_manifest_sha256 != *expected {
+        findings.push(Finding {
+            severity: Severity::Warning,
+            code: "other_dataset".to_owned(),
+            file: SUBMISSION.to_owned(),
+            place: "/dataset_manifest_sha256".to_owned(),
+            message: format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
+            action: "scored all the same; make it anew for this dataset".to_owned(),
+        });
+    }
+    Ok(Entry { file, findings, files: Vec::new(), pictures: vec![Vec::new(); plan.protocols.len()] })
+}
+
+fn score_scene(plan: &ScorePlan<'_>, scene: &SceneFile, entries: &mut [Entry]) -> Result<(), EvalError> {
+    let folder = plan.dataset.folder(&scene.id);
+    let world = World::new(Arc::new(reference_io::read(&folder)?));
+    let atlases = read_atlases(&folder, &world)?;
+    let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
+    for view in scored_views(plan, scene) {
+        let pictures = albedo_pictures(&world, &atlases, &view.camera, &predictions);
+        let truth = Truth::read(&folder, view)?;
+        for (entry, picture) in entries.iter_mut().zip(&pictures) {
+            for (protocol, values) in plan.protocols.iter().zip(&mut entry.pictures) {
+                values.extend(picture_values(plan, protocol, scene, view, picture, &truth)?);
+            }
+        }
+    }
+    for (entry, prediction) in entries.iter_mut().zip(predictions) {
+        entry.findings.extend(prediction.findings);
+        entry.files.extend(prediction.files);
+    }
+    Ok(())
+}
+
+/// The views of the scene that `targets.json` names, in the scene's order.
+fn scored_views<'a>(plan: &ScorePlan<'_>, scene: &'a SceneFile) -> impl Iterator<Item = &'a View> {
+    let targets = &plan.dataset.targets.targets;
+    scene.views.iter().filter(move |view| targets.iter().any(|t| t.scene == scene.id && t.view == view.id))
+}
+
+/// The meshes of `instances.glb`; the same triangles as the world's surfaces, or the dataset is unsound.
+fn read_atlases(folder: &SceneFolder, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
+    let meshes: Vec<TriangleMesh> = glb::read(&folder.instances())?.into_iter().map(|node| node.mesh).collect();
+    let surfaces = &world.scene().surfaces;
+    let fits = meshes.len() == surfaces.len()
+        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
+    if fits {
+        return Ok(meshes);
+    }
+    let path = folder.instances();
+    let what = "its triangles are not those of ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
+}
+
+/// What a view is compared with.
+struct Truth {
+    albedo: Picture<LinearRgb>,
+    valid: Mask,
+    /// None for the input view.
+    unobserved: Option<Mask>,
+}
+
+impl Truth {
+    fn read(folder: &SceneFolder, view: &View) -> Result<Self, EvalError> {
+        let shown = folder.view(&view.id);
+        let is_input = view.id.as_str() == INPUT;
+        let unobserved = (!is_input).then(|| png_io::read_mask(&shown.join("unobserved.png"))).transpose()?;
+        Ok(Self {
+            albedo: exr_io::read_linear(&folder.truth_view(&view.id).join("albedo.exr"))?,
+            valid: png_io::read_mask(&shown.join("valid.png"))?,
+            unobserved,
+        })
+    }
+}
+
+/// Albedo raw and aligned, over all valid pixels and over the unobserved ones (which keep their picture's scale).
+fn picture_values(
+    plan: &ScorePlan<'_>,
+    protocol: &Protocol,
+    scene: &SceneFile,
+    view: &View,
+    predicted: &Picture<LinearRgb>,
+    truth: &Truth,
+) -> Result<Vec<PictureValue>, EvalError> {
+    let failed = |source| EvalError::Metric { what: format!("scene '{}', view '{}'", scene.id, view.id), source };
+    if !predicted.same_size(&truth.albedo) || !predicted.same_size(&truth.valid) {
+        let what =
+            format!("scene '{}', view '{}': the truth's pictures are not of the camera's size", scene.id, view.id);
+        return Err(EvalError::Invalid(format!("{what}; run `mateval prep verify`")));
+    }
+    let aligned = scaled(predicted, channel_scales(predicted, &truth.albedo, &truth.valid));
+    let regions = std::iter::once((Region::Valid, &truth.valid))
+        .chain(truth.unobserved.iter().map(|mask| (Region::Unobserved, mask)));
+    let mut values = Vec::new();
+    for (region, mask) in regions {
+        for (name, picture) in [("albedo", predicted), ("albedo_aligned", &aligned)] {
+            let measured =
+                albedo_metrics(protocol, plan.lpips.network(), picture, &truth.albedo, mask).map_err(failed)?;
+            values.extend(measured.into_iter().map(|measured| PictureValue {
+                scene: scene.id.clone(),
+                view: view.id.clone(),
+                picture: name.to_owned(),
+                region,
+                metric: measured.metric,
+                value: measured.value,
+                exact: measured.exact,
+                count: measured.count,
+            }));
+        }
+    }
+    Ok(values)
+}
+
+fn finish(plan: &ScorePlan<'_>, scenes: &[&SceneFile], mut entry: Entry) -> ResultFile {
+    let manifest = &plan.dataset.file.manifest_sha256;
+    let weights = plan.lpips.network().map(Lpips::sha256);
+    let protocols = plan.protocols.iter().zip(entry.pictures).map(|(protocol, pictures)| {
+        let (scenes, summary) = means(&pictures);
+        let fingerprint = protocol.fingerprint(manifest, weights);
+        (protocol.name.clone(), ProtocolResult { protocol: protocol.clone(), fingerprint, summary, scenes, pictures })
+    });
+    let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
+    let missing = match &plan.lpips {
+        LpipsWeights::Loaded(_) => Vec::new(),
+        LpipsWeights::Missing { reason, mend } => {
+            vec![MissingMetric { metric: "lpips_alex".to_owned(), reason: reason.clone(), mend: mend.clone() }]
+        }
+    };
+    entry.findings.sort();
+    let files: String = entry.files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
+    ResultFile {
+        format: RESULT_FORMAT.to_owned(),
+        tool: plan.tool.clone(),
+        method: entry.file.method,
+        submission: SubmissionId { sha256: sha256_of_bytes(files.as_bytes()), description: entry.file.description },
+        dataset: DatasetId {
+            name: plan.dataset.file.name.clone(),
+            version: plan.dataset.file.version.clone(),
+            manifest_sha256: manifest.clone(),
+            scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
+            scenes_in_all: plan.dataset.scenes.len(),
+        },
+        lpips_weights: BTreeMap::from([("alex".to_owned(), weights.map(str::to_owned))]),
+        protocols,
+        missing,
+        findings: entry.findings,
+    }
+}

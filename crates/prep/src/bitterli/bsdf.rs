@@ -1,0 +1,154 @@
+//! BSDFs: wrappers (`twosided`, `mask`, `bumpmap`) in any order around one model become one flat material.
+
+use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput};
+use mateval_scene::reference::MaterialIndex;
+
+use super::document::Element;
+use super::log::shortened;
+use super::parameters::Parameters;
+use super::reader::Reader;
+
+/// More wrappers than this are a loop of references.
+const MOST_WRAPPERS: usize = 16;
+
+impl<'a> Reader<'a> {
+    /// The material of the BSDF `element`, made once. Without an id it is called after `owner`, the shape.
+    pub(super) fn material(&mut self, element: &'a Element, owner: &str) -> MaterialIndex {
+        if let Some(known) = self.materials.get(&element.serial) {
+            return *known;
+        }
+        let material = self.flat_material(element, owner);
+        let index = self.add_material(material);
+        self.materials.insert(element.serial, index);
+        index
+    }
+
+    /// What a shape without a BSDF is made of, as in Mitsuba: grey, or black where it emits.
+    pub(super) fn default_material(&mut self, owner: &str, emits: bool) -> MaterialIndex {
+        let reflectance = if emits { 0.0 } else { 0.5 };
+        self.add_material(Material {
+            name: owner.to_owned(),
+            model: diffuse(reflectance),
+            two_sided: false,
+            opacity: None,
+            bump: None,
+        })
+    }
+
+    fn add_material(&mut self, material: Material) -> MaterialIndex {
+        self.scene.materials.push(material);
+        MaterialIndex(self.scene.materials.len() - 1)
+    }
+
+    fn flat_material(&mut self, outer: &'a Element, owner: &str) -> Material {
+        let mut material =
+            Material { name: owner.to_owned(), model: diffuse(0.5), two_sided: false, opacity: None, bump: None };
+        let mut named = false;
+        let mut element = outer;
+        for _ in 0..MOST_WRAPPERS {
+            if let (Some(id), false) = (element.attribute("id"), named) {
+                (material.name, named) = (id.to_owned(), true);
+            }
+            let place = if named { format!("bsdf '{}'", shortened(&material.name)) } else { place_of(element, owner) };
+            let mut from = self.parameters(element, place);
+            let inner = self.unwrap_layer(element, &mut from, &mut material);
+            from.finish(&mut self.log);
+            match inner {
+                Some(inner) => element = inner,
+                None => return material,
+            }
+        }
+        let message = format!("more than {MOST_WRAPPERS} BSDFs within each other");
+        self.log.warn("nested_too_deep", &place_of(outer, owner), message, "used diffuse grey 0.5");
+        material
+    }
+
+    /// Takes one layer into `material`; gives the BSDF within, or none at the innermost.
+    fn unwrap_layer(
+        &mut self,
+        element: &'a Element,
+        from: &mut Parameters<'a>,
+        material: &mut Material,
+    ) -> Option<&'a Element> {
+        match element.kind() {
+            "twosided" => material.two_sided = true,
+            "mask" => {
+                let opacity = self.opacity(from, "opacity");
+                self.set_opacity(material, opacity, &from.place);
+            }
+            "bumpmap" | "bump" => self.bump(from, material),
+            "null" => {
+                self.set_opacity(material, Some(ScalarInput::Constant(0.0)), &from.place);
+                return None;
+            }
+            "normalmap" | "blendbsdf" | "mixturebsdf" | "coating" | "roughcoating" => self.replaced(element, from),
+            _ => {
+                material.model = self.model(element, from);
+                return None;
+            }
+        }
+        self.only_child(from)
+    }
+
+    fn set_opacity(&mut self, material: &mut Material, opacity: Option<ScalarInput>, place: &str) {
+        if material.opacity.is_some() {
+            self.log.warn("unsupported", place, "a mask within a mask", "used the outer one");
+        } else {
+            material.opacity = opacity;
+        }
+    }
+
+    /// Mitsuba moves the surface by `scale` times the texture's luminance, in scene units.
+    fn bump(&mut self, from: &mut Parameters<'a>, material: &mut Material) {
+        let scale = from.number("scale", &mut self.log).unwrap_or(1.0) as f32;
+        let textures = from.objects("texture");
+        let Some(texture) = textures.first() else {
+            self.log.warn("missing_child", &from.place, "a bumpmap without texture", "left the bumps out");
+            return;
+        };
+        let height = self.height(texture, &from.place);
+        if material.bump.is_some() {
+            self.log.warn("unsupported", &from.place, "a bumpmap within a bumpmap", "used the outer one");
+        } else {
+            material.bump = height.map(|height| BumpMap { height, scale });
+        }
+    }
+
+    /// Wrappers that we have no word for.
+    fn replaced(&mut self, element: &Element, from: &mut Parameters<'a>) {
+        let message = format!("line {}: the bsdf '{}' is not supported", element.line, element.kind());
+        self.log.warn("unsupported", &from.place, message, "used the first bsdf in it");
+        from.objects("texture");
+        from.ignore(&["weight", "weights", "sigma_a", "thickness", "alpha", "int_ior", "ext_ior", "distribution"]);
+    }
+
+    fn only_child(&mut self, from: &mut Parameters<'a>) -> Option<&'a Element> {
+        let children = from.objects("bsdf");
+        match children.len() {
+            0 => self.log.warn("missing_child", &from.place, "no bsdf within", "used diffuse grey 0.5"),
+            1 => {}
+            more => {
+                let message = format!("{more} bsdfs within");
+                self.log.warn("unsupported", &from.place, message, "used the first one everywhere");
+            }
+        }
+        children.first().copied()
+    }
+
+    /// An unknown model is diffuse grey.
+    pub(super) fn unknown_model(&mut self, element: &Element, from: &mut Parameters<'a>) -> MaterialModel {
+        let message = format!("line {}: the bsdf '{}' is not known", element.line, shortened(element.kind()));
+        self.log.warn("unknown_plugin", &from.place, message, "used diffuse grey 0.5");
+        from.take_all();
+        diffuse(0.5)
+    }
+}
+
+fn diffuse(reflectance: f32) -> MaterialModel {
+    let reflectance = mateval_scene::material::ColorInput::Constant([reflectance; 3]);
+    MaterialModel::Diffuse { reflectance, alpha: None }
+}
+
+fn place_of(element: &Element, owner: &str) -> String {
+    if element.attribute("id").is_some() { element.place() } else { format!("bsdf of '{}'", shortened(owner)) }
+}

@@ -1,0 +1,114 @@
+//! Emitters: areas on shapes, an environment map, a constant world, sun and sky.
+
+use glam::{DMat3, DMat4};
+use mateval_image::Wrap;
+use mateval_scene::reference::{Emission, LightGroup, SurfaceIndex};
+
+use super::document::Element;
+use super::log::shortened;
+use super::parameters::Parameters;
+use super::reader::Reader;
+use super::source::SourceFolder;
+use super::texture::{Bounds, mean_color};
+
+impl<'a> Reader<'a> {
+    /// The emitter of a shape: it glows on its front side.
+    pub(super) fn area_light(&mut self, element: &'a Element, surface: SurfaceIndex, owner: &str) {
+        let mut from = self.parameters(element, format!("emitter of '{}'", shortened(owner)));
+        if element.kind() == "area" {
+            from.ignore(&["sampling_weight"]);
+            let radiance = self.radiance(&mut from, "radiance", [1.0; 3]);
+            let emission = Emission::Area { surfaces: vec![surface], radiance, two_sided: false };
+            self.add_light(LightGroup { name: owner.to_owned(), emission, camera_visible: true });
+        } else {
+            let message = format!("line {}: the emitter '{}' on a shape", element.line, shortened(element.kind()));
+            self.log.warn("unknown_plugin", &from.place, message, "the shape does not emit");
+            from.take_all();
+        }
+        from.finish(&mut self.log);
+    }
+
+    /// An emitter of the scene itself.
+    pub(super) fn scene_emitter(&mut self, element: &'a Element) {
+        let mut from = self.parameters(element, element.place());
+        from.ignore(&["sampling_weight"]);
+        let world = matches!(element.kind(), "envmap" | "constant" | "sunsky" | "sun" | "sky");
+        if world && self.has_environment {
+            let message = format!("line {}: a second environment, '{}'", element.line, element.kind());
+            self.log.warn("unsupported", &from.place, message, "left it out");
+            return;
+        }
+        self.has_environment |= world;
+        let light = match element.kind() {
+            "envmap" => self.environment_map(element, &mut from),
+            "constant" => {
+                let radiance = self.radiance(&mut from, "radiance", [1.0; 3]);
+                Some(("constant", Emission::Constant { radiance }))
+            }
+            kind @ ("sunsky" | "sun" | "sky") => self.sun_sky(kind, &mut from),
+            other => {
+                let message = format!("line {}: the emitter '{}' is not supported", element.line, shortened(other));
+                self.log.warn("unknown_plugin", &from.place, message, "left it out");
+                from.take_all();
+                None
+            }
+        };
+        if let Some((name, emission)) = light {
+            self.add_light(LightGroup { name: name.to_owned(), emission, camera_visible: true });
+        }
+        from.finish(&mut self.log);
+    }
+
+    fn radiance(&mut self, from: &mut Parameters<'a>, name: &str, default: [f32; 3]) -> [f32; 3] {
+        let Some(element) = from.take(&[name]) else { return default };
+        if element.tag != "texture" {
+            return self.constant(element, &from.place, Bounds::NotNegative).unwrap_or(default);
+        }
+        let message = format!("line {}: a texture as radiance", element.line);
+        self.log.warn("unsupported", &from.place, message, "used its mean colour");
+        let mean = self.texture_mean(element, &from.place);
+        mean.unwrap_or(default)
+    }
+
+    /// The mean colour of a bitmap; none where it cannot be read.
+    fn texture_mean(&mut self, element: &'a Element, place: &str) -> Option<[f32; 3]> {
+        let index = self.color_texture(element, place)?;
+        Some(mean_color(&self.scene.textures[index.0].texture).map(|v| v as f32))
+    }
+
+    fn environment_map(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<(&'static str, Emission)> {
+        let name = from.string("filename").unwrap_or("");
+        let scale = from.number_within("scale", 0.0, 1e9, &mut self.log).unwrap_or(1.0) as f32;
+        let to_world = from.transform("to_world", &mut self.log);
+        let world_from_environment = self.rotation(to_world, &from.place);
+        from.ignore(&["cache", "gamma", "mis_compensation"]);
+        let picture = SourceFolder::relative(name)
+            .and_then(|file| Ok((self.read_picture(&file, false, Wrap::Repeat, false)?, file)));
+        match picture {
+            Ok((texture, file)) => {
+                let texture = self.add_texture(file, texture);
+                Some(("environment", Emission::Environment { texture, scale, world_from_environment }))
+            }
+            Err(fault) => {
+                self.report_file(name, &from.place, element.line, &fault, "left the environment out: it is black");
+                None
+            }
+        }
+    }
+
+    /// The rotation in a transform, row-major; what else is in it is a finding.
+    pub(super) fn rotation(&mut self, transform: DMat4, place: &str) -> [[f32; 3]; 3] {
+        let linear = DMat3::from_mat4(transform);
+        let x = linear.x_axis.normalize_or(glam::DVec3::X);
+        let y = (linear.y_axis - x * x.dot(linear.y_axis)).try_normalize().unwrap_or(x.any_orthonormal_vector());
+        let z = x.cross(y);
+        // A mirror is kept: its axes are orthonormal too.
+        let rotation = DMat3::from_cols(x, y, if z.dot(linear.z_axis) < 0.0 { -z } else { z });
+        let miss = (rotation - linear).to_cols_array().iter().fold(0.0_f64, |worst, v| worst.max(v.abs()));
+        if miss > 1e-4 {
+            let message = "the emitter's to_world holds scale or shear";
+            self.log.warn("not_a_rotation", place, message, "used its rotation alone");
+        }
+        rotation.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32))
+    }
+}

@@ -1,0 +1,198 @@
+//! Reads Bitterli's scenes: Mitsuba XML of versions 0.5, 0.6 and 3, with OBJ meshes and textures beside it.
+//!
+//! In: the path of a scene's XML; nothing outside of its folder is read. Out: a [`BitterliScene`]. Whatever is not known,
+//! missing or faulty is a finding, and the scene goes on without it; an error is left for what is no scene at all.
+//!
+//! Between: `document` makes a tree of the XML (depth and size checked, variables put in, names in snake_case),
+//! `parameters` takes what a plugin knows and reports the rest, and each kind of plugin has its file: `sensor`, `shape`
+//! (with `obj`, `primitives`, `surface_mesh`), `bsdf` (with `bsdf_model`, `ior`), `texture`, `emitter` (with `sun_sky`,
+//! `sun`). Where the documentation of Mitsuba leaves room, Mitsuba 3.9.1 was asked; the tests cite its answers.
+
+mod bsdf;
+mod bsdf_model;
+mod document;
+mod emitter;
+mod error;
+mod ior;
+mod limits;
+mod log;
+mod obj;
+mod parameters;
+mod primitives;
+mod reader;
+mod sensor;
+mod shape;
+mod source;
+mod sun;
+mod sun_sky;
+mod surface_mesh;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_real;
+mod texture;
+mod transform;
+mod value;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::{Camera, Finding};
+
+use document::Document;
+pub use error::BitterliError;
+pub use limits::Limits;
+use log::{Log, shortened};
+use reader::{Reader, Totals};
+use source::SourceFolder;
+
+/// A licence that must travel with the scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LicenceText {
+    /// The file's name in the scene's folder.
+    pub file: String,
+    /// What it says.
+    pub text: String,
+}
+
+/// A scene of Bitterli's resources.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BitterliScene {
+    /// The scene's name and author as its licence tells them, as in `'Modern Hall' by NewSee2l035`; else the folder's.
+    pub title: String,
+    /// Everything in it, world space.
+    pub scene: ReferenceScene,
+    /// Its first sensor; the picture's size is that of the film's crop window.
+    pub camera: Camera,
+    /// What was left out, replaced or approximated; sorted.
+    pub findings: Vec<Finding>,
+    /// `LICENSE.txt` beside the XML, if there is one.
+    pub licence: Option<LicenceText>,
+    /// Every file read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
+    pub source_files: Vec<(String, String)>,
+}
+
+/// Reads the scene whose XML is at `xml_path`.
+///
+/// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
+pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, BitterliError> {
+    let invalid = |what: String| BitterliError::Invalid { path: xml_path.to_owned(), what };
+    let (mut source, name, text) = read_xml_file(xml_path, limits)?;
+    let mut log = Log::new(name, limits.findings);
+    let document = Document::parse(xml_path, &text, limits, &mut log)?;
+    let ids = document.ids(&mut log);
+    let licence = read_licence(&mut source);
+    let mut reader = Reader {
+        ids,
+        major_version: document.major_version,
+        limits: *limits,
+        log,
+        source,
+        scene: ReferenceScene::default(),
+        textures: BTreeMap::new(),
+        texels: 0,
+        alphas: BTreeMap::new(),
+        materials: BTreeMap::new(),
+        totals: Totals::default(),
+        has_environment: false,
+        light_names: BTreeSet::new(),
+        light_numbers: BTreeMap::new(),
+    };
+    let camera = read_elements(&mut reader, &document).map_err(invalid)?;
+    report_unused(&mut reader, &document);
+    let title = title(licence.as_ref(), xml_path);
+    let Reader { scene, log, source, .. } = reader;
+    Ok(BitterliScene {
+        title,
+        scene,
+        camera,
+        findings: log.into_findings(),
+        licence,
+        source_files: source.into_hashes(),
+    })
+}
+
+fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), BitterliError> {
+    let io = |source| BitterliError::Io { path: xml_path.to_owned(), source };
+    let invalid = |what: String| BitterliError::Invalid { path: xml_path.to_owned(), what };
+    let size = std::fs::metadata(xml_path).map_err(io)?.len();
+    if size > limits.xml_bytes {
+        return Err(invalid(format!("expected at most {} bytes of XML, found {size}", limits.xml_bytes)));
+    }
+    let name = xml_path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.ok_or_else(|| invalid("expected the path of a file".to_owned()))?;
+    let folder = xml_path.parent().map_or(PathBuf::new(), Path::to_owned);
+    let mut source = SourceFolder::new(&folder, limits.file_bytes).map_err(io)?;
+    let bytes = source.read(&name).map_err(|fault| invalid(fault.message))?;
+    let text = String::from_utf8(bytes).map_err(|_| invalid("expected UTF-8, found other bytes".to_owned()))?;
+    Ok((source, name, text))
+}
+
+fn read_licence(source: &mut SourceFolder) -> Option<LicenceText> {
+    let file = ["LICENSE.txt", "LICENSE", "license.txt"].into_iter().find(|name| source.path(name).is_ok())?;
+    let text = String::from_utf8_lossy(&source.read(file).ok()?).into_owned();
+    Some(LicenceText { file: file.to_owned(), text })
+}
+
+/// What a `LICENSE.txt` of Bitterli's says between "version of" and the comma, else the name of the folder.
+fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
+    let first = licence.and_then(|licence| licence.text.lines().next()).unwrap_or("");
+    let named = first.split_once("version of ").map(|(_, rest)| rest.split(',').next().unwrap_or(rest).trim());
+    if let Some(named) = named.filter(|named| !named.is_empty()) {
+        return shortened(named).replace("\\'", "'");
+    }
+    let folder = xml_path.canonicalize().ok().and_then(|path| path.parent()?.file_name().map(|n| n.to_owned()));
+    folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
+}
+
+/// Reads everything at the top of the scene; the camera is what it must have.
+fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<Camera, String> {
+    let mut camera = None;
+    let mut shapes = 0;
+    for element in &document.root.children {
+        match element.tag.as_str() {
+            "shape" if shapes < reader.limits.shapes => {
+                shapes += 1;
+                reader.shape(element);
+            }
+            "shape" => {
+                let message = format!("the scene has more than {} shapes", reader.limits.shapes);
+                reader.log.warn("limit", "", message, "left the rest out");
+            }
+            "sensor" if camera.is_none() => camera = Some(reader.sensor(element)?),
+            "sensor" => reader.log.warn("unsupported", &element.place(), "a second sensor", "used the first one"),
+            "emitter" => reader.scene_emitter(element),
+            "medium" => reader.log.warn("unsupported", &element.place(), "a medium", "ignored it"),
+            "bsdf" | "texture" | "integrator" | "sampler" | "film" | "alias" => {}
+            "include" => {
+                let message = format!("line {}: <include> is not followed", element.line);
+                reader.log.warn("unsupported", &element.place(), message, "left out what it includes");
+            }
+            other => {
+                let message = format!("line {}: <{}> is not known", element.line, shortened(other));
+                reader.log.warn("unknown_element", &element.place(), message, "ignored");
+            }
+        }
+    }
+    camera.ok_or_else(|| "expected a <sensor>, found none: there is nothing to look through".to_owned())
+}
+
+/// BSDFs that no shape uses. A `bumpmap` around the BSDF with the id is one: references mean what has the id, so in
+/// Mitsuba, too, such bumps do not show.
+fn report_unused(reader: &mut Reader, document: &Document) {
+    for element in document.root.children.iter().filter(|e| e.tag == "bsdf") {
+        if reader.materials.contains_key(&element.serial) {
+            continue;
+        }
+        let inner = element.children.iter().find(|c| c.tag == "bsdf" && reader.materials.contains_key(&c.serial));
+        let (message, action) = match inner {
+            Some(inner) => (
+                format!("shapes refer to the {} within, not to this {}", inner.place(), element.kind()),
+                format!("left the {} out, as Mitsuba does", element.kind()),
+            ),
+            None => ("no shape uses this bsdf".to_owned(), "left it out".to_owned()),
+        };
+        reader.log.note("unused_bsdf", &element.place(), message, action);
+    }
+}

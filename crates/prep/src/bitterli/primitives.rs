@@ -1,0 +1,183 @@
+//! Mitsuba's shapes without a file, in their own space, as triangles. Normals point to the front; v grows upwards, so it
+//! is one minus Mitsuba's.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use mateval_scene::TriangleMesh;
+
+/// Straight pieces of a full circle.
+pub(super) const SEGMENTS: u32 = 64;
+
+/// A mesh under construction.
+#[derive(Default)]
+struct Builder {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Builder {
+    /// `uv` is Mitsuba's.
+    fn vertex(&mut self, position: DVec3, normal: DVec3, uv: DVec2) -> u32 {
+        self.positions.push(position.as_vec3());
+        self.normals.push(normal.as_vec3());
+        self.uvs.push(DVec2::new(uv.x, 1.0 - uv.y).as_vec2());
+        self.positions.len() as u32 - 1
+    }
+
+    /// Two triangles of four corners, counter-clockwise.
+    fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
+        self.triangles.extend([[a, b, c], [a, c, d]]);
+    }
+
+    fn finish(self) -> TriangleMesh {
+        TriangleMesh {
+            positions: self.positions,
+            normals: Some(self.normals),
+            uvs: Some(self.uvs),
+            triangles: self.triangles,
+        }
+    }
+}
+
+/// [-1, 1]^2 at z = 0, front +z; Mitsuba's uv (0, 0) lies at (-1, -1).
+pub(super) fn rectangle() -> TriangleMesh {
+    let mut build = Builder::default();
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+    let ids = corners
+        .map(|(x, y)| build.vertex(DVec3::new(x, y, 0.0), DVec3::Z, DVec2::new((x + 1.0) / 2.0, (y + 1.0) / 2.0)));
+    build.quad(ids);
+    build.finish()
+}
+
+/// The box [-1, 1]^3, each face with its own uv.
+pub(super) fn cube() -> TriangleMesh {
+    let mut build = Builder::default();
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        for normal in [axis, -axis] {
+            let right = DVec3::new(axis.y.abs() + axis.z.abs(), axis.x.abs(), 0.0).normalize();
+            let right = if axis == DVec3::X { DVec3::Z } else { right.with_y(0.0).normalize() };
+            let up = normal.cross(right);
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+            let ids = corners.map(|(x, y)| {
+                build.vertex(normal + right * x + up * y, normal, DVec2::new((x + 1.0) / 2.0, (y + 1.0) / 2.0))
+            });
+            build.quad(ids);
+        }
+    }
+    build.finish()
+}
+
+/// Radius 1 at z = 0, front +z, as a fan whose area is the disk's; uv = (radius, angle / 2 pi).
+pub(super) fn disk() -> TriangleMesh {
+    let mut build = Builder::default();
+    let step = 2.0 * PI / f64::from(SEGMENTS);
+    // A polygon inscribed in the unit circle is smaller by sin(step) / step.
+    let radius = (step / libm::sin(step)).sqrt();
+    for segment in 0..SEGMENTS {
+        let turn = |part: f64| (f64::from(segment) + part) / f64::from(SEGMENTS);
+        let rim = |part: f64| on_circle(turn(part)) * radius;
+        let middle = build.vertex(DVec3::ZERO, DVec3::Z, DVec2::new(0.0, turn(0.5)));
+        let a = build.vertex(rim(0.0), DVec3::Z, DVec2::new(1.0, turn(0.0)));
+        let b = build.vertex(rim(1.0), DVec3::Z, DVec2::new(1.0, turn(1.0)));
+        build.triangles.push([middle, a, b]);
+    }
+    build.finish()
+}
+
+/// The side of a cylinder, open at both ends, front outside.
+pub(super) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
+    let mut build = Builder::default();
+    let axis = (end - start).normalize_or_zero();
+    let (x, y) = axis.any_orthonormal_pair();
+    for segment in 0..SEGMENTS {
+        let corner = |build: &mut Builder, part: u32, far: bool| {
+            let turn = f64::from(segment + part) / f64::from(SEGMENTS);
+            let circle = on_circle(turn);
+            let normal = x * circle.x + y * circle.y;
+            let foot = if far { end } else { start };
+            build.vertex(foot + normal * radius, normal, DVec2::new(turn, f64::from(u8::from(far))))
+        };
+        let ids = [(0, false), (1, false), (1, true), (0, true)].map(|(part, far)| corner(&mut build, part, far));
+        build.quad(ids);
+    }
+    build.finish()
+}
+
+/// A sphere, front outside, poles at +-z; uv = (phi / 2 pi, theta / pi).
+pub(super) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
+    let mut build = Builder::default();
+    let (columns, rows) = (SEGMENTS, SEGMENTS / 2);
+    for row in 0..=rows {
+        let v = f64::from(row) / f64::from(rows);
+        let (sin, cos) = libm::sincos(PI * v);
+        for column in 0..=columns {
+            let u = f64::from(column) / f64::from(columns);
+            let normal = (on_circle(u) * sin).with_z(cos);
+            build.vertex(center + normal * radius, normal, DVec2::new(u, v));
+        }
+    }
+    let at = |row: u32, column: u32| row * (columns + 1) + column;
+    for row in 0..rows {
+        for column in 0..columns {
+            let [a, b] = [at(row, column), at(row, column + 1)];
+            let [c, d] = [at(row + 1, column), at(row + 1, column + 1)];
+            if row > 0 {
+                build.triangles.push([a, d, b]);
+            }
+            if row + 1 < rows {
+                build.triangles.push([a, c, d]);
+            }
+        }
+    }
+    build.finish()
+}
+
+/// A point of the unit circle in the plane z = 0, after `turn` full turns from +x.
+fn on_circle(turn: f64) -> DVec3 {
+    let (sin, cos) = libm::sincos(2.0 * PI * turn);
+    DVec3::new(cos, sin, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all() -> [(TriangleMesh, f64, f64); 5] {
+        [
+            (rectangle(), 4.0, 1e-12),
+            (cube(), 24.0, 1e-12),
+            (disk(), PI, 1e-6),
+            (cylinder(DVec3::ZERO, DVec3::Y * 2.0, 0.5), 2.0 * PI, 0.01),
+            (sphere(DVec3::X, 1.0), 4.0 * PI, 0.05),
+        ]
+    }
+
+    #[test]
+    fn areas() {
+        for (mesh, area, within) in all() {
+            assert!((mesh.area() - area).abs() < within, "{} {area}", mesh.area());
+        }
+    }
+
+    #[test]
+    fn winding_agrees_with_normals() {
+        for (mesh, ..) in all() {
+            let normals = mesh.normals.as_ref().unwrap();
+            for (index, triangle) in mesh.triangles.iter().enumerate() {
+                let [a, b, c] = mesh.corners(index);
+                let front = (b - a).cross(c - a).normalize();
+                assert!(triangle.iter().all(|&v| front.dot(normals[v as usize]) > 0.9));
+            }
+        }
+    }
+
+    /// Mitsuba 3.9.1: the rectangle's point (0.5, -0.5) has uv (0.75, 0.25); in ours v is one minus that.
+    #[test]
+    fn rectangle_uv() {
+        let mesh = rectangle();
+        assert_eq!(mesh.uvs.unwrap()[0], Vec2::new(0.0, 1.0));
+    }
+}

@@ -1,0 +1,160 @@
+//! The scene's folder: file names from the XML made safe, files read within limits, each one's hash kept.
+
+use std::collections::BTreeMap;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest as _, Sha256};
+
+/// Why a file that the XML names was not read.
+#[derive(Debug)]
+pub(super) struct FileFault {
+    /// The finding's code.
+    pub(super) code: &'static str,
+    /// What was expected and what was found.
+    pub(super) message: String,
+}
+
+/// The folder of the XML. Nothing outside of it is read.
+#[derive(Debug)]
+pub(super) struct SourceFolder {
+    root: PathBuf,
+    file_bytes: u64,
+    hashes: BTreeMap<String, String>,
+}
+
+impl SourceFolder {
+    /// `root` is the folder of the XML; no file of more than `file_bytes` is read.
+    pub(super) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
+        let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
+        Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new() })
+    }
+
+    /// A file name of the XML with forward slashes and without `.` and `..`; refused where it leads out.
+    pub(super) fn relative(name: &str) -> Result<String, FileFault> {
+        let forward = name.trim().replace('\\', "/");
+        let escapes = || FileFault {
+            code: "path_escapes",
+            message: format!("'{}' leads out of the scene's folder", super::log::shortened(name)),
+        };
+        if forward.is_empty() || forward.contains('\0') || forward.len() > 1024 {
+            let message = format!("expected a file name, found '{}'", super::log::shortened(name));
+            return Err(FileFault { code: "bad_value", message });
+        }
+        let drive = forward.as_bytes().get(1) == Some(&b':');
+        if forward.starts_with('/') || drive {
+            return Err(escapes());
+        }
+        let mut parts: Vec<&str> = Vec::new();
+        for part in forward.split('/') {
+            match part {
+                "" | "." => {}
+                ".." => drop(parts.pop().ok_or_else(escapes)?),
+                part => parts.push(part),
+            }
+        }
+        if parts.is_empty() { Err(escapes()) } else { Ok(parts.join("/")) }
+    }
+
+    /// The bytes of the file `relative`.
+    pub(super) fn read(&mut self, relative: &str) -> Result<Vec<u8>, FileFault> {
+        let path = self.path(relative)?;
+        let unreadable = |error: std::io::Error| FileFault {
+            code: "unreadable_file",
+            message: format!("'{}' cannot be read: {error}", super::log::shortened(relative)),
+        };
+        let file = std::fs::File::open(&path).map_err(unreadable)?;
+        let mut bytes = Vec::new();
+        file.take(self.file_bytes + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        if bytes.len() as u64 > self.file_bytes {
+            return Err(self.too_large(relative));
+        }
+        self.hashes.insert(relative.to_owned(), sha256_hex(&bytes));
+        Ok(bytes)
+    }
+
+    /// Where the file `relative` is: an ordinary file inside the folder and within the limit.
+    pub(super) fn path(&self, relative: &str) -> Result<PathBuf, FileFault> {
+        let short = super::log::shortened(relative);
+        let path = match self.root.join(relative).canonicalize() {
+            Ok(path) => path,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                return Err(FileFault { code: "missing_file", message: format!("the file '{short}' is not there") });
+            }
+            Err(error) => {
+                let message = format!("'{short}' cannot be read: {error}");
+                return Err(FileFault { code: "unreadable_file", message });
+            }
+        };
+        if !path.starts_with(&self.root) {
+            let message = format!("'{short}' is a link that leads out of the scene's folder");
+            return Err(FileFault { code: "path_escapes", message });
+        }
+        match path.metadata() {
+            Ok(data) if data.is_file() && data.len() <= self.file_bytes => Ok(path),
+            Ok(data) if data.is_file() => Err(self.too_large(relative)),
+            _ => Err(FileFault { code: "unreadable_file", message: format!("'{short}' is not an ordinary file") }),
+        }
+    }
+
+    fn too_large(&self, relative: &str) -> FileFault {
+        let message = format!("'{}' has more than {} bytes", super::log::shortened(relative), self.file_bytes);
+        FileFault { code: "limit", message }
+    }
+
+    /// The hash of a file that was read.
+    pub(super) fn hash(&self, relative: &str) -> Option<String> {
+        self.hashes.get(relative).cloned()
+    }
+
+    /// Every file that was read and its SHA-256, sorted by name.
+    pub(super) fn into_hashes(self) -> Vec<(String, String)> {
+        self.hashes.into_iter().collect()
+    }
+}
+
+fn sha256_hex(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_stay_inside() {
+        for (name, relative) in [("models\\a b.obj", "models/a b.obj"), ("./a/../b.png", "b.png"), ("a..b", "a..b")] {
+            assert_eq!(SourceFolder::relative(name).unwrap(), relative);
+        }
+        for bad in ["../a", "a/../../b", "/etc/passwd", "C:\\a", "", "..", ".", "a/.."] {
+            assert!(SourceFolder::relative(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn reads_hashes_and_limits() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a"), "abc").unwrap();
+        let mut source = SourceFolder::new(folder.path(), 3).unwrap();
+        assert_eq!(source.read("a").unwrap(), b"abc");
+        // FIPS 180-2's example.
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(source.hash("a").unwrap(), expected);
+        std::fs::write(folder.path().join("b"), "abcd").unwrap();
+        assert_eq!(source.read("b").unwrap_err().code, "limit");
+        assert_eq!(source.read("c").unwrap_err().code, "missing_file");
+        std::fs::create_dir(folder.path().join("d")).unwrap();
+        assert_eq!(source.read("d").unwrap_err().code, "unreadable_file");
+        assert_eq!(source.into_hashes().len(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_that_lead_out_are_refused() {
+        let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        std::fs::write(outside.path().join("a"), "abc").unwrap();
+        std::os::unix::fs::symlink(outside.path().join("a"), folder.path().join("a")).unwrap();
+        let mut source = SourceFolder::new(folder.path(), 3).unwrap();
+        assert_eq!(source.read("a").unwrap_err().code, "path_escapes");
+    }
+}

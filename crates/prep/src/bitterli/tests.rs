@@ -1,0 +1,428 @@
+//! Whole scenes, built here, with and without faults.
+
+use std::path::Path;
+
+use mateval_image::Texels;
+use mateval_scene::Severity;
+use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput};
+use mateval_scene::reference::{Emission, SurfaceIndex};
+use proptest::prelude::*;
+
+use super::*;
+
+const SENSOR: &str = "<sensor type='perspective'><float name='fov' value='60'/></sensor>";
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nf 1/1/1 2/2/1 3/3/1\n";
+
+/// A 2x2 sRGB PNG: red, green; blue, white.
+fn write_png(path: &Path) {
+    let bytes = [[255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]];
+    let picture = mateval_image::Picture::new(2, 2, bytes.to_vec()).unwrap();
+    mateval_image::png_io::write_rgb_bytes(path, &picture).unwrap();
+}
+
+fn folder_with(xml: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("scene.xml"), xml).unwrap();
+    std::fs::create_dir(folder.path().join("models")).unwrap();
+    std::fs::write(folder.path().join("models/a b.obj"), TRIANGLE).unwrap();
+    write_png(&folder.path().join("a b.png"));
+    folder
+}
+
+/// Reads a scene from a folder with `models/a b.obj` and `a b.png`.
+pub(super) fn read_xml(xml: &str) -> Result<BitterliScene, BitterliError> {
+    read(&folder_with(xml).path().join("scene.xml"), &Limits::default())
+}
+
+/// A scene of version 0.6 with a sensor and `inner`.
+fn read_inner(inner: &str) -> BitterliScene {
+    read_xml(&format!("<scene version='0.6.0'>{SENSOR}{inner}</scene>")).unwrap()
+}
+
+/// Codes of the findings above notes.
+fn codes(scene: &BitterliScene) -> Vec<&str> {
+    scene.findings.iter().filter(|f| f.severity != Severity::Note).map(|f| f.code.as_str()).collect()
+}
+
+fn only_model(bsdf: &str) -> (MaterialModel, BitterliScene) {
+    let scene = read_inner(&format!("<shape type='rectangle'>{bsdf}</shape>"));
+    (scene.scene.materials[0].model, scene)
+}
+
+const SCENE: &str = r#"<?xml version="1.0" encoding="utf-8"?><scene version="0.6.0">
+<default name="size" value="64"/>
+<integrator type="path"><integer name="maxDepth" value="65"/></integrator>
+<sensor type="perspective"><string name="fovAxis" value="y"/><float name="fov" value="60"/>
+ <transform name="toWorld"><lookAt origin="1,2,3" target="0,1,0" up="0,1,0"/></transform>
+ <film type="hdrfilm"><integer name="width" value="$size"/><integer name="height" value="32"/></film></sensor>
+<bsdf type="mask" id="Wood"><rgb name="opacity" value="0.5, 0.5, 0.5"/><bsdf type="twosided"><bsdf type="roughplastic">
+ <float name="alpha" value="0.1"/><string name="distribution" value="ggx"/>
+ <float name="intIOR" value="1.5"/><float name="extIOR" value="1"/><boolean name="nonlinear" value="true"/>
+ <texture name="diffuseReflectance" type="bitmap"><string name="filename" value="a b.png"/>
+  <string name="filterType" value="trilinear"/><string name="wrapMode" value="clamp"/></texture></bsdf></bsdf></bsdf>
+<bsdf type="twosided" id="Metal"><bsdf type="roughconductor"><float name="alpha" value="0.2"/>
+ <float name="extEta" value="2"/><rgb name="eta" value="2 4 6"/><rgb name="k" value="8, 4, 2"/>
+ <rgb name="specularReflectance" value="0.5"/></bsdf></bsdf>
+<shape type="obj" id="Table"><string name="filename" value="models/a b.obj"/><boolean name="faceNormals" value="true"/>
+ <transform name="toWorld"><scale value="2"/><translate x="1"/></transform><ref id="Wood"/></shape>
+<shape type="rectangle"><ref id="Metal"/><emitter type="area"><spectrum name="radiance" value="16.032"/></emitter></shape>
+<emitter type="envmap"><string name="filename" value="a b.png"/><float name="scale" value="3"/>
+ <transform name="toWorld"><rotate y="1" angle="90"/></transform></emitter>
+</scene>"#;
+
+#[test]
+fn the_three_versions_spell_one_scene() {
+    let second = read_xml(SCENE).unwrap();
+    assert_eq!(codes(&second), [""; 0]);
+    let first = read_xml(&SCENE.replace("0.6.0", "0.5.0")).unwrap();
+    let words = [
+        ("0.6.0", "3.0.0"),
+        ("maxDepth", "max_depth"),
+        ("fovAxis", "fov_axis"),
+        ("toWorld", "to_world"),
+        ("lookAt", "lookat"),
+        ("intIOR", "int_ior"),
+        ("extIOR", "ext_ior"),
+        ("diffuseReflectance", "diffuse_reflectance"),
+        ("filterType", "filter_type"),
+        ("wrapMode", "wrap_mode"),
+        ("extEta", "ext_eta"),
+        ("specularReflectance", "specular_reflectance"),
+        ("faceNormals", "face_normals"),
+    ];
+    let third = words.iter().fold(SCENE.to_owned(), |xml, (old, new)| xml.replace(old, new));
+    let third = read_xml(&third).unwrap();
+    for other in [first, third] {
+        assert_eq!((&other.scene, &other.camera, &other.findings), (&second.scene, &second.camera, &second.findings));
+    }
+    // Twin: another number is another scene.
+    assert_ne!(read_xml(&SCENE.replace("16.032", "16.033")).unwrap().scene, second.scene);
+}
+
+#[test]
+fn what_the_scene_says_is_there() {
+    let BitterliScene { scene, camera, source_files, .. } = read_xml(SCENE).unwrap();
+    assert_eq!((camera.intrinsics.width, camera.intrinsics.height), (64, 32));
+    assert_eq!(camera.position(), glam::DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(scene.surfaces[0].name, "Table");
+    assert_eq!(scene.surfaces[0].mesh.positions[1], glam::Vec3::new(3.0, 0.0, 0.0));
+    assert!(scene.surfaces[0].mesh.normals.is_none());
+    let wood = &scene.materials[0];
+    assert!(wood.two_sided && wood.name == "Wood" && wood.opacity == Some(ScalarInput::Constant(0.5)));
+    let MaterialModel::Conductor { ior, .. } = scene.materials[1].model else { panic!("expected a conductor") };
+    assert_eq!(ior, ConductorIor::EtaK { eta: [1.0, 2.0, 3.0], k: [4.0, 2.0, 1.0] });
+    let emission = Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [16.032; 3], two_sided: false };
+    assert_eq!(scene.lights[0].emission, emission);
+    let Emission::Environment { scale, world_from_environment, .. } = scene.lights[1].emission else {
+        panic!("expected an environment")
+    };
+    assert_eq!(scale, 3.0);
+    // A quarter turn about y takes +z to +x.
+    assert!((world_from_environment[0][2] - 1.0).abs() < 1e-6);
+    let files: Vec<_> = source_files.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(files, ["a b.png", "models/a b.obj", "scene.xml"]);
+}
+
+#[test]
+fn wrappers_may_nest_in_any_order() {
+    let texture = "<texture type='bitmap'><string name='filename' value='a b.png'/></texture>";
+    let wrap = |order: [&str; 3]| {
+        let inner = "<bsdf type='diffuse'/>".to_owned();
+        let bsdf = order.iter().rev().fold(inner, |inner, kind| match *kind {
+            "mask" => format!("<bsdf type='mask'><float name='opacity' value='0.25'/>{inner}</bsdf>"),
+            "bumpmap" => format!("<bsdf type='bumpmap'>{texture}{inner}</bsdf>"),
+            kind => format!("<bsdf type='{kind}'>{inner}</bsdf>"),
+        });
+        let scene = read_inner(&format!("<shape type='rectangle'>{bsdf}</shape>"));
+        assert_eq!(codes(&scene), [""; 0]);
+        scene.scene.materials
+    };
+    let first = wrap(["mask", "bumpmap", "twosided"]);
+    assert!(first[0].two_sided && first[0].opacity.is_some() && first[0].bump.is_some());
+    for order in [["twosided", "bumpmap", "mask"], ["bumpmap", "twosided", "mask"], ["bumpmap", "mask", "twosided"]] {
+        assert_eq!(wrap(order), first);
+    }
+}
+
+#[test]
+fn an_id_within_a_bumpmap_means_what_has_it() {
+    let bsdf = "<bsdf type='bumpmap'><texture name='map' type='bitmap'><string name='filename' value='a b.png'/>\
+                </texture><bsdf type='twosided' id='Floor'><bsdf type='diffuse'/></bsdf></bsdf>";
+    let scene = read_inner(&format!("{bsdf}<shape type='rectangle'><ref id='Floor'/></shape>"));
+    assert!(scene.scene.materials[0].bump.is_none());
+    assert!(scene.findings.iter().any(|f| f.code == "unused_bsdf" && f.message.contains("Floor")));
+}
+
+#[test]
+fn defaults_are_those_of_the_version() {
+    let cu = only_model("<bsdf type='conductor'/>").0;
+    let MaterialModel::Conductor { ior: ConductorIor::EtaK { eta, .. }, .. } = cu else { panic!("{cu:?}") };
+    assert!((eta[0] - 0.201).abs() < 1e-3);
+    let none = only_model("<bsdf type='roughconductor'><string name='material' value='none'/></bsdf>").0;
+    assert!(matches!(none, MaterialModel::Conductor { ior: ConductorIor::PerfectMirror, microfacets: Some(_), .. }));
+    let three =
+        format!("<scene version='3.0.0'>{SENSOR}<shape type='rectangle'><bsdf type='conductor'/></shape></scene>");
+    let three = read_xml(&three).unwrap().scene.materials[0].model;
+    assert!(matches!(three, MaterialModel::Conductor { ior: ConductorIor::PerfectMirror, microfacets: None, .. }));
+    let MaterialModel::Plastic { eta, nonlinear, .. } = only_model("<bsdf type='plastic'/>").0 else { panic!() };
+    assert!((eta - 1.48959).abs() < 1e-5 && !nonlinear);
+    let water = "<bsdf type='dielectric'><string name='intIOR' value='water'/><float name='extIOR' value='1'/></bsdf>";
+    let MaterialModel::Dielectric { eta, .. } = only_model(water).0 else { panic!() };
+    assert_eq!(eta, 1.333);
+}
+
+#[test]
+fn a_shape_without_bsdf_is_grey_and_a_lamp_black() {
+    let scene = read_inner("<shape type='rectangle'/><shape type='rectangle'><emitter type='area'/></shape>").scene;
+    let reflectance = |value| ColorInput::Constant([value; 3]);
+    for (material, value) in scene.materials.iter().zip([0.5, 0.0]) {
+        assert_eq!(material.model, MaterialModel::Diffuse { reflectance: reflectance(value), alpha: None });
+    }
+    assert_eq!(
+        scene.lights[0].emission,
+        Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [1.0; 3], two_sided: false }
+    );
+}
+
+#[test]
+fn each_fault_is_a_finding_and_the_scene_goes_on() {
+    for (inner, code) in [
+        ("<shape type='teapot'/>", "unknown_plugin"),
+        ("<shape type='obj'><string name='filename' value='models/none.obj'/></shape>", "missing_file"),
+        ("<shape type='obj'><string name='filename' value='../a.obj'/></shape>", "path_escapes"),
+        ("<shape type='obj'><string name='filename' value='/etc/passwd'/></shape>", "path_escapes"),
+        ("<shape type='obj'/>", "bad_value"),
+        ("<shape type='obj'><string name='filename' value='a b.png'/></shape>", "empty_mesh"),
+        ("<shape type='rectangle'><float name='wings' value='2'/></shape>", "unknown_parameter"),
+        ("<shape type='rectangle'><ref id='nothing'/></shape>", "unknown_id"),
+        ("<shape type='rectangle'><bsdf type='velvet'/></shape>", "unknown_plugin"),
+        ("<shape type='rectangle'><bsdf type='twosided'/></shape>", "missing_child"),
+        (
+            "<shape type='rectangle'><bsdf type='diffuse'><rgb name='reflectance' value='nan'/></bsdf></shape>",
+            "bad_value",
+        ),
+        (
+            "<shape type='rectangle'><bsdf type='diffuse'><rgb name='reflectance' value='2'/></bsdf></shape>",
+            "out_of_range",
+        ),
+        (
+            "<shape type='rectangle'><bsdf type='conductor'><string name='material' value='Unobtainium'/></bsdf></shape>",
+            "unknown_material",
+        ),
+        ("<shape type='rectangle'><transform name='toWorld'><scale value='1e308'/></transform></shape>", "not_finite"),
+        ("<shape type='rectangle'><medium type='homogeneous' name='interior'/></shape>", "unsupported"),
+        (
+            "<bsdf id='a' type='twosided'><ref id='a'/></bsdf><shape type='rectangle'><ref id='a'/></shape>",
+            "nested_too_deep",
+        ),
+        ("<emitter type='point'/>", "unknown_plugin"),
+        ("<emitter type='constant'/><emitter type='constant'/>", "unsupported"),
+        ("<emitter type='envmap'><string name='filename' value='none.exr'/></emitter>", "missing_file"),
+        ("<include filename='more.xml'/>", "unsupported"),
+        ("<medium type='homogeneous'/>", "unsupported"),
+        ("<teapot/>", "unknown_element"),
+    ] {
+        let scene = read_inner(&format!("{inner}<shape type='cube'/>"));
+        assert!(codes(&scene).contains(&code), "{inner}: {:?}", scene.findings);
+        assert_eq!(scene.scene.surfaces.last().map(|s| s.name.as_str()), Some("cube"), "{inner}");
+    }
+    // Twin.
+    assert_eq!(codes(&read_inner("<shape type='cube'/>")), [""; 0]);
+}
+
+#[test]
+fn findings_name_file_and_element() {
+    let scene = read_inner("\n<shape type='obj'><string name='filename' value='models/Mesh7.obj'/></shape>");
+    let finding = &scene.findings[0];
+    assert_eq!((finding.file.as_str(), finding.place.as_str()), ("models/Mesh7.obj", "shape 'Mesh7'"));
+    assert!(finding.message.contains("'scene.xml' line 2"), "{finding}");
+}
+
+#[test]
+fn a_missing_texture_is_grey_and_named_once() {
+    let bsdf = "<bsdf type='diffuse'><texture name='reflectance' type='bitmap'>\
+                <string name='filename' value='rug.png'/></texture></bsdf>";
+    let scene = read_inner(&format!("<shape type='cube'>{bsdf}</shape><shape type='rectangle'>{bsdf}</shape>"));
+    assert_eq!(codes(&scene), ["missing_file"]);
+    assert_eq!(scene.findings[0].file, "rug.png");
+    for material in &scene.scene.materials {
+        let grey = ColorInput::Constant([0.5; 3]);
+        assert_eq!(material.model, MaterialModel::Diffuse { reflectance: grey, alpha: None });
+    }
+}
+
+#[test]
+fn textures_are_decoded_shared_and_turned_upright() {
+    let bitmap = |more: &str| {
+        format!(
+            "<bsdf type='diffuse'><texture name='reflectance' type='bitmap'>\
+             <string name='filename' value='a b.png'/>{more}</texture></bsdf>"
+        )
+    };
+    let shapes = [
+        bitmap(""),
+        bitmap(""),
+        bitmap("<float name='gamma' value='1'/>"),
+        bitmap("<boolean name='raw' value='true'/>"),
+        bitmap(
+            "<float name='uscale' value='2'/><float name='vscale' value='0.5'/><float name='voffset' value='0.25'/>",
+        ),
+    ];
+    let inner: String = shapes.iter().map(|bsdf| format!("<shape type='rectangle'>{bsdf}</shape>")).collect();
+    let BitterliScene { scene, .. } = read_inner(&inner);
+    assert_eq!(scene.textures.len(), 2);
+    assert!(matches!(scene.textures[0].texture.texels(), Texels::Srgb8(_)));
+    assert!(matches!(scene.textures[1].texture.texels(), Texels::Linear8(_)));
+    assert!(scene.textures.iter().all(|t| t.sha256.is_some()));
+    let MaterialModel::Diffuse { reflectance: ColorInput::Texture { uv, .. }, .. } = scene.materials[4].model else {
+        panic!("expected a texture")
+    };
+    // Mitsuba's v is one minus ours: ours 0.2 is its 0.8, scaled and shifted 0.65, so ours 0.35.
+    let at = uv.apply(glam::Vec2::new(0.1, 0.2));
+    assert!((at - glam::Vec2::new(0.2, 0.35)).length() < 1e-6, "{at}");
+    // Mitsuba looks the picture's top row up at the rectangle's lower edge.
+    let mesh = &scene.surfaces[0].mesh;
+    let lower_left = mesh.uvs.as_ref().unwrap()[0] + glam::Vec2::new(0.25, -0.25);
+    assert_eq!(scene.textures[0].texture.sample(lower_left.to_array()), [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn opacity_is_luminance_unless_alpha_says_more() {
+    let folder = folder_with("");
+    let write = |alpha: u8| {
+        let file = std::fs::File::create(folder.path().join("leaf.png")).unwrap();
+        let mut encoder = png::Encoder::new(file, 2, 1);
+        encoder.set_color(png::ColorType::Rgba);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[200, 200, 200, 255, 200, 200, 200, alpha]).unwrap();
+    };
+    let xml = format!(
+        "<scene version='0.6.0'>{SENSOR}<shape type='rectangle'><bsdf type='mask'><texture name='opacity' type='bitmap'>\
+         <string name='filename' value='leaf.png'/></texture><bsdf type='diffuse'/></bsdf></shape></scene>"
+    );
+    std::fs::write(folder.path().join("scene.xml"), xml).unwrap();
+    let opacity = || {
+        let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+        let texture = scene.scene.textures[0].texture.clone();
+        ([texture.texel(0, 0)[0], texture.texel(1, 0)[0]], scene.findings)
+    };
+    write(255);
+    let (values, findings) = opacity();
+    assert!((values[0] - 0.5776).abs() < 1e-3 && values[0] == values[1] && findings.is_empty(), "{values:?}");
+    write(0);
+    let (values, findings) = opacity();
+    assert_eq!(values, [1.0, 0.0]);
+    assert_eq!((findings[0].code.as_str(), findings[0].severity), ("opacity_from_alpha", Severity::Note));
+}
+
+#[test]
+fn the_licence_travels_and_names_the_scene() {
+    let folder = folder_with(&format!("<scene version='0.6.0'>{SENSOR}</scene>"));
+    let text = "This is the Mitsuba version of 'A Room' by Somebody, downloaded from there\nCC0\n";
+    std::fs::write(folder.path().join("LICENSE.txt"), text).unwrap();
+    let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+    assert_eq!(scene.title, "'A Room' by Somebody");
+    assert_eq!(scene.licence.map(|licence| licence.text).as_deref(), Some(text));
+}
+
+#[test]
+fn limits_hold() {
+    let folder = folder_with(&format!("<scene version='0.6.0'>{SENSOR}{}</scene>", "<shape type='cube'/>".repeat(5)));
+    let path = folder.path().join("scene.xml");
+    let read_with = |limits: Limits| read(&path, &limits);
+    let shapes = read_with(Limits { shapes: 2, ..Limits::default() }).unwrap();
+    assert_eq!((shapes.scene.surfaces.len(), codes(&shapes)), (2, vec!["limit"]));
+    let triangles = read_with(Limits { triangles: 36, ..Limits::default() }).unwrap();
+    assert_eq!(triangles.scene.surfaces.len(), 3);
+    assert!(read_with(Limits { xml_bytes: 10, ..Limits::default() }).is_err());
+    assert!(read(Path::new("/nowhere/scene.xml"), &Limits::default()).is_err());
+    assert!(read(folder.path(), &Limits::default()).is_err());
+}
+
+#[test]
+fn lights_have_names_of_their_own_however_many() {
+    let lamp = "<shape type='rectangle'><emitter type='area'/></shape>";
+    let scene = read_inner(&lamp.repeat(3000)).scene;
+    let names: std::collections::BTreeSet<_> = scene.lights.iter().map(|light| &light.name).collect();
+    assert_eq!(names.len(), 3000);
+    assert_eq!(scene.lights[2].name, "rectangle-3");
+}
+
+/// Some bytes of the file changed, or its end cut off.
+fn mutated(bytes: &[u8], changes: &[(usize, u8)], cut: usize) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let length = bytes.len();
+    changes.iter().for_each(|(at, byte)| bytes[at % length] = *byte);
+    bytes.truncate(length - cut % length);
+    bytes
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 192, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn mutated_xml_never_panics(
+        changes in prop::collection::vec((any::<usize>(), any::<u8>()), 0..6),
+        cut in prop_oneof![3 => Just(0_usize), 1 => any::<usize>()],
+    ) {
+        let folder = folder_with("");
+        let path = folder.path().join("scene.xml");
+        std::fs::write(&path, mutated(SCENE.as_bytes(), &changes, cut)).unwrap();
+        let _ = read(&path, &Limits { triangles: 10_000, ..Limits::default() });
+    }
+
+    /// Words of the format in any order, which a change of bytes would hardly reach.
+    #[test]
+    fn shuffled_xml_never_panics(words in prop::collection::vec(0_usize..WORDS.len(), 0..40)) {
+        let body: String = words.iter().map(|&word| WORDS[word]).collect();
+        let _ = read_xml(&format!("<scene version='3.0.0'>{SENSOR}{body}</scene>"));
+    }
+
+    #[test]
+    fn mutated_obj_never_panics(
+        changes in prop::collection::vec((any::<usize>(), any::<u8>()), 0..8),
+        cut in prop_oneof![3 => Just(0_usize), 1 => any::<usize>()],
+    ) {
+        let xml = format!(
+            "<scene version='0.6.0'>{SENSOR}<shape type='obj'><string name='filename' value='models/a b.obj'/></shape></scene>"
+        );
+        let folder = folder_with(&xml);
+        std::fs::write(folder.path().join("models/a b.obj"), mutated(TRIANGLE.as_bytes(), &changes, cut)).unwrap();
+        let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+        for surface in &scene.scene.surfaces {
+            let count = surface.mesh.positions.len();
+            prop_assert!(surface.mesh.triangles.iter().flatten().all(|&v| (v as usize) < count));
+            prop_assert!(surface.mesh.positions.iter().all(|p| p.is_finite()));
+        }
+        prop_assert!(!scene.scene.surfaces.is_empty() || !scene.findings.is_empty());
+    }
+
+    #[test]
+    fn any_faces_never_panic(faces in prop::collection::vec("f( -?[0-9]{1,20}(/-?[0-9]{0,20}){0,2}){0,6}", 0..6)) {
+        let text = format!("{TRIANGLE}{}\n", faces.join("\n"));
+        let _ = obj::read(text.as_bytes(), obj::ObjLimits { triangles: 100, corners: 300 });
+    }
+}
+
+const WORDS: [&str; 20] = [
+    "<shape type='rectangle'>",
+    "<shape type='sphere'>",
+    "<shape type='cylinder'>",
+    "</shape>",
+    "<bsdf type='twosided' id='a'>",
+    "<bsdf type='principled'>",
+    "<bsdf type='mask'>",
+    "</bsdf>",
+    "<ref id='a' name='reflectance'/>",
+    "<float name='radius' value='-1'/>",
+    "<vector name='p1' x='0' z='0'/>",
+    "<float name='roughness' value='1e400'/>",
+    "<texture type='bitmap' name='opacity'><string name='filename' value='a b.png'/></texture>",
+    "<emitter type='sky'/>",
+    "<emitter type='area'/>",
+    "<transform name='to_world'><scale value='0'/></transform>",
+    "<transform name='to_world'><rotate x='1' angle='1e300'/></transform>",
+    "<default name='x' value='$x$x'/>",
+    "<string name='$x' value='$'/>",
+    "<sensor type='thinlens'/>",
+];

@@ -1,0 +1,358 @@
+//! Colours and numbers of plugins: constants, or bitmaps read from files.
+
+use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
+use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
+use mateval_scene::reference::SourceTexture;
+
+use super::document::Element;
+use super::log::shortened;
+use super::parameters::Parameters;
+use super::reader::Reader;
+use super::source::{FileFault, SourceFolder};
+use super::value;
+
+/// What stands for a texture that cannot be read: linear mid-grey. (Mitsuba would refuse the scene.)
+const MISSING: [f32; 3] = [0.5; 3];
+
+/// What of a picture is looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Aspect {
+    Color,
+    Luminance,
+    Alpha,
+}
+
+/// Textures with equal keys are the same: file, whether it is linear, how it wraps (0 repeat, 1 clamp, 2 mirror), aspect.
+pub(super) type TextureKey = (String, bool, u8, Aspect);
+
+/// Which values a constant may have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Bounds {
+    /// A share of light: 0 to 1.
+    Share,
+    /// Radiance or an index of refraction: 0 and more.
+    NotNegative,
+}
+
+/// A `<texture type="bitmap">`, not read yet.
+struct Bitmap {
+    file: String,
+    linear: bool,
+    wrap: Wrap,
+    uv: UvTransform,
+    channel: Option<char>,
+    place: String,
+    line: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// The colour `name`, linear Rec. 709, or `default` where it is absent.
+    pub(super) fn color(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ColorInput {
+        let Some(element) = from.take(&[name]) else { return ColorInput::Constant([default; 3]) };
+        if element.tag != "texture" {
+            let constant = self.constant(element, &from.place, Bounds::Share);
+            return ColorInput::Constant(constant.unwrap_or([default; 3]));
+        }
+        let Some(bitmap) = self.bitmap(element, &from.place) else { return ColorInput::Constant(MISSING) };
+        if bitmap.channel.is_some() {
+            let message = format!("line {}: one channel of a bitmap as a colour", element.line);
+            self.log.warn("unsupported", &from.place, message, "used all its channels");
+        }
+        match self.texture(&bitmap, Aspect::Color) {
+            Some(texture) => ColorInput::Texture { texture, uv: bitmap.uv },
+            None => ColorInput::Constant(MISSING),
+        }
+    }
+
+    /// The bitmap `element` as colours; none, after a finding, where it cannot be read.
+    pub(super) fn color_texture(&mut self, element: &'a Element, place: &str) -> Option<TextureIndex> {
+        let bitmap = self.bitmap(element, place)?;
+        self.texture(&bitmap, Aspect::Color)
+    }
+
+    /// The number `name` from 0 to 1, or `default` where it is absent. A colour counts by its luminance, as in Mitsuba.
+    pub(super) fn scalar(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ScalarInput {
+        let Some(element) = from.take(&[name]) else { return ScalarInput::Constant(default) };
+        if element.tag != "texture" {
+            let constant = self.constant(element, &from.place, Bounds::Share);
+            return ScalarInput::Constant(constant.map_or(default, luminance));
+        }
+        self.scalar_texture(element, &from.place, false).unwrap_or(ScalarInput::Constant(default))
+    }
+
+    /// The coverage `name`: where the picture has an alpha channel that says anything, that channel.
+    ///
+    /// Mitsuba takes the luminance of the colours and drops alpha, which makes the white background of a cut-out leaf
+    /// opaque and the leaf itself half clear; the scenes were converted from a renderer that takes alpha.
+    pub(super) fn opacity(&mut self, from: &mut Parameters<'a>, name: &str) -> Option<ScalarInput> {
+        let Some(element) = from.take(&[name]) else { return Some(ScalarInput::Constant(0.5)) };
+        if element.tag != "texture" {
+            return self.constant(element, &from.place, Bounds::Share).map(|rgb| ScalarInput::Constant(luminance(rgb)));
+        }
+        self.scalar_texture(element, &from.place, true)
+    }
+
+    /// Heights from a texture by luminance; none where it cannot be read.
+    pub(super) fn height(&mut self, element: &'a Element, place: &str) -> Option<ScalarInput> {
+        self.scalar_texture(element, place, false)
+    }
+
+    fn scalar_texture(&mut self, element: &'a Element, place: &str, prefer_alpha: bool) -> Option<ScalarInput> {
+        let bitmap = self.bitmap(element, place)?;
+        let (aspect, channel) = match bitmap.channel {
+            Some('a') => (Aspect::Alpha, 0),
+            Some(letter) => (Aspect::Color, "rgb".find(letter).unwrap_or(0)),
+            None if prefer_alpha && self.alpha_says_something(&bitmap) => (Aspect::Alpha, 0),
+            None => (Aspect::Luminance, 0),
+        };
+        if aspect == Aspect::Alpha && bitmap.channel.is_none() {
+            let message = format!("opacity from '{}', whose alpha is not the same everywhere", shortened(&bitmap.file));
+            self.log.note("opacity_from_alpha", place, message, "used alpha, not the luminance that Mitsuba takes");
+        }
+        let texture = self.texture(&bitmap, aspect)?;
+        Some(ScalarInput::Texture { texture, channel, uv: bitmap.uv })
+    }
+
+    /// A constant colour: `<rgb>`, `<srgb>`, `<spectrum>`, `<float>`; none, after a finding, where it is none.
+    pub(super) fn constant(&mut self, element: &Element, place: &str, bounds: Bounds) -> Option<[f32; 3]> {
+        match constant_color(element) {
+            Ok((rgb, approximated)) => {
+                if let Some(what) = approximated {
+                    let message = format!("line {}: '{}': {what}", element.line, element.name());
+                    self.log.warn("spectrum_approximated", place, message, "used the mean of its values");
+                }
+                Some(self.bounded(rgb, element, place, bounds))
+            }
+            Err(what) => {
+                let message = format!("line {}: '{}': {what}", element.line, shortened(element.name()));
+                self.log.warn("bad_value", place, message, "used the default");
+                None
+            }
+        }
+    }
+
+    fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, bounds: Bounds) -> [f32; 3] {
+        let most = if bounds == Bounds::Share { 1.0 } else { 1e9 };
+        if rgb.iter().any(|v| *v < 0.0 || *v > most) {
+            let message = format!("line {}: '{}': expected 0 to {most}, found {rgb:?}", element.line, element.name());
+            self.log.warn("out_of_range", place, message, "clamped");
+        }
+        rgb.map(|v| v.clamp(0.0, most) as f32)
+    }
+
+    fn bitmap(&mut self, element: &'a Element, place: &str) -> Option<Bitmap> {
+        if element.kind() != "bitmap" {
+            let message = format!("line {}: the texture '{}' is not known", element.line, shortened(element.kind()));
+            self.log.warn("unknown_plugin", place, message, "used mid-grey, or the default of a number");
+            return None;
+        }
+        let mut from = self.parameters(element, place.to_owned());
+        let name = from.string("filename").unwrap_or("");
+        let file = match SourceFolder::relative(name) {
+            Ok(file) => file,
+            Err(fault) => {
+                self.report_file(name, place, element.line, &fault, TEXTURE_LEFT_OUT);
+                return None;
+            }
+        };
+        let linear = self.is_linear(&mut from, element);
+        let wrap = self.wrap(&mut from, element);
+        self.check_filter(&mut from, element);
+        let uv = self.uv_transform(&mut from);
+        let channel = from.string("channel").and_then(|text| text.trim().to_ascii_lowercase().chars().next());
+        from.ignore(&["cache", "max_anisotropy", "format", "accel"]);
+        from.finish(&mut self.log);
+        Some(Bitmap { file, linear, wrap, uv, channel, place: place.to_owned(), line: element.line })
+    }
+
+    /// `raw`, or a gamma of 1. Otherwise files of whole numbers are sRGB, and files of floats linear in any case.
+    fn is_linear(&mut self, from: &mut Parameters<'a>, element: &Element) -> bool {
+        let raw = from.boolean("raw", false, &mut self.log);
+        let Some(gamma) = from.number("gamma", &mut self.log) else { return raw };
+        if gamma != 1.0 && gamma != -1.0 {
+            let message = format!("line {}: a bitmap with gamma {gamma}", element.line);
+            self.log.note("gamma_approximated", &from.place, message, "decoded with the sRGB curve");
+        }
+        raw || gamma == 1.0
+    }
+
+    fn wrap(&mut self, from: &mut Parameters<'a>, element: &Element) -> Wrap {
+        let mut found = [from.string("wrap_mode"), from.string("wrap_mode_u"), from.string("wrap_mode_v")];
+        let both = found[0].take();
+        let (u, v) = (found[1].or(both), found[2].or(both));
+        if u != v {
+            let message = format!("line {}: a bitmap wraps differently along u and v", element.line);
+            self.log.warn("unsupported", &from.place, message, "used the mode of u for both");
+        }
+        match u.or(v).unwrap_or("repeat") {
+            "repeat" => Wrap::Repeat,
+            "clamp" => Wrap::Clamp,
+            "mirror" => Wrap::Mirror,
+            other => {
+                let message = format!("line {}: wrap mode '{}' is not known", element.line, shortened(other));
+                self.log.warn("bad_value", &from.place, message, "used repeat");
+                Wrap::Repeat
+            }
+        }
+    }
+
+    fn check_filter(&mut self, from: &mut Parameters<'a>, element: &Element) {
+        let filter = from.string("filter_type").unwrap_or("bilinear");
+        if !matches!(filter, "bilinear" | "trilinear" | "ewa") {
+            let message = format!("line {}: filter '{}'", element.line, shortened(filter));
+            self.log.warn("unsupported", &from.place, message, "filtered bilinearly");
+        }
+    }
+
+    /// Mitsuba's v grows downwards in the picture (OBJ's vt is flipped on loading), ours upwards: v = 1 - v there.
+    fn uv_transform(&mut self, from: &mut Parameters<'a>) -> UvTransform {
+        let m = from.transform("to_uv", &mut self.log);
+        let number = |from: &mut Parameters<'a>, name, default, log: &mut _| from.number(name, log).unwrap_or(default);
+        let scale = [number(from, "uscale", 1.0, &mut self.log), number(from, "vscale", 1.0, &mut self.log)];
+        let offset = [number(from, "uoffset", 0.0, &mut self.log), number(from, "voffset", 0.0, &mut self.log)];
+        let rows: [[f64; 3]; 2] = std::array::from_fn(|r| {
+            let (x, y, shift) = (m.x_axis[r] * scale[r], m.y_axis[r] * scale[r], m.w_axis[r] * scale[r] + offset[r]);
+            if r == 0 { [x, -y, y + shift] } else { [-x, y, 1.0 - y - shift] }
+        });
+        // Adding 0 turns the -0 of an absent shear into 0.
+        UvTransform(rows.map(|row| row.map(|v| v as f32 + 0.0)))
+    }
+
+    fn alpha_says_something(&mut self, bitmap: &Bitmap) -> bool {
+        if let Some(known) = self.alphas.get(&bitmap.file) {
+            return *known;
+        }
+        let path = self.source.path(&bitmap.file).ok();
+        let alpha = path.and_then(|path| read_alpha(&path, bitmap.wrap).ok()).flatten();
+        let says = alpha.is_some_and(|alpha| !all_texels(&alpha, |value| value[0] == 1.0));
+        self.alphas.insert(bitmap.file.clone(), says);
+        says
+    }
+
+    /// Reads a texture once; a fault of its file is reported once.
+    fn texture(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Option<TextureIndex> {
+        let wrap = match bitmap.wrap {
+            Wrap::Repeat => 0,
+            Wrap::Clamp => 1,
+            Wrap::Mirror => 2,
+        };
+        let key = (bitmap.file.clone(), bitmap.linear, wrap, aspect);
+        if let Some(known) = self.textures.get(&key) {
+            return *known;
+        }
+        let index = match self.load(bitmap, aspect) {
+            Ok(texture) => Some(self.add_texture(bitmap.file.clone(), texture)),
+            Err(fault) => {
+                self.report_file(&bitmap.file, &bitmap.place, bitmap.line, &fault, TEXTURE_LEFT_OUT);
+                None
+            }
+        };
+        self.textures.insert(key, index);
+        index
+    }
+
+    /// Keeps a texture; its hash is that of the file `name`, if it is one that was read.
+    pub(super) fn add_texture(&mut self, name: String, texture: Texture) -> TextureIndex {
+        let sha256 = self.source.hash(&name);
+        self.scene.textures.push(SourceTexture { name, sha256, texture });
+        TextureIndex(self.scene.textures.len() - 1)
+    }
+
+    fn load(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Result<Texture, FileFault> {
+        let texture = self.read_picture(&bitmap.file, bitmap.linear, bitmap.wrap, aspect == Aspect::Alpha)?;
+        if aspect == Aspect::Luminance { luminance_texture(&texture) } else { Ok(texture) }
+    }
+
+    /// The picture in the file `file` of the scene's folder.
+    pub(super) fn read_picture(
+        &mut self,
+        file: &str,
+        linear: bool,
+        wrap: Wrap,
+        alpha: bool,
+    ) -> Result<Texture, FileFault> {
+        let path = self.source.path(file)?;
+        self.source.read(file)?;
+        let encoding = if linear { Encoding::Linear } else { Encoding::Srgb };
+        let texture = if alpha { read_alpha(&path, wrap) } else { read_texture(&path, encoding, wrap).map(Some) };
+        let texture = texture.map_err(|error| picture_fault(file, &error))?.ok_or_else(|| FileFault {
+            code: "bad_value",
+            message: format!("'{}' has no alpha channel", shortened(file)),
+        })?;
+        let total = self.texels.saturating_add(texture.width().saturating_mul(texture.height()));
+        if total > self.limits.texels {
+            let message = format!("all textures together have more than {} texels", self.limits.texels);
+            return Err(FileFault { code: "limit", message });
+        }
+        self.texels = total;
+        Ok(texture)
+    }
+}
+
+const TEXTURE_LEFT_OUT: &str = "used linear mid-grey 0.5; as opacity or bump map, nothing";
+
+/// The fault in words that do not hold this machine's folders.
+fn picture_fault(file: &str, error: &ImageError) -> FileFault {
+    let what = match error {
+        ImageError::Io { source, .. } => source.to_string(),
+        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
+        ImageError::PixelCount { .. } => error.to_string(),
+    };
+    FileFault { code: "unreadable_texture", message: format!("'{}': {what}", shortened(file)) }
+}
+
+/// Rec. 709 luminance of a linear colour, with Mitsuba's weights.
+pub(super) fn luminance(rgb: [f32; 3]) -> f32 {
+    if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
+        return rgb[0];
+    }
+    0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2]
+}
+
+fn all_texels(texture: &Texture, holds: impl Fn([f32; 3]) -> bool) -> bool {
+    (0..texture.height()).all(|y| (0..texture.width()).all(|x| holds(texture.texel(x, y))))
+}
+
+fn luminance_texture(texture: &Texture) -> Result<Texture, FileFault> {
+    if matches!(texture.texels(), Texels::Grey(_) | Texels::Grey8(_)) {
+        return Ok(texture.clone());
+    }
+    let row = |y| (0..texture.width()).map(move |x| luminance(texture.texel(x, y)));
+    let values = (0..texture.height()).flat_map(row).collect();
+    Texture::new(texture.width(), texture.height(), Texels::Grey(values), texture.wrap())
+        .map_err(|error| FileFault { code: "unreadable_texture", message: error.to_string() })
+}
+
+/// The mean colour of a texture's texels, summed in f64.
+pub(super) fn mean_color(texture: &Texture) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for y in 0..texture.height() {
+        for x in 0..texture.width() {
+            let texel = texture.texel(x, y);
+            sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
+        }
+    }
+    sum.map(|s| s / (texture.width() * texture.height()) as f64)
+}
+
+/// A linear colour, and what of it is approximated, if anything.
+fn constant_color(element: &Element) -> Result<([f64; 3], Option<String>), String> {
+    let text = element.attribute("value").unwrap_or("");
+    match element.tag.as_str() {
+        "float" | "integer" => Ok(([value::number(text)?; 3], None)),
+        "rgb" => Ok((value::triple(text)?, None)),
+        "srgb" => {
+            let linear = |v: f64| f64::from(mateval_image::transfer::linear_from_srgb(v as f32));
+            Ok((value::triple(text)?.map(linear), None))
+        }
+        "spectrum" if text.contains(':') => {
+            let values = text.split(',').map(|pair| value::number(pair.rsplit(':').next().unwrap_or("")));
+            let values = values.take(4096).collect::<Result<Vec<_>, _>>()?;
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            Ok(([mean; 3], Some(format!("a spectrum of {} wavelengths", values.len()))))
+        }
+        "spectrum" => Ok((value::triple(text)?, None)),
+        other => Err(format!("expected a colour, found <{}>", shortened(other))),
+    }
+}

@@ -1,0 +1,182 @@
+//! A recipe carried out: scene by scene, each whole or not at all, going on where an earlier run was killed.
+
+use std::path::{Path, PathBuf};
+
+use mateval_scene::dataset::{DatasetFile, FORMAT, Licence, SceneFile, Target, TargetsFile};
+use mateval_scene::layout::{DATASET, SceneFolder, TARGETS};
+use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::{Finding, SceneId, json, manifest};
+use serde::{Deserialize, Serialize};
+
+use crate::build_scene;
+use crate::error::PrepError;
+use crate::progress::Progress;
+use crate::recipe::{self, Recipe, RecipeScene};
+
+/// The recipe as the dataset keeps it.
+pub const RECIPE: &str = "recipe.toml";
+/// What an unfinished build keeps in the dataset's folder; a finished one removes it.
+const BUILD: &str = ".build";
+
+/// What a build was given.
+#[derive(Clone, Debug)]
+pub struct BuildOptions {
+    /// The recipe.
+    pub recipe: PathBuf,
+    /// The folder that its paths are relative to; the recipe's own where absent.
+    pub source: Option<PathBuf>,
+    /// The dataset's folder.
+    pub out: PathBuf,
+    /// Replace a finished dataset that is there.
+    pub force: bool,
+}
+
+/// What a build gave.
+#[derive(Clone, Debug)]
+pub struct BuildReport {
+    /// The dataset's description.
+    pub dataset: DatasetFile,
+    /// The findings of every scene.
+    pub findings: Vec<(SceneId, Vec<Finding>)>,
+    /// Scenes that an earlier, unfinished run had already made.
+    pub resumed: Vec<SceneId>,
+}
+
+/// What an unfinished build must share with the one that goes on with it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct BuildKey {
+    tool: String,
+    recipe_sha256: String,
+}
+
+/// Carries the recipe out. `tool` is the name and version that the dataset is marked with.
+pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Result<BuildReport, PrepError> {
+    let (recipe, text) = recipe::read(&options.recipe)?;
+    let source = source_folder(options);
+    check_sources(options, &recipe, &source)?;
+    let key = BuildKey { tool: tool.to_owned(), recipe_sha256: manifest::sha256_of_bytes(text.as_bytes()) };
+    let resumes = prepare_output(options, &key)?;
+
+    let mut report = BuildReport { dataset: empty_dataset(&recipe, tool), findings: Vec::new(), resumed: Vec::new() };
+    for (at, entry) in recipe.scenes.iter().enumerate() {
+        progress(&format!("scene {}", entry.id), at, recipe.scenes.len());
+        let mark = options.out.join(BUILD).join(format!("{}.json", entry.id));
+        let folder = SceneFolder::of(&options.out, &entry.id);
+        let licence = match finished_scene(&folder, &mark, resumes) {
+            Some(licence) => {
+                report.resumed.push(entry.id.clone());
+                licence
+            }
+            None => make_scene(&recipe, entry, &source, &folder, &mark, progress)?,
+        };
+        let file: SceneFile = json::read(&folder.scene_file())?;
+        report.dataset.scenes.push(entry.id.clone());
+        report.dataset.licences.extend(licence.0);
+        report.findings.push((entry.id.clone(), file.findings));
+    }
+    finish(&options.out, &recipe, &text, &mut report.dataset)?;
+    Ok(report)
+}
+
+fn source_folder(options: &BuildOptions) -> PathBuf {
+    let beside = || options.recipe.parent().map(Path::to_owned).unwrap_or_default();
+    options.source.clone().unwrap_or_else(beside)
+}
+
+/// Whatever can fail early must: every scene's file is there before the first one is made.
+fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
+    let faults: Vec<String> = recipe
+        .scenes
+        .iter()
+        .filter(|scene| !source.join(&scene.bitterli).is_file())
+        .map(|scene| {
+            let path = source.join(&scene.bitterli);
+            format!(
+                "scene '{}': there is no file '{}'; mend `bitterli`, or name the folder with --source",
+                scene.id,
+                path.display()
+            )
+        })
+        .collect();
+    if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
+}
+
+fn empty_dataset(recipe: &Recipe, tool: &str) -> DatasetFile {
+    DatasetFile {
+        format: FORMAT.to_owned(),
+        name: recipe.name.clone(),
+        version: recipe.version.clone(),
+        tool: tool.to_owned(),
+        scenes: Vec::new(),
+        scored_renderer: None,
+        licences: Vec::new(),
+        manifest_sha256: String::new(),
+    }
+}
+
+/// Makes the output's folder ready. True where an unfinished build of the same recipe is gone on with.
+fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepError> {
+    let out = &options.out;
+    let refuse = |what: &str| PrepError::Output { path: out.clone(), what: what.to_owned() };
+    let marks = out.join(BUILD);
+    let key_file = marks.join("key.json");
+    let unfinished = marks.is_dir();
+    if unfinished && json::read::<BuildKey>(&key_file).is_ok_and(|found| found == *key) {
+        return Ok(true);
+    }
+    let is_dataset = out.join(DATASET).is_file();
+    let is_empty = std::fs::read_dir(out).map(|mut entries| entries.next().is_none()).unwrap_or(!out.exists());
+    match (unfinished, is_dataset, is_empty, options.force) {
+        (_, _, true, _) => {}
+        (true, _, _, true) | (_, true, _, true) => {
+            std::fs::remove_dir_all(out).map_err(PrepError::io("remove", out))?;
+        }
+        (true, ..) => {
+            return Err(refuse("holds an unfinished build of another recipe or version; add --force to replace it"));
+        }
+        (_, true, ..) => return Err(refuse("holds a finished dataset; add --force to replace it")),
+        _ => return Err(refuse("is there and is no dataset: it is not replaced; choose another --out")),
+    }
+    std::fs::create_dir_all(&marks).map_err(PrepError::io("make", &marks))?;
+    json::write(&key_file, key)?;
+    Ok(false)
+}
+
+/// What a finished scene leaves in the build folder: its licence.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct SceneMark(Option<Licence>);
+
+fn finished_scene(folder: &SceneFolder, mark: &Path, resumes: bool) -> Option<SceneMark> {
+    (resumes && folder.scene_file().is_file()).then(|| json::read(mark).ok()).flatten()
+}
+
+fn make_scene(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Path,
+    folder: &SceneFolder,
+    mark: &Path,
+    progress: Progress<'_>,
+) -> Result<SceneMark, PrepError> {
+    let work = WorkFolder::start(folder.path())?;
+    let licence = build_scene::build(recipe, entry, source, &SceneFolder::at(work.path().to_owned()), progress)?;
+    let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
+    work.finish()?;
+    // Only now: a scene without its mark is made again.
+    json::write(mark, &SceneMark(licence.clone()))?;
+    Ok(SceneMark(licence))
+}
+
+fn finish(out: &Path, recipe: &Recipe, text: &str, dataset: &mut DatasetFile) -> Result<(), PrepError> {
+    let targets = dataset.scenes.iter().flat_map(|scene| {
+        let input = mateval_scene::ViewId::new(mateval_scene::layout::INPUT).expect("our own id is an id");
+        let views = std::iter::once(input).chain(recipe.views.iter().map(|view| view.id.clone()));
+        views.map(|view| Target { scene: scene.clone(), view })
+    });
+    json::write(&out.join(TARGETS), &TargetsFile { format: FORMAT.to_owned(), targets: targets.collect() })?;
+    mateval_image::store::write_whole(&out.join(RECIPE), text.as_bytes())?;
+    dataset.manifest_sha256 = manifest::write(out)?;
+    json::write(&out.join(DATASET), dataset)?;
+    let marks = out.join(BUILD);
+    std::fs::remove_dir_all(&marks).map_err(PrepError::io("remove", &marks))
+}

@@ -1,0 +1,310 @@
+//! What stands where, what it is made of, and the XML that says so.
+//!
+//! The room spans x 0..4, y 0..2.6, z 0..3.2 metres. The wallpaper and the mirror are at x = 0, the window at z = 0, the
+//! camera in the opposite corner.
+
+use std::fmt::Write as _;
+
+use glam::{DVec2, DVec3};
+
+use super::furniture::{self, tile};
+use super::solid::Solid;
+
+const WIDTH: f64 = 4.0;
+const HEIGHT: f64 = 2.6;
+const DEPTH: f64 = 3.2;
+
+/// The window's lower left corner and size in the wall z = 0, and how deep it sits.
+const WINDOW: (DVec2, DVec2) = (DVec2::new(1.25, 1.05), DVec2::new(1.3, 1.05));
+const REVEAL: f64 = 0.12;
+
+/// One shape of the scene.
+pub(super) struct Item {
+    /// Its id, and its file's name.
+    pub(super) name: &'static str,
+    /// In its own space.
+    pub(super) solid: Solid,
+    /// The id of its BSDF.
+    material: &'static str,
+    /// Degrees about +y, before it is moved.
+    turn_deg: f64,
+    /// Where it stands.
+    at: DVec3,
+    /// Whether it glows, and how: linear Rec. 709 radiance.
+    radiance: Option<[f64; 3]>,
+}
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+fn item(name: &'static str, material: &'static str, solid: Solid) -> Item {
+    Item { name, solid, material, turn_deg: 0.0, at: DVec3::ZERO, radiance: None }
+}
+
+fn placed(name: &'static str, material: &'static str, solid: Solid, turn_deg: f64, at: DVec3) -> Item {
+    Item { turn_deg, at, ..item(name, material, solid) }
+}
+
+/// Everything with a mesh.
+pub(super) fn items() -> Vec<Item> {
+    let mut items = shell();
+    items.extend(things());
+    items
+}
+
+fn shell() -> Vec<Item> {
+    let square = |size: f64| DVec2::splat(size);
+    let (x, y, z) = (v(WIDTH, 0.0, 0.0), v(0.0, HEIGHT, 0.0), v(0.0, 0.0, DEPTH));
+    let floor = Solid::default().rectangle(z, x, -z, square(tile::PLANKS));
+    let ceiling = Solid::default().rectangle(y, x, z, square(tile::PLAIN));
+    let paper = Solid::default().rectangle(z, -z, y, square(tile::WALLPAPER));
+    let right = Solid::default().rectangle(x, z, y, square(tile::PLAIN));
+    let near = Solid::default().rectangle(x + z, -x, y, square(tile::PLAIN));
+    let (corner, size) = WINDOW;
+    let pane = v(corner.x, corner.y, -REVEAL / 2.0);
+    vec![
+        item("floor", "planks", floor),
+        item("ceiling", "white_paint", ceiling),
+        item("wall_paper", "wallpaper", paper),
+        item("wall_window", "wall_paint", window_wall()),
+        item("wall_right", "wall_paint", right),
+        item("wall_near", "wall_paint", near),
+        placed("window_frame", "white_paint", window_frame(size), 0.0, v(corner.x, corner.y, 0.0)),
+        placed("window_glass", "clear_glass", furniture::pane(size), 0.0, pane),
+    ]
+}
+
+/// The wall z = 0 with a hole, and the hole's inner sides.
+fn window_wall() -> Solid {
+    let (low, size) = WINDOW;
+    let high = low + size;
+    let tile = DVec2::splat(tile::PLAIN);
+    let flat = |wall: Solid, x0: f64, y0: f64, x1: f64, y1: f64| {
+        wall.rectangle(v(x0, y0, 0.0), v(x1 - x0, 0.0, 0.0), v(0.0, y1 - y0, 0.0), tile)
+    };
+    let mut wall = flat(Solid::default(), 0.0, 0.0, low.x, HEIGHT);
+    wall = flat(wall, high.x, 0.0, WIDTH, HEIGHT);
+    wall = flat(wall, low.x, 0.0, high.x, low.y);
+    wall = flat(wall, low.x, high.y, high.x, HEIGHT);
+    let (right, up, back) = (v(size.x, 0.0, 0.0), v(0.0, size.y, 0.0), v(0.0, 0.0, -REVEAL));
+    wall.rectangle(v(low.x, low.y, 0.0), right, back, tile)
+        .rectangle(v(low.x, high.y, -REVEAL), right, -back, tile)
+        .rectangle(v(low.x, low.y, 0.0), back, up, tile)
+        .rectangle(v(high.x, low.y, -REVEAL), -back, up, tile)
+}
+
+/// A frame with a cross in it, just inside of the hole.
+fn window_frame(size: DVec2) -> Solid {
+    let bar = 0.05;
+    let (back, front) = (-REVEAL / 2.0 - 0.02, -REVEAL / 2.0 + 0.02);
+    furniture::frame(size, 0.04, -0.002, 0.015)
+        .boxed(v(size.x / 2.0 - bar / 2.0, 0.0, back), v(size.x / 2.0 + bar / 2.0, size.y, front), tile::PLAIN)
+        .boxed(v(0.0, size.y * 0.62, back), v(size.x, size.y * 0.62 + bar, front), tile::PLAIN)
+}
+
+fn things() -> Vec<Item> {
+    let mirror = DVec2::new(0.7, 0.85);
+    let mirror_at = |off: f64| v(off, 1.15, 1.65);
+    // The shelf stands at x = 0 and looks along +x; its own x runs along the room's -z.
+    let on_shelf = |along: f64, y: f64| v(0.2, y, 1.3 - along);
+    let glow = |item: Item, radiance| Item { radiance: Some(radiance), ..item };
+    vec![
+        placed("rug", "wool", furniture::rug(), 4.0, v(1.95, 0.0, 1.7)),
+        placed("table", "table_wood", furniture::table(), 4.0, v(1.95, 0.012, 1.7)),
+        placed("bowl", "ceramic", furniture::bowl(), 0.0, v(2.1, 0.432, 1.66)),
+        placed("sofa", "fabric", furniture::sofa(), 0.0, v(1.75, 0.0, 0.5)),
+        placed("sofa_feet", "brass", furniture::sofa_feet(), 0.0, v(1.75, 0.0, 0.5)),
+        placed("shelf", "table_wood", furniture::shelf(), 90.0, v(0.18, 0.0, 1.3)),
+        placed("box_red", "red", furniture::container(v(0.3, 0.24, 0.22)), 90.0, on_shelf(-0.3, 0.415)),
+        placed("box_teal", "teal", furniture::container(v(0.4, 0.28, 0.24)), 90.0, on_shelf(0.3, 0.415)),
+        placed("box_yellow", "yellow", furniture::container(v(0.42, 0.26, 0.24)), 90.0, on_shelf(-0.28, 0.055)),
+        placed("box_small", "teal", furniture::container(v(0.14, 0.18, 0.14)), 70.0, on_shelf(0.42, 0.8)),
+        placed("box_top", "red", furniture::container(v(0.22, 0.1, 0.16)), 100.0, on_shelf(-0.4, 0.8)),
+        placed("mirror", "silver", furniture::pane(mirror), 90.0, mirror_at(0.02)),
+        placed("mirror_frame", "table_wood", furniture::frame(mirror, 0.05, 0.0, 0.035), 90.0, mirror_at(0.0)),
+        placed("lamp_stand", "brass", furniture::lamp_stand(), 0.0, v(0.42, 0.0, 0.4)),
+        glow(placed("lamp_shade", "shade", furniture::lamp_shade(), 0.0, v(0.42, 0.0, 0.4)), [6.0, 4.2, 2.4]),
+    ]
+}
+
+/// The materials, in Mitsuba's words; everything opaque is seen from both sides.
+const MATERIALS: &str = r#"
+    <bsdf type="twosided" id="planks">
+        <bsdf type="roughplastic">
+            <string name="distribution" value="ggx"/>
+            <float name="alpha" value="0.15"/>
+            <float name="int_ior" value="1.5"/>
+            <float name="ext_ior" value="1"/>
+            <boolean name="nonlinear" value="true"/>
+            <texture name="diffuse_reflectance" type="bitmap">
+                <string name="filename" value="textures/planks.png"/>
+            </texture>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="table_wood">
+        <bsdf type="roughplastic">
+            <string name="distribution" value="ggx"/>
+            <float name="alpha" value="0.08"/>
+            <float name="int_ior" value="1.5"/>
+            <float name="ext_ior" value="1"/>
+            <boolean name="nonlinear" value="true"/>
+            <texture name="diffuse_reflectance" type="bitmap">
+                <string name="filename" value="textures/wood.png"/>
+            </texture>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="wallpaper">
+        <bsdf type="diffuse">
+            <texture name="reflectance" type="bitmap">
+                <string name="filename" value="textures/wallpaper.png"/>
+            </texture>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="fabric">
+        <bsdf type="diffuse">
+            <texture name="reflectance" type="bitmap">
+                <string name="filename" value="textures/fabric.png"/>
+            </texture>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="wool">
+        <bsdf type="diffuse">
+            <texture name="reflectance" type="bitmap">
+                <string name="filename" value="textures/rug.png"/>
+                <string name="wrap_mode" value="clamp"/>
+            </texture>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="white_paint">
+        <bsdf type="diffuse">
+            <rgb name="reflectance" value="0.82, 0.81, 0.78"/>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="wall_paint">
+        <bsdf type="diffuse">
+            <rgb name="reflectance" value="0.72, 0.69, 0.6"/>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="shade">
+        <bsdf type="diffuse">
+            <rgb name="reflectance" value="0.7, 0.66, 0.58"/>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="brass">
+        <bsdf type="roughconductor">
+            <string name="distribution" value="ggx"/>
+            <float name="alpha" value="0.15"/>
+            <rgb name="eta" value="0.444, 0.527, 1.094"/>
+            <rgb name="k" value="3.695, 2.765, 1.829"/>
+        </bsdf>
+    </bsdf>
+    <bsdf type="twosided" id="silver">
+        <bsdf type="conductor">
+            <string name="material" value="none"/>
+        </bsdf>
+    </bsdf>
+    <bsdf type="thindielectric" id="clear_glass">
+        <float name="int_ior" value="1.5"/>
+        <float name="ext_ior" value="1"/>
+    </bsdf>
+"#;
+
+/// Glossy paints: id and linear colour.
+const GLOSSY: [(&str, &str); 4] = [
+    ("red", "0.55, 0.05, 0.04"),
+    ("teal", "0.03, 0.28, 0.3"),
+    ("yellow", "0.75, 0.5, 0.06"),
+    ("ceramic", "0.78, 0.78, 0.74"),
+];
+
+/// The scene in Mitsuba 3's spelling.
+pub(super) fn xml() -> String {
+    let mut xml = String::from(HEAD);
+    xml.push_str(MATERIALS);
+    for (id, rgb) in GLOSSY {
+        xml.push_str(&GLOSSY_BSDF.replace("ID", id).replace("RGB", rgb));
+    }
+    for item in items() {
+        push_item(&mut xml, &item);
+    }
+    xml.push_str(TAIL);
+    xml
+}
+
+fn push_item(xml: &mut String, item: &Item) {
+    // Writing to a String cannot fail.
+    let _ = write!(
+        xml,
+        "    <shape type=\"obj\" id=\"{0}\">\n        <string name=\"filename\" value=\"models/{0}.obj\"/>\n",
+        item.name
+    );
+    if item.turn_deg != 0.0 || item.at != DVec3::ZERO {
+        xml.push_str("        <transform name=\"to_world\">\n");
+        if item.turn_deg != 0.0 {
+            let _ = writeln!(xml, "            <rotate y=\"1\" angle=\"{}\"/>", item.turn_deg);
+        }
+        let at = item.at;
+        let _ = writeln!(xml, "            <translate x=\"{:.3}\" y=\"{:.3}\" z=\"{:.3}\"/>", at.x, at.y, at.z);
+        xml.push_str("        </transform>\n");
+    }
+    let _ = writeln!(xml, "        <ref id=\"{}\"/>", item.material);
+    if let Some([r, g, b]) = item.radiance {
+        let _ = write!(
+            xml,
+            "        <emitter type=\"area\">\n            <rgb name=\"radiance\" value=\"{r}, {g}, {b}\"/>\n        </emitter>\n"
+        );
+    }
+    xml.push_str("    </shape>\n");
+}
+
+const GLOSSY_BSDF: &str = r#"    <bsdf type="twosided" id="ID">
+        <bsdf type="roughplastic">
+            <string name="distribution" value="ggx"/>
+            <float name="alpha" value="0.05"/>
+            <float name="int_ior" value="1.5"/>
+            <float name="ext_ior" value="1"/>
+            <rgb name="diffuse_reflectance" value="RGB"/>
+        </bsdf>
+    </bsdf>
+"#;
+
+const HEAD: &str = r#"<?xml version="1.0" encoding="utf-8"?>
+<!-- A room made by MatEval, CC0 1.0. Metres, +y up. -->
+<scene version="3.0.0">
+    <integrator type="path">
+        <integer name="max_depth" value="18"/>
+    </integrator>
+    <sensor type="perspective">
+        <float name="fov" value="65"/>
+        <transform name="to_world">
+            <lookat origin="3.72, 1.5, 2.95" target="1.0, 0.8, 0.75" up="0, 1, 0"/>
+        </transform>
+        <sampler type="independent">
+            <integer name="sample_count" value="256"/>
+        </sampler>
+        <film type="hdrfilm">
+            <integer name="width" value="320"/>
+            <integer name="height" value="240"/>
+            <rfilter type="box"/>
+        </film>
+    </sensor>
+"#;
+
+const TAIL: &str = r#"    <shape type="rectangle" id="ceiling_light">
+        <transform name="to_world">
+            <scale x="0.5" y="0.3"/>
+            <rotate x="1" angle="90"/>
+            <translate x="2.1" y="2.59" z="1.7"/>
+        </transform>
+        <ref id="white_paint"/>
+        <emitter type="area">
+            <rgb name="radiance" value="17, 16, 14"/>
+        </emitter>
+    </shape>
+    <emitter type="envmap">
+        <string name="filename" value="textures/outside.png"/>
+        <float name="scale" value="5"/>
+    </emitter>
+</scene>
+"#;

@@ -1,0 +1,182 @@
+//! Meshes from boxes, cushions and turned shapes, in metres, written as OBJ. Texture coordinates are metres divided by
+//! the size of the texture's tile.
+
+use std::fmt::Write as _;
+
+use glam::{DVec2, DVec3};
+
+/// A mesh under construction; every face brings its own vertices.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solid {
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    uvs: Vec<DVec2>,
+    /// Counter-clockwise from outside, three or four corners.
+    faces: Vec<Vec<usize>>,
+}
+
+/// A corner of a face.
+type Corner = (DVec3, DVec3, DVec2);
+
+impl Solid {
+    /// Triangles after quads are split.
+    #[cfg(test)]
+    pub(super) fn triangle_count(&self) -> usize {
+        self.faces.iter().map(|face| face.len() - 2).sum()
+    }
+
+    fn face(&mut self, corners: &[Corner]) {
+        let first = self.positions.len();
+        for (position, normal, uv) in corners {
+            self.positions.push(*position);
+            self.normals.push(*normal);
+            self.uvs.push(*uv);
+        }
+        self.faces.push((first..first + corners.len()).collect());
+    }
+
+    /// A rectangle from `corner` along `right` and `up`, front towards their cross product; uv in tiles of `tile` metres.
+    pub(super) fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, tile: DVec2) -> Self {
+        let normal = right.cross(up).normalize();
+        let size = DVec2::new(right.length(), up.length()) / tile;
+        let at = |u: f64, v: f64| (corner + right * u + up * v, normal, size * DVec2::new(u, v));
+        self.face(&[at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)]);
+        self
+    }
+
+    /// A box between two corners. The texture's u runs along the longest edge of each side.
+    pub(super) fn boxed(mut self, low: DVec3, high: DVec3, tile: f64) -> Self {
+        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
+        for (normal, right, up) in sides() {
+            let (right, up) = longest_first(normal, right, up, half);
+            let corner = middle + normal * half - right * half - up * half;
+            self = self.rectangle(corner, right * half * 2.0, up * half * 2.0, DVec2::splat(tile));
+        }
+        self
+    }
+
+    /// A box with edges rounded by `radius`.
+    pub(super) fn cushion(mut self, low: DVec3, high: DVec3, radius: f64, tile: f64) -> Self {
+        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
+        for (normal, right, up) in sides() {
+            let lines = |axis: DVec3| {
+                let (h, bend) = ((axis * half).length(), 0.4 * radius);
+                [-h, -h + bend, -h + radius, h - radius, h - bend, h]
+            };
+            let (across, along) = (lines(right), lines(up));
+            let at = |i: usize, j: usize| {
+                let flat = normal * half + right * across[i] + up * along[j];
+                let core = flat.clamp(-half + radius, half - radius);
+                let out = (flat - core).normalize();
+                (middle + core + out * radius, out, DVec2::new(across[i], along[j]) / tile)
+            };
+            for i in 0..5 {
+                for j in 0..5 {
+                    self.face(&[at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+                }
+            }
+        }
+        self
+    }
+
+    /// A profile of (radius, height) from bottom to top turned about the vertical through `foot`; front outside.
+    pub(super) fn turned(mut self, foot: DVec3, profile: &[(f64, f64)], segments: usize, tile: f64) -> Self {
+        let turn = |step: usize| {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * (step % segments) as f64 / segments as f64);
+            DVec3::new(sin, 0.0, cos)
+        };
+        let widest = profile.iter().fold(0.0_f64, |widest, (radius, _)| widest.max(*radius));
+        let mut length = 0.0;
+        for pair in profile.windows(2) {
+            let [(r0, y0), (r1, y1)] = [pair[0], pair[1]];
+            let slope = DVec2::new(y1 - y0, r0 - r1).normalize();
+            let next = length + DVec2::new(r1 - r0, y1 - y0).length();
+            let at = |step: usize, radius: f64, height: f64, v: f64| {
+                let out = turn(step);
+                let around = std::f64::consts::TAU * widest * step as f64 / segments as f64;
+                let normal = (out * slope.x).with_y(slope.y);
+                (foot + (out * radius).with_y(height), normal, DVec2::new(around, v) / tile)
+            };
+            for step in 0..segments {
+                let (a, b) = (at(step, r0, y0, length), at(step + 1, r0, y0, length));
+                let (c, d) = (at(step + 1, r1, y1, next), at(step, r1, y1, next));
+                match (r0 > 0.0, r1 > 0.0) {
+                    (true, true) => self.face(&[a, b, c, d]),
+                    (true, false) => self.face(&[a, b, d]),
+                    _ => self.face(&[a, c, d]),
+                }
+            }
+            length = next;
+        }
+        self
+    }
+
+    /// Wavefront OBJ: positions and normals to a tenth of a millimetre, every face with uv and normal.
+    pub(super) fn to_obj(&self) -> String {
+        let mut text = String::from("# made by MatEval, CC0 1.0\n");
+        // Writing to a String cannot fail. Adding 0 to a rounded value turns -0 into 0.
+        let round = |v: f64| (v * 1e4).round() / 1e4 + 0.0;
+        for p in &self.positions {
+            let _ = writeln!(text, "v {:.4} {:.4} {:.4}", round(p.x), round(p.y), round(p.z));
+        }
+        for uv in &self.uvs {
+            let _ = writeln!(text, "vt {:.4} {:.4}", round(uv.x), round(uv.y));
+        }
+        for n in &self.normals {
+            let _ = writeln!(text, "vn {:.4} {:.4} {:.4}", round(n.x), round(n.y), round(n.z));
+        }
+        for face in &self.faces {
+            text.push('f');
+            for corner in face {
+                let _ = write!(text, " {0}/{0}/{0}", corner + 1);
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Normal, right and up of a box's six sides, right times up being the normal.
+fn sides() -> [(DVec3, DVec3, DVec3); 6] {
+    let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
+    [(x, -z, y), (-x, z, y), (y, x, -z), (-y, x, z), (z, x, y), (-z, -x, y)]
+}
+
+/// Right and up, turned a quarter where up is the longer edge.
+fn longest_first(normal: DVec3, right: DVec3, up: DVec3, half: DVec3) -> (DVec3, DVec3) {
+    if (up * half).length() > (right * half).length() { (up, normal.cross(up)) } else { (right, up) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each face, seen from the side of its normals, is counter-clockwise.
+    fn faces_agree_with_normals(solid: &Solid) -> bool {
+        solid.faces.iter().all(|face| {
+            let p: Vec<_> = face.iter().map(|&i| solid.positions[i]).collect();
+            let front = (p[1] - p[0]).cross(p[2] - p[0]);
+            face.iter().all(|&i| front.dot(solid.normals[i]) > 0.0)
+        })
+    }
+
+    #[test]
+    fn all_builders_face_outwards() {
+        let (low, high) = (DVec3::new(0.0, 0.0, 0.0), DVec3::new(1.0, 0.5, 0.3));
+        for (solid, triangles) in [
+            (Solid::default().boxed(low, high, 0.5), 12),
+            (Solid::default().cushion(low, high, 0.1, 0.5), 300),
+            (Solid::default().turned(low, &[(0.0, 0.0), (0.2, 0.0), (0.1, 0.5), (0.0, 0.5)], 12, 0.5), 48),
+        ] {
+            assert!(faces_agree_with_normals(&solid));
+            assert_eq!(solid.triangle_count(), triangles);
+        }
+    }
+
+    #[test]
+    fn a_box_has_texture_coordinates_in_tiles() {
+        let solid = Solid::default().boxed(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.5), 0.5);
+        let widest = solid.uvs.iter().fold(DVec2::ZERO, |most, uv| most.max(*uv));
+        assert_eq!(widest, DVec2::new(4.0, 2.0));
+    }
+}

@@ -1,0 +1,140 @@
+//! A dataset held against its own rules: every fault is named, none is mended.
+
+mod geometry;
+mod pictures;
+mod renders;
+mod scene_file;
+mod schema;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
+use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_scene::{Finding, Severity, json, manifest, reference_io};
+use mateval_tracer::World;
+
+use crate::error::PrepError;
+use crate::progress::Progress;
+
+/// Where faults are gathered, with the path that they are in.
+struct Faults {
+    all: Vec<Finding>,
+    prefix: String,
+}
+
+impl Faults {
+    fn add(&mut self, code: &str, file: &str, place: impl Into<String>, message: impl Into<String>) {
+        self.all.push(Finding {
+            severity: Severity::Error,
+            code: code.to_owned(),
+            file: format!("{}{file}", self.prefix),
+            place: place.into(),
+            message: message.into(),
+            action: "get the dataset anew, or build it again".to_owned(),
+        });
+    }
+
+    /// The value, or the reason why it could not be read as a fault.
+    fn read<T, E: std::fmt::Display>(&mut self, file: &str, result: Result<T, E>) -> Option<T> {
+        result.map_err(|error| self.add("unreadable", file, "", error.to_string())).ok()
+    }
+}
+
+/// Looks for faults: hashes, schemas, cameras, meshes against ids, masks, reprojection. Sorted; errors only where the
+/// dataset is unsound. Fails where there is no dataset at all.
+pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepError> {
+    let dataset_path = root.join(DATASET);
+    if !dataset_path.is_file() {
+        let what = "holds no dataset.json: no dataset, or an unfinished `prep build` (run it again)".to_owned();
+        return Err(PrepError::Output { path: root.to_owned(), what });
+    }
+    let mut faults = Faults { all: Vec::new(), prefix: String::new() };
+    progress("hashes", 0, 1);
+    check_manifest(root, &mut faults);
+    schema::check::<DatasetFile>(root, DATASET, &mut faults);
+    schema::check::<TargetsFile>(root, TARGETS, &mut faults);
+    let dataset = faults.read(DATASET, json::read::<DatasetFile>(&dataset_path));
+    if let Some(dataset) = &dataset {
+        check_dataset(root, dataset, &mut faults);
+        for (at, id) in dataset.scenes.iter().enumerate() {
+            progress(&format!("scene {id}"), at, dataset.scenes.len());
+            let folder = SceneFolder::of(root, id);
+            faults.prefix = format!("scenes/{id}/");
+            check_scene(&folder, dataset, id.as_str(), &mut faults);
+            faults.prefix.clear();
+        }
+        check_targets(root, dataset, &mut faults);
+    }
+    faults.all.sort();
+    Ok(faults.all)
+}
+
+fn check_manifest(root: &Path, faults: &mut Faults) {
+    if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
+        faults.all.extend(found);
+    }
+}
+
+fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
+    if dataset.format != FORMAT {
+        faults.add("wrong_format", DATASET, "/format", format!("'{}', expected '{FORMAT}'", dataset.format));
+    }
+    match manifest::sha256_of_file(&root.join(MANIFEST)) {
+        Ok(found) if found != dataset.manifest_sha256 => {
+            let message = format!("{}, but MANIFEST.sha256 hashes to {found}", dataset.manifest_sha256);
+            faults.add("wrong_manifest", DATASET, "/manifest_sha256", message);
+        }
+        // A manifest that is not there has been named already.
+        _ => {}
+    }
+    for (at, licence) in dataset.licences.iter().enumerate() {
+        if !dataset.scenes.contains(&licence.scene) {
+            let message = format!("there is no scene '{}'", licence.scene);
+            faults.add("dangling_reference", DATASET, format!("/licences/{at}/scene"), message);
+        }
+    }
+}
+
+fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
+    let Some(file) = faults.read(TARGETS, json::read::<TargetsFile>(&root.join(TARGETS))) else { return };
+    let mut seen = std::collections::BTreeSet::new();
+    for (at, target) in file.targets.iter().enumerate() {
+        let place = format!("/targets/{at}");
+        if !seen.insert(target) {
+            faults.add("duplicate_target", TARGETS, &place, format!("{} {} is there twice", target.scene, target.view));
+        }
+        let view_is_there = SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
+        if !dataset.scenes.contains(&target.scene) || !view_is_there {
+            let message = format!("there is no view '{}' of a scene '{}'", target.view, target.scene);
+            faults.add("dangling_reference", TARGETS, &place, message);
+        }
+    }
+}
+
+fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
+    schema::check::<SceneFile>(folder.path(), "scene.json", faults);
+    let Some(scene) = faults.read("scene.json", json::read::<SceneFile>(&folder.scene_file())) else { return };
+    if scene.id.as_str() != id {
+        faults.add("wrong_id", "scene.json", "/id", format!("'{}', but its folder is '{id}'", scene.id));
+    }
+    scene_file::check(&scene, faults);
+    let Some(meshes) = geometry::check(folder, &scene, faults) else { return };
+    let world = match folder.truth().is_dir() {
+        true => {
+            schema::check::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
+            schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
+            let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
+            geometry::check_reference(&reference, &meshes, faults);
+            geometry::check_materials(folder, &scene, faults);
+            World::new(Arc::new(reference))
+        }
+        false => World::new(Arc::new(geometry::opaque(&meshes))),
+    };
+    if world.scene().surfaces.len() == scene.instances.len() {
+        pictures::check(folder, &scene, &meshes, &world, faults);
+    }
+    if let Some(renderer) = &dataset.scored_renderer {
+        renders::check(folder, &scene, renderer, faults);
+    }
+}
