@@ -21,6 +21,9 @@ pub enum EvalError {
     /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
+    /// The tracer cannot work with the scene.
+    #[error(transparent)]
+    Tracer(#[from] mateval_tracer::TracerError),
     /// A picture could not be read.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),

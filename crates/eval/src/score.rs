@@ -125,7 +125,7 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
 
 fn score_scene(plan: &ScorePlan<'_>, scene: &SceneFile, entries: &mut [Entry]) -> Result<(), EvalError> {
     let folder = plan.dataset.folder(&scene.id);
-    let world = World::new(Arc::new(reference_io::read(&folder)?));
+    let world = World::new(Arc::new(reference_io::read(&folder)?))?;
     let atlases = read_atlases(&folder, &world)?;
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
     for view in scored_views(plan, scene) {

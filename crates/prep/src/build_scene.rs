@@ -122,7 +122,7 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
 /// Writes the pictures of every view. Gives the nearest depth in metres at which each instance is seen: in the input view,
 /// or where that does not show it in any other.
 fn write_views(plan: &Plan, folder: &SceneFolder, progress: Progress<'_>) -> Result<Vec<Option<f64>>, PrepError> {
-    let world = World::new(plan.scene.clone());
+    let world = World::new(plan.scene.clone())?;
     let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
     let parts: Vec<Vec<u16>> = plan
         .instances

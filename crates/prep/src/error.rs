@@ -42,6 +42,9 @@ pub enum PrepError {
     /// The source could not be read at all.
     #[error(transparent)]
     Bitterli(#[from] crate::bitterli::BitterliError),
+    /// The tracer cannot work with the scene.
+    #[error(transparent)]
+    Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),

@@ -9,8 +9,7 @@ use mateval_scene::dataset::{DatasetFile, SceneFile, View};
 use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
 use mateval_scene::manifest::{self, sha256_of_bytes};
 use mateval_scene::{SceneId, json, reference_io};
-use mateval_tracer::World;
-use mateval_tracer::path::{RenderSettings, RenderStats, render as render_view};
+use mateval_tracer::{Render, RenderSettings, RenderStats, World};
 use serde::{Deserialize, Serialize};
 
 use crate::build::RECIPE;
@@ -50,6 +49,8 @@ struct RenderFile {
     samples_each_half: u32,
     seeds: [u64; 2],
     max_bounces: u32,
+    /// What paths cut at that bounce still carried, averaged over all: times the radiance there, the light that is missing.
+    capped_throughput: f64,
 }
 
 /// Renders with our own tracer, then makes its pictures the scored ones and renews the manifest. Views that are there with
@@ -111,29 +112,34 @@ fn render_scene(
     for view in &scene.views {
         let place = folder.render(BUILTIN, &view.id);
         let settings = [0, 1].map(|half| RenderSettings { samples, seed: seed(id, view, half), ..Default::default() });
-        let file = RenderFile {
+        let seeds = [settings[0].seed, settings[1].seed];
+        let max_bounces = settings[0].max_bounces;
+        let is_same = |found: &RenderFile| {
+            (found.samples_each_half, found.seeds, found.max_bounces) == (samples, seeds, max_bounces)
+        };
+        let file = |a: &Render, b: &Render| RenderFile {
             renderer: BUILTIN.to_owned(),
             samples_each_half: samples,
-            seeds: [settings[0].seed, settings[1].seed],
-            max_bounces: settings[0].max_bounces,
+            seeds,
+            max_bounces,
+            capped_throughput: (a.stats.capped_throughput + b.stats.capped_throughput) / 2.0,
         };
-        if !force && json::read::<RenderFile>(&place.join("render.json")).is_ok_and(|found| found == file) {
+        if !force && json::read::<RenderFile>(&place.join("render.json")).is_ok_and(|found| is_same(&found)) {
             report.kept += 1;
             continue;
         }
         let world = match &mut world {
             Some(world) => world,
-            none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))),
+            none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
         };
         let step = format!("{id} {}", view.id);
-        let halves = [0, 1].map(|half| {
+        let half = |half: usize| {
             let shown = |done: usize, all: usize| progress(&step, half * all + done, 2 * all);
-            render_view(world, &view.camera, &settings[half], &shown)
-        });
-        write_view(&folder, view, scene.exposure, &halves, &file)?;
-        for (_, stats) in &halves {
-            report.remarks.extend(remark(&step, stats));
-        }
+            mateval_tracer::render(world, &view.camera, &settings[half], &shown)
+        };
+        let (a, b) = (half(0)?, half(1)?);
+        write_view(&folder, view, scene.exposure, [&a, &b], file(&a, &b))?;
+        report.remarks.extend(remark(&step, &a.stats).into_iter().chain(remark(&step, &b.stats)));
         report.rendered += 1;
     }
     Ok(())
@@ -146,19 +152,19 @@ fn seed(scene: &SceneId, view: &View, half: usize) -> u64 {
 }
 
 fn remark(step: &str, stats: &RenderStats) -> Option<String> {
-    (stats.non_finite > 0).then(|| format!("{step}: {} samples were not finite and left out", stats.non_finite))
+    (stats.not_finite > 0).then(|| format!("{step}: {} samples were not finite and left out: a bug", stats.not_finite))
 }
 
 fn write_view(
     folder: &SceneFolder,
     view: &View,
     exposure: f64,
-    halves: &[(Picture<LinearRgb>, RenderStats); 2],
-    file: &RenderFile,
+    [a, b]: [&Render; 2],
+    file: RenderFile,
 ) -> Result<(), PrepError> {
     let place = folder.render(BUILTIN, &view.id);
     std::fs::create_dir_all(&place).map_err(PrepError::io("make", &place))?;
-    let [(a, _), (b, _)] = halves;
+    let (a, b) = (&a.picture, &b.picture);
     let mean = mean(a, b);
     exr_io::write_linear(&place.join("rgb_a.exr"), a, Precision::Float)?;
     exr_io::write_linear(&place.join("rgb_b.exr"), b, Precision::Float)?;
@@ -171,7 +177,7 @@ fn write_view(
         png_io::write_srgb(&shown.join("rgb.png"), &preview)?;
     }
     // Last: it says that the others are whole.
-    Ok(json::write(&place.join("render.json"), file)?)
+    Ok(json::write(&place.join("render.json"), &file)?)
 }
 
 fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {

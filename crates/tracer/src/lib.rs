@@ -1,1 +1,34 @@
-//! x
+//! Traces light through a scene.
+//!
+//! In: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and a
+//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render`]), and first hits ([`World::first_hit`]) for depth, normals, ids and
+//! material pictures.
+//!
+//! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
+//! [`SurfaceHit`]; the surface's material there becomes a [`Bsdf`]; [`emitter`] samples what shines on it; [`sampler`]
+//! gives every number from seed, pixel and sample index; [`film`] averages tiles in a fixed order. Trigonometry is the
+//! `libm` crate's, so every machine computes the same bits.
+
+pub mod accel;
+pub mod aov;
+pub mod bsdf;
+pub mod emitter;
+pub mod error;
+pub mod film;
+mod frame;
+mod path;
+pub mod ray;
+pub mod render;
+pub mod sampler;
+pub mod surface_hit;
+mod warp;
+pub mod world;
+
+pub use accel::{Accel, Hit, TriangleIndex};
+pub use bsdf::{Bsdf, BsdfSample};
+pub use error::TracerError;
+pub use ray::Ray;
+pub use render::{LightSampling, Render, RenderSettings, RenderStats, render};
+pub use sampler::Sampler;
+pub use surface_hit::SurfaceHit;
+pub use world::World;

@@ -131,6 +131,7 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
         }
         false => World::new(Arc::new(geometry::opaque(&meshes))),
     };
+    let Some(world) = faults.read("ground_truth/reference", world) else { return };
     if world.scene().surfaces.len() == scene.instances.len() {
         pictures::check(folder, &scene, &meshes, &world, faults);
     }

@@ -1,0 +1,143 @@
+//! First hits through places of a picture: what pictures without light are made of.
+
+use glam::{DVec2, DVec3, Vec2, Vec3};
+use mateval_scene::Camera;
+use mateval_scene::reference::SurfaceIndex;
+
+use crate::ray::Ray;
+use crate::world::World;
+
+/// Sub-pixels along a pixel's side.
+const SUBPIXELS_A_SIDE: usize = 4;
+/// Sub-pixels of a pixel.
+pub const SUBPIXELS: usize = SUBPIXELS_A_SIDE * SUBPIXELS_A_SIDE;
+
+/// The places at which pixel (x, y) is looked at: the centres of a regular 4x4 grid, the same for truth and prediction.
+pub fn subpixels(x: usize, y: usize) -> [DVec2; SUBPIXELS] {
+    std::array::from_fn(|index| {
+        let step = |index: usize| (index as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
+        DVec2::new(x as f64 + step(index % SUBPIXELS_A_SIDE), y as f64 + step(index / SUBPIXELS_A_SIDE))
+    })
+}
+
+/// What a picture shows at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelHit {
+    /// The surface.
+    pub surface: SurfaceIndex,
+    /// The triangle of that surface.
+    pub triangle: usize,
+    /// Weights of the triangle's corners, adding to one.
+    pub barycentrics: Vec3,
+    /// Metres along the camera's axis.
+    pub depth: f64,
+    /// World-space shading normal, unit length, turned towards the camera.
+    pub normal: Vec3,
+    /// Whether the side is seen from which the triangle's corners run counter-clockwise.
+    pub front: bool,
+}
+
+impl PixelHit {
+    /// A value that is given at the vertices, at the hit.
+    pub fn interpolate(&self, triangles: &[[u32; 3]], values: &[Vec2]) -> Vec2 {
+        let [a, b, c] = triangles[self.triangle].map(|vertex| values[vertex as usize]);
+        a * self.barycentrics.x + b * self.barycentrics.y + c * self.barycentrics.z
+    }
+}
+
+/// What the camera sees at `pixel`; masked-out texels (opacity under one half) are looked through, glass is not.
+pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<PixelHit> {
+    let direction = camera.direction(pixel);
+    let hit = world.first_hit(&Ray::endless(camera.position().as_vec3(), direction.as_vec3()))?;
+    let mesh = &world.scene().surfaces[hit.surface.0].mesh;
+    let triangle = hit.triangle.0;
+    let corners = mesh.corners(triangle).map(|corner| corner.as_dvec3());
+    let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+    let front = geometric.dot(direction) < 0.0;
+    // From the corners, not from the distance along the ray: as exact as the mesh is.
+    let weights = hit.barycentrics.as_dvec3();
+    let point = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+    let (_, depth) = camera.project(point)?;
+    let shading = mesh.normals.as_deref().map(|normals| {
+        let [a, b, c] = mesh.triangles[triangle].map(|vertex| normals[vertex as usize].as_dvec3());
+        a * weights.x + b * weights.y + c * weights.z
+    });
+    let normal = towards_camera(shading.unwrap_or(geometric), geometric, direction);
+    Some(PixelHit { surface: hit.surface, triangle, barycentrics: hit.barycentrics, depth, normal, front })
+}
+
+/// The shading normal, on the side of the surface that the camera sees; the geometric one where that has no length.
+fn towards_camera(shading: DVec3, geometric: DVec3, direction: DVec3) -> Vec3 {
+    let geometric = if geometric.dot(direction) > 0.0 { -geometric } else { geometric }.normalize_or_zero();
+    let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
+    shading.try_normalize().unwrap_or(geometric).as_vec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use mateval_image::{Texels, Texture, Wrap};
+    use mateval_scene::material::{ColorInput, Material, MaterialModel, ScalarInput, TextureIndex};
+    use mateval_scene::reference::{MaterialIndex, ReferenceScene, SourceTexture, Surface};
+    use mateval_scene::{Intrinsics, TriangleMesh};
+
+    use super::*;
+
+    fn quad(z: f32, material: usize) -> Surface {
+        let corner = |x: f32, y: f32| Vec3::new(x, y, z);
+        let mesh = TriangleMesh {
+            positions: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+            normals: None,
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        Surface { name: String::new(), mesh, material: MaterialIndex(material) }
+    }
+
+    /// A sheet whose left half is cut out at z = -2 before a wall at z = -4.
+    fn world() -> World {
+        let plain = Material {
+            name: String::new(),
+            model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
+            two_sided: true,
+            opacity: None,
+            bump: None,
+        };
+        let opacity = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: Default::default() };
+        let texture = Texture::new(2, 1, Texels::Grey(vec![0.0, 1.0]), Wrap::Clamp).unwrap();
+        World::new(Arc::new(ReferenceScene {
+            surfaces: vec![quad(-2.0, 1), quad(-4.0, 0)],
+            materials: vec![plain.clone(), Material { opacity: Some(opacity), ..plain }],
+            textures: vec![SourceTexture { name: String::new(), sha256: None, texture }],
+            lights: Vec::new(),
+        }))
+    }
+
+    fn camera() -> Camera {
+        let intrinsics = Intrinsics::from_fov_x(64, 64, std::f64::consts::FRAC_PI_4);
+        Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap()
+    }
+
+    #[test]
+    fn depth_lies_along_the_axis_and_the_normal_faces_the_camera() {
+        for x in [40.5, 50.5, 60.5] {
+            let hit = hit_through(&world(), &camera(), DVec2::new(x, 20.5)).unwrap();
+            assert!((hit.depth - 2.0).abs() < 1e-6 && hit.front, "{hit:?}");
+            assert_eq!(hit.normal, Vec3::Z);
+        }
+    }
+
+    #[test]
+    fn cut_out_texels_are_looked_through() {
+        let hit = hit_through(&world(), &camera(), DVec2::new(20.5, 20.5)).unwrap();
+        assert_eq!((hit.surface, hit.depth.round()), (SurfaceIndex(1), 4.0));
+    }
+
+    #[test]
+    fn subpixels_lie_in_the_pixel_and_about_its_centre() {
+        let places = subpixels(3, 7);
+        assert_eq!(places.iter().sum::<DVec2>() / SUBPIXELS as f64, DVec2::new(3.5, 7.5));
+        assert!(places.iter().all(|p| p.x > 3.0 && p.x < 4.0 && p.y > 7.0 && p.y < 8.0));
+    }
+}

@@ -1,0 +1,50 @@
+//! Bends the shading normal by the slope of a height texture.
+//!
+//! Blinn, "Simulation of Wrinkled Surfaces" (1978), the surface's own curvature neglected: the tangents dp/du and dp/dv
+//! are raised along the normal by the height's slope, their cross product is the new normal.
+
+use glam::{Vec2, Vec3};
+use mateval_image::Texture;
+use mateval_scene::TriangleMesh;
+use mateval_scene::material::{BumpMap, ScalarInput};
+
+use crate::surface_hit::SurfaceHit;
+
+/// The bent normal, on the side of `hit.shading_normal`; that normal itself where the mesh has no usable uv.
+pub(crate) fn bumped_normal(bump: &BumpMap, textures: &[Texture], mesh: &TriangleMesh, hit: &SurfaceHit) -> Vec3 {
+    let normal = hit.shading_normal;
+    let Some([dp_du, dp_dv]) = tangents(mesh, hit.triangle.0) else { return normal };
+    let slope = slope(&bump.height, textures, hit.uv) * bump.scale;
+    let raised = |tangent: Vec3, slope: f32| tangent + normal * (slope - normal.dot(tangent));
+    let bent = raised(dp_du, slope.x).cross(raised(dp_dv, slope.y)).normalize_or(normal);
+    let bent = if bent.dot(normal) < 0.0 { -bent } else { bent };
+    if bent.is_finite() { bent } else { normal }
+}
+
+/// How the position changes with u and with v over the triangle, in metres.
+fn tangents(mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 2]> {
+    let uvs = mesh.uvs.as_ref()?;
+    let [a, b, c] = mesh.corners(triangle);
+    let [ta, tb, tc] = mesh.triangles[triangle].map(|vertex| uvs[vertex as usize]);
+    let (e1, e2, d1, d2) = (b - a, c - a, tb - ta, tc - ta);
+    let area = d1.x * d2.y - d1.y * d2.x;
+    let tangents = [(e1 * d2.y - e2 * d1.y) / area, (e2 * d1.x - e1 * d2.x) / area];
+    tangents.iter().all(|t| t.is_finite()).then_some(tangents)
+}
+
+/// How the height changes with the surface's u and v: central differences over one texel.
+fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
+    let ScalarInput::Texture { texture, channel, uv: transform } = height else { return Vec2::ZERO };
+    let map = &textures[texture.0];
+    let at = transform.apply(uv);
+    let difference = |step: Vec2| {
+        let value = |uv: Vec2| map.sample(uv.to_array())[*channel];
+        value(at + step) - value(at - step)
+    };
+    let (width, height) = (map.width() as f32, map.height() as f32);
+    // In the texture's own uv first, then by the chain rule.
+    let du = difference(Vec2::new(0.5 / width, 0.0)) * width;
+    let dv = difference(Vec2::new(0.0, 0.5 / height)) * height;
+    let rows = &transform.0;
+    Vec2::new(du * rows[0][0] + dv * rows[1][0], du * rows[0][1] + dv * rows[1][1])
+}

@@ -1,0 +1,87 @@
+//! A diffuse base under a dielectric coat, rough or smooth: Mitsuba's `plastic` and `roughplastic`.
+//!
+//! The light that enters through the coat, is scattered by the base, is reflected inside by the coat any number of times
+//! and leaves: T(wi) T(wo) / eta^2 * base / (1 - base * R_inside) / pi (Mitsuba 3's documentation of `plastic`). Without
+//! `nonlinear`, the base's own colour stays out of the denominator.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+
+use super::conductor::{reflection, reflection_density};
+use super::facets::{Facets, reflect};
+use super::fresnel;
+use super::lobe::LocalSample;
+use super::rough_boundary::RoughBoundary;
+use crate::warp;
+
+/// The coat and its base, at one place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plastic<'w> {
+    pub(crate) eta: f32,
+    pub(crate) nonlinear: bool,
+    pub(crate) base: Vec3,
+    pub(crate) tint: Vec3,
+    pub(crate) coat: Coat<'w>,
+}
+
+/// The coat's boundary.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Coat<'w> {
+    /// With the share of uniform light from inside that it reflects back.
+    Smooth { inside: f32 },
+    /// With its facets, their width and the table of what they reflect together.
+    Rough { facets: Facets, alpha: f32, boundary: &'w RoughBoundary },
+}
+
+impl Plastic<'_> {
+    /// What the coat reflects of light from or to the cosine `cos`. It is also the share of samples for the coat: so the
+    /// choice does not depend on colours.
+    fn reflected(&self, cos: f32) -> f32 {
+        match self.coat {
+            Coat::Smooth { .. } => fresnel::dielectric(cos, self.eta).0,
+            Coat::Rough { alpha, boundary, .. } => boundary.reflected(cos, alpha),
+        }
+    }
+
+    fn base_value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let inside = match self.coat {
+            Coat::Smooth { inside } => inside,
+            Coat::Rough { alpha, boundary, .. } => boundary.reflected_inside(alpha),
+        };
+        let returned = if self.nonlinear { self.base * inside } else { Vec3::splat(inside) };
+        let through = (1.0 - self.reflected(wo.z)) * (1.0 - self.reflected(wi.z)) / (self.eta * self.eta);
+        self.base / (Vec3::ONE - returned) * (through * FRAC_1_PI * wi.z)
+    }
+
+    /// The base, and the coat where it is rough.
+    pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let base = self.base_value(wo, wi);
+        let (Coat::Rough { facets, .. }, Some(m)) = (self.coat, (wo + wi).try_normalize()) else { return base };
+        let reflected = fresnel::dielectric(wo.dot(m).clamp(0.0, 1.0), self.eta).0;
+        base + self.tint * (reflected * reflection(&facets, wo, wi, m))
+    }
+
+    /// The density of the directions that [`Self::eval`] covers.
+    pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let coat_share = self.reflected(wo.z);
+        let base = (1.0 - coat_share) * warp::cosine_density(wi.z);
+        match self.coat {
+            Coat::Smooth { .. } => base,
+            Coat::Rough { facets, .. } => base + coat_share * reflection_density(&facets, wo, wi),
+        }
+    }
+
+    pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
+        let coat_share = self.reflected(wo.z);
+        let wi = match self.coat {
+            _ if u[0] >= coat_share => warp::cosine_hemisphere([u[1], u[2]]),
+            Coat::Smooth { .. } => {
+                return Some(LocalSample::delta(Vec3::new(-wo.x, -wo.y, wo.z), self.tint, coat_share));
+            }
+            Coat::Rough { facets, .. } => reflect(wo, facets.sample(wo, [u[1], u[2]])),
+        };
+        let density = self.density(wo, wi);
+        (wi.z > 0.0 && density > 0.0).then(|| LocalSample::spread(wi, self.eval(wo, wi), density))
+    }
+}

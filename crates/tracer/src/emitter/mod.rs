@@ -1,0 +1,286 @@
+//! What emits light, and how it is found from a place that it may shine on.
+//!
+//! One emitter is chosen, then a place on it or a direction to it. The choice follows from geometry alone (solid angle,
+//! with a share of 0.2 for all alike), never from radiance: pictures of each light group alone, and of any weights of
+//! them, can come from the same paths.
+
+mod area;
+mod distribution;
+mod environment;
+
+use glam::Vec3;
+use mateval_image::Texture;
+use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
+
+use crate::error::TracerError;
+use crate::surface_hit::SurfaceHit;
+use area::AreaEmitter;
+use environment::EnvironmentMap;
+
+/// All light groups of a scene.
+#[derive(Debug)]
+pub struct Emitters {
+    areas: Vec<AreaEmitter>,
+    /// For each surface the place in `areas`, if it glows.
+    area_of: Vec<Option<usize>>,
+    distant: Vec<DistantEmitter>,
+    /// For each light group, whether the camera sees it.
+    camera_visible: Vec<bool>,
+    scene_size: f32,
+}
+
+#[derive(Debug)]
+struct DistantEmitter {
+    light: LightIndex,
+    kind: DistantKind,
+}
+
+#[derive(Debug)]
+enum DistantKind {
+    Map(Box<EnvironmentMap>),
+    Constant(Vec3),
+}
+
+/// Light that arrives along a sampled direction, unless something is in between.
+#[derive(Clone, Copy, Debug)]
+pub struct EmitterSample {
+    /// The group that it belongs to.
+    pub light: LightIndex,
+    /// Where it comes from, unit length.
+    pub direction: Vec3,
+    /// Linear Rec. 709.
+    pub radiance: Vec3,
+    /// Per solid angle, the choice of emitter included.
+    pub density: f32,
+    /// The place on the emitter; none for one far outside.
+    pub place: Option<SurfaceHit>,
+}
+
+/// Radiance found without sampling, by a ray that happened to go there.
+#[derive(Clone, Copy, Debug)]
+pub struct Emitted {
+    /// The group that it belongs to.
+    pub light: LightIndex,
+    /// Linear Rec. 709.
+    pub radiance: Vec3,
+    /// The density with which [`Emitters::sample`] would have found it, per solid angle.
+    pub density: f32,
+}
+
+/// The share of choices that is spread over all area emitters alike.
+const UNIFORM_SHARE: f32 = 0.2;
+/// Above this many glowing surfaces, those of a light group are sampled as one.
+const SEPARATE_SURFACES: usize = 64;
+
+impl Emitters {
+    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
+        let mut emitters = Self {
+            areas: Vec::new(),
+            area_of: vec![None; scene.surfaces.len()],
+            distant: Vec::new(),
+            camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
+            scene_size,
+        };
+        let glowing = |emission: &Emission| match emission {
+            Emission::Area { surfaces, .. } => surfaces.len(),
+            _ => 0,
+        };
+        let count: usize = scene.lights.iter().map(|group| glowing(&group.emission)).sum();
+        for (index, group) in scene.lights.iter().enumerate() {
+            emitters
+                .add(scene, textures, LightIndex(index), &group.emission, count <= SEPARATE_SURFACES)
+                .map_err(|what| TracerError::Invalid(format!("light {index} '{}': {what}", group.name)))?;
+        }
+        Ok(emitters)
+    }
+
+    fn add(
+        &mut self,
+        scene: &ReferenceScene,
+        textures: &[Texture],
+        light: LightIndex,
+        emission: &Emission,
+        separate: bool,
+    ) -> Result<(), String> {
+        match emission {
+            Emission::Area { surfaces, radiance, two_sided } => {
+                check_radiance(radiance)?;
+                let parts: Vec<&[SurfaceIndex]> =
+                    if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
+                for part in parts {
+                    self.claim(part)?;
+                    self.areas.push(AreaEmitter::new(scene, light, *radiance, *two_sided, part.to_vec()));
+                }
+            }
+            Emission::Environment { texture, scale, world_from_environment } => {
+                let map = textures.get(texture.0).ok_or(format!("texture {} of {}", texture.0, textures.len()))?;
+                let numbers = world_from_environment.iter().flatten().chain([scale]);
+                if !numbers.into_iter().all(|v| v.is_finite()) {
+                    return Err("scale or rotation is not finite".into());
+                }
+                let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
+                self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map) });
+            }
+            Emission::Constant { radiance } => {
+                check_radiance(radiance)?;
+                let kind = DistantKind::Constant(Vec3::from_array(*radiance));
+                self.distant.push(DistantEmitter { light, kind });
+            }
+        }
+        Ok(())
+    }
+
+    /// Notes that `surfaces` belong to the area emitter that comes next.
+    fn claim(&mut self, surfaces: &[SurfaceIndex]) -> Result<(), String> {
+        for surface in surfaces {
+            let slot = self.area_of.get_mut(surface.0).ok_or(format!("surface {} does not exist", surface.0))?;
+            if slot.replace(self.areas.len()).is_some() {
+                return Err(format!("surface {} glows twice", surface.0));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the camera sees the group glow.
+    pub fn is_camera_visible(&self, light: LightIndex) -> bool {
+        self.camera_visible[light.0]
+    }
+
+    /// The group that a surface glows for, whichever side is seen.
+    pub fn light_of(&self, surface: SurfaceIndex) -> Option<LightIndex> {
+        self.area_of[surface.0].map(|area| self.areas[area].light)
+    }
+
+    /// Light for the place `from`, from three numbers in [0, 1); none when there is none to be had. `opacity` is asked
+    /// for the coverage of a glowing surface.
+    pub fn sample(
+        &self,
+        scene: &ReferenceScene,
+        from: Vec3,
+        u: [f32; 3],
+        opacity: impl Fn(&SurfaceHit) -> f32,
+    ) -> Option<EmitterSample> {
+        let distant_share = self.distant_share();
+        if u[0] < distant_share {
+            return self.sample_distant((u[0] / distant_share).min(1.0 - f32::EPSILON), [u[1], u[2]], distant_share);
+        }
+        let choice = ((u[0] - distant_share) / (1.0 - distant_share)).clamp(0.0, 1.0 - f32::EPSILON);
+        self.sample_area(scene, from, choice, [u[1], u[2]], opacity)
+    }
+
+    fn sample_area(
+        &self,
+        scene: &ReferenceScene,
+        from: Vec3,
+        choice: f32,
+        u: [f32; 2],
+        opacity: impl Fn(&SurfaceHit) -> f32,
+    ) -> Option<EmitterSample> {
+        let (which, rest, probability) = self.choose_area(from, choice)?;
+        let area = &self.areas[which];
+        let place = area.sample(scene, self.scene_size, rest, u);
+        let towards = place.position - from;
+        let direction = towards.try_normalize()?;
+        let cos = place.geometric_normal.dot(direction).abs();
+        let density = probability * towards.length_squared() / (cos * area.area());
+        if !area.glows(&place, -direction) || !density.is_finite() || density <= 0.0 {
+            return None;
+        }
+        let radiance = area.radiance * opacity(&place).clamp(0.0, 1.0);
+        Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place) })
+    }
+
+    fn sample_distant(&self, choice: f32, u: [f32; 2], share: f32) -> Option<EmitterSample> {
+        let count = self.distant.len();
+        let emitter = self.distant.get(((choice * count as f32) as usize).min(count.checked_sub(1)?))?;
+        let (direction, density) = match &emitter.kind {
+            DistantKind::Map(map) => map.sample(u),
+            DistantKind::Constant(_) => environment::sample_constant(u),
+        };
+        let density = density * share / count as f32;
+        (density > 0.0 && density.is_finite()).then(|| EmitterSample {
+            light: emitter.light,
+            direction,
+            radiance: emitter.radiance(direction),
+            density,
+            place: None,
+        })
+    }
+
+    /// What the surface at `place` sends to `from`, if it glows there.
+    pub fn emitted(&self, place: &SurfaceHit, from: Vec3) -> Option<Emitted> {
+        let which = self.area_of[place.surface.0]?;
+        let area = &self.areas[which];
+        let towards = place.position - from;
+        if !area.glows(place, -towards) {
+            return None;
+        }
+        let probability = (1.0 - self.distant_share()) * self.area_probability(which, from);
+        let distance2 = towards.length_squared();
+        let cos = place.geometric_normal.dot(towards).abs() / distance2.sqrt();
+        let density = probability * distance2 / (cos * area.area());
+        Some(Emitted { light: area.light, radiance: area.radiance, density })
+    }
+
+    /// What arrives from far outside along a ray to `direction` that met nothing, one entry a group.
+    pub fn from_outside(&self, direction: Vec3) -> impl Iterator<Item = Emitted> + '_ {
+        let share = self.distant_share() / self.distant.len().max(1) as f32;
+        self.distant.iter().map(move |emitter| Emitted {
+            light: emitter.light,
+            radiance: emitter.radiance(direction),
+            density: share
+                * match &emitter.kind {
+                    DistantKind::Map(map) => map.density(direction),
+                    DistantKind::Constant(_) => environment::CONSTANT_DENSITY,
+                },
+        })
+    }
+
+    /// How often light from far outside is chosen.
+    fn distant_share(&self) -> f32 {
+        match (self.areas.is_empty(), self.distant.is_empty()) {
+            (_, true) => 0.0,
+            (true, false) => 1.0,
+            (false, false) => 0.5,
+        }
+    }
+
+    /// The area emitter for `choice` in [0, 1), the part of the choice within it, and its probability among them.
+    fn choose_area(&self, from: Vec3, choice: f32) -> Option<(usize, f32, f32)> {
+        let total: f32 = self.areas.iter().map(|area| area.importance(from)).sum();
+        let (mut before, last) = (0.0_f32, self.areas.len().checked_sub(1)?);
+        for (which, area) in self.areas.iter().enumerate() {
+            let probability = self.mixed(area.importance(from), total);
+            if choice < before + probability || which == last {
+                let rest = ((choice - before) / probability).clamp(0.0, 1.0 - f32::EPSILON);
+                return (probability > 0.0).then_some((which, rest, probability));
+            }
+            before += probability;
+        }
+        None
+    }
+
+    fn area_probability(&self, which: usize, from: Vec3) -> f32 {
+        let total: f32 = self.areas.iter().map(|area| area.importance(from)).sum();
+        self.mixed(self.areas[which].importance(from), total)
+    }
+
+    fn mixed(&self, importance: f32, total: f32) -> f32 {
+        let alike = 1.0 / self.areas.len() as f32;
+        if total > 0.0 { UNIFORM_SHARE * alike + (1.0 - UNIFORM_SHARE) * importance / total } else { alike }
+    }
+}
+
+impl DistantEmitter {
+    fn radiance(&self, direction: Vec3) -> Vec3 {
+        match &self.kind {
+            DistantKind::Map(map) => map.radiance(direction),
+            DistantKind::Constant(radiance) => *radiance,
+        }
+    }
+}
+
+fn check_radiance(radiance: &[f32; 3]) -> Result<(), String> {
+    let sound = radiance.iter().all(|&v| v.is_finite() && v >= 0.0);
+    if sound { Ok(()) } else { Err(format!("radiance {radiance:?}, expected finite and not negative")) }
+}

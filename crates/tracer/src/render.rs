@@ -1,0 +1,153 @@
+//! Pictures of a world's light.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::DVec2;
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::Camera;
+
+use crate::error::TracerError;
+use crate::film;
+use crate::path::{PathCounts, trace};
+use crate::ray::Ray;
+use crate::sampler::Sampler;
+use crate::world::World;
+
+/// How light is looked for. All three have the same mean; they differ in noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightSampling {
+    /// Emitters are sampled and surfaces too, weighed by the power heuristic.
+    #[default]
+    Both,
+    /// Emitters are sampled; what a scattered ray meets counts only after a mirror or clear glass.
+    Emitters,
+    /// Emitters are found by scattered rays alone.
+    Bsdf,
+}
+
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Paths a pixel.
+    pub samples: u32,
+    /// Two seeds make two independent pictures.
+    pub seed: u64,
+    /// Scatterings beyond the first that a path may have before its last piece of direct light: Blender's "max bounces";
+    /// Mitsuba's `max_depth` is 2 more.
+    pub max_bounces: u32,
+    /// From this bounce on, paths end by chance.
+    pub roulette_start: u32,
+    /// The probability to go on then, above 0 and up to 1.
+    pub roulette_survival: f32,
+    /// How light is looked for.
+    pub light_sampling: LightSampling,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            samples: 64,
+            seed: 0,
+            max_bounces: 16,
+            roulette_start: 4,
+            roulette_survival: 0.8,
+            light_sampling: LightSampling::Both,
+        }
+    }
+}
+
+/// What happened on the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RenderStats {
+    /// Paths started.
+    pub paths: u64,
+    /// Rays that looked for the nearest surface.
+    pub rays: u64,
+    /// Rays that asked whether an emitter is seen.
+    pub shadow_rays: u64,
+    /// Share of paths that `max_bounces` cut.
+    pub capped_share: f64,
+    /// What those still carried, averaged over all paths: times the radiance around them, the light that is missing.
+    pub capped_throughput: f64,
+    /// Contributions left out because they were not finite: each is a bug.
+    pub not_finite: u64,
+}
+
+/// A picture and what happened on the way to it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Render {
+    /// Linear radiance.
+    pub picture: Picture<LinearRgb>,
+    /// What happened.
+    pub stats: RenderStats,
+}
+
+/// Renders what `camera` sees. `progress` is told, from any thread, how many tiles of how many are done.
+///
+/// The same bytes for any number of threads of the current rayon pool. Fails for settings that make no sense.
+pub fn render(
+    world: &World,
+    camera: &Camera,
+    settings: &RenderSettings,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Render, TracerError> {
+    check(settings)?;
+    let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+    let total = film::tiles(width, height).len();
+    let finished = AtomicUsize::new(0);
+    let (picture, counts) = film::develop(
+        width,
+        height,
+        |counts: &mut PathCounts, x, y| pixel(world, camera, settings, counts, [x, y]),
+        || progress(finished.fetch_add(1, Ordering::Relaxed) + 1, total),
+    );
+    let paths = (width * height) as u64 * u64::from(settings.samples);
+    Ok(Render { picture, stats: stats(paths, &counts) })
+}
+
+fn check(settings: &RenderSettings) -> Result<(), TracerError> {
+    let RenderSettings { samples, roulette_survival, .. } = *settings;
+    if samples == 0 || !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
+        return Err(TracerError::Invalid(format!(
+            "{samples} samples, roulette survival {roulette_survival}; expected at least 1, and above 0 up to 1"
+        )));
+    }
+    Ok(())
+}
+
+/// The mean of the pixel's samples.
+fn pixel(
+    world: &World,
+    camera: &Camera,
+    settings: &RenderSettings,
+    counts: &mut PathCounts,
+    [x, y]: [usize; 2],
+) -> [f64; 3] {
+    let mut sum = [0.0_f64; 3];
+    for index in 0..settings.samples {
+        let sampler = Sampler::new(settings.seed, [x as u32, y as u32], index);
+        let [dx, dy, ..] = sampler.set(0);
+        let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
+        let ray = Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3());
+        trace(world, settings, &sampler, ray, counts, |_, value| {
+            for (channel, value) in sum.iter_mut().zip(value.to_array()) {
+                *channel += f64::from(value);
+            }
+        });
+    }
+    sum.map(|channel| channel / f64::from(settings.samples))
+}
+
+fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {
+    let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
+    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput).sum();
+    let all = paths.max(1) as f64;
+    RenderStats {
+        paths,
+        rays: sum(|tile| tile.rays),
+        shadow_rays: sum(|tile| tile.shadow_rays),
+        capped_share: sum(|tile| tile.capped) as f64 / all,
+        capped_throughput: capped_throughput / all,
+        not_finite: sum(|tile| tile.not_finite),
+    }
+}

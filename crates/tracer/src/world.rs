@@ -1,0 +1,190 @@
+//! A scene made ready for rays.
+
+use std::sync::Arc;
+
+use glam::Vec2;
+use mateval_image::Texture;
+use mateval_scene::TriangleMesh;
+use mateval_scene::material::Material;
+use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
+
+use crate::accel::{Accel, Hit};
+use crate::bsdf::MaterialTables;
+use crate::emitter::Emitters;
+use crate::error::TracerError;
+use crate::ray::Ray;
+use crate::sampler::unit_hash;
+use crate::surface_hit::SurfaceHit;
+
+/// A scene, its triangles in a hierarchy, its lights in tables.
+#[derive(Debug)]
+pub struct World {
+    scene: Arc<ReferenceScene>,
+    textures: Vec<Texture>,
+    accel: Arc<Accel>,
+    emitters: Emitters,
+    tables: MaterialTables,
+    /// Whether any material has an opacity.
+    masked: bool,
+    /// The largest coordinate of anything.
+    size: f32,
+}
+
+/// From this opacity on a surface counts as there, for pictures without light.
+const OPACITY_THRESHOLD: f32 = 0.5;
+
+impl World {
+    /// Checks the scene and builds the hierarchy over all surfaces.
+    ///
+    /// Fails where an index leads nowhere, a vertex array has the wrong length, or a number is not finite.
+    pub fn new(scene: Arc<ReferenceScene>) -> Result<Self, TracerError> {
+        let accel = Arc::new(Accel::build(&meshes(&scene))?);
+        Self::assemble(scene, accel)
+    }
+
+    /// A world of the same triangles with other materials, uvs, normals or lights, which shares `accel`.
+    ///
+    /// Fails as [`Self::new`], and where the triangles are not those that `accel` was built from.
+    pub fn sharing(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
+        if !accel.holds(&meshes(&scene))? {
+            return Err(TracerError::Invalid("the hierarchy was built from other triangles".into()));
+        }
+        Self::assemble(scene, accel)
+    }
+
+    fn assemble(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
+        for (index, surface) in scene.surfaces.iter().enumerate() {
+            check_surface(index, surface, scene.materials.len())?;
+        }
+        let textures = scene.texture_list();
+        let [low, high] = accel.bounds();
+        let size = low.abs().max(high.abs()).max_element();
+        Ok(Self {
+            emitters: Emitters::new(&scene, &textures, size)?,
+            tables: MaterialTables::new(&scene, &textures)?,
+            masked: scene.materials.iter().any(|material| material.opacity.is_some()),
+            textures,
+            scene,
+            accel,
+            size,
+        })
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &ReferenceScene {
+        &self.scene
+    }
+
+    /// The hierarchy, to be shared with [`Self::sharing`].
+    pub fn accel(&self) -> &Arc<Accel> {
+        &self.accel
+    }
+
+    /// The textures of the scene.
+    pub fn textures(&self) -> &[Texture] {
+        &self.textures
+    }
+
+    /// What emits.
+    pub fn emitters(&self) -> &Emitters {
+        &self.emitters
+    }
+
+    pub(crate) fn tables(&self) -> &MaterialTables {
+        &self.tables
+    }
+
+    /// The nearest hit on a surface whose opacity there is at least one half.
+    pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
+        self.closest_above(ray, |_| OPACITY_THRESHOLD)
+    }
+
+    /// The nearest hit; a surface of opacity o is met with probability o. Equal `salt`, ray and scene give equal hits.
+    pub fn closest(&self, ray: &Ray, salt: u32) -> Option<Hit> {
+        self.closest_above(ray, |hit| opacity_draw(salt, hit))
+    }
+
+    /// Whether the ray is stopped; a surface of opacity o stops it with probability o, as `salt` says.
+    pub fn occluded(&self, ray: &Ray, salt: u32) -> bool {
+        if !self.masked {
+            return self.accel.occluded(ray);
+        }
+        self.accel.occluded_where(ray, |hit| self.opacity(hit) >= opacity_draw(salt, hit))
+    }
+
+    fn closest_above(&self, ray: &Ray, threshold: impl Fn(&Hit) -> f32) -> Option<Hit> {
+        if !self.masked {
+            return self.accel.closest(ray);
+        }
+        self.accel.closest_where(ray, |hit| self.opacity(hit) >= threshold(hit))
+    }
+
+    /// The opacity at a hit, 1 where the material has none.
+    pub fn opacity(&self, hit: &Hit) -> f32 {
+        match &self.material_of(hit.surface).opacity {
+            None => 1.0,
+            Some(opacity) => opacity.at(&self.textures, self.source_uv(hit)),
+        }
+    }
+
+    /// The opacity at a place, 1 where the material has none.
+    pub fn opacity_at(&self, place: &SurfaceHit) -> f32 {
+        self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
+    }
+
+    /// The material at a hit.
+    pub fn material(&self, hit: &Hit) -> &Material {
+        self.material_of(hit.surface)
+    }
+
+    /// The material of a surface.
+    pub fn material_of(&self, surface: SurfaceIndex) -> &Material {
+        &self.scene.materials[self.scene.surfaces[surface.0].material.0]
+    }
+
+    /// The surface's own uv at a hit; zero where it has none.
+    pub fn source_uv(&self, hit: &Hit) -> Vec2 {
+        let mesh = self.mesh(hit.surface);
+        let Some(uvs) = &mesh.uvs else { return Vec2::ZERO };
+        let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
+        a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
+    }
+
+    /// What is known of the surface at a hit.
+    pub fn surface_hit(&self, hit: &Hit) -> SurfaceHit {
+        SurfaceHit::new(hit.surface, hit.triangle, self.mesh(hit.surface), hit.barycentrics, self.size)
+    }
+
+    pub(crate) fn mesh(&self, surface: SurfaceIndex) -> &TriangleMesh {
+        &self.scene.surfaces[surface.0].mesh
+    }
+}
+
+fn meshes(scene: &ReferenceScene) -> Vec<&TriangleMesh> {
+    scene.surfaces.iter().map(|surface| &surface.mesh).collect()
+}
+
+/// A number in (0, 1] from the salt and the triangle: the order in which triangles are met does not enter.
+fn opacity_draw(salt: u32, hit: &Hit) -> f32 {
+    1.0 - unit_hash(salt, hit.global)
+}
+
+fn check_surface(index: usize, surface: &Surface, materials: usize) -> Result<(), TracerError> {
+    let invalid = |what: String| Err(TracerError::Invalid(format!("surface {index} '{}': {what}", surface.name)));
+    let mesh = &surface.mesh;
+    let count = mesh.positions.len();
+    if surface.material.0 >= materials {
+        return invalid(format!("material {} of {materials}", surface.material.0));
+    }
+    if let Some(normals) = &mesh.normals
+        && (normals.len() != count || !normals.iter().all(|normal| normal.is_finite()))
+    {
+        return invalid(format!("{} normals for {count} vertices, expected as many, all finite", normals.len()));
+    }
+    if let Some(uvs) = &mesh.uvs
+        && (uvs.len() != count || !uvs.iter().all(|uv| uv.is_finite()))
+    {
+        return invalid(format!("{} uvs for {count} vertices, expected as many, all finite", uvs.len()));
+    }
+    Ok(())
+}

@@ -1,0 +1,13 @@
+//! Whole pictures: closed forms, agreement among ways of sampling, sameness of bytes, agreement with Mitsuba.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+#[path = "suite/bench_room.rs"]
+mod bench_room;
+#[path = "suite/closed_forms.rs"]
+mod closed_forms;
+#[path = "suite/estimators.rs"]
+mod estimators;
+#[path = "suite/scenes.rs"]
+mod scenes;
+#[path = "suite/statistics.rs"]
+mod statistics;

@@ -1,0 +1,105 @@
+//! Small scenes built in code.
+
+use std::sync::Arc;
+
+use glam::{DVec3, Vec2, Vec3};
+use mateval_scene::material::{ColorInput, Material, MaterialModel};
+use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_tracer::World;
+
+/// A parallelogram from `corner` along `u` and `v`; its front is where u x v points.
+pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
+    TriangleMesh {
+        positions: vec![corner, corner + u, corner + u + v, corner + v],
+        normals: None,
+        uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+/// The six sides of the cube from -1 to 1, their fronts inside.
+pub fn room() -> Vec<TriangleMesh> {
+    let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
+    let (low, high) = (Vec3::splat(-1.0), Vec3::splat(1.0));
+    vec![quad(low, z, x), quad(high, -x, -z), quad(low, y, z), quad(high, -z, -y), quad(low, x, y), quad(high, -y, -x)]
+}
+
+/// A sphere of `rings` x 2 `rings` quads with smooth normals, its front outside.
+pub fn sphere(centre: Vec3, radius: f32, rings: u32) -> TriangleMesh {
+    let sectors = 2 * rings;
+    let mut normals = Vec::new();
+    for ring in 0..=rings {
+        for sector in 0..=sectors {
+            let (sin_t, cos_t) = libm::sincosf(std::f32::consts::PI * ring as f32 / rings as f32);
+            let (sin_p, cos_p) = libm::sincosf(std::f32::consts::TAU * sector as f32 / sectors as f32);
+            normals.push(Vec3::new(sin_t * cos_p, cos_t, sin_t * sin_p));
+        }
+    }
+    let at = |ring: u32, sector: u32| ring * (sectors + 1) + sector;
+    let triangles = (0..rings).flat_map(|r| {
+        (0..sectors)
+            .flat_map(move |s| [[at(r, s), at(r, s + 1), at(r + 1, s)], [at(r + 1, s), at(r, s + 1), at(r + 1, s + 1)]])
+    });
+    let positions = normals.iter().map(|n| centre + *n * radius).collect();
+    TriangleMesh { positions, triangles: triangles.collect(), normals: Some(normals), uvs: None }
+}
+
+/// A material of `model`, the same on both sides.
+pub fn material(model: MaterialModel) -> Material {
+    Material { name: String::new(), model, two_sided: true, opacity: None, bump: None }
+}
+
+/// Lambert's, grey.
+pub fn grey(reflectance: f32) -> Material {
+    material(MaterialModel::Diffuse { reflectance: ColorInput::Constant([reflectance; 3]), alpha: None })
+}
+
+/// A scene that grows piece by piece.
+#[derive(Default)]
+pub struct Builder(ReferenceScene);
+
+impl Builder {
+    /// Adds a mesh made of `material`.
+    pub fn surface(mut self, mesh: TriangleMesh, material: Material) -> Self {
+        let index = MaterialIndex(self.0.materials.len());
+        self.0.materials.push(material);
+        self.0.surfaces.push(Surface { name: String::new(), mesh, material: index });
+        self
+    }
+
+    /// Makes the surface that was added last glow on its front.
+    pub fn glowing(self, radiance: [f32; 3]) -> Self {
+        let last = SurfaceIndex(self.0.surfaces.len() - 1);
+        self.light(Emission::Area { surfaces: vec![last], radiance, two_sided: false })
+    }
+
+    /// Adds light.
+    pub fn light(mut self, emission: Emission) -> Self {
+        self.0.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
+        self
+    }
+
+    /// Hides the light that was added last from the camera.
+    pub fn hidden(mut self) -> Self {
+        self.0.lights.last_mut().unwrap().camera_visible = false;
+        self
+    }
+
+    /// The scene so far, to be changed at will.
+    pub fn scene(self) -> ReferenceScene {
+        self.0
+    }
+
+    /// The scene, ready for rays.
+    pub fn world(self) -> World {
+        World::new(Arc::new(self.0)).unwrap()
+    }
+}
+
+/// A camera of `size` x `size` pixels.
+pub fn camera(position: [f64; 3], target: [f64; 3], size: u32, fov_deg: f64) -> Camera {
+    let (position, target) = (DVec3::from_array(position), DVec3::from_array(target));
+    let up = if (target - position).normalize().y.abs() > 0.99 { DVec3::Z } else { DVec3::Y };
+    Camera::look_at(position, target, up, Intrinsics::from_fov_x(size, size, fov_deg.to_radians())).unwrap()
+}
