@@ -198,6 +198,10 @@ fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
         }
     };
     for (at, out) in outs.iter().enumerate() {
+        // Scoring takes minutes: what can fail early must.
+        if !out.parent().is_some_and(|folder| folder.as_os_str().is_empty() || folder.is_dir()) {
+            bail!("the folder of '{}' is not there; make it, or choose another --out", out.display());
+        }
         if out.exists() && !args.force {
             bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
         }

@@ -11,7 +11,7 @@ use super::fresnel;
 pub(crate) struct RoughBoundary {
     /// Rising.
     alphas: Vec<f32>,
-    /// For each alpha, at cosines k / (COSINES - 1).
+    /// For each alpha, at the cosines of [`cosine`].
     reflected: Vec<[f32; COSINES]>,
     /// For each alpha, the reflected share of uniform light from inside.
     inside: Vec<f32>,
@@ -39,7 +39,7 @@ impl RoughBoundary {
         let table = |eta: f32| -> Vec<[f32; COSINES]> {
             let at = |&alpha: &f32| {
                 let facets = Facets::new(distribution, alpha);
-                std::array::from_fn(|k| albedo(&facets, eta, (k as f32 / (COSINES - 1) as f32).max(1e-6)))
+                std::array::from_fn(|k| albedo(&facets, eta, cosine(k).max(1e-6)))
             };
             alphas.iter().map(at).collect()
         };
@@ -71,26 +71,35 @@ impl RoughBoundary {
     }
 }
 
+/// Entry k is at this cosine: closer together towards grazing, where reflection rises steeply.
+fn cosine(k: usize) -> f32 {
+    let root = k as f32 / (COSINES - 1) as f32;
+    root * root
+}
+
 fn lookup(row: &[f32; COSINES], cos: f32) -> f32 {
-    let position = cos.clamp(0.0, 1.0) * (COSINES - 1) as f32;
+    let position = cos.clamp(0.0, 1.0).sqrt() * (COSINES - 1) as f32;
     let cell = (position as usize).min(COSINES - 2);
     row[cell] + (position - cell as f32) * (row[cell + 1] - row[cell])
 }
 
 /// Twice the integral of f(mu) mu dmu, trapezoids.
 fn cosine_mean(row: &[f32; COSINES]) -> f32 {
-    let last = (COSINES - 1) as f32;
-    let term = |k: usize| row[k] * k as f32 / last * if k == COSINES - 1 { 0.5 } else { 1.0 };
-    (0..COSINES).map(term).sum::<f32>() * 2.0 / last
+    let part = |k: usize| {
+        let (a, b) = (cosine(k), cosine(k + 1));
+        (row[k] * a + row[k + 1] * b) * (b - a)
+    };
+    (0..COSINES - 1).map(part).sum()
 }
 
 /// The share of light from the cosine `cos` that facets with Fresnel's reflection send anywhere upwards.
-fn albedo(facets: &Facets, eta: f32, cos: f32) -> f32 {
+fn albedo(facets: &Facets, eta: f32, cos: f32) -> f32 { albedo_n(facets, eta, cos, GRID) }
+fn albedo_n(facets: &Facets, eta: f32, cos: f32, grid: u32) -> f32 {
     let wo = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
     let mut sum = 0.0_f64;
-    for i in 0..GRID {
-        for j in 0..GRID {
-            let u = [i, j].map(|k| (k as f32 + 0.5) / GRID as f32);
+    for i in 0..grid {
+        for j in 0..grid {
+            let u = [i, j].map(|k| (k as f32 + 0.5) / grid as f32);
             let m = facets.sample(wo, u);
             let wi = reflect(wo, m);
             let density = facets.sample_density(wo, m);
@@ -100,7 +109,7 @@ fn albedo(facets: &Facets, eta: f32, cos: f32) -> f32 {
             }
         }
     }
-    (sum / f64::from(GRID * GRID)) as f32
+    (sum / f64::from(grid * grid)) as f32
 }
 
 #[cfg(test)]
@@ -116,6 +125,15 @@ mod tests {
         assert!((table.reflected_inside(1e-3) - fresnel::diffuse_reflectance(1.0 / 1.5)).abs() < 2e-3);
     }
 
+    #[test]
+    fn dbg_alb() {
+        for g in [32, 64, 128, 256] { for (a, c) in [(0.01, 0.08), (0.3, 0.08), (0.8, 0.3), (0.01, 0.5), (0.0044444, 0.08), (0.01778, 0.08)] {
+            let f = Facets::new(Distribution::Ggx, a); let b = Facets::new(Distribution::Beckmann, a);
+            eprintln!("DBG {g} {a} {c} {} {} in {} {}", albedo_n(&f, 1.5, c, g), albedo_n(&b, 1.5, c, g), albedo_n(&f, 1.0/1.5, c, g), albedo_n(&b, 1.0/1.5, c, g));
+        } }
+        let v = RoughBoundary::varying(Distribution::Ggx, 1.5); let u = RoughBoundary::uniform(Distribution::Ggx, 1.5, 0.01);
+        eprintln!("DBG var {} uni {}", v.reflected(0.08, 0.01), u.reflected(0.08, 0.01));
+    }
     #[test]
     fn the_table_over_widths_agrees_with_one_made_for_a_width() {
         let varying = RoughBoundary::varying(Distribution::Ggx, 1.5);

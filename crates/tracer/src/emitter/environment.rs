@@ -157,10 +157,11 @@ mod tests {
         let n = 256;
         for i in 0..n {
             for j in 0..n {
-                let direction = warp::sphere([(i as f32 + 0.5) / n as f32, (j as f32 + 0.5) / n as f32]);
-                let density = map.density(direction);
+                let (theta, phi) = (PI * (i as f32 + 0.5) / n as f32, TAU * (j as f32 + 0.5) / n as f32);
+                let ((sin, cos), (sin_phi, cos_phi)) = (libm::sincosf(theta), libm::sincosf(phi));
+                let density = map.density(Vec3::new(sin * cos_phi, cos, sin * sin_phi));
                 assert!(density > 0.0);
-                total += f64::from(density) * 4.0 * std::f64::consts::PI / f64::from(n * n);
+                total += f64::from(density * sin * PI * TAU) / f64::from(n * n);
             }
         }
         assert!((total - 1.0).abs() < 0.01, "{total}");

@@ -55,10 +55,10 @@ fn agrees_with_mitsuba() {
     eprintln!("bench/room: ratio {ratio:.5}, z {z:.2}, mean squared z of tiles {tiles:.3}");
     assert!((ratio - 1.0).abs() < 0.01 && z.abs() < 4.0, "ratio {ratio}, z {z}");
     // The squares of Student's t with 15 degrees of freedom average to 15 / 13; 1024 tiles leave a deviation of 0.06.
-    assert!(tiles < 1.4, "{tiles}");
+    assert!(tiles < 1.35, "{tiles}");
 
     let (ratio, z, tiles) = compare(&found(1.03), &reference);
-    assert!((ratio - 1.0).abs() > 0.01 && z.abs() > 4.0 && tiles > 1.4, "the twin passes: {ratio} {z} {tiles}");
+    assert!((ratio - 1.0).abs() > 0.01 && z.abs() > 4.0 && tiles > 1.35, "the twin passes: {ratio} {z} {tiles}");
 }
 
 /// The ratio of the means, its distance from 1 in standard errors, and the mean square of that over tiles.
@@ -69,8 +69,9 @@ fn compare(renders: &Renders, reference: &Picture<LinearRgb>) -> (f64, f64, f64)
             pixels.map(|(x, y)| reference.get(x, y).0.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0).collect();
         values.iter().sum::<f64>() / values.len() as f64
     };
-    // The reference has 64 samples on 16 times the pixels against our 64: its variance is a sixteenth of ours.
-    let with_reference = |ours: Estimate| Estimate { error: ours.error * (17.0_f64 / 16.0).sqrt(), ..ours };
+    // Two renders of Mitsuba's, of 768 samples on such tiles (the reference has 1024), differ by 1.57 % rms, so one
+    // is off by 1.1 %; ours by 2.6 %. Its variance is 0.18 of ours.
+    let with_reference = |ours: Estimate| Estimate { error: ours.error * 1.18_f64.sqrt(), ..ours };
     let whole = with_reference(renders.whole());
     let expected = mean(0..512, 0..512);
     let mut squares = Vec::new();

@@ -1,28 +1,27 @@
 //! One scene of a recipe, from its source to its folder.
 
+mod geometry;
+mod materials;
+
 use std::path::Path;
 
 use glam::DVec3;
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::{Picture, png_io};
+use mateval_image::png_io;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, Part, SceneFile, SceneSource, SourceFile, View};
-use mateval_scene::glb::{self, GlbNode};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::submission::Map;
-use mateval_scene::{Finding, SceneError, Severity, TriangleMesh, ViewId, json, reference_io};
+use mateval_scene::{Finding, ViewId, json, reference_io};
 use mateval_tracer::World;
-use rayon::prelude::*;
 
-use crate::atlas::{AtlasError, CHOSEN_SIZES, SizeWish, Unwrapped, unwrap};
-use crate::bake::{Baked, BakedMaterial, bake};
 use crate::bitterli::{self, BitterliScene};
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
 use crate::progress::Progress;
 use crate::recipe::{GivenCamera, Recipe, RecipeScene};
 use crate::views::{GeometryPictures, TruthPictures, ViewScene};
+use materials::InstanceAtlas;
 
 /// A scene, its instances numbered and its cameras placed.
 struct Plan {
@@ -55,8 +54,8 @@ pub fn build(
 
     let nearest = write_views(&plan, folder, progress)?;
     let atlas_size = entry.atlas_size.or(recipe.atlas_size);
-    let atlases = write_materials(&mut plan, folder, atlas_size, &nearest, progress)?;
-    write_geometry(&plan, folder, &atlases)?;
+    let atlases = materials::write(&mut plan, folder, atlas_size, &nearest, progress)?;
+    geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
     write_scene_file(plan, entry, files, &atlases, folder)?;
     Ok(licence)
@@ -173,199 +172,6 @@ fn write_view(
     exr_io::write_scalar(&hidden.join("metallic.exr"), &truth.metallic, Precision::Float)?;
     png_io::write_mask(&hidden.join("specular_region.png"), &truth.specular_region)?;
     Ok(())
-}
-
-/// An instance's atlas, if it has one.
-struct InstanceAtlas {
-    unwrapped: Option<Unwrapped>,
-    half_pixel_m: Option<f64>,
-    finding: Option<Finding>,
-}
-
-/// Unwraps every instance and bakes its material; one instance a thread.
-fn write_materials(
-    plan: &mut Plan,
-    folder: &SceneFolder,
-    fixed_size: Option<u32>,
-    nearest: &[Option<f64>],
-    progress: Progress<'_>,
-) -> Result<Vec<InstanceAtlas>, PrepError> {
-    let textures = plan.scene.texture_list();
-    let focal = plan.views[0].camera.intrinsics.fx;
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    let shown: &Plan = plan;
-    let atlases = shown
-        .instances
-        .par_iter()
-        .enumerate()
-        .map(|(at, instance)| {
-            let surface = &shown.scene.surfaces[at];
-            let material = &shown.scene.materials[surface.material.0];
-            let half_pixel_m = nearest[at].map(|depth| 0.5 * depth / focal);
-            let mut atlas = InstanceAtlas { unwrapped: None, half_pixel_m, finding: None };
-            if material.has_appearance() {
-                match unwrap_as_wished(&surface.mesh, fixed_size, half_pixel_m) {
-                    Ok((unwrapped, remark)) => {
-                        let baked = bake(&unwrapped, &surface.mesh, material, &textures);
-                        atlas.finding = remark.map(|(code, what)| atlas_finding(shown, instance, code, &what));
-                        if let Some(baked) = baked {
-                            write_material(folder, instance, unwrapped.size, &baked)?;
-                            atlas.finding = atlas.finding.or_else(|| clipped_finding(shown, instance, &baked));
-                        }
-                        atlas.unwrapped = Some(unwrapped);
-                    }
-                    // Nothing can hit it, so no pixel of it is valid.
-                    Err(AtlasError::NoArea) => {
-                        let what = AtlasError::NoArea.to_string();
-                        atlas.finding = Some(atlas_finding(shown, instance, "no_atlas", &what));
-                    }
-                    Err(error) => {
-                        let what = format!("instance '{}': {error}", instance.id);
-                        return Err(PrepError::Scene { scene: shown.id.clone(), what });
-                    }
-                }
-            }
-            progress("atlases", done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, shown.instances.len());
-            Ok(atlas)
-        })
-        .collect::<Result<Vec<_>, PrepError>>()?;
-    plan.findings.extend(atlases.iter().filter_map(|atlas| atlas.finding.clone()));
-    Ok(atlases)
-}
-
-type Remark = Option<(&'static str, String)>;
-
-/// At the recipe's size, or as fine as half a pixel; an instance that no view shows gets the least size. Where its charts
-/// do not fit into the recipe's size it gets the least power of two that they fit into.
-fn unwrap_as_wished(
-    mesh: &TriangleMesh,
-    fixed_size: Option<u32>,
-    half_pixel_m: Option<f64>,
-) -> Result<(Unwrapped, Remark), AtlasError> {
-    // So coarse that only the charts and their gutters ask for room.
-    let least = SizeWish::Texel(mesh.area().sqrt().max(f64::MIN_POSITIVE));
-    let unwrapped = match fixed_size {
-        Some(size) => match unwrap(mesh, SizeWish::Fixed(size)) {
-            Err(error @ AtlasError::DoesNotFit { .. }) => {
-                let unwrapped = unwrap(mesh, least)?;
-                let remark = ("atlas_grown", format!("{error}; its atlas is {0}x{0}", unwrapped.size));
-                return Ok((unwrapped, Some(remark)));
-            }
-            other => other?,
-        },
-        None => unwrap(mesh, half_pixel_m.map_or(least, SizeWish::Texel))?,
-    };
-    let coarse = fixed_size.is_none() && half_pixel_m.is_some_and(|wish| unwrapped.texel_m > wish * COARSE);
-    let remark = coarse.then(|| {
-        let wish = half_pixel_m.unwrap_or_default();
-        let what = format!(
-            "at the largest size of {} a texel is {:.5} m, half a pixel of the input view {wish:.5} m",
-            CHOSEN_SIZES.1, unwrapped.texel_m
-        );
-        ("coarse_atlas", what)
-    });
-    Ok((unwrapped, remark))
-}
-
-/// A texel larger than half a pixel by this factor is worth a finding.
-const COARSE: f64 = 1.05;
-
-fn atlas_finding(plan: &Plan, instance: &InstanceEntry, code: &str, message: &str) -> Finding {
-    let action = match code {
-        "no_atlas" => "it has no atlas and is not scored",
-        "atlas_grown" => "its atlas is larger than the recipe says",
-        _ => "kept; its truth is as coarse as its texels",
-    };
-    Finding {
-        severity: if code == "no_atlas" { Severity::Warning } else { Severity::Note },
-        code: code.to_owned(),
-        file: plan.file.clone(),
-        place: format!("instance '{}'", instance.id),
-        message: message.to_owned(),
-        action: action.to_owned(),
-    }
-}
-
-fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Option<Finding> {
-    baked.clipped.then(|| Finding {
-        severity: Severity::Warning,
-        code: "base_color_clipped".to_owned(),
-        file: plan.file.clone(),
-        place: format!("instance '{}'", instance.id),
-        message: "its base colour leaves 0..1".to_owned(),
-        action: "clipped where it is baked; the truth's pictures are not".to_owned(),
-    })
-}
-
-fn write_material(folder: &SceneFolder, instance: &InstanceEntry, size: u32, baked: &Baked) -> Result<(), PrepError> {
-    let path = folder.truth_material(&instance.id);
-    std::fs::create_dir_all(&path).map_err(PrepError::io("make", &path))?;
-    let [base, rough, metal] = Map::ALL.map(|map| path.join(map.stem()).with_extension("png"));
-    match &baked.material {
-        BakedMaterial::Constant { base_color, roughness, metallic } => {
-            let size = size as usize;
-            png_io::write_rgb_words(&base, &Picture::filled(size, size, *base_color))?;
-            png_io::write_ids(&rough, &Picture::filled(size, size, *roughness))?;
-            png_io::write_ids(&metal, &Picture::filled(size, size, *metallic))?;
-        }
-        BakedMaterial::Textured { base_color, roughness, metallic } => {
-            png_io::write_rgb_bytes(&base, base_color)?;
-            png_io::write_grey_bytes(&rough, roughness)?;
-            png_io::write_grey_bytes(&metal, metallic)?;
-        }
-    }
-    Ok(())
-}
-
-fn write_geometry(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), SceneError> {
-    let meshes: Vec<TriangleMesh> = plan
-        .scene
-        .surfaces
-        .iter()
-        .zip(atlases)
-        .map(|(surface, atlas)| match &atlas.unwrapped {
-            Some(unwrapped) => unwrapped.mesh.clone(),
-            None => TriangleMesh { uvs: None, ..surface.mesh.clone() },
-        })
-        .collect();
-    let mut parts = Vec::new();
-    for (instance, mesh) in plan.instances.iter().zip(&meshes) {
-        for (at, part) in instance.parts.iter().enumerate() {
-            let mesh = part_mesh(mesh, |triangle| instance.part_of_triangle[triangle] == at);
-            parts.push(GlbNode { name: part.id.to_string(), mesh });
-        }
-    }
-    glb::write(&folder.parts(), &parts)?;
-    let instances: Vec<GlbNode> = plan
-        .instances
-        .iter()
-        .zip(meshes)
-        .map(|(instance, mesh)| GlbNode { name: instance.id.to_string(), mesh })
-        .collect();
-    glb::write(&folder.instances(), &instances)
-}
-
-/// The triangles that belong, in their order, with the vertices that they use.
-fn part_mesh(mesh: &TriangleMesh, belongs: impl Fn(usize) -> bool) -> TriangleMesh {
-    let mut new_place = vec![u32::MAX; mesh.positions.len()];
-    let mut used = Vec::new();
-    let mut triangles = Vec::new();
-    for triangle in (0..mesh.triangles.len()).filter(|triangle| belongs(*triangle)) {
-        triangles.push(mesh.triangles[triangle].map(|vertex| {
-            let place = &mut new_place[vertex as usize];
-            if *place == u32::MAX {
-                *place = used.len() as u32;
-                used.push(vertex as usize);
-            }
-            *place
-        }));
-    }
-    TriangleMesh {
-        positions: used.iter().map(|vertex| mesh.positions[*vertex]).collect(),
-        normals: mesh.normals.as_ref().map(|all| used.iter().map(|vertex| all[*vertex]).collect()),
-        uvs: mesh.uvs.as_ref().map(|all| used.iter().map(|vertex| all[*vertex]).collect()),
-        triangles,
-    }
 }
 
 fn write_scene_file(

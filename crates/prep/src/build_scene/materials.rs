@@ -1,0 +1,167 @@
+//! Every instance unwrapped and its material baked.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use mateval_image::{Picture, Texture, png_io};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::submission::Map;
+use mateval_scene::{Finding, Severity, TriangleMesh};
+use rayon::prelude::*;
+
+use super::Plan;
+use crate::atlas::{AtlasError, CHOSEN_SIZES, SizeWish, Unwrapped, unwrap};
+use crate::bake::{Baked, BakedMaterial, bake};
+use crate::error::PrepError;
+use crate::instances::InstanceEntry;
+use crate::progress::Progress;
+
+/// An instance's atlas, if it has one.
+pub(super) struct InstanceAtlas {
+    pub(super) unwrapped: Option<Unwrapped>,
+    pub(super) half_pixel_m: Option<f64>,
+    finding: Option<Finding>,
+}
+
+/// Unwraps every instance and bakes its material; one instance a thread. `nearest` is the depth at which each is seen.
+pub(super) fn write(
+    plan: &mut Plan,
+    folder: &SceneFolder,
+    fixed_size: Option<u32>,
+    nearest: &[Option<f64>],
+    progress: Progress<'_>,
+) -> Result<Vec<InstanceAtlas>, PrepError> {
+    let textures = plan.scene.texture_list();
+    let focal = plan.views[0].camera.intrinsics.fx;
+    let (done, all) = (AtomicUsize::new(0), plan.instances.len());
+    let shown: &Plan = plan;
+    let atlases = (0..all)
+        .into_par_iter()
+        .map(|at| {
+            let half_pixel_m = nearest[at].map(|depth| 0.5 * depth / focal);
+            let atlas = write_instance(shown, folder, at, &textures, fixed_size, half_pixel_m);
+            progress("atlases", done.fetch_add(1, Ordering::Relaxed) + 1, all);
+            atlas
+        })
+        .collect::<Result<Vec<_>, PrepError>>()?;
+    plan.findings.extend(atlases.iter().filter_map(|atlas| atlas.finding.clone()));
+    Ok(atlases)
+}
+
+fn write_instance(
+    plan: &Plan,
+    folder: &SceneFolder,
+    at: usize,
+    textures: &[Texture],
+    fixed_size: Option<u32>,
+    half_pixel_m: Option<f64>,
+) -> Result<InstanceAtlas, PrepError> {
+    let (instance, surface) = (&plan.instances[at], &plan.scene.surfaces[at]);
+    let material = &plan.scene.materials[surface.material.0];
+    let mut atlas = InstanceAtlas { unwrapped: None, half_pixel_m, finding: None };
+    if !material.has_appearance() {
+        return Ok(atlas);
+    }
+    let (unwrapped, remark) = match unwrap_as_wished(&surface.mesh, fixed_size, half_pixel_m) {
+        Ok(unwrapped) => unwrapped,
+        // Nothing can hit it, so no pixel of it is valid.
+        Err(error @ AtlasError::NoArea) => {
+            atlas.finding = Some(atlas_finding(plan, instance, "no_atlas", &error.to_string()));
+            return Ok(atlas);
+        }
+        Err(error) => {
+            let what = format!("instance '{}': {error}", instance.id);
+            return Err(PrepError::Scene { scene: plan.id.clone(), what });
+        }
+    };
+    atlas.finding = remark.map(|(code, what)| atlas_finding(plan, instance, code, &what));
+    if let Some(baked) = bake(&unwrapped, &surface.mesh, material, textures) {
+        write_material(folder, instance, unwrapped.size, &baked)?;
+        atlas.finding = atlas.finding.or_else(|| clipped_finding(plan, instance, &baked));
+    }
+    atlas.unwrapped = Some(unwrapped);
+    Ok(atlas)
+}
+
+type Remark = Option<(&'static str, String)>;
+
+/// At the recipe's size, or as fine as half a pixel; an instance that no view shows gets the least size. Where its charts
+/// do not fit into the recipe's size it gets the least power of two that they fit into.
+fn unwrap_as_wished(
+    mesh: &TriangleMesh,
+    fixed_size: Option<u32>,
+    half_pixel_m: Option<f64>,
+) -> Result<(Unwrapped, Remark), AtlasError> {
+    // So coarse that only the charts and their gutters ask for room.
+    let least = SizeWish::Texel(mesh.area().sqrt().max(f64::MIN_POSITIVE));
+    let unwrapped = match fixed_size {
+        Some(size) => match unwrap(mesh, SizeWish::Fixed(size)) {
+            Err(error @ AtlasError::DoesNotFit { .. }) => {
+                let unwrapped = unwrap(mesh, least)?;
+                let remark = ("atlas_grown", format!("{error}; its atlas is {0}x{0}", unwrapped.size));
+                return Ok((unwrapped, Some(remark)));
+            }
+            other => other?,
+        },
+        None => unwrap(mesh, half_pixel_m.map_or(least, SizeWish::Texel))?,
+    };
+    let coarse = fixed_size.is_none() && half_pixel_m.is_some_and(|wish| unwrapped.texel_m > wish * COARSE);
+    let remark = coarse.then(|| {
+        let wish = half_pixel_m.unwrap_or_default();
+        let what = format!(
+            "at the largest size of {} a texel is {:.5} m, half a pixel of the input view {wish:.5} m",
+            CHOSEN_SIZES.1, unwrapped.texel_m
+        );
+        ("coarse_atlas", what)
+    });
+    Ok((unwrapped, remark))
+}
+
+/// A texel larger than half a pixel by this factor is worth a finding.
+const COARSE: f64 = 1.05;
+
+fn atlas_finding(plan: &Plan, instance: &InstanceEntry, code: &str, message: &str) -> Finding {
+    let action = match code {
+        "no_atlas" => "it has no atlas and is not scored",
+        "atlas_grown" => "its atlas is larger than the recipe says",
+        _ => "kept; its truth is as coarse as its texels",
+    };
+    Finding {
+        severity: if code == "no_atlas" { Severity::Warning } else { Severity::Note },
+        code: code.to_owned(),
+        file: plan.file.clone(),
+        place: format!("instance '{}'", instance.id),
+        message: message.to_owned(),
+        action: action.to_owned(),
+    }
+}
+
+fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Option<Finding> {
+    baked.clipped.then(|| Finding {
+        severity: Severity::Warning,
+        code: "base_color_clipped".to_owned(),
+        file: plan.file.clone(),
+        place: format!("instance '{}'", instance.id),
+        message: "its base colour leaves 0..1".to_owned(),
+        action: "clipped where it is baked; the truth's pictures are not".to_owned(),
+    })
+}
+
+fn write_material(folder: &SceneFolder, instance: &InstanceEntry, size: u32, baked: &Baked) -> Result<(), PrepError> {
+    let path = folder.truth_material(&instance.id);
+    std::fs::create_dir_all(&path).map_err(PrepError::io("make", &path))?;
+    let [base, rough, metal] = Map::ALL.map(|map| path.join(map.stem()).with_extension("png"));
+    match &baked.material {
+        BakedMaterial::Constant { base_color, roughness, metallic } => {
+            let size = size as usize;
+            png_io::write_rgb_words(&base, &Picture::filled(size, size, *base_color))?;
+            png_io::write_ids(&rough, &Picture::filled(size, size, *roughness))?;
+            png_io::write_ids(&metal, &Picture::filled(size, size, *metallic))?;
+        }
+        BakedMaterial::Textured { base_color, roughness, metallic } => {
+            png_io::write_rgb_bytes(&base, base_color)?;
+            png_io::write_grey_bytes(&rough, roughness)?;
+            png_io::write_grey_bytes(&metal, metallic)?;
+        }
+    }
+    Ok(())
+}

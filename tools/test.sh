@@ -1,0 +1,6 @@
+#!/bin/sh
+# All tests: the Python tools', then every crate's, all of them even where one fails.
+set -eu
+cd "$(dirname "$0")/.."
+python3 tools/test_fetch_lpips_weights.py
+cargo test --workspace --no-fail-fast
