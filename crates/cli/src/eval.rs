@@ -128,7 +128,7 @@ fn image(args: &ImageArgs) -> anyhow::Result<Outcome> {
             "values": values,
             "missing": missing
                 .iter()
-                .map(|(net, reason)| serde_json::json!({ "metric": format!("lpips_{net}"), "reason": reason, "mend": weights::MEND }))
+                .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "mend": weights::MEND }))
                 .collect::<Vec<_>>(),
         }))),
         ImageFormat::Text => print(&image_text(&values, &missing)),
@@ -145,7 +145,7 @@ fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)
     line("psnr_db", values.psnr);
     line("ssim", values.ssim);
     for net in &values.lpips {
-        line(&format!("lpips_{}", net.net), net.value);
+        line(&net.metric, net.value);
     }
     if let Some(masked) = &values.masked {
         line("masked mse", masked.mse);
@@ -154,12 +154,12 @@ fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)
         line("masked ssim black_fill", masked.ssim_black_fill);
         for (rule, nets) in [("inside", &masked.lpips_inside), ("black_fill", &masked.lpips_black_fill)] {
             for net in nets {
-                line(&format!("masked lpips_{} {rule}", net.net), net.value);
+                line(&format!("masked {} {rule}", net.metric), net.value);
             }
         }
     }
     lines.extend(
-        missing.iter().map(|(net, _)| format!("{:24} missing; run: {}", format!("lpips_{net}"), weights::MEND)),
+        missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::MEND)),
     );
     lines.join("\n") + "\n"
 }

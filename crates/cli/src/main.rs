@@ -10,6 +10,7 @@ mod eval;
 mod outcome;
 mod prep;
 mod sample;
+mod schema;
 mod weights;
 
 use clap::{Parser, Subcommand};
@@ -41,6 +42,9 @@ enum Command {
     /// Scores submissions.
     #[command(subcommand)]
     Eval(eval::Command),
+    /// Writes the JSON Schemas of the format's files.
+    #[command(hide = true)]
+    Schema(schema::Args),
 }
 
 fn main() -> std::process::ExitCode {
@@ -50,6 +54,7 @@ fn main() -> std::process::ExitCode {
         Command::Prep(command) => prep::run(&command),
         Command::Baseline(args) => baseline::run(&args),
         Command::Eval(command) => eval::run(&command),
+        Command::Schema(args) => schema::run(&args),
     };
     match result {
         Ok(Outcome::Good) => std::process::ExitCode::from(0),

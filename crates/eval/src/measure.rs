@@ -18,8 +18,8 @@ pub struct Measured {
     pub count: usize,
 }
 
-/// LPIPS is stored rounded to this: its last bits depend on the processor.
-const LPIPS_STEP: f64 = 1e-6;
+/// LPIPS is stored rounded to one part of so many: its last bits depend on the processor.
+const LPIPS_STEPS: f64 = 1e6;
 
 /// MSE, PSNR, SSIM and (where its weights are there) LPIPS of an albedo picture over the mask; linear pictures.
 pub fn albedo_metrics(
@@ -49,10 +49,15 @@ pub fn albedo_metrics(
     });
     if let Some(lpips) = lpips {
         let distance = match protocol.mask_rule {
-            MaskRule::BlackFill => lpips.black_fill(&encoded, &reference_encoded, mask)?,
-            MaskRule::Inside => lpips.masked(&encoded, &reference_encoded, mask)?,
+            MaskRule::BlackFill => lpips.black_fill(&encoded, &reference_encoded, mask),
+            MaskRule::Inside => lpips.masked(&encoded, &reference_encoded, mask),
         };
-        let rounded = distance.map(|distance| (distance / LPIPS_STEP).round() * LPIPS_STEP);
+        let distance = match distance {
+            // The network has no value for so small a picture: missing, not wrong.
+            Err(MetricError::TooSmall { .. }) => None,
+            other => other?,
+        };
+        let rounded = distance.map(|distance| (distance * LPIPS_STEPS).round() / LPIPS_STEPS);
         measured.push(plain(&format!("lpips_{}", protocol.lpips_net), rounded, pixels));
     }
     Ok(measured)

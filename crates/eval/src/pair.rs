@@ -48,8 +48,8 @@ pub struct MaskedValues {
 /// A network's distance.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NetValue {
-    /// `alex` or `vgg`.
-    pub net: String,
+    /// `lpips_alex` or `lpips_vgg`.
+    pub metric: String,
     /// Its distance.
     pub value: Option<f64>,
 }
@@ -91,7 +91,7 @@ fn values(
     let (mse, psnr) = errors(prediction, reference, None)?;
     let each = |value: &dyn Fn(&Lpips) -> Result<Option<f64>, mateval_metrics::MetricError>| {
         nets.iter()
-            .map(|net| Ok(NetValue { net: net.net().key().to_owned(), value: value(net)? }))
+            .map(|net| Ok(NetValue { metric: net.net().key().to_owned(), value: value(net)? }))
             .collect::<Result<Vec<_>, mateval_metrics::MetricError>>()
     };
     let masked = match mask {

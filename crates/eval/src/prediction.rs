@@ -1,6 +1,6 @@
 //! A submission's maps, read for one scene; what is missing or unsound is a finding and scores as the default.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texels, Texture, Wrap};
@@ -29,7 +29,7 @@ pub struct PredictedScene {
     pub materials: Vec<Option<PredictedMaterial>>,
     /// What was wrong and what is scored instead.
     pub findings: Vec<Finding>,
-    /// Path in the submission and SHA-256 of every file that was read.
+    /// Path in the submission and SHA-256 of every map that is there.
     pub files: Vec<(String, String)>,
 }
 
@@ -38,7 +38,8 @@ pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
     let mut read = PredictedScene { materials: Vec::new(), findings: Vec::new(), files: Vec::new() };
     for instance in &scene.instances {
         let material = instance.atlas.is_some().then(|| {
-            let base_color = read_map(submission, scene, instance, Map::BaseColor, &mut read);
+            let base_color = read_base_color(submission, scene, instance, &mut read);
+            note_files(submission, scene, instance, &mut read);
             let grey = Texels::Grey(vec![DEFAULT_BASE_COLOR]);
             let default = || Texture::new(1, 1, grey, Wrap::Clamp).expect("one texel is what one pixel needs");
             PredictedMaterial { base_color: base_color.unwrap_or_else(default) }
@@ -48,55 +49,59 @@ pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
     read
 }
 
-fn read_map(
+fn read_base_color(
     submission: &Path,
     scene: &SceneFile,
     instance: &Instance,
-    map: Map,
     read: &mut PredictedScene,
 ) -> Option<Texture> {
-    let folder = instance_folder(submission, &scene.id, &instance.id);
-    let candidates = ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending));
-    let present: Vec<&std::path::PathBuf> = candidates.iter().filter(|path| path.is_file()).collect();
-    let relative = |path: &Path| path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/");
-    let path = match present.as_slice() {
-        [path] => *path,
+    let candidates = candidates(submission, scene, instance, Map::BaseColor);
+    let file = relative(submission, &candidates[0]);
+    let present: Vec<&PathBuf> = candidates.iter().filter(|path| path.is_file()).collect();
+    let found = match present.as_slice() {
+        [path] => read_sound(path),
         [] => {
-            read.findings.push(replaced(
-                "missing_map",
-                &relative(&candidates[0]),
-                "expected a PNG or an EXR, found none",
-            ));
+            read.findings.push(replaced("missing_map", &file, "expected a PNG or an EXR, found none"));
             return None;
         }
         _ => {
             let message = "found both a PNG and an EXR; expected one of them";
-            read.findings.push(replaced("ambiguous_map", &relative(&candidates[0]), message));
+            read.findings.push(replaced("ambiguous_map", &file, message));
             return None;
         }
     };
-    match read_sound(path, map) {
-        Ok((texture, hash)) => {
-            read.files.push((relative(path), hash));
-            Some(texture)
-        }
-        Err(message) => {
-            read.findings.push(replaced("unsound_map", &relative(path), &message));
-            None
+    let unsound = |message: String| replaced("unsound_map", &relative(submission, present[0]), &message);
+    found.map_err(|message| read.findings.push(unsound(message))).ok()
+}
+
+/// Notes every map that is there with its hash: what a result was made of, whatever was made of it.
+fn note_files(submission: &Path, scene: &SceneFile, instance: &Instance, read: &mut PredictedScene) {
+    for path in Map::ALL.into_iter().flat_map(|map| candidates(submission, scene, instance, map)) {
+        if let Ok(hash) = sha256_of_file(&path) {
+            read.files.push((relative(submission, &path), hash));
         }
     }
 }
 
-fn read_sound(path: &Path, map: Map) -> Result<(Texture, String), String> {
-    let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
-    let texture = read_texture(path, encoding, Wrap::Clamp).map_err(|error| error.to_string())?;
+/// Where a map may lie.
+fn candidates(submission: &Path, scene: &SceneFile, instance: &Instance, map: Map) -> [PathBuf; 2] {
+    let folder = instance_folder(submission, &scene.id, &instance.id);
+    ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
+}
+
+fn relative(submission: &Path, path: &Path) -> String {
+    path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}
+
+/// The texture, or what is wrong with it.
+fn read_sound(path: &Path) -> Result<Texture, String> {
+    let texture = read_texture(path, Encoding::Srgb, Wrap::Clamp).map_err(|error| error.to_string())?;
     let (width, height) = (texture.width(), texture.height());
     if width != height || !SIZES.contains(&width) {
         let (least, most) = (SIZES.start(), SIZES.end());
         return Err(format!("{width}x{height} texels; expected a square of {least} to {most} a side"));
     }
-    let hash = sha256_of_file(path).map_err(|error| error.to_string())?;
-    Ok((texture.collapsed(), hash))
+    Ok(texture.collapsed())
 }
 
 fn replaced(code: &str, file: &str, message: &str) -> Finding {

@@ -10,6 +10,7 @@ use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
 use mateval_scene::manifest::{self, sha256_of_bytes};
 use mateval_scene::{SceneId, json, reference_io};
 use mateval_tracer::{Render, RenderSettings, RenderStats, World};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::build::RECIPE;
@@ -43,14 +44,19 @@ pub struct RenderReport {
 }
 
 /// `render.json` beside a view's pictures: how they were made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct RenderFile {
-    renderer: String,
-    samples_each_half: u32,
-    seeds: [u64; 2],
-    max_bounces: u32,
-    /// What paths cut at that bounce still carried, averaged over all: times the radiance there, the light that is missing.
-    capped_throughput: f64,
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RenderFile {
+    /// `builtin`.
+    pub renderer: String,
+    /// Samples a pixel of each of the two halves.
+    pub samples_each_half: u32,
+    /// Seeds of `rgb_a` and `rgb_b`, 16 hexadecimal digits each.
+    pub seeds: [String; 2],
+    /// Scatterings after which a path is cut.
+    pub max_bounces: u32,
+    /// What cut paths still carried, averaged over all: times the radiance there, the light that is missing.
+    pub capped_throughput: f64,
 }
 
 /// Renders with our own tracer, then makes its pictures the scored ones and renews the manifest. Views that are there with
@@ -112,15 +118,15 @@ fn render_scene(
     for view in &scene.views {
         let place = folder.render(BUILTIN, &view.id);
         let settings = [0, 1].map(|half| RenderSettings { samples, seed: seed(id, view, half), ..Default::default() });
-        let seeds = [settings[0].seed, settings[1].seed];
+        let seeds = [0, 1].map(|half: usize| format!("{:016x}", settings[half].seed));
         let max_bounces = settings[0].max_bounces;
         let is_same = |found: &RenderFile| {
-            (found.samples_each_half, found.seeds, found.max_bounces) == (samples, seeds, max_bounces)
+            (found.samples_each_half, &found.seeds, found.max_bounces) == (samples, &seeds, max_bounces)
         };
         let file = |a: &Render, b: &Render| RenderFile {
             renderer: BUILTIN.to_owned(),
             samples_each_half: samples,
-            seeds,
+            seeds: seeds.clone(),
             max_bounces,
             capped_throughput: (a.stats.capped_throughput + b.stats.capped_throughput) / 2.0,
         };

@@ -72,8 +72,14 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
 
 fn check_manifest(root: &Path, faults: &mut Faults) {
     if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
-        faults.all.extend(found);
+        faults.all.extend(found.into_iter().filter(|finding| !is_withheld(root, finding)));
     }
+}
+
+/// Whether a file is missing because its scene's ground truth is withheld as a whole, which is no fault.
+fn is_withheld(root: &Path, finding: &Finding) -> bool {
+    let inside = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
+    finding.code == "missing_file" && inside.is_some_and(|folder| !folder.exists())
 }
 
 fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {

@@ -4,10 +4,15 @@ use mateval_image::exr_io;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::{INPUT, SceneFolder};
 
-use super::Faults;
+use super::{Faults, schema};
+use crate::render::RenderFile;
 
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &str, faults: &mut Faults) {
     for view in &scene.views {
+        if folder.truth().is_dir() {
+            let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);
+            schema::check::<RenderFile>(folder.path(), &file, faults);
+        }
         let k = view.camera.intrinsics;
         let expected = (k.width as usize, k.height as usize);
         for name in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {

@@ -17,8 +17,11 @@ fn mesh() -> impl Strategy<Value = TriangleMesh> {
     // Indices drawn at random share vertices and edges, and repeat a vertex within a triangle at times.
     prop::collection::vec(point(), 3..40).prop_flat_map(|positions| {
         let count = positions.len() as u32;
-        prop::collection::vec([0..count, 0..count, 0..count], 1..80)
-            .prop_map(move |triangles| TriangleMesh { positions: positions.clone(), triangles, ..Default::default() })
+        prop::collection::vec([0..count, 0..count, 0..count], 1..80).prop_map(move |triangles| TriangleMesh {
+            positions: positions.clone(),
+            triangles,
+            ..Default::default()
+        })
     })
 }
 
@@ -135,7 +138,9 @@ fn bad_meshes_are_refused() {
     let dangling = TriangleMesh { triangles: vec![[0, 1, 99]], ..sound.clone() };
     let infinite = TriangleMesh { positions: vec![Vec3::INFINITY; 14], ..sound.clone() };
     for mesh in [&dangling, &infinite] {
-        assert!(matches!(Accel::build(&[&sound, mesh]), Err(TracerError::Invalid(what)) if what.starts_with("surface 1")));
+        assert!(
+            matches!(Accel::build(&[&sound, mesh]), Err(TracerError::Invalid(what)) if what.starts_with("surface 1"))
+        );
     }
 }
 

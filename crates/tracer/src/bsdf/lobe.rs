@@ -68,10 +68,10 @@ impl<'w> Lobe<'w> {
                 }
             }
             MaterialModel::Plastic { eta, nonlinear, diffuse_reflectance, specular_reflectance, microfacets } => {
-                let coat = match (microfacets, &table.boundary) {
-                    (Some(microfacets), Some(boundary)) => {
+                let coat = match (microfacets, &table.coat) {
+                    (Some(microfacets), Some(table)) => {
                         let alpha = microfacets.alpha.at(textures, uv);
-                        Coat::Rough { facets: Facets::new(microfacets.distribution, alpha), alpha, boundary }
+                        Coat::Rough { facets: Facets::new(microfacets.distribution, alpha), alpha, table }
                     }
                     _ => Coat::Smooth { inside: table.inside },
                 };
@@ -96,7 +96,7 @@ impl<'w> Lobe<'w> {
                     roughness: roughness.at(textures, uv).clamp(0.0, 1.0),
                     metallic: metallic.at(textures, uv).clamp(0.0, 1.0),
                     eta: eta_from_specular(*specular),
-                    style: Principled::style(*flavour, table.boundary.as_deref()),
+                    style: Principled::style(*flavour, table.reflection.as_deref()),
                 })
             }
         }

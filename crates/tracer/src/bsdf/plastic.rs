@@ -12,7 +12,7 @@ use super::conductor::{reflection, reflection_density};
 use super::facets::{Facets, reflect};
 use super::fresnel;
 use super::lobe::LocalSample;
-use super::rough_boundary::RoughBoundary;
+use super::rough_boundary::RoughCoat;
 use crate::warp;
 
 /// The coat and its base, at one place.
@@ -30,27 +30,27 @@ pub(crate) struct Plastic<'w> {
 pub(crate) enum Coat<'w> {
     /// With the share of uniform light from inside that it reflects back.
     Smooth { inside: f32 },
-    /// With its facets, their width and the table of what they reflect together.
-    Rough { facets: Facets, alpha: f32, boundary: &'w RoughBoundary },
+    /// With its facets, their width and what they do together.
+    Rough { facets: Facets, alpha: f32, table: &'w RoughCoat },
 }
 
 impl Plastic<'_> {
-    /// What the coat reflects of light from or to the cosine `cos`. It is also the share of samples for the coat: so the
-    /// choice does not depend on colours.
-    fn reflected(&self, cos: f32) -> f32 {
+    /// What the coat lets through of light from or to the cosine `cos`. It is also the share of samples for the base: so
+    /// the choice does not depend on colours.
+    fn transmitted(&self, cos: f32) -> f32 {
         match self.coat {
-            Coat::Smooth { .. } => fresnel::dielectric(cos, self.eta).0,
-            Coat::Rough { alpha, boundary, .. } => boundary.reflected(cos, alpha),
+            Coat::Smooth { .. } => 1.0 - fresnel::dielectric(cos, self.eta).0,
+            Coat::Rough { alpha, table, .. } => table.transmitted(cos, alpha),
         }
     }
 
     fn base_value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let inside = match self.coat {
             Coat::Smooth { inside } => inside,
-            Coat::Rough { alpha, boundary, .. } => boundary.reflected_inside(alpha),
+            Coat::Rough { alpha, table, .. } => table.reflected_inside(alpha),
         };
         let returned = if self.nonlinear { self.base * inside } else { Vec3::splat(inside) };
-        let through = (1.0 - self.reflected(wo.z)) * (1.0 - self.reflected(wi.z)) / (self.eta * self.eta);
+        let through = self.transmitted(wo.z) * self.transmitted(wi.z) / (self.eta * self.eta);
         self.base / (Vec3::ONE - returned) * (through * FRAC_1_PI * wi.z)
     }
 
@@ -64,7 +64,7 @@ impl Plastic<'_> {
 
     /// The density of the directions that [`Self::eval`] covers.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let coat_share = self.reflected(wo.z);
+        let coat_share = 1.0 - self.transmitted(wo.z);
         let base = (1.0 - coat_share) * warp::cosine_density(wi.z);
         match self.coat {
             Coat::Smooth { .. } => base,
@@ -73,7 +73,7 @@ impl Plastic<'_> {
     }
 
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
-        let coat_share = self.reflected(wo.z);
+        let coat_share = 1.0 - self.transmitted(wo.z);
         let wi = match self.coat {
             _ if u[0] >= coat_share => warp::cosine_hemisphere([u[1], u[2]]),
             Coat::Smooth { .. } => {

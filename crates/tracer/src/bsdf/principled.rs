@@ -18,7 +18,7 @@ use super::conductor::{reflection, reflection_density};
 use super::facets::{Facets, reflect};
 use super::fresnel;
 use super::lobe::LocalSample;
-use super::rough_boundary::RoughBoundary;
+use super::rough_boundary::RoughReflection;
 use crate::warp;
 
 /// The material at one place.
@@ -35,7 +35,7 @@ pub(crate) struct Principled<'w> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Style<'w> {
     Mitsuba,
-    Blender(&'w RoughBoundary),
+    Blender(&'w RoughReflection),
 }
 
 /// Mitsuba's and Disney's; keeps the peak of a mirror finite.
@@ -47,9 +47,9 @@ pub(crate) fn eta_from_specular(specular: f32) -> f32 {
 }
 
 impl<'w> Principled<'w> {
-    pub(crate) fn style(flavour: PrincipledFlavour, boundary: Option<&'w RoughBoundary>) -> Style<'w> {
-        match (flavour, boundary) {
-            (PrincipledFlavour::Blender, Some(boundary)) => Style::Blender(boundary),
+    pub(crate) fn style(flavour: PrincipledFlavour, table: Option<&'w RoughReflection>) -> Style<'w> {
+        match (flavour, table) {
+            (PrincipledFlavour::Blender, Some(table)) => Style::Blender(table),
             _ => Style::Mitsuba,
         }
     }
@@ -81,7 +81,7 @@ impl<'w> Principled<'w> {
     fn diffuse(&self, wo: Vec3, wi: Vec3, cos_difference: f32) -> Vec3 {
         let share = match self.style {
             Style::Mitsuba => self.disney_diffuse(wo.z, wi.z, cos_difference),
-            Style::Blender(boundary) => 1.0 - boundary.reflected(wo.z, self.alpha()),
+            Style::Blender(table) => 1.0 - table.reflected(wo.z, self.alpha()),
         };
         self.base_color * ((1.0 - self.metallic) * share * FRAC_1_PI * wi.z)
     }

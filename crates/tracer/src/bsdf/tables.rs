@@ -4,12 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use mateval_image::Texture;
-use mateval_scene::material::{ColorInput, Distribution, Material, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_scene::material::{
+    ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+};
 use mateval_scene::reference::ReferenceScene;
 
 use super::fresnel;
 use super::principled::eta_from_specular;
-use super::rough_boundary::RoughBoundary;
+use super::rough_boundary::{RoughCoat, RoughReflection, Widths};
 use crate::error::TracerError;
 
 /// One entry a material.
@@ -19,19 +21,27 @@ pub(crate) struct MaterialTables(Vec<Table>);
 /// What one material needs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
-    /// For rough plastic and Blender's principled.
-    pub(crate) boundary: Option<Arc<RoughBoundary>>,
+    /// For Blender's principled.
+    pub(crate) reflection: Option<Arc<RoughReflection>>,
+    /// For rough plastic.
+    pub(crate) coat: Option<Arc<RoughCoat>>,
     /// For smooth plastic: the share of uniform light from inside that its coat reflects back.
     pub(crate) inside: f32,
 }
 
-/// Distribution, bits of eta, bits of alpha where it is the same everywhere.
-type Key = (bool, u32, Option<u32>);
+/// Tables made so far, by what they depend on.
+#[derive(Default)]
+struct Known {
+    /// By the bits of eta.
+    reflections: BTreeMap<u32, Arc<RoughReflection>>,
+    /// By whether it is GGX, the bits of eta, those of alpha where it is the same everywhere.
+    coats: BTreeMap<(bool, u32, Option<u32>), Arc<RoughCoat>>,
+}
 
 impl MaterialTables {
     /// Checks the materials' constants and integrates what they need, once for equal ones.
     pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, TracerError> {
-        let mut known = BTreeMap::new();
+        let mut known = Known::default();
         let mut tables = Vec::with_capacity(scene.materials.len());
         for (index, material) in scene.materials.iter().enumerate() {
             check(material, textures.len())
@@ -46,32 +56,36 @@ impl MaterialTables {
     }
 }
 
-fn table(material: &Material, known: &mut BTreeMap<Key, Arc<RoughBoundary>>) -> Table {
-    let mut boundary = |distribution: Distribution, eta: f32, alpha: Option<f32>| {
-        let key = (distribution == Distribution::Ggx, eta.to_bits(), alpha.map(f32::to_bits));
-        let made = known.entry(key).or_insert_with(|| {
-            Arc::new(match alpha {
-                Some(alpha) => RoughBoundary::uniform(distribution, eta, alpha),
-                None => RoughBoundary::varying(distribution, eta),
-            })
-        });
-        Some(made.clone())
-    };
+fn table(material: &Material, known: &mut Known) -> Table {
     match &material.model {
         MaterialModel::Plastic { eta, microfacets: None, .. } => {
-            Table { boundary: None, inside: fresnel::diffuse_reflectance(1.0 / eta) }
+            Table { inside: fresnel::diffuse_reflectance(1.0 / eta), ..Table::default() }
         }
         MaterialModel::Plastic { eta, microfacets: Some(microfacets), .. } => {
-            let alpha = match microfacets.alpha {
-                ScalarInput::Constant(alpha) => Some(alpha),
-                ScalarInput::Texture { .. } => None,
-            };
-            Table { boundary: boundary(microfacets.distribution, *eta, alpha), inside: 0.0 }
+            Table { coat: Some(known.coat(*eta, microfacets)), ..Table::default() }
         }
         MaterialModel::Principled { specular, flavour: PrincipledFlavour::Blender, .. } => {
-            Table { boundary: boundary(Distribution::Ggx, eta_from_specular(*specular), None), inside: 0.0 }
+            Table { reflection: Some(known.reflection(eta_from_specular(*specular))), ..Table::default() }
         }
         _ => Table::default(),
+    }
+}
+
+impl Known {
+    fn reflection(&mut self, eta: f32) -> Arc<RoughReflection> {
+        let make = || Arc::new(RoughReflection::new(Distribution::Ggx, eta, Widths::varying()));
+        self.reflections.entry(eta.to_bits()).or_insert_with(make).clone()
+    }
+
+    fn coat(&mut self, eta: f32, microfacets: &Microfacets) -> Arc<RoughCoat> {
+        let alpha = match microfacets.alpha {
+            ScalarInput::Constant(alpha) => Some(alpha),
+            ScalarInput::Texture { .. } => None,
+        };
+        let distribution = microfacets.distribution;
+        let make = || Arc::new(RoughCoat::new(distribution, eta, alpha.map_or_else(Widths::varying, Widths::uniform)));
+        let key = (distribution == Distribution::Ggx, eta.to_bits(), alpha.map(f32::to_bits));
+        self.coats.entry(key).or_insert_with(make).clone()
     }
 }
 

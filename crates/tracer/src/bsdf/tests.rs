@@ -65,7 +65,7 @@ fn models() -> Vec<MaterialModel> {
         }
     }
     for flavour in [PrincipledFlavour::Blender, PrincipledFlavour::Mitsuba] {
-        for roughness in [0.1, 0.5, 0.9] {
+        for roughness in [0.2, 0.5, 0.9] {
             models.extend([0.0, 0.5, 1.0].map(|metallic| principled(flavour, roughness, metallic)));
         }
     }
@@ -80,9 +80,9 @@ fn with_lobe<R>(model: &MaterialModel, look: impl FnOnce(&Lobe) -> R) -> R {
     look(&Lobe::at(&scene.materials[0], tables.of(0), &[], Vec2::ZERO))
 }
 
-/// Views from above at 6 angles, and from below for what transmits.
+/// Views from above at 4 angles, and from below for what transmits.
 fn views(lobe: &Lobe) -> Vec<Vec3> {
-    let from_above = [0.08_f32, 0.2, 0.5, 0.8, 0.97, 1.0];
+    let from_above = [0.1_f32, 0.4, 0.8, 1.0];
     let mut views = from_above.map(|z| Vec3::new((1.0 - z * z).sqrt() * 0.6, (1.0 - z * z).sqrt() * 0.8, z)).to_vec();
     if lobe.transmits() {
         views.extend(views.clone().into_iter().map(|view| Vec3::new(view.x, view.y, -view.z)));
@@ -95,8 +95,8 @@ fn draws(count: u32) -> impl Iterator<Item = [f32; 3]> {
     (0..count).map(|k| [0, 1, 2].map(|stream| crate::sampler::unit_hash(k, 77 + stream)))
 }
 
-const ROWS: usize = 24;
-const COLUMNS: usize = 24;
+const ROWS: usize = 16;
+const COLUMNS: usize = 16;
 
 /// The cell of the sphere, cosine by angle, that `w` lies in.
 fn cell(w: Vec3) -> usize {
@@ -108,7 +108,7 @@ fn cell(w: Vec3) -> usize {
 /// The density integrated over each cell, in f64, by a grid that is fine enough for narrow peaks and finest where rows
 /// meet: at the poles and at the horizon peaks are narrowest.
 fn expected(lobe: &Lobe, wo: Vec3) -> Vec<f64> {
-    const FINE: usize = 128;
+    const FINE: usize = 96;
     let mut cells = vec![0.0_f64; ROWS * COLUMNS];
     let area = f64::from(4.0 * PI) / (ROWS * COLUMNS * FINE * FINE) as f64;
     for row in 0..ROWS * FINE {
@@ -173,7 +173,7 @@ fn samples_follow_their_density() {
             }
         });
     }
-    assert!(tests > 250, "{tests}");
+    assert!(tests > 180, "{tests}");
 }
 
 /// The twin: a density for another width, angle or share is found out.
@@ -184,10 +184,7 @@ fn samples_of_another_density_are_found_out() {
         (conductor(facets(Distribution::Ggx, 0.3)), conductor(facets(Distribution::Ggx, 0.33))),
         (conductor(facets(Distribution::Beckmann, 0.3)), conductor(facets(Distribution::Ggx, 0.3))),
         (dielectric(1.5, facets(Distribution::Ggx, 0.3)), dielectric(1.6, facets(Distribution::Ggx, 0.3))),
-        (
-            principled(PrincipledFlavour::Mitsuba, 0.5, 0.0),
-            principled(PrincipledFlavour::Mitsuba, 0.5, 0.3),
-        ),
+        (principled(PrincipledFlavour::Mitsuba, 0.5, 0.0), principled(PrincipledFlavour::Mitsuba, 0.5, 0.3)),
     ];
     for (sampled, described) in pairs {
         let expected = with_lobe(&described, |lobe| expected(lobe, wo));
@@ -264,7 +261,7 @@ fn lossless_models_lose_nothing() {
     ];
     for model in lossless {
         with_lobe(&model, |lobe| {
-            for wo in views(lobe).into_iter().filter(|wo| wo.z > 0.1) {
+            for wo in views(lobe).into_iter().filter(|wo| wo.z > 0.2) {
                 let albedo = albedo(lobe, wo);
                 assert!((albedo - 1.0).abs() < 0.01, "{model:?} from {wo}: {albedo}");
             }
@@ -289,7 +286,11 @@ fn reciprocity() {
                 let wi = sample.wi;
                 let scale = match &model {
                     MaterialModel::Dielectric { eta, .. } if wo.z * wi.z < 0.0 => {
-                        if wo.z > 0.0 { eta * eta } else { 1.0 / (eta * eta) }
+                        if wo.z > 0.0 {
+                            eta * eta
+                        } else {
+                            1.0 / (eta * eta)
+                        }
                     }
                     _ => 1.0,
                 };
@@ -346,4 +347,136 @@ fn sides() {
     let front = Bsdf::new(&two, &hit, mirrored(wo)).eval(mirrored(wo), mirrored(wi));
     let back = Bsdf::new(&two, &hit, wo).eval(wo, wi);
     assert!(front.x > 0.1 && (front - back).length() < 1e-6, "{front} {back}");
+}
+
+const BROWN: ColorInput = ColorInput::Constant([0.8, 0.4, 0.1]);
+
+fn copper(distribution: Distribution) -> MaterialModel {
+    let ior = ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] };
+    MaterialModel::Conductor { ior, specular_reflectance: WHITE, microfacets: facets(distribution, 0.3) }
+}
+
+fn brown_plastic(nonlinear: bool, microfacets: Option<Microfacets>) -> MaterialModel {
+    MaterialModel::Plastic {
+        eta: 1.5,
+        nonlinear,
+        diffuse_reflectance: BROWN,
+        specular_reflectance: WHITE,
+        microfacets,
+    }
+}
+
+fn brown_principled(roughness: f32, metallic: f32) -> MaterialModel {
+    MaterialModel::Principled {
+        base_color: BROWN,
+        roughness: ScalarInput::Constant(roughness),
+        metallic: ScalarInput::Constant(metallic),
+        specular: 0.5,
+        flavour: PrincipledFlavour::Mitsuba,
+    }
+}
+
+/// `wo` and `wi` are (cosine, azimuth). Rough plastic rests on tables of their own on both sides, plastic on Mitsuba's fit
+/// of the diffuse reflectance (0.1 % off) against our integral; all else is formulas.
+fn agrees(model: &MaterialModel, wo: (f32, f32), wi: (f32, f32), expected: [f32; 3]) {
+    let direction = |(z, phi): (f32, f32)| {
+        let (sin, cos) = libm::sincosf(phi);
+        (Vec2::new(cos, sin) * (1.0 - z * z).sqrt()).extend(z)
+    };
+    let tolerance = match model {
+        MaterialModel::Plastic { microfacets: Some(_), .. } => 0.01,
+        MaterialModel::Plastic { .. } => 2e-3,
+        _ => 1e-3,
+    };
+    let found = with_lobe(model, |lobe| lobe.eval(direction(wo), direction(wi)));
+    let off = ((found - Vec3::from_array(expected)) / Vec3::from_array(expected)).abs().max_element();
+    assert!(off < tolerance, "{model:?} {wo:?} {wi:?}: {found}, expected {expected:?}");
+}
+
+/// Values with the cosine, from Mitsuba 3.9.1's `eval` (scalar_rgb).
+#[test]
+fn values_are_mitsubas() {
+    // conductor_ggx
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.744_212, 0.482_017, 0.394_615]),
+        ((0.3, 1.0), (0.5, -1.5), [0.109_506, 0.072_303_7, 0.060_868_2]),
+        ((0.95, 0.5), (0.2, 0.7), [0.014_501_2, 0.009_382_2, 0.007_648_38]),
+    ] {
+        agrees(&copper(Distribution::Ggx), wo, wi, expected);
+    }
+    // conductor_beckmann
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.900_913, 0.58351, 0.477_706]),
+        ((0.3, 1.0), (0.5, -1.5), [0.018_546_6, 0.012_245_7, 0.010_308_9]),
+        ((0.95, 0.5), (0.2, 0.7), [3.68514e-06, 2.38426e-06, 1.94366e-06]),
+    ] {
+        agrees(&copper(Distribution::Beckmann), wo, wi, expected);
+    }
+    // plastic
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.137_574, 0.047_216_5, 0.009_556_53]),
+        ((0.3, 1.0), (0.5, -1.5), [0.078_142_4, 0.026_819_1, 0.005_428_13]),
+        ((0.95, 0.5), (0.2, 0.7), [0.027_486_5, 0.009_433_58, 0.001_909_34]),
+    ] {
+        agrees(&brown_plastic(true, None), wo, wi, expected);
+    }
+    // plastic_linear
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.178_302, 0.089_151_2, 0.022_287_8]),
+        ((0.3, 1.0), (0.5, -1.5), [0.101_276, 0.050_638_1, 0.012_659_5]),
+        ((0.95, 0.5), (0.2, 0.7), [0.035_623_8, 0.017_811_9, 0.004_452_97]),
+    ] {
+        agrees(&brown_plastic(false, None), wo, wi, expected);
+    }
+    // roughplastic_ggx
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.139_518, 0.077_634, 0.045_282_7]),
+        ((0.3, 1.0), (0.5, -1.5), [0.071_949_8, 0.035_144_3, 0.015_903_5]),
+        ((0.95, 0.5), (0.2, 0.7), [0.025_478, 0.010_584_5, 0.002_798_57]),
+    ] {
+        agrees(&brown_plastic(true, facets(Distribution::Ggx, 0.3)), wo, wi, expected);
+    }
+    // roughplastic_beckmann
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.222_538, 0.135_164, 0.097_927_4]),
+        ((0.3, 1.0), (0.5, -1.5), [0.076_312, 0.026_604_7, 0.005_420_46]),
+        ((0.95, 0.5), (0.2, 0.7), [0.027_575_4, 0.009_613_64, 0.001_958_69]),
+    ] {
+        agrees(&brown_plastic(true, facets(Distribution::Beckmann, 0.1)), wo, wi, expected);
+    }
+    // roughdielectric
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.036_288_4, 0.036_288_4, 0.036_288_4]),
+        ((0.3, 1.0), (0.5, -1.5), [0.010_554_2, 0.010_554_2, 0.010_554_2]),
+        ((0.95, 0.5), (0.2, 0.7), [0.000_633_948, 0.000_633_948, 0.000_633_948]),
+        ((0.8, 0.0), (-0.75, 3.0), [0.269_743, 0.269_743, 0.269_743]),
+        ((-0.9, 0.4), (0.85, -2.6), [8.10793, 8.10793, 8.10793]),
+        ((-0.9, 0.4), (-0.8, -2.6), [0.046_830_5, 0.046_830_5, 0.046_830_5]),
+    ] {
+        agrees(&dielectric(1.5, facets(Distribution::Ggx, 0.3)), wo, wi, expected);
+    }
+    // principled_a
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.224_465, 0.135_321, 0.068_462_2]),
+        ((0.3, 1.0), (0.5, -1.5), [0.129_422, 0.068_985_6, 0.023_658_3]),
+        ((0.95, 0.5), (0.2, 0.7), [0.055_511_1, 0.028_002_6, 0.007_371_26]),
+    ] {
+        agrees(&brown_principled(0.5, 0.0), wo, wi, expected);
+    }
+    // principled_b
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.819_088, 0.41922, 0.119_318]),
+        ((0.3, 1.0), (0.5, -1.5), [0.045_661_6, 0.023_263_4, 0.006_464_74]),
+        ((0.95, 0.5), (0.2, 0.7), [0.016_197_7, 0.008_111_8, 0.002_047_37]),
+    ] {
+        agrees(&brown_principled(0.3, 0.7), wo, wi, expected);
+    }
+    // principled_c
+    for (wo, wi, expected) in [
+        ((0.8, 0.0), (0.7, 2.9), [0.095_670_5, 0.047_886_6, 0.012_048_7]),
+        ((0.3, 1.0), (0.5, -1.5), [0.091_349_9, 0.047_552_5, 0.014_704_5]),
+        ((0.95, 0.5), (0.2, 0.7), [0.023_638_2, 0.011_819_8, 0.002_956_02]),
+    ] {
+        agrees(&brown_principled(0.9, 1.0), wo, wi, expected);
+    }
 }

@@ -182,6 +182,7 @@ impl Emitters {
         let towards = place.position - from;
         let direction = towards.try_normalize()?;
         let cos = place.geometric_normal.dot(direction).abs();
+        let probability = (1.0 - self.distant_share()) * probability;
         let density = probability * towards.length_squared() / (cos * area.area());
         if !area.glows(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;

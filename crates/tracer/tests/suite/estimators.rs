@@ -1,1 +1,198 @@
+//! Different ways to the same picture, and the same way to the same bytes.
 
+use std::sync::Arc;
+
+use glam::Vec3;
+use mateval_image::{Texels, Texture, Wrap};
+use mateval_scene::material::{
+    ColorInput, ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
+};
+use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture, SurfaceIndex};
+use mateval_scene::{Camera, TriangleMesh};
+use mateval_tracer::{LightSampling, RenderSettings, World, render};
+
+use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use super::statistics::Renders;
+
+fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
+    MaterialModel::Principled {
+        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
+        roughness: ScalarInput::Constant(roughness),
+        metallic: ScalarInput::Constant(metallic),
+        specular: 0.5,
+        flavour,
+    }
+}
+
+/// A room open to a map on one side, with a lamp, a large metal ball, a rough plastic box side and a frosted pane.
+fn scene(brightness: f32) -> ReferenceScene {
+    let mut walls = room();
+    walls.truncate(5);
+    let facets = Some(Microfacets { distribution: Distribution::Ggx, alpha: ScalarInput::Constant(0.2) });
+    let plastic = MaterialModel::Plastic {
+        eta: 1.5,
+        nonlinear: true,
+        diffuse_reflectance: ColorInput::Constant([0.2, 0.5, 0.6]),
+        specular_reflectance: ColorInput::Constant([1.0; 3]),
+        microfacets: facets,
+    };
+    let frosted = MaterialModel::Dielectric {
+        eta: 1.5,
+        specular_reflectance: ColorInput::Constant([1.0; 3]),
+        specular_transmittance: ColorInput::Constant([1.0; 3]),
+        microfacets: facets,
+    };
+    let metal = MaterialModel::Conductor {
+        ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
+        specular_reflectance: ColorInput::Constant([1.0; 3]),
+        microfacets: facets,
+    };
+    let mut builder = Builder::default();
+    for (index, wall) in walls.into_iter().enumerate() {
+        builder = match index {
+            0 => builder.surface(wall, material(principled(0.4, 0.0, PrincipledFlavour::Blender))),
+            2 => builder.surface(wall, material(plastic)),
+            _ => builder.surface(wall, grey(0.6)),
+        };
+    }
+    let mut scene = builder
+        .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal))
+        .surface(sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12), material(principled(0.3, 1.0, PrincipledFlavour::Mitsuba)))
+        .surface(quad(Vec3::new(-0.9, -0.4, 0.3), Vec3::X * 0.6, Vec3::Y * 0.8), material(frosted))
+        .surface(quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8), grey(0.0))
+        .glowing([4.0 * brightness; 3])
+        .scene();
+    let texels = (0..16 * 8).map(|k| if k == 60 { [20.0; 3] } else { [0.3; 3] }).collect();
+    scene.textures.push(SourceTexture {
+        name: String::new(),
+        sha256: None,
+        texture: Texture::new(16, 8, Texels::Linear(texels), Wrap::Repeat).unwrap(),
+    });
+    let world_from_environment = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let sky = Emission::Environment { texture: TextureIndex(0), scale: brightness, world_from_environment };
+    scene.lights.extend(Builder::default().light(sky).scene().lights);
+    scene
+}
+
+fn view() -> Camera {
+    camera([0.2, 0.1, 2.6], [0.0, -0.1, 0.0], 32, 50.0)
+}
+
+/// Whole and quarters within 4.5 standard errors.
+fn worst(a: &Renders, b: &Renders) -> f64 {
+    let quarter = |k: usize| (16 * (k % 2)..16 * (k % 2) + 16, 16 * (k / 2)..16 * (k / 2) + 16);
+    let regions = (0..4).map(quarter).chain([(0..32, 0..32)]);
+    regions.map(|(x, y)| a.region(x.clone(), y.clone()).z_against(&b.region(x, y)).abs()).fold(0.0, f64::max)
+}
+
+/// Sampling emitters, surfaces or both, and ending paths by chance or not, have one mean; 3 % more light has not.
+#[test]
+fn ways_of_sampling_agree() {
+    let world = World::new(Arc::new(scene(1.0))).unwrap();
+    let settings = |samples, light_sampling, seed| RenderSettings {
+        samples,
+        light_sampling,
+        seed,
+        max_bounces: 6,
+        ..Default::default()
+    };
+    let both = Renders::new(&world, &view(), settings(64, LightSampling::Both, 1), 16);
+    let emitters = Renders::new(&world, &view(), settings(64, LightSampling::Emitters, 2), 16);
+    let surfaces = Renders::new(&world, &view(), settings(256, LightSampling::Bsdf, 3), 16);
+    let unending = RenderSettings { roulette_start: 99, ..settings(64, LightSampling::Both, 4) };
+    let unending = Renders::new(&world, &view(), unending, 16);
+    if let Some(out) = std::env::var_os("MATEVAL_TEST_PICTURES") {
+        let path = std::path::Path::new(&out).join("estimators.png");
+        mateval_image::png_io::write_srgb(&path, &both.picture().to_srgb()).unwrap();
+    }
+    for (name, other) in [("emitters", &emitters), ("surfaces", &surfaces), ("no roulette", &unending)] {
+        let z = worst(&both, other);
+        assert!(z < 4.5, "{name}: {z}, {:?} {:?}", both.whole(), other.whole());
+    }
+    let brighter = World::new(Arc::new(scene(1.03))).unwrap();
+    let brighter = Renders::new(&brighter, &view(), settings(64, LightSampling::Both, 5), 16);
+    let z = worst(&both, &brighter);
+    assert!(z > 4.5, "the twin passes: {z}");
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let world = World::new(Arc::new(scene(1.0))).unwrap();
+    let settings = RenderSettings { samples: 4, seed: 3, ..Default::default() };
+    let on_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render(&world, &view(), &settings, &|_, _| ()).unwrap())
+    };
+    let one = on_threads(1);
+    assert_eq!(one, on_threads(2));
+    assert_eq!(one, on_threads(3));
+    let other = render(&world, &view(), &RenderSettings { seed: 4, ..settings }, &|_, _| ()).unwrap();
+    assert_ne!(one.picture, other.picture);
+}
+
+#[test]
+fn progress_reaches_its_end() {
+    let world = Builder::default().world();
+    let seen = std::sync::Mutex::new(Vec::new());
+    let told = |done, total| seen.lock().unwrap().push((done, total));
+    render(&world, &view(), &RenderSettings { samples: 1, ..Default::default() }, &told).unwrap();
+    let mut seen = seen.into_inner().unwrap();
+    seen.sort_unstable();
+    assert_eq!(seen, [(1, 4), (2, 4), (3, 4), (4, 4)]);
+}
+
+/// A world of other materials and uvs over the same triangles takes the hierarchy as it is; other triangles are refused.
+#[test]
+fn worlds_share_a_hierarchy() {
+    let first = World::new(Arc::new(scene(1.0))).unwrap();
+    let mut changed = scene(1.0);
+    changed.surfaces[1].material = changed.surfaces[2].material;
+    let second = World::sharing(Arc::new(changed.clone()), first.accel().clone()).unwrap();
+    let settings = RenderSettings { samples: 1, ..Default::default() };
+    let picture = |world: &World| render(world, &view(), &settings, &|_, _| ()).unwrap().picture;
+    assert_eq!(picture(&second), picture(&World::new(Arc::new(changed.clone())).unwrap()));
+    assert_ne!(picture(&first), picture(&second));
+    changed.surfaces[0].mesh.positions[0].x += 0.5;
+    assert!(World::sharing(Arc::new(changed), first.accel().clone()).is_err());
+}
+
+#[test]
+fn what_the_cap_cut_is_reported() {
+    let world = World::new(Arc::new(scene(1.0))).unwrap();
+    let stats = |max_bounces| {
+        let settings = RenderSettings { samples: 8, max_bounces, ..Default::default() };
+        render(&world, &view(), &settings, &|_, _| ()).unwrap().stats
+    };
+    let (short, long) = (stats(1), stats(16));
+    assert!(short.capped_share > 0.2 && short.capped_throughput > 0.05, "{short:?}");
+    assert!(long.capped_share < 0.05 && long.capped_throughput < 0.01, "{long:?}");
+    assert_eq!((long.paths, long.not_finite), (32 * 32 * 8, 0));
+}
+
+/// Every kind of scene that contradicts itself is refused, and the message says where.
+#[test]
+fn bad_scenes_are_refused() {
+    let refused = |change: fn(&mut ReferenceScene), place: &str| {
+        let mut scene = scene(1.0);
+        change(&mut scene);
+        let error = World::new(Arc::new(scene)).unwrap_err().to_string();
+        assert!(error.contains(place), "{error}");
+    };
+    refused(|s| s.surfaces[1].material.0 = 99, "surface 1");
+    refused(|s| s.surfaces[2].mesh.uvs = Some(vec![]), "surface 2");
+    refused(|s| s.surfaces[2].mesh.normals = Some(vec![Vec3::NAN; 4]), "surface 2");
+    refused(|s| s.surfaces[3].mesh = TriangleMesh { triangles: vec![[7, 0, 1]], ..Default::default() }, "surface 3");
+    refused(|s| s.lights[0].emission = Emission::Constant { radiance: [f32::NAN; 3] }, "light 0");
+    refused(|s| s.lights.push(s.lights[0].clone()), "light 2");
+    refused(
+        |s| {
+            let surfaces = vec![SurfaceIndex(99)];
+            s.lights[0].emission = Emission::Area { surfaces, radiance: [1.0; 3], two_sided: false };
+        },
+        "light 0",
+    );
+    let dangling = ColorInput::Texture { texture: TextureIndex(5), uv: Default::default() };
+    let mut bad = scene(1.0);
+    bad.materials[1].model = MaterialModel::Diffuse { reflectance: dangling, alpha: None };
+    assert!(World::new(Arc::new(bad)).unwrap_err().to_string().contains("material 1"));
+}

@@ -1,0 +1,51 @@
+//! `mateval schema`: the JSON Schemas of the format's files, from the Rust types that read and write them.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail};
+use mateval_eval::result::ResultFile;
+use mateval_prep::render::RenderFile;
+use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
+use mateval_scene::json;
+use mateval_scene::reference_io::{LightsFile, ReferenceFile};
+use mateval_scene::submission::SubmissionFile;
+use schemars::{Schema, schema_for};
+
+use crate::outcome::{Outcome, print};
+
+/// What it is given.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder to write them to, as in `dataset_spec/schema`.
+    out: PathBuf,
+    /// Replace schemas that are there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Writes `NAME.schema.json` for every kind of JSON file.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let schemas = schemas().map(|(name, schema)| (args.out.join(name).with_extension("schema.json"), schema));
+    if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !args.force) {
+        bail!("'{}' is already there; choose another folder, or add --force to replace it", path.display());
+    }
+    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make '{}'", args.out.display()))?;
+    for (path, schema) in &schemas {
+        json::write(path, schema)?;
+        print(&format!("{}\n", path.display()));
+    }
+    Ok(Outcome::Good)
+}
+
+fn schemas() -> [(&'static str, Schema); 8] {
+    [
+        ("dataset", schema_for!(DatasetFile)),
+        ("targets", schema_for!(TargetsFile)),
+        ("scene", schema_for!(SceneFile)),
+        ("reference", schema_for!(ReferenceFile)),
+        ("lights", schema_for!(LightsFile)),
+        ("render", schema_for!(RenderFile)),
+        ("submission", schema_for!(SubmissionFile)),
+        ("result", schema_for!(ResultFile)),
+    ]
+}
