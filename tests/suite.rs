@@ -1,1 +1,26 @@
+//! Everything that crosses crates: the command `mateval` run on the sample that it makes itself, on planted faults, and
+//! on the real scenes where they are there. One concept a module, one binary for all.
 
+#![allow(
+    clippy::unwrap_used,
+    reason = "tests unwrap; clippy exempts only functions marked as tests, not what they call"
+)]
+
+mod suite {
+    mod arrows;
+    mod bad_input;
+    mod command;
+    mod determinism;
+    mod full_disk;
+    mod help;
+    mod images;
+    mod planted;
+    mod real_scenes;
+    mod reprojection;
+    mod resume;
+    mod sample;
+    mod schemas;
+    mod scores;
+    mod unsound_submissions;
+    mod verify_faults;
+}

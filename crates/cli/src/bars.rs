@@ -49,9 +49,11 @@ impl Bars {
             say(&format!("{step}: {done}/{all}"));
         }
     }
+}
 
-    /// Takes the bar away.
-    pub fn finish(&self) {
+impl Drop for Bars {
+    /// Takes the bar away, before an error is said too.
+    fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }

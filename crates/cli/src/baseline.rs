@@ -39,6 +39,6 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         Name::Grey => mateval_baselines::grey::write,
     };
     let instances = write(&dataset, &args.out, args.force)?;
-    print(&format!("{}: {instances} instances\n", args.out.display()));
+    print(&format!("{}: {instances} instances\n", args.out.display()))?;
     Ok(Outcome::Good)
 }

@@ -72,12 +72,12 @@ fn make_baselines(dataset: &Path, out: &Path, force: bool) -> anyhow::Result<Vec
 
 fn print_closing(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
     let results = files.iter().map(|path| mateval_scene::json::read(path)).collect::<Result<Vec<_>, _>>()?;
-    print("\n");
-    print(&mateval_eval::tables::tables(&results, "mateval-1", mateval_eval::tables::TableFormat::Markdown)?);
+    print("\n")?;
+    print(&mateval_eval::tables::tables(&results, "mateval-1", mateval_eval::tables::TableFormat::Markdown)?)?;
     let scene = out.join("dataset/scenes/room");
-    print(&format!("input picture:  {}\n", scene.join("views/input/rgb.png").display()));
-    print(&format!("all pictures:   {}\n", scene.join("views").display()));
-    print(&format!("truth:          {}\n", scene.join("ground_truth").display()));
-    print(&format!("results:        {}\n", out.join("results").display()));
+    print(&format!("input picture:  {}\n", scene.join("views/input/rgb.png").display()))?;
+    print(&format!("all pictures:   {}\n", scene.join("views").display()))?;
+    print(&format!("truth:          {}\n", scene.join("ground_truth").display()))?;
+    print(&format!("results:        {}\n", out.join("results").display()))?;
     Ok(())
 }

@@ -130,8 +130,8 @@ fn image(args: &ImageArgs) -> anyhow::Result<Outcome> {
                 .iter()
                 .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "mend": weights::MEND }))
                 .collect::<Vec<_>>(),
-        }))),
-        ImageFormat::Text => print(&image_text(&values, &missing)),
+        })))?,
+        ImageFormat::Text => print(&image_text(&values, &missing))?,
     }
     Ok(Outcome::Good)
 }
@@ -158,9 +158,7 @@ fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)
             }
         }
     }
-    lines.extend(
-        missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::MEND)),
-    );
+    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::MEND)));
     lines.join("\n") + "\n"
 }
 
@@ -179,11 +177,11 @@ pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
     };
     let bars = Bars::new();
     let results = score(&plan, &|step, done, all| bars.step(step, done, all)).context("cannot score")?;
-    bars.finish();
+    drop(bars);
     for (result, out) in results.iter().zip(&outs) {
         json::write(out, result)?;
         say_findings(&result.method, &result.findings);
-        print(&format!("{}\n", out.display()));
+        print(&format!("{}\n", out.display()))?;
     }
     Ok(outs)
 }
@@ -194,13 +192,16 @@ fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
         [_] => vec![args.out.clone()],
         several => {
             std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make '{}'", args.out.display()))?;
-            several.iter().map(|path| args.out.join(folder_name(path)).with_extension("json")).collect()
+            several.iter().map(|path| args.out.join(format!("{}.json", folder_name(path)))).collect()
         }
     };
     for (at, out) in outs.iter().enumerate() {
         // Scoring takes minutes: what can fail early must.
         if !out.parent().is_some_and(|folder| folder.as_os_str().is_empty() || folder.is_dir()) {
             bail!("the folder of '{}' is not there; make it, or choose another --out", out.display());
+        }
+        if out.is_dir() {
+            bail!("'{}' is a folder; expected the name of a result file", out.display());
         }
         if out.exists() && !args.force {
             bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
@@ -212,9 +213,9 @@ fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
     Ok(outs)
 }
 
-fn folder_name(path: &Path) -> PathBuf {
+fn folder_name(path: &Path) -> String {
     let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or_else(|| PathBuf::from("submission"), PathBuf::from)
+    whole.file_name().map_or_else(|| "submission".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {
@@ -224,7 +225,7 @@ fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {
         TableName::Latex => TableFormat::Latex,
         TableName::Csv => TableFormat::Csv,
     };
-    print(&tables(&results, &args.protocol, format)?);
+    print(&tables(&results, &args.protocol, format)?)?;
     for result in results.iter().filter(|result| !result.missing.is_empty()) {
         for missing in &result.missing {
             say(&format!(

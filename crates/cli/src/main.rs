@@ -48,6 +48,11 @@ enum Command {
 }
 
 fn main() -> std::process::ExitCode {
+    // A bug that panics has said so by itself; what it was about to do could not be done.
+    std::panic::catch_unwind(run).unwrap_or(std::process::ExitCode::from(2))
+}
+
+fn run() -> std::process::ExitCode {
     let result = match Cli::parse().command {
         Command::Demo(args) => demo::run(&args),
         Command::Sample(args) => sample::run(&args),
@@ -60,7 +65,7 @@ fn main() -> std::process::ExitCode {
         Ok(Outcome::Good) => std::process::ExitCode::from(0),
         Ok(Outcome::No) => std::process::ExitCode::from(1),
         Err(error) => {
-            outcome::say(&format!("error: {error:#}"));
+            outcome::say(&format!("error: {}", outcome::told(&error)));
             std::process::ExitCode::from(2)
         }
     }

@@ -100,9 +100,9 @@ pub fn build(args: &BuildArgs) -> anyhow::Result<Outcome> {
     let bars = Bars::new();
     let report = mateval_prep::build::build(&options, TOOL, &|step, done, all| bars.step(step, done, all))
         .context("cannot build the dataset")?;
-    bars.finish();
+    drop(bars);
     tell(&report);
-    print(&format!("{}: {} scenes\n", args.out.display(), report.dataset.scenes.len()));
+    print(&format!("{}: {} scenes\n", args.out.display(), report.dataset.scenes.len()))?;
     Ok(Outcome::Good)
 }
 
@@ -122,11 +122,11 @@ pub fn render(args: &RenderArgs) -> anyhow::Result<Outcome> {
     let bars = Bars::new();
     let report = mateval_prep::render::render(&args.dataset, &options, &|step, done, all| bars.step(step, done, all))
         .context("cannot render the dataset")?;
-    bars.finish();
+    drop(bars);
     for line in &report.remarks {
         say(line);
     }
-    print(&format!("{}: {} views rendered, {} were there\n", args.dataset.display(), report.rendered, report.kept));
+    print(&format!("{}: {} views rendered, {} were there\n", args.dataset.display(), report.rendered, report.kept))?;
     Ok(Outcome::Good)
 }
 
@@ -134,16 +134,21 @@ fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     let bars = Bars::new();
     let findings = mateval_prep::verify::verify(&args.dataset, &|step, done, all| bars.step(step, done, all))
         .with_context(|| format!("cannot verify '{}'", args.dataset.display()))?;
-    bars.finish();
+    drop(bars);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     match args.format {
-        Format::Json => print(&mateval_scene::json::to_text(&findings)),
+        Format::Json => print(&mateval_scene::json::to_text(&serde_json::json!({
+            "format": "mateval-verify/1",
+            "tool": TOOL,
+            "sound": errors == 0,
+            "findings": findings,
+        })))?,
         Format::Text => {
             for finding in &findings {
-                print(&format!("{finding}\n"));
+                print(&format!("{finding}\n"))?;
             }
             let verdict = if errors == 0 { "sound" } else { "NOT sound" };
-            print(&format!("{}: {verdict}, {errors} errors\n", args.dataset.display()));
+            print(&format!("{}: {verdict}, {errors} errors\n", args.dataset.display()))?;
         }
     }
     Ok(if errors == 0 { Outcome::Good } else { Outcome::No })

@@ -18,9 +18,6 @@ pub struct Measured {
     pub count: usize,
 }
 
-/// LPIPS is stored rounded to one part of so many: its last bits depend on the processor.
-const LPIPS_STEPS: f64 = 1e6;
-
 /// MSE, PSNR, SSIM and (where its weights are there) LPIPS of an albedo picture over the mask; linear pictures.
 pub fn albedo_metrics(
     protocol: &Protocol,
@@ -57,7 +54,8 @@ pub fn albedo_metrics(
             Err(MetricError::TooSmall { .. }) => None,
             other => other?,
         };
-        let rounded = distance.map(|distance| (distance * LPIPS_STEPS).round() / LPIPS_STEPS);
+        let steps = 10_f64.powi(protocol.lpips_decimals as i32);
+        let rounded = distance.map(|distance| (distance * steps).round() / steps);
         measured.push(plain(&format!("lpips_{}", protocol.lpips_net), rounded, pixels));
     }
     Ok(measured)

@@ -6,14 +6,11 @@ use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::submission::{Map, instance_folder};
+use mateval_scene::submission::{GREY, MAP_SIZES, Map, instance_folder};
 use mateval_scene::{Finding, Severity};
 
-/// What a missing base colour scores as, linear.
-pub const DEFAULT_BASE_COLOR: f32 = 0.5;
-
-/// Texels a side that a submission may use.
-pub const SIZES: std::ops::RangeInclusive<usize> = 64..=4096;
+/// What a base colour may be, linear; a stray value must not swamp the mean over all pixels.
+pub const BASE_COLOR_RANGE: std::ops::RangeInclusive<f32> = -1.0..=16.0;
 
 /// One instance's maps.
 #[derive(Clone, Debug)]
@@ -40,7 +37,7 @@ pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
         let material = instance.atlas.is_some().then(|| {
             let base_color = read_base_color(submission, scene, instance, &mut read);
             note_files(submission, scene, instance, &mut read);
-            let grey = Texels::Grey(vec![DEFAULT_BASE_COLOR]);
+            let grey = Texels::Grey(vec![GREY]);
             let default = || Texture::new(1, 1, grey, Wrap::Clamp).expect("one texel is what one pixel needs");
             PredictedMaterial { base_color: base_color.unwrap_or_else(default) }
         });
@@ -97,9 +94,15 @@ fn relative(submission: &Path, path: &Path) -> String {
 fn read_sound(path: &Path) -> Result<Texture, String> {
     let texture = read_texture(path, Encoding::Srgb, Wrap::Clamp).map_err(|error| error.to_string())?;
     let (width, height) = (texture.width(), texture.height());
-    if width != height || !SIZES.contains(&width) {
-        let (least, most) = (SIZES.start(), SIZES.end());
+    if width != height || !MAP_SIZES.contains(&width) {
+        let (least, most) = (MAP_SIZES.start(), MAP_SIZES.end());
         return Err(format!("{width}x{height} texels; expected a square of {least} to {most} a side"));
+    }
+    if let Texels::Linear(values) = texture.texels()
+        && let Some(value) = values.iter().flatten().find(|value| !BASE_COLOR_RANGE.contains(value))
+    {
+        let (least, most) = (BASE_COLOR_RANGE.start(), BASE_COLOR_RANGE.end());
+        return Err(format!("a base colour of {value}; expected {least} to {most}"));
     }
     Ok(texture.collapsed())
 }
@@ -111,6 +114,6 @@ fn replaced(code: &str, file: &str, message: &str) -> Finding {
         file: file.to_owned(),
         place: String::new(),
         message: message.to_owned(),
-        action: format!("scored as base colour {DEFAULT_BASE_COLOR} (linear)"),
+        action: format!("scored as base colour {GREY} (linear)"),
     }
 }

@@ -1,5 +1,6 @@
 //! Protocols: every rule that a number depends on, as data with a fingerprint.
 
+use mateval_scene::SceneId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +28,7 @@ pub enum AlbedoSpace {
 }
 
 /// A protocol. Its fingerprint is the hash of this and of all that a number depends on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
     /// Its name.
@@ -38,6 +39,14 @@ pub struct Protocol {
     pub albedo_space: AlbedoSpace,
     /// The network of LPIPS.
     pub lpips_net: String,
+    /// Decimals that LPIPS is rounded to: its last bits depend on the processor.
+    pub lpips_decimals: u32,
+    /// Places, in a regular square, at which a pixel of the truth and of the prediction is looked at.
+    pub subpixels: usize,
+    /// What a missing or unsound base colour scores as, linear.
+    pub missing_base_color: f32,
+    /// [`SCORER_VERSION`].
+    pub scorer_version: u32,
 }
 
 /// Raised whenever a number could change for the same inputs.
@@ -57,16 +66,30 @@ impl Protocol {
                 return Err(EvalError::Invalid(format!("there is no protocol '{name}'; known are '{known}'")));
             }
         };
-        Ok(Self { name: name.to_owned(), mask_rule, albedo_space, lpips_net: "alex".to_owned() })
+        Ok(Self {
+            name: name.to_owned(),
+            mask_rule,
+            albedo_space,
+            lpips_net: "alex".to_owned(),
+            lpips_decimals: 6,
+            subpixels: mateval_tracer::aov::SUBPIXELS,
+            missing_base_color: mateval_scene::submission::GREY,
+            scorer_version: SCORER_VERSION,
+        })
     }
 
-    /// SHA-256, hex, over the scorer's version, this protocol, the dataset's manifest and the weights of LPIPS (or a
-    /// word for their absence).
-    pub fn fingerprint(&self, dataset_manifest_sha256: &str, lpips_weights_sha256: Option<&str>) -> String {
+    /// SHA-256, hex, over this protocol, the dataset's manifest, the scenes that are scored and the weights of LPIPS (or
+    /// a word for their absence).
+    pub fn fingerprint(
+        &self,
+        dataset_manifest_sha256: &str,
+        scenes: &[&SceneId],
+        lpips_weights_sha256: Option<&str>,
+    ) -> String {
         let text = mateval_scene::json::to_text(&(
-            SCORER_VERSION,
             self,
             dataset_manifest_sha256,
+            scenes,
             lpips_weights_sha256.unwrap_or("missing"),
         ));
         mateval_scene::manifest::sha256_of_bytes(text.as_bytes())
@@ -80,18 +103,22 @@ mod tests {
     #[test]
     fn the_fingerprint_holds_everything() {
         let base = Protocol::named("mateval-1").unwrap();
+        let scene = SceneId::new("s").unwrap();
+        let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some("w"));
         let mut prints = vec![
-            base.fingerprint("a", Some("w")),
-            base.fingerprint("b", Some("w")),
-            base.fingerprint("a", Some("v")),
-            base.fingerprint("a", None),
-            Protocol::named("paper").unwrap().fingerprint("a", Some("w")),
-            Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }.fingerprint("a", Some("w")),
-            Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }.fingerprint("a", Some("w")),
+            print(&base),
+            base.fingerprint("b", &[&scene], Some("w")),
+            base.fingerprint("a", &[], Some("w")),
+            base.fingerprint("a", &[&scene], Some("v")),
+            base.fingerprint("a", &[&scene], None),
+            print(&Protocol::named("paper").unwrap()),
+            print(&Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }),
+            print(&Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }),
+            print(&Protocol { missing_base_color: 0.4, ..base.clone() }),
         ];
         prints.sort();
         prints.dedup();
-        assert_eq!(prints.len(), 7);
+        assert_eq!(prints.len(), 9);
     }
 
     #[test]

@@ -39,7 +39,7 @@ pub struct ResultFile {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {
-    /// SHA-256, hex, over the path and SHA-256 of every map of the scored scenes, in order.
+    /// SHA-256, hex, over path and SHA-256 of submission.json and of every map of the scored scenes, in order.
     pub sha256: String,
     /// Its own description.
     pub description: String,

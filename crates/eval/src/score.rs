@@ -8,10 +8,10 @@ use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
 use mateval_metrics::Lpips;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_scene::{Finding, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io};
+use mateval_scene::{Finding, Progress, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io};
 use mateval_tracer::World;
 
 use crate::albedo::albedo_pictures;
@@ -62,9 +62,6 @@ pub struct ScorePlan<'a> {
     pub tool: String,
 }
 
-/// Called with the step's name, how much of it is done, and how much there is.
-pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
-
 /// One submission on its way to a result.
 struct Entry {
     file: SubmissionFile,
@@ -79,11 +76,9 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     let scenes = chosen_scenes(plan)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
-    for (at, scene) in scenes.iter().enumerate() {
-        progress(&format!("scene {}", scene.id), at, scenes.len());
-        score_scene(plan, scene, &mut entries)?;
+    for scene in &scenes {
+        score_scene(plan, scene, &mut entries, progress)?;
     }
-    progress("scenes", scenes.len(), scenes.len());
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
 }
 
@@ -120,15 +115,25 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
             action: "scored all the same; make it anew for this dataset".to_owned(),
         });
     }
-    Ok(Entry { file, findings, files: Vec::new(), pictures: vec![Vec::new(); plan.protocols.len()] })
+    let files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
+    Ok(Entry { file, findings, files, pictures: vec![Vec::new(); plan.protocols.len()] })
 }
 
-fn score_scene(plan: &ScorePlan<'_>, scene: &SceneFile, entries: &mut [Entry]) -> Result<(), EvalError> {
+fn score_scene(
+    plan: &ScorePlan<'_>,
+    scene: &SceneFile,
+    entries: &mut [Entry],
+    progress: Progress<'_>,
+) -> Result<(), EvalError> {
+    // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
+    plan.dataset.check_files(&scene.id, |path| !path.contains("/renders/") && !path.contains("/materials/"))?;
     let folder = plan.dataset.folder(&scene.id);
     let world = World::new(Arc::new(reference_io::read(&folder)?))?;
-    let atlases = read_atlases(&folder, &world)?;
+    let atlases = read_atlases(&folder, scene, &world)?;
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
-    for view in scored_views(plan, scene) {
+    let views = scored_views(plan, scene)?;
+    for (at, view) in views.iter().enumerate() {
+        progress(&format!("scene {}", scene.id), at, views.len());
         let pictures = albedo_pictures(&world, &atlases, &view.camera, &predictions);
         let truth = Truth::read(&folder, view)?;
         for (entry, picture) in entries.iter_mut().zip(&pictures) {
@@ -144,23 +149,34 @@ fn score_scene(plan: &ScorePlan<'_>, scene: &SceneFile, entries: &mut [Entry]) -
     Ok(())
 }
 
-/// The views of the scene that `targets.json` names, in the scene's order.
-fn scored_views<'a>(plan: &ScorePlan<'_>, scene: &'a SceneFile) -> impl Iterator<Item = &'a View> {
+/// The views of the scene that `targets.json` names, in the scene's order; at least one.
+fn scored_views<'a>(plan: &ScorePlan<'_>, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
     let targets = &plan.dataset.targets.targets;
-    scene.views.iter().filter(move |view| targets.iter().any(|t| t.scene == scene.id && t.view == view.id))
+    let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
+    let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
+    if views.is_empty() {
+        let what = format!("scene '{}': targets.json names no view of it; run `mateval prep verify`", scene.id);
+        return Err(EvalError::Invalid(what));
+    }
+    Ok(views)
 }
 
-/// The meshes of `instances.glb`; the same triangles as the world's surfaces, or the dataset is unsound.
-fn read_atlases(folder: &SceneFolder, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
-    let meshes: Vec<TriangleMesh> = glb::read(&folder.instances())?.into_iter().map(|node| node.mesh).collect();
+/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
+/// surfaces, or the dataset is unsound.
+fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
+    let nodes = glb::read(&folder.instances())?;
+    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
+    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
+    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
     let surfaces = &world.scene().surfaces;
-    let fits = meshes.len() == surfaces.len()
+    let fits = named
+        && meshes.len() == surfaces.len()
         && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
     if fits {
         return Ok(meshes);
     }
     let path = folder.instances();
-    let what = "its triangles are not those of ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
     Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
 }
 
@@ -223,12 +239,13 @@ fn picture_values(
     Ok(values)
 }
 
-fn finish(plan: &ScorePlan<'_>, scenes: &[&SceneFile], mut entry: Entry) -> ResultFile {
+fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> ResultFile {
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
     let protocols = plan.protocols.iter().zip(entry.pictures).map(|(protocol, pictures)| {
         let (scenes, summary) = means(&pictures);
-        let fingerprint = protocol.fingerprint(manifest, weights);
+        let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
+        let fingerprint = protocol.fingerprint(manifest, &ids, weights);
         (protocol.name.clone(), ProtocolResult { protocol: protocol.clone(), fingerprint, summary, scenes, pictures })
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
@@ -249,7 +266,7 @@ fn finish(plan: &ScorePlan<'_>, scenes: &[&SceneFile], mut entry: Entry) -> Resu
             name: plan.dataset.file.name.clone(),
             version: plan.dataset.file.version.clone(),
             manifest_sha256: manifest.clone(),
-            scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
+            scenes: scored.iter().map(|scene| scene.id.clone()).collect(),
             scenes_in_all: plan.dataset.scenes.len(),
         },
         lpips_weights: BTreeMap::from([("alex".to_owned(), weights.map(str::to_owned))]),

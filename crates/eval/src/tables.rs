@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::error::EvalError;
-use crate::result::ResultFile;
+use crate::result::{RESULT_FORMAT, ResultFile};
 
 /// How a table is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +68,12 @@ fn check_comparable(results: &[ResultFile], protocol: &str) -> Result<(), EvalEr
     };
     let mut faults = Vec::new();
     for result in results {
+        if result.format != RESULT_FORMAT {
+            faults.push(format!(
+                "'{}' is of format '{}'; this version reads '{RESULT_FORMAT}'",
+                result.method, result.format
+            ));
+        }
         let Some(scores) = result.protocols.get(protocol) else {
             faults.push(format!(
                 "'{}' has no scores under protocol '{protocol}'; score it with --protocol {protocol}",
@@ -215,7 +221,7 @@ mod tests {
 
     use super::*;
     use crate::protocol::Protocol;
-    use crate::result::{DatasetId, ProtocolResult, RESULT_FORMAT, SubmissionId};
+    use crate::result::{DatasetId, ProtocolResult, SubmissionId};
 
     fn result(method: &str, psnr: f64, fingerprint: &str) -> ResultFile {
         let summary = BTreeMap::from([

@@ -13,8 +13,10 @@ use crate::limits::{check_size, read_file};
 use crate::store::write_whole;
 use crate::{ImageError, LinearRgb, Normal, Picture};
 
-/// Most channels that a layer may have.
-const MAX_CHANNELS: usize = 64;
+/// Most samples of a layer, all channels together: one gibibyte as floats.
+const MAX_SAMPLES: usize = 1 << 28;
+/// Most blocks of a layer.
+const MAX_BLOCKS: usize = 1 << 20;
 
 /// How a float is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,16 +147,19 @@ fn checked_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
         .map_err(|error| invalid(path, &error))?;
     for header in &meta.headers {
         check_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
-        check_channel_count(path, header.channels.list.len())?;
+        check_amount(path, header)?;
     }
     Ok(bytes)
 }
 
-fn check_channel_count(path: &Path, count: usize) -> Result<(), ImageError> {
-    if count <= MAX_CHANNELS {
+/// Memory follows samples and blocks, so both are bounded before any is taken.
+fn check_amount(path: &Path, header: &exr::meta::header::Header) -> Result<(), ImageError> {
+    let samples = header.layer_size.area() * header.channels.list.len();
+    if samples <= MAX_SAMPLES && header.chunk_count <= MAX_BLOCKS {
         return Ok(());
     }
-    let what = format!("{count} channels; expected at most {MAX_CHANNELS}");
+    let blocks = header.chunk_count;
+    let what = format!("{samples} samples in {blocks} blocks; expected at most {MAX_SAMPLES} in {MAX_BLOCKS}");
     Err(ImageError::Invalid { path: path.to_owned(), what })
 }
 

@@ -1,6 +1,6 @@
 //! Pictures that know what they hold.
 //!
-//! In: PNG, JPEG, HDR, TGA, BMP and EXR files from strangers, or pixels made by the other crates. Out: typed pictures
+//! In: PNG, JPEG, HDR, BMP and EXR files from strangers, or pixels made by the other crates. Out: typed pictures
 //! ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures prepared for lookups
 //! ([`Texture`]), and files that hold the same bytes on every machine (no dates, no host names).
 //!

@@ -1,4 +1,4 @@
-//! Textures from files of strangers: PNG, JPEG, TGA, BMP, Radiance HDR, OpenEXR.
+//! Textures from files of strangers: PNG, JPEG, BMP, Radiance HDR, OpenEXR.
 
 use std::io::Cursor;
 use std::path::Path;

@@ -70,14 +70,23 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
     let mut atlas = Xatlas::new();
     atlas.add_mesh(&decl).map_err(|error| AtlasError::Refused(format!("{error:?}")))?;
     atlas.compute_charts(&ChartOptions::default());
-    let size = match wish {
+    match wish {
         SizeWish::Fixed(size) => {
             pack_into(&mut atlas, f64::from(size) / f64::from(XATLAS_LENGTH), size)?;
-            size
+            read_back(&atlas, mesh, size)
         }
-        SizeWish::Texel(texel_m) => pack_at_least(&mut atlas, 1.0 / (texel_m * f64::from(scale)))?,
-    };
-    read_back(&atlas, mesh, size)
+        SizeWish::Texel(texel_m) => {
+            let mut size = pack_at_least(&mut atlas, 1.0 / (texel_m * f64::from(scale)))?;
+            let mut unwrapped = read_back(&atlas, mesh, size)?;
+            // Packing may have had to go coarser than was asked for.
+            while unwrapped.texel_m > texel_m && size < CHOSEN_SIZES.1 {
+                size *= 2;
+                pack_into(&mut atlas, 1.0 / (texel_m * f64::from(scale)), size)?;
+                unwrapped = read_back(&atlas, mesh, size)?;
+            }
+            Ok(unwrapped)
+        }
+    }
 }
 
 /// The positions about the middle of the box, its longest side [`XATLAS_LENGTH`]; and the factor from metres.
@@ -99,7 +108,7 @@ fn scaled_positions(mesh: &TriangleMesh) -> Result<(Vec<f32>, f32), AtlasError> 
 /// fine as fits.
 fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64) -> Result<u32, AtlasError> {
     let (least, most) = CHOSEN_SIZES;
-    // Beyond this no packing succeeds, and xatlas would raster charts of any size.
+    // As in `pack_into`.
     let bounded = texels_per_unit.min(f64::from(most) / f64::from(XATLAS_LENGTH) * 4.0);
     let side = pack(atlas, bounded);
     if side == 0 {
@@ -116,7 +125,8 @@ fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64) -> Result<u32, At
 
 /// Packs at `texels_per_unit`, or as little coarser as it takes, so that the atlas is no larger than `size`.
 fn pack_into(atlas: &mut Xatlas<'_>, texels_per_unit: f64, size: u32) -> Result<(), AtlasError> {
-    let mut density = texels_per_unit;
+    // Beyond four times its side no mesh fits, and xatlas would raster charts of any size.
+    let mut density = texels_per_unit.min(4.0 * f64::from(size) / f64::from(XATLAS_LENGTH));
     for _ in 0..MAX_PACKS {
         let side = pack(atlas, density);
         if side == 0 {

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::dataset::{DatasetFile, FORMAT, Licence, SceneFile, Target, TargetsFile};
+use mateval_scene::dataset::{DatasetFile, FORMAT, Licence, SceneFile, SourceFile, Target, TargetsFile};
 use mateval_scene::layout::{DATASET, SceneFolder, TARGETS};
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, put_aside, remove_aside};
 use mateval_scene::{Finding, SceneId, json, manifest};
 use serde::{Deserialize, Serialize};
 
 use crate::build_scene;
 use crate::error::PrepError;
-use crate::progress::Progress;
 use crate::recipe::{self, Recipe, RecipeScene};
+use mateval_scene::Progress;
 
 /// The recipe as the dataset keeps it.
 pub const RECIPE: &str = "recipe.toml";
@@ -47,6 +47,7 @@ pub struct BuildReport {
 struct BuildKey {
     tool: String,
     recipe_sha256: String,
+    source: PathBuf,
 }
 
 /// Carries the recipe out. `tool` is the name and version that the dataset is marked with.
@@ -54,7 +55,11 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
     let (recipe, text) = recipe::read(&options.recipe)?;
     let source = source_folder(options);
     check_sources(options, &recipe, &source)?;
-    let key = BuildKey { tool: tool.to_owned(), recipe_sha256: manifest::sha256_of_bytes(text.as_bytes()) };
+    let key = BuildKey {
+        tool: tool.to_owned(),
+        recipe_sha256: manifest::sha256_of_bytes(text.as_bytes()),
+        source: std::path::absolute(&source).map_err(PrepError::io("find", &source))?,
+    };
     let resumes = prepare_output(options, &key)?;
 
     let mut report = BuildReport { dataset: empty_dataset(&recipe, tool), findings: Vec::new(), resumed: Vec::new() };
@@ -62,7 +67,8 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         progress(&format!("scene {}", entry.id), at, recipe.scenes.len());
         let mark = options.out.join(BUILD).join(format!("{}.json", entry.id));
         let folder = SceneFolder::of(&options.out, &entry.id);
-        let licence = match finished_scene(&folder, &mark, resumes) {
+        let finished = if resumes { finished_scene(&folder, &mark, &source.join(&entry.bitterli)) } else { None };
+        let licence = match finished {
             Some(licence) => {
                 report.resumed.push(entry.id.clone());
                 licence
@@ -114,40 +120,51 @@ fn empty_dataset(recipe: &Recipe, tool: &str) -> DatasetFile {
     }
 }
 
-/// Makes the output's folder ready. True where an unfinished build of the same recipe is gone on with.
+/// Makes the output's folder ready. True where an unfinished build of the same recipe and source is gone on with.
 fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepError> {
     let out = &options.out;
     let refuse = |what: &str| PrepError::Output { path: out.clone(), what: what.to_owned() };
     let marks = out.join(BUILD);
     let key_file = marks.join("key.json");
-    let unfinished = marks.is_dir();
-    if unfinished && json::read::<BuildKey>(&key_file).is_ok_and(|found| found == *key) {
+    let is_dataset = out.join(DATASET).is_file();
+    let unfinished = !is_dataset && marks.is_dir();
+    if unfinished && !options.force && json::read::<BuildKey>(&key_file).is_ok_and(|found| found == *key) {
         return Ok(true);
     }
-    let is_dataset = out.join(DATASET).is_file();
-    let is_empty = std::fs::read_dir(out).map(|mut entries| entries.next().is_none()).unwrap_or(!out.exists());
-    match (unfinished, is_dataset, is_empty, options.force) {
-        (_, _, true, _) => {}
-        (true, _, _, true) | (_, true, _, true) => {
-            std::fs::remove_dir_all(out).map_err(PrepError::io("remove", out))?;
+    // A build killed before it wrote its key has written nothing else.
+    let is_empty = !out.exists() || holds_only(out, &[BUILD]) && !key_file.exists();
+    match (unfinished || is_dataset, is_empty, options.force) {
+        (_, true, _) => {}
+        (true, _, true) => put_aside(out)?,
+        (true, ..) if unfinished => {
+            let what = "holds an unfinished build of another recipe, source or version; add --force to replace it";
+            return Err(refuse(what));
         }
-        (true, ..) => {
-            return Err(refuse("holds an unfinished build of another recipe or version; add --force to replace it"));
-        }
-        (_, true, ..) => return Err(refuse("holds a finished dataset; add --force to replace it")),
+        (true, ..) => return Err(refuse("holds a finished dataset; add --force to replace it")),
         _ => return Err(refuse("is there and is no dataset: it is not replaced; choose another --out")),
     }
     std::fs::create_dir_all(&marks).map_err(PrepError::io("make", &marks))?;
     json::write(&key_file, key)?;
+    remove_aside(out)?;
     Ok(false)
+}
+
+fn holds_only(folder: &Path, names: &[&str]) -> bool {
+    std::fs::read_dir(folder)
+        .is_ok_and(|entries| entries.flatten().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
 }
 
 /// What a finished scene leaves in the build folder: its licence.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct SceneMark(Option<Licence>);
 
-fn finished_scene(folder: &SceneFolder, mark: &Path, resumes: bool) -> Option<SceneMark> {
-    (resumes && folder.scene_file().is_file()).then(|| json::read(mark).ok()).flatten()
+/// A scene that an earlier run made of the same files as are there now.
+fn finished_scene(folder: &SceneFolder, mark: &Path, source: &Path) -> Option<SceneMark> {
+    let mark = json::read(mark).ok()?;
+    let scene: SceneFile = json::read(&folder.scene_file()).ok()?;
+    let root = source.parent().unwrap_or(Path::new(""));
+    let is_same = |file: &SourceFile| manifest::sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
+    scene.source.files.iter().all(is_same).then_some(mark)
 }
 
 fn make_scene(
@@ -177,6 +194,7 @@ fn finish(out: &Path, recipe: &Recipe, text: &str, dataset: &mut DatasetFile) ->
     mateval_image::store::write_whole(&out.join(RECIPE), text.as_bytes())?;
     dataset.manifest_sha256 = manifest::write(out)?;
     json::write(&out.join(DATASET), dataset)?;
+    // From here on the dataset is finished: what is left of the build folder no longer counts.
     let marks = out.join(BUILD);
     std::fs::remove_dir_all(&marks).map_err(PrepError::io("remove", &marks))
 }

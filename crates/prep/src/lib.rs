@@ -15,7 +15,6 @@ pub mod build_scene;
 pub mod error;
 pub mod instances;
 pub mod parts;
-pub mod progress;
 pub mod recipe;
 pub mod render;
 pub mod sample;

@@ -99,7 +99,7 @@ fn default_views() -> Vec<Offset> {
 /// Largest recipe that is read, in bytes.
 const MAX_RECIPE_BYTES: u64 = 16 << 20;
 /// Least and most pixels of a side.
-const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
+pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
 /// Least and most texels of an atlas's side.
 pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 

@@ -8,15 +8,15 @@ use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::dataset::{DatasetFile, SceneFile, View};
 use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
 use mateval_scene::manifest::{self, sha256_of_bytes};
-use mateval_scene::{SceneId, json, reference_io};
+use mateval_scene::{RendererId, SceneError, SceneId, json, reference_io};
 use mateval_tracer::{Render, RenderSettings, RenderStats, World};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::build::RECIPE;
 use crate::error::PrepError;
-use crate::progress::Progress;
 use crate::recipe;
+use mateval_scene::Progress;
 
 /// The name that its renders are kept under.
 pub const BUILTIN: &str = "builtin";
@@ -64,6 +64,7 @@ pub struct RenderFile {
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let mut dataset: DatasetFile = json::read(&root.join(DATASET))?;
     check_scenes(root, &dataset, options)?;
+    check_hashes(root)?;
     let samples = match options.samples {
         Some(samples) => samples,
         None => recipe::read(&root.join(RECIPE))?.0.samples,
@@ -74,7 +75,7 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     }
     let complete = dataset.scenes.iter().all(|id| is_complete(root, id));
     if complete {
-        dataset.scored_renderer = Some(BUILTIN.to_owned());
+        dataset.scored_renderer = Some(builtin());
     } else {
         report.remarks.push("some scenes have no pictures yet: the dataset names no scored renderer".to_owned());
     }
@@ -97,10 +98,26 @@ fn check_scenes(root: &Path, dataset: &DatasetFile, options: &RenderOptions) -> 
     Ok(())
 }
 
+/// Everything that is no render of ours must be what the manifest says: it is about to be renewed.
+fn check_hashes(root: &Path) -> Result<(), PrepError> {
+    let ours = format!("/ground_truth/renders/{BUILTIN}/");
+    let shown = format!("/views/{INPUT}/rgb.");
+    let is_ours = |path: &str| path.contains(&ours) || path.contains(&shown) || path.ends_with(".partial");
+    let findings = manifest::check_those(root, |path| !is_ours(path))?;
+    if findings.is_empty() {
+        return Ok(());
+    }
+    Err(SceneError::Invalid { path: root.to_owned(), findings }.into())
+}
+
+fn builtin() -> RendererId {
+    RendererId::new(BUILTIN).expect("our own id is an id")
+}
+
 fn is_complete(root: &Path, id: &SceneId) -> bool {
     let folder = SceneFolder::of(root, id);
     json::read::<SceneFile>(&folder.scene_file()).is_ok_and(|scene| {
-        scene.views.iter().all(|view| folder.render(BUILTIN, &view.id).join("render.json").is_file())
+        scene.views.iter().all(|view| folder.render(&builtin(), &view.id).join("render.json").is_file())
     })
 }
 
@@ -116,7 +133,7 @@ fn render_scene(
     let scene: SceneFile = json::read(&folder.scene_file())?;
     let mut world: Option<World> = None;
     for view in &scene.views {
-        let place = folder.render(BUILTIN, &view.id);
+        let place = folder.render(&builtin(), &view.id);
         let settings = [0, 1].map(|half| RenderSettings { samples, seed: seed(id, view, half), ..Default::default() });
         let seeds = [0, 1].map(|half: usize| format!("{:016x}", settings[half].seed));
         let max_bounces = settings[0].max_bounces;
@@ -168,8 +185,13 @@ fn write_view(
     [a, b]: [&Render; 2],
     file: RenderFile,
 ) -> Result<(), PrepError> {
-    let place = folder.render(BUILTIN, &view.id);
+    let place = folder.render(&builtin(), &view.id);
     std::fs::create_dir_all(&place).map_err(PrepError::io("make", &place))?;
+    // First: it must not vouch for pictures that are half replaced.
+    let mark = place.join("render.json");
+    if mark.exists() {
+        std::fs::remove_file(&mark).map_err(PrepError::io("remove", &mark))?;
+    }
     let (a, b) = (&a.picture, &b.picture);
     let mean = mean(a, b);
     exr_io::write_linear(&place.join("rgb_a.exr"), a, Precision::Float)?;
@@ -183,7 +205,7 @@ fn write_view(
         png_io::write_srgb(&shown.join("rgb.png"), &preview)?;
     }
     // Last: it says that the others are whole.
-    Ok(json::write(&place.join("render.json"), &file)?)
+    Ok(json::write(&mark, &file)?)
 }
 
 fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {

@@ -23,6 +23,8 @@ pub struct ViewScene<'a> {
     instances: &'a [u16],
     /// The value in `part.png` of every triangle of every surface.
     parts: &'a [Vec<u16>],
+    /// Whether a surface is scored at all.
+    scored: &'a [bool],
     glow: Vec<Glow>,
 }
 
@@ -65,39 +67,57 @@ pub struct TruthPictures {
     pub specular_region: Mask,
 }
 
-/// One pixel of all pictures.
-#[derive(Clone, Copy)]
-struct Pixel {
-    depth: f32,
-    normal: [f32; 3],
-    instance: u16,
-    part: u16,
-    valid: bool,
-    unobserved: bool,
-    truth: Truth,
-    specular: bool,
+/// One pixel of all pictures; the names are those of the pictures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewPixel {
+    /// See [`GeometryPictures::depth`].
+    pub depth: f32,
+    /// See [`GeometryPictures::normal`].
+    pub normal: [f32; 3],
+    /// See [`GeometryPictures::instance`].
+    pub instance: u16,
+    /// See [`GeometryPictures::part`].
+    pub part: u16,
+    /// See [`GeometryPictures::valid`].
+    pub valid: bool,
+    /// See [`GeometryPictures::unobserved`].
+    pub unobserved: bool,
+    /// The means over the pixel.
+    pub truth: PixelTruth,
+    /// See [`TruthPictures::specular_region`].
+    pub specular: bool,
 }
 
-/// Means over a pixel.
-#[derive(Clone, Copy, Default)]
-struct Truth {
-    albedo: [f32; 3],
-    diffuse_albedo: [f32; 3],
-    roughness: f32,
-    metallic: f32,
+/// Means over a pixel; the names are those of [`TruthPictures`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PixelTruth {
+    /// base_color, linear.
+    pub albedo: [f32; 3],
+    /// base_color times (1 - metallic), linear.
+    pub diffuse_albedo: [f32; 3],
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Metallic.
+    pub metallic: f32,
 }
 
 impl<'a> ViewScene<'a> {
-    /// `instances` holds a number a surface, `parts` one a triangle of each surface.
-    pub fn new(reference: &'a ReferenceScene, world: &'a World, instances: &'a [u16], parts: &'a [Vec<u16>]) -> Self {
+    /// `instances` and `scored` hold an entry a surface, `parts` one a triangle of each surface.
+    pub fn new(
+        reference: &'a ReferenceScene,
+        world: &'a World,
+        instances: &'a [u16],
+        parts: &'a [Vec<u16>],
+        scored: &'a [bool],
+    ) -> Self {
         let textures = reference.texture_list();
-        Self { reference, world, textures, instances, parts, glow: glow_of_surfaces(reference) }
+        Self { reference, world, textures, instances, parts, scored, glow: glow_of_surfaces(reference) }
     }
 
     /// The pictures of the view of `camera`; what `input` did not see is unobserved (nothing, for the input view itself).
     pub fn pictures(&self, camera: &Camera, input: &Camera) -> (GeometryPictures, TruthPictures) {
         let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-        let pixels: Vec<Pixel> = (0..height)
+        let pixels: Vec<ViewPixel> = (0..height)
             .into_par_iter()
             .flat_map_iter(|y| (0..width).map(move |x| self.pixel(camera, input, x, y)))
             .collect();
@@ -120,7 +140,8 @@ impl<'a> ViewScene<'a> {
         (geometry, truth)
     }
 
-    fn pixel(&self, camera: &Camera, input: &Camera, x: usize, y: usize) -> Pixel {
+    /// Pixel (x, y) of the pictures of `camera`'s view.
+    pub fn pixel(&self, camera: &Camera, input: &Camera, x: usize, y: usize) -> ViewPixel {
         let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let hit = hit_through(self.world, camera, centre);
         let (truth, valid) = self.truth(camera, x, y);
@@ -130,7 +151,7 @@ impl<'a> ViewScene<'a> {
         let valid = valid && at_centre.is_some();
         let unobserved = valid && hit.as_ref().is_some_and(|hit| !self.is_seen_by(input, camera, centre, hit));
         let surface = hit.as_ref().map(|hit| hit.surface.0);
-        Pixel {
+        ViewPixel {
             depth: hit.as_ref().map_or(0.0, |hit| hit.depth as f32),
             normal: hit.as_ref().map_or([0.0; 3], |hit| hit.normal.to_array()),
             instance: surface.map_or(0, |surface| self.instances[surface]),
@@ -143,7 +164,7 @@ impl<'a> ViewScene<'a> {
     }
 
     /// The means over the sub-pixels that show a scored surface, and whether all do.
-    fn truth(&self, camera: &Camera, x: usize, y: usize) -> (Truth, bool) {
+    fn truth(&self, camera: &Camera, x: usize, y: usize) -> (PixelTruth, bool) {
         let mut sum = [0.0_f64; 8];
         let mut count = 0_usize;
         let places = subpixels(x, y);
@@ -160,17 +181,18 @@ impl<'a> ViewScene<'a> {
             count += 1;
         }
         if count == 0 {
-            return (Truth::default(), false);
+            return (PixelTruth::default(), false);
         }
         let [r, g, b, dr, dg, db, roughness, metallic] = sum.map(|sum| (sum / count as f64) as f32);
-        let truth = Truth { albedo: [r, g, b], diffuse_albedo: [dr, dg, db], roughness, metallic };
+        let truth = PixelTruth { albedo: [r, g, b], diffuse_albedo: [dr, dg, db], roughness, metallic };
         (truth, count == places.len())
     }
 
     /// base_color, roughness and metallic where the hit is on a surface that is scored: not glass, not glowing.
     fn scored_appearance(&self, hit: &PixelHit) -> Option<Appearance> {
         let glow = self.glow[hit.surface.0];
-        if if hit.front { glow.front } else { glow.back } {
+        let glows = if hit.front { glow.front } else { glow.back };
+        if glows || !self.scored[hit.surface.0] {
             return None;
         }
         let surface = &self.reference.surfaces[hit.surface.0];

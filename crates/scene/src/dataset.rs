@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 use crate::findings::Finding;
-use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, SceneId, ViewId};
+use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, RendererId, SceneId, ViewId};
 
 /// The word for this version of the format.
 pub const FORMAT: &str = "mateval/1";
@@ -25,7 +25,7 @@ pub struct DatasetFile {
     /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
     pub scenes: Vec<SceneId>,
     /// The renderer whose pictures are scored against and shown as `input/rgb`; null until there is one.
-    pub scored_renderer: Option<String>,
+    pub scored_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,
     /// SHA-256 of MANIFEST.sha256, hex. The manifest holds every file but itself and this one.

@@ -27,6 +27,12 @@ pub struct GlbNode {
 
 /// Writes the nodes in their order. The same nodes give the same bytes.
 pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
+    let bytes: u64 =
+        nodes.iter().map(|node| 32 * node.mesh.positions.len() as u64 + 12 * node.mesh.triangles.len() as u64).sum();
+    if bytes > MAX_GLB_BYTES - (64 << 20) {
+        let what = format!("{bytes} bytes of geometry; a .glb holds 4 GiB: split the scene");
+        return Err(SceneError::Unsupported { path: path.to_owned(), what });
+    }
     let mut file = Writer::default();
     for node in nodes {
         file.add_node(node);
@@ -157,7 +163,7 @@ impl Writer {
         self.blob.resize(self.blob.len().next_multiple_of(4), 0);
         let header = gltf::binary::Header { magic: *b"glTF", version: 2, length: 0 };
         let glb = gltf::binary::Glb { header, json: Cow::Owned(text), bin: Some(Cow::Owned(self.blob)) };
-        glb.to_vec().expect("writing to memory cannot fail below 4 GiB")
+        glb.to_vec().expect("`write` has checked that it stays below 4 GiB")
     }
 }
 

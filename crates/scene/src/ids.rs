@@ -105,6 +105,11 @@ id_type!(
     ViewId
 );
 
+id_type!(
+    /// A renderer's id: a folder in `ground_truth/renders/`.
+    RendererId
+);
+
 /// An instance's value in `instance.png`: 1 to 65535; 0 in the picture is "nothing".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]

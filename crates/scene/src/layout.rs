@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::ids::{InstanceId, SceneId, ViewId};
+use crate::ids::{InstanceId, RendererId, SceneId, ViewId};
 
 /// `dataset.json`.
 pub const DATASET: &str = "dataset.json";
@@ -69,8 +69,8 @@ impl SceneFolder {
     }
 
     /// `ground_truth/renders/<renderer>/<view>`.
-    pub fn render(&self, renderer: &str, view: &ViewId) -> PathBuf {
-        self.truth().join("renders").join(renderer).join(view.as_str())
+    pub fn render(&self, renderer: &RendererId, view: &ViewId) -> PathBuf {
+        self.truth().join("renders").join(renderer.as_str()).join(view.as_str())
     }
 
     /// `ground_truth/lights.json`.

@@ -32,7 +32,7 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Every file below `root` but the manifest, `dataset.json` and hidden ones at the top, relative, sorted. Links are not followed.
+/// Every file below `root` but the manifest, `dataset.json` and hidden ones at the top, relative, sorted. Folders behind links are not entered.
 pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = Vec::new();
     let mut folders = vec![PathBuf::new()];
@@ -54,18 +54,33 @@ pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     Ok(files)
 }
 
-/// Hashes every file of the dataset and writes the manifest; gives the manifest's own hash, which `dataset.json` holds.
+/// What a killed process leaves of a file that it was writing.
+fn is_partial(file: &str) -> bool {
+    file.ends_with(".partial") || file.contains(".partial/")
+}
+
+/// Hashes every file of the dataset and writes the manifest; what killed runs left half-written is removed. Gives the manifest's own hash, which `dataset.json` holds.
 pub fn write(root: &Path) -> Result<String, SceneError> {
     let mut text = String::new();
     for file in list_files(root)? {
+        if is_partial(&file) {
+            let path = root.join(&file);
+            std::fs::remove_file(&path).map_err(SceneError::io("remove", path))?;
+            continue;
+        }
         text.push_str(&format!("{}  {file}\n", sha256_of_file(&root.join(&file))?));
     }
     write_whole(&root.join(MANIFEST), text.as_bytes())?;
     Ok(sha256_of_bytes(text.as_bytes()))
 }
 
-/// Holds the files against the manifest: every one that is missing, changed or not listed is a finding.
+/// Holds every file against the manifest: each one that is missing, changed or not listed is a finding.
 pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
+    check_those(root, |_| true)
+}
+
+/// Holds the files that `concerns` picks, by their paths in the dataset, against the manifest.
+pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
     let path = root.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
     let mut findings = Vec::new();
@@ -82,8 +97,14 @@ pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
             ));
             continue;
         };
+        if !concerns(file) {
+            continue;
+        }
         listed.insert(file.to_owned());
         match sha256_of_file(&root.join(file)) {
+            Err(error) if root.join(file).exists() => {
+                findings.push(fault("unreadable", file, String::new(), &error.to_string()));
+            }
             Err(_) => findings.push(fault("missing_file", file, String::new(), "listed in the manifest but not there")),
             Ok(found) if found != hash => {
                 findings.push(fault(
@@ -97,7 +118,7 @@ pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
         }
     }
     for file in list_files(root)? {
-        if !listed.contains(&file) {
+        if concerns(&file) && !listed.contains(&file) {
             findings.push(fault("unlisted_file", &file, String::new(), "not listed in the manifest"));
         }
     }
@@ -140,6 +161,9 @@ mod tests {
         }
         write(root).unwrap();
         assert!(check(root).unwrap().is_empty());
+        std::fs::write(root.join("scenes/e.partial"), "half").unwrap();
+        write(root).unwrap();
+        assert!(check(root).unwrap().is_empty() && !root.join("scenes/e.partial").exists());
         std::fs::remove_file(root.join("scenes/a")).unwrap();
         std::fs::write(root.join("scenes/b"), "other").unwrap();
         std::fs::write(root.join("d"), "new").unwrap();

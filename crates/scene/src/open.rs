@@ -21,15 +21,12 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    /// Opens the dataset in `root`. Its JSON must be sound and its manifest the one that `dataset.json` names; the other
-    /// files are not hashed (that is `prep verify`'s work).
+    /// Opens the dataset in `root`. Its JSON must be sound and be what the manifest says, the manifest what `dataset.json`
+    /// names. The other files are not hashed: see [`Dataset::check_files`].
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let path = root.join(DATASET);
         let file: DatasetFile = json::read(&path)?;
-        if file.format != FORMAT {
-            let what = format!("format '{}'; this version reads '{FORMAT}'", file.format);
-            return Err(SceneError::Unsupported { path, what });
-        }
+        check_format(&path, &file.format)?;
         let found = manifest::sha256_of_file(&root.join(MANIFEST))?;
         if found != file.manifest_sha256 {
             let what = format!(
@@ -38,17 +35,47 @@ impl Dataset {
             );
             return Err(SceneError::Unsupported { path, what });
         }
-        let targets = json::read(&root.join(TARGETS))?;
-        let scenes = file
-            .scenes
-            .iter()
-            .map(|id| json::read(&SceneFolder::of(root, id).scene_file()))
-            .collect::<Result<Vec<SceneFile>, _>>()?;
+        let is_json = |path: &str| path == TARGETS || (path.starts_with("scenes/") && path.ends_with("/scene.json"));
+        check_hashes(root, is_json)?;
+        let targets: TargetsFile = json::read(&root.join(TARGETS))?;
+        check_format(&root.join(TARGETS), &targets.format)?;
+        let scenes = file.scenes.iter().map(|id| read_scene(root, id)).collect::<Result<Vec<SceneFile>, _>>()?;
         Ok(Self { root: root.to_owned(), file, targets, scenes })
+    }
+
+    /// Fails where a file of the scene that `concerns` picks, by its path in the scene's folder, is not what the manifest
+    /// says: then nothing made of it would deserve the dataset's fingerprint.
+    pub fn check_files(&self, scene: &SceneId, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
+        let folder = format!("scenes/{scene}/");
+        check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
     /// The scene's folder.
     pub fn folder(&self, scene: &SceneId) -> SceneFolder {
         SceneFolder::of(&self.root, scene)
     }
+}
+
+fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, SceneError> {
+    let path = SceneFolder::of(root, id).scene_file();
+    let scene: SceneFile = json::read(&path)?;
+    check_format(&path, &scene.format)?;
+    if scene.id == *id {
+        return Ok(scene);
+    }
+    let what = format!("id '{}' in the folder of '{id}'; run `mateval prep verify`", scene.id);
+    Err(SceneError::Unsupported { path, what })
+}
+
+fn check_format(path: &Path, format: &str) -> Result<(), SceneError> {
+    if format == FORMAT {
+        return Ok(());
+    }
+    let what = format!("format '{format}'; this version reads '{FORMAT}'");
+    Err(SceneError::Unsupported { path: path.to_owned(), what })
+}
+
+fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
+    let findings = manifest::check_those(root, concerns)?;
+    if findings.is_empty() { Ok(()) } else { Err(SceneError::Invalid { path: root.to_owned(), findings }) }
 }

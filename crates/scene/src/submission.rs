@@ -28,6 +28,12 @@ pub struct SubmissionFile {
     pub dataset_manifest_sha256: String,
 }
 
+/// Texels a side that a submission may use.
+pub const MAP_SIZES: std::ops::RangeInclusive<usize> = 64..=4096;
+
+/// What a missing base colour scores as, and what the grey baseline holds; linear.
+pub const GREY: f32 = 0.5;
+
 /// One of a material's maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

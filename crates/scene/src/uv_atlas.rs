@@ -110,6 +110,10 @@ impl UvAtlas {
     fn claim_near(&mut self) {
         let mut distances = Picture::filled(self.size, self.size, f32::INFINITY);
         for triangle in 0..self.corners.len() {
+            // No place of it can be told from another: it must not colour its neighbours' texels.
+            if self.texel_area(triangle) == 0.0 {
+                continue;
+            }
             for (x, y) in self.texels_around(triangle, BILINEAR_REACH) {
                 if matches!(self.owners.get(x, y), Owner::Inside(_)) {
                     continue;

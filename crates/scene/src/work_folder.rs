@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::SceneError;
 
-/// A folder under work beside its place; [`WorkFolder::finish`] renames it there.
+/// A folder under work beside its place; [`WorkFolder::finish`] renames it there, dropping it removes it.
 #[derive(Debug)]
 pub struct WorkFolder {
     place: PathBuf,
@@ -12,12 +12,10 @@ pub struct WorkFolder {
 }
 
 impl WorkFolder {
-    /// Starts anew: what an earlier, killed run left beside `place` is removed.
+    /// Starts anew: what an earlier, killed run left beside `place` is removed. Fails for a place without a name of its
+    /// own, as in `.` or `/`.
     pub fn start(place: &Path) -> Result<Self, SceneError> {
-        let mut name = std::ffi::OsString::from(".");
-        name.push(place.file_name().unwrap_or_default());
-        name.push(".partial");
-        let work = place.with_file_name(name);
+        let work = beside(place, "partial")?;
         remove(&work)?;
         std::fs::create_dir_all(&work).map_err(SceneError::io("make", &work))?;
         Ok(Self { place: place.to_owned(), work })
@@ -28,11 +26,48 @@ impl WorkFolder {
         &self.work
     }
 
-    /// Moves the folder to its place, replacing what is there.
+    /// Moves the folder to its place. What is there is put aside first and removed last.
     pub fn finish(self) -> Result<(), SceneError> {
-        remove(&self.place)?;
-        std::fs::rename(&self.work, &self.place).map_err(SceneError::io("rename to", &self.place))
+        put_aside(&self.place)?;
+        std::fs::rename(&self.work, &self.place).map_err(SceneError::io("rename to", &self.place))?;
+        remove(&beside(&self.place, "old")?)
     }
+}
+
+impl Drop for WorkFolder {
+    fn drop(&mut self) {
+        // After `finish` there is nothing there; after an error the next start would remove it too.
+        let _ = remove(&self.work);
+    }
+}
+
+/// Renames a folder, if it is there, to `.NAME.old` beside it, so that its place is free at once; [`remove_aside`] deletes
+/// it.
+pub fn put_aside(place: &Path) -> Result<(), SceneError> {
+    let old = beside(place, "old")?;
+    remove(&old)?;
+    match std::fs::rename(place, &old) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(SceneError::io("put aside", place)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Deletes what [`put_aside`] put aside.
+pub fn remove_aside(place: &Path) -> Result<(), SceneError> {
+    remove(&beside(place, "old")?)
+}
+
+/// `.NAME.ending` beside `NAME`.
+fn beside(place: &Path, ending: &str) -> Result<PathBuf, SceneError> {
+    let Some(name) = place.file_name() else {
+        let what = "a folder without a name of its own; name the folder to be made".to_owned();
+        return Err(SceneError::Unsupported { path: place.to_owned(), what });
+    };
+    let mut hidden = std::ffi::OsString::from(".");
+    hidden.push(name);
+    hidden.push(".");
+    hidden.push(ending);
+    Ok(place.with_file_name(hidden))
 }
 
 fn remove(path: &Path) -> Result<(), SceneError> {
@@ -50,15 +85,25 @@ mod tests {
     fn nothing_is_at_the_place_until_it_is_finished() {
         let root = tempfile::tempdir().unwrap();
         let place = root.path().join("out");
-        let killed = WorkFolder::start(&place).unwrap();
-        std::fs::write(killed.path().join("old"), "x").unwrap();
-        drop(killed);
-        assert!(!place.exists());
+        // As a killed run leaves it.
+        std::fs::create_dir(root.path().join(".out.partial")).unwrap();
+        std::fs::write(root.path().join(".out.partial/old"), "x").unwrap();
+        std::fs::create_dir(&place).unwrap();
+        std::fs::write(place.join("older"), "x").unwrap();
         let folder = WorkFolder::start(&place).unwrap();
         std::fs::write(folder.path().join("new"), "x").unwrap();
+        assert!(place.join("older").exists());
         folder.finish().unwrap();
         let names: Vec<_> = std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names, ["new"]);
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn an_error_leaves_nothing_and_a_nameless_place_is_refused() {
+        let root = tempfile::tempdir().unwrap();
+        drop(WorkFolder::start(&root.path().join("out")).unwrap());
+        assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 0);
+        assert!(WorkFolder::start(Path::new(".")).is_err());
     }
 }

@@ -31,28 +31,26 @@ pub struct SurfaceHit {
 const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
 impl SurfaceHit {
-    /// The place with weights `barycentrics` in a triangle of a mesh. `scene_size` is the scene's largest coordinate.
+    /// The place with weights `weights` in a triangle of a mesh, whose facing is `facing`.
     pub(crate) fn new(
         surface: SurfaceIndex,
         triangle: TriangleIndex,
         mesh: &TriangleMesh,
-        barycentrics: Vec3,
-        scene_size: f32,
+        facing: &Facing,
+        weights: Vec3,
     ) -> Self {
-        let corners = mesh.corners(triangle.0);
-        let geometric_normal = front_normal(mesh, triangle);
-        let uv = mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| {
-            let [a, b, c] = mesh.triangles[triangle.0].map(|vertex| uvs[vertex as usize]);
-            a * barycentrics.x + b * barycentrics.y + c * barycentrics.z
-        });
+        let [a, b, c] = mesh.triangles[triangle.0].map(|vertex| vertex as usize);
+        let blend = |values: &[Vec3]| values[a] * weights.x + values[b] * weights.y + values[c] * weights.z;
+        let uv = |uvs: &Vec<Vec2>| uvs[a] * weights.x + uvs[b] * weights.y + uvs[c] * weights.z;
+        let shading = mesh.normals.as_ref().and_then(|normals| blend(normals).try_normalize());
         Self {
             surface,
             triangle,
-            position: blend(corners, barycentrics),
-            geometric_normal,
-            shading_normal: shading_normal(mesh, triangle, barycentrics, geometric_normal),
-            uv,
-            offset: offset(corners, scene_size),
+            position: blend(&mesh.positions),
+            geometric_normal: facing.normal,
+            shading_normal: shading.filter(|normal| normal.dot(facing.normal) > 0.0).unwrap_or(facing.normal),
+            uv: mesh.uvs.as_ref().map_or(Vec2::ZERO, uv),
+            offset: facing.offset,
         }
     }
 
@@ -86,31 +84,34 @@ impl SurfaceHit {
     }
 }
 
+/// What is the same all over a triangle; 16 bytes each, worked out once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Facing {
+    /// [`SurfaceHit::geometric_normal`].
+    pub(crate) normal: Vec3,
+    offset: f32,
+}
+
+impl Facing {
+    /// Of a triangle of a mesh. `scene_size` is the scene's largest coordinate.
+    pub(crate) fn new(mesh: &TriangleMesh, triangle: TriangleIndex, scene_size: f32) -> Self {
+        let corners = mesh.corners(triangle.0);
+        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+        let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Z).as_vec3();
+        let turned = mesh.normals.as_ref().is_some_and(|normals| {
+            let sum: Vec3 = mesh.triangles[triangle.0].iter().map(|&vertex| normals[vertex as usize]).sum();
+            sum.dot(normal) < 0.0
+        });
+        Self { normal: if turned { -normal } else { normal }, offset: offset(corners, scene_size) }
+    }
+}
+
 /// The hit is off its triangle by 4 roundings of the corners' coordinates (interpolation), the next ray's triangle test
 /// moves corners by 6 roundings of distances of up to twice them along two axes (17 in all), the sum rounds once; 32
 /// leaves a margin. A neighbour in the same plane may be as large as the scene, which the second term is for.
 fn offset(corners: [Vec3; 3], scene_size: f32) -> f32 {
     let largest = corners.iter().fold(0.0_f32, |size, corner| size.max(corner.abs().max_element()));
     ROUNDING * (32.0 * largest + 4.0 * scene_size)
-}
-
-/// The normal of a triangle on its front; see [`SurfaceHit::geometric_normal`].
-pub(crate) fn front_normal(mesh: &TriangleMesh, triangle: TriangleIndex) -> Vec3 {
-    let [a, b, c] = mesh.corners(triangle.0).map(|corner| corner.as_dvec3());
-    let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Z).as_vec3();
-    let Some(normals) = &mesh.normals else { return normal };
-    let sum: Vec3 = mesh.triangles[triangle.0].iter().map(|&vertex| normals[vertex as usize]).sum();
-    if sum.dot(normal) < 0.0 { -normal } else { normal }
-}
-
-fn shading_normal(mesh: &TriangleMesh, triangle: TriangleIndex, weights: Vec3, geometric: Vec3) -> Vec3 {
-    let Some(normals) = &mesh.normals else { return geometric };
-    let blended = blend(mesh.triangles[triangle.0].map(|vertex| normals[vertex as usize]), weights);
-    blended.try_normalize().filter(|normal| normal.dot(geometric) > 0.0).unwrap_or(geometric)
-}
-
-fn blend([a, b, c]: [Vec3; 3], weights: Vec3) -> Vec3 {
-    a * weights.x + b * weights.y + c * weights.z
 }
 
 #[cfg(test)]
@@ -142,7 +143,8 @@ mod tests {
                 let (b, c) = if x + y > 1.0 { (1.0 - x, 1.0 - y) } else { (x, y) };
                 let weights = Vec3::new(1.0 - b - c, b, c);
                 let triangle = TriangleIndex((index % 2) as usize);
-                let hit = SurfaceHit::new(SurfaceIndex(0), triangle, &mesh, weights, 3.0 * size);
+                let facing = Facing::new(&mesh, triangle, 3.0 * size);
+                let hit = SurfaceHit::new(SurfaceIndex(0), triangle, &mesh, &facing, weights);
                 assert!(hit.offset < 1e-5 * size);
                 let frame = crate::frame::Frame::around(hit.geometric_normal);
                 // Elevations from a millionth of a radian to a right angle, on both sides.
@@ -163,16 +165,17 @@ mod tests {
     #[test]
     fn vertex_normals_say_where_the_front_is() {
         let mut mesh = square(1.0);
-        let by_winding = front_normal(&mesh, TriangleIndex(0));
+        let by_winding = Facing::new(&mesh, TriangleIndex(0), 3.0).normal;
         mesh.normals = Some(vec![-by_winding; 4]);
-        assert_eq!(front_normal(&mesh, TriangleIndex(0)), -by_winding);
+        assert_eq!(Facing::new(&mesh, TriangleIndex(0), 3.0).normal, -by_winding);
     }
 
     #[test]
     fn a_bad_vertex_normal_is_replaced() {
         let mut mesh = square(1.0);
         mesh.normals = Some(vec![Vec3::ZERO; 4]);
-        let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, Vec3::splat(1.0 / 3.0), 3.0);
+        let facing = Facing::new(&mesh, TriangleIndex(0), 3.0);
+        let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, Vec3::splat(1.0 / 3.0));
         assert_eq!(hit.shading_normal, hit.geometric_normal);
     }
 }

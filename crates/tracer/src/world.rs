@@ -8,13 +8,13 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::material::Material;
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 
-use crate::accel::{Accel, Hit};
+use crate::accel::{Accel, Hit, TriangleIndex};
 use crate::bsdf::MaterialTables;
 use crate::emitter::Emitters;
 use crate::error::TracerError;
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
-use crate::surface_hit::SurfaceHit;
+use crate::surface_hit::{Facing, SurfaceHit};
 
 /// A scene, its triangles in a hierarchy, its lights in tables.
 #[derive(Debug)]
@@ -26,8 +26,8 @@ pub struct World {
     tables: MaterialTables,
     /// Whether any material has an opacity.
     masked: bool,
-    /// The largest coordinate of anything.
-    size: f32,
+    /// Of all triangles, surface by surface.
+    facings: Vec<Facing>,
 }
 
 /// From this opacity on a surface counts as there, for pictures without light.
@@ -59,14 +59,17 @@ impl World {
         let textures = scene.texture_list();
         let [low, high] = accel.bounds();
         let size = low.abs().max(high.abs()).max_element();
+        let facings = meshes(&scene).into_iter().flat_map(|mesh| {
+            (0..mesh.triangles.len()).map(move |triangle| Facing::new(mesh, TriangleIndex(triangle), size))
+        });
         Ok(Self {
+            facings: facings.collect(),
             emitters: Emitters::new(&scene, &textures, size)?,
             tables: MaterialTables::new(&scene, &textures)?,
             masked: scene.materials.iter().any(|material| material.opacity.is_some()),
             textures,
             scene,
             accel,
-            size,
         })
     }
 
@@ -152,7 +155,8 @@ impl World {
 
     /// What is known of the surface at a hit.
     pub fn surface_hit(&self, hit: &Hit) -> SurfaceHit {
-        SurfaceHit::new(hit.surface, hit.triangle, self.mesh(hit.surface), hit.barycentrics, self.size)
+        let facing = &self.facings[hit.global as usize];
+        SurfaceHit::new(hit.surface, hit.triangle, self.mesh(hit.surface), facing, hit.barycentrics)
     }
 
     pub(crate) fn mesh(&self, surface: SurfaceIndex) -> &TriangleMesh {

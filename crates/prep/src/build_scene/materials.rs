@@ -9,17 +9,17 @@ use mateval_scene::{Finding, Severity, TriangleMesh};
 use rayon::prelude::*;
 
 use super::Plan;
-use crate::atlas::{AtlasError, CHOSEN_SIZES, SizeWish, Unwrapped, unwrap};
+use crate::atlas::{AtlasError, SizeWish, Unwrapped, unwrap};
 use crate::bake::{Baked, BakedMaterial, bake};
 use crate::error::PrepError;
 use crate::instances::InstanceEntry;
-use crate::progress::Progress;
+use mateval_scene::Progress;
 
 /// An instance's atlas, if it has one.
 pub(super) struct InstanceAtlas {
     pub(super) unwrapped: Option<Unwrapped>,
     pub(super) half_pixel_m: Option<f64>,
-    finding: Option<Finding>,
+    findings: Vec<Finding>,
 }
 
 /// Unwraps every instance and bakes its material; one instance a thread. `nearest` is the depth at which each is seen.
@@ -43,7 +43,7 @@ pub(super) fn write(
             atlas
         })
         .collect::<Result<Vec<_>, PrepError>>()?;
-    plan.findings.extend(atlases.iter().filter_map(|atlas| atlas.finding.clone()));
+    plan.findings.extend(atlases.iter().flat_map(|atlas| atlas.findings.clone()));
     Ok(atlases)
 }
 
@@ -57,26 +57,26 @@ fn write_instance(
 ) -> Result<InstanceAtlas, PrepError> {
     let (instance, surface) = (&plan.instances[at], &plan.scene.surfaces[at]);
     let material = &plan.scene.materials[surface.material.0];
-    let mut atlas = InstanceAtlas { unwrapped: None, half_pixel_m, finding: None };
+    let mut atlas = InstanceAtlas { unwrapped: None, half_pixel_m, findings: Vec::new() };
     if !material.has_appearance() {
         return Ok(atlas);
     }
     let (unwrapped, remark) = match unwrap_as_wished(&surface.mesh, fixed_size, half_pixel_m) {
         Ok(unwrapped) => unwrapped,
-        // Nothing can hit it, so no pixel of it is valid.
-        Err(error @ AtlasError::NoArea) => {
-            atlas.finding = Some(atlas_finding(plan, instance, "no_atlas", &error.to_string()));
+        Err(error) => {
+            atlas.findings.push(atlas_finding(plan, instance, "no_atlas", &error.to_string()));
             return Ok(atlas);
         }
-        Err(error) => {
-            let what = format!("instance '{}': {error}", instance.id);
-            return Err(PrepError::Scene { scene: plan.id.clone(), what });
-        }
     };
-    atlas.finding = remark.map(|(code, what)| atlas_finding(plan, instance, code, &what));
+    atlas.findings.extend(remark.map(|(code, what)| atlas_finding(plan, instance, code, &what)));
+    if unwrapped.unmapped > 0 {
+        let what =
+            format!("{} of {} triangles have no place in its atlas", unwrapped.unmapped, surface.mesh.triangles.len());
+        atlas.findings.push(atlas_finding(plan, instance, "unmapped_triangles", &what));
+    }
     if let Some(baked) = bake(&unwrapped, &surface.mesh, material, textures) {
         write_material(folder, instance, unwrapped.size, &baked)?;
-        atlas.finding = atlas.finding.or_else(|| clipped_finding(plan, instance, &baked));
+        atlas.findings.extend(clipped_finding(plan, instance, &baked));
     }
     atlas.unwrapped = Some(unwrapped);
     Ok(atlas)
@@ -108,8 +108,8 @@ fn unwrap_as_wished(
     let remark = coarse.then(|| {
         let wish = half_pixel_m.unwrap_or_default();
         let what = format!(
-            "at the largest size of {} a texel is {:.5} m, half a pixel of the input view {wish:.5} m",
-            CHOSEN_SIZES.1, unwrapped.texel_m
+            "at {0}x{0} texels a texel is {1:.5} m, half a pixel of the input view {wish:.5} m",
+            unwrapped.size, unwrapped.texel_m
         );
         ("coarse_atlas", what)
     });
@@ -117,12 +117,13 @@ fn unwrap_as_wished(
 }
 
 /// A texel larger than half a pixel by this factor is worth a finding.
-const COARSE: f64 = 1.05;
+const COARSE: f64 = 1.02;
 
 fn atlas_finding(plan: &Plan, instance: &InstanceEntry, code: &str, message: &str) -> Finding {
     let action = match code {
         "no_atlas" => "it has no atlas and is not scored",
         "atlas_grown" => "its atlas is larger than the recipe says",
+        "unmapped_triangles" => "each lies on one point of it; they have no area to speak of",
         _ => "kept; its truth is as coarse as its texels",
     };
     Finding {

@@ -11,17 +11,17 @@ use mateval_image::png_io;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, Part, SceneFile, SceneSource, SourceFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::reference::ReferenceScene;
+use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Finding, ViewId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::bitterli::{self, BitterliScene};
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
-use crate::progress::Progress;
-use crate::recipe::{GivenCamera, Recipe, RecipeScene};
+use crate::recipe::{GivenCamera, RESOLUTION, Recipe, RecipeScene};
 use crate::views::{GeometryPictures, TruthPictures, ViewScene};
 use materials::InstanceAtlas;
+use mateval_scene::Progress;
 
 /// A scene, its instances numbered and its cameras placed.
 struct Plan {
@@ -30,7 +30,6 @@ struct Plan {
     views: Vec<View>,
     findings: Vec<Finding>,
     file: String,
-    id: String,
 }
 
 /// Makes the scene in `folder`, from its source below `source`. Gives the licence that came with it.
@@ -52,9 +51,16 @@ pub fn build(
     let mut plan = plan(recipe, entry, read)?;
     make_folders(folder, &plan)?;
 
-    let nearest = write_views(&plan, folder, progress)?;
+    let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
+    let hoped: Vec<bool> = plan.scene.surfaces.iter().map(has_appearance).collect();
+    let nearest = write_views(&plan, folder, &hoped, progress)?;
     let atlas_size = entry.atlas_size.or(recipe.atlas_size);
     let atlases = materials::write(&mut plan, folder, atlas_size, &nearest, progress)?;
+    let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
+    if scored != hoped {
+        // An instance without an atlas cannot be scored: its pixels must not be valid.
+        write_views(&plan, folder, &scored, progress)?;
+    }
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
     write_scene_file(plan, entry, files, &atlases, folder)?;
@@ -78,20 +84,18 @@ fn plan(recipe: &Recipe, entry: &RecipeScene, read: BitterliScene) -> Result<Pla
     });
     let views = std::iter::once(input).chain(turned).collect();
     let file = entry.bitterli.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Plan {
-        scene: std::sync::Arc::new(read.scene),
-        instances,
-        views,
-        findings: read.findings,
-        file,
-        id: entry.id.to_string(),
-    })
+    Ok(Plan { scene: std::sync::Arc::new(read.scene), instances, views, findings: read.findings, file })
 }
 
 /// The source's camera or the recipe's, at the recipe's resolution: the horizontal field of view is kept.
 fn input_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, String> {
     let old = source.intrinsics;
     let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or([old.width, old.height]);
+    if ![width, height].iter().all(|side| RESOLUTION.contains(side)) {
+        return Err(format!(
+            "the source's film is {width}x{height}; name a resolution of 16 to 8192 a side in the recipe"
+        ));
+    }
     if let Some(GivenCamera { position, target, fov_y_deg }) = entry.camera {
         let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
         let camera = Camera::look_at(DVec3::from_array(position), DVec3::from_array(target), DVec3::Y, intrinsics);
@@ -120,7 +124,12 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
 
 /// Writes the pictures of every view. Gives the nearest depth in metres at which each instance is seen: in the input view,
 /// or where that does not show it in any other.
-fn write_views(plan: &Plan, folder: &SceneFolder, progress: Progress<'_>) -> Result<Vec<Option<f64>>, PrepError> {
+fn write_views(
+    plan: &Plan,
+    folder: &SceneFolder,
+    scored: &[bool],
+    progress: Progress<'_>,
+) -> Result<Vec<Option<f64>>, PrepError> {
     let world = World::new(plan.scene.clone())?;
     let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
     let parts: Vec<Vec<u16>> = plan
@@ -128,7 +137,7 @@ fn write_views(plan: &Plan, folder: &SceneFolder, progress: Progress<'_>) -> Res
         .iter()
         .map(|entry| entry.part_of_triangle.iter().map(|part| entry.parts[*part].index.0.get()).collect())
         .collect();
-    let scene = ViewScene::new(&plan.scene, &world, &instances, &parts);
+    let scene = ViewScene::new(&plan.scene, &world, &instances, &parts, scored);
     let mut in_input = vec![None; plan.instances.len()];
     let mut elsewhere = vec![None; plan.instances.len()];
     for (at, view) in plan.views.iter().enumerate() {
@@ -212,7 +221,8 @@ fn write_scene_file(
         })
         .collect();
     let house = entry.house.clone().unwrap_or_else(|| {
-        entry.bitterli.parent().and_then(Path::file_name).unwrap_or_default().to_string_lossy().into_owned()
+        let folder = entry.bitterli.parent().and_then(Path::file_name);
+        folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned())
     });
     let mut findings = plan.findings;
     findings.sort();

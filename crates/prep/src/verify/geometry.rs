@@ -102,13 +102,14 @@ fn parts_of_triangles(
     Some(all)
 }
 
-/// The reference has the same triangles, to the last bit.
-pub(super) fn check_reference(reference: &ReferenceScene, meshes: &Meshes, faults: &mut Faults) {
+/// Whether the reference has the same triangles, to the last bit; if not, that is a fault.
+pub(super) fn is_reference(reference: &ReferenceScene, meshes: &Meshes, faults: &mut Faults) -> bool {
+    let before = faults.all.len();
     const FILE: &str = "ground_truth/reference/geometry.glb";
     if reference.surfaces.len() != meshes.instances.len() {
         let message = format!("{} surfaces, {} instances", reference.surfaces.len(), meshes.instances.len());
         faults.add("wrong_nodes", FILE, "", message);
-        return;
+        return false;
     }
     for (surface, node) in reference.surfaces.iter().zip(&meshes.instances) {
         let (a, b) = (&surface.mesh, &node.mesh);
@@ -119,6 +120,7 @@ pub(super) fn check_reference(reference: &ReferenceScene, meshes: &Meshes, fault
             faults.add("wrong_geometry", FILE, format!("node '{}'", node.name), message);
         }
     }
+    faults.all.len() == before
 }
 
 /// Every atlas has its three baked maps, of its size.

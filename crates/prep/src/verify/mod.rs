@@ -15,7 +15,7 @@ use mateval_scene::{Finding, Severity, json, manifest, reference_io};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
-use crate::progress::Progress;
+use mateval_scene::Progress;
 
 /// Where faults are gathered, with the path that they are in.
 struct Faults {
@@ -105,6 +105,9 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
 fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
     let Some(file) = faults.read(TARGETS, json::read::<TargetsFile>(&root.join(TARGETS))) else { return };
     let mut seen = std::collections::BTreeSet::new();
+    for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
+        faults.add("no_target", TARGETS, "/targets", format!("no view of the scene '{scene}' is scored"));
+    }
     for (at, target) in file.targets.iter().enumerate() {
         let place = format!("/targets/{at}");
         if !seen.insert(target) {
@@ -131,16 +134,16 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
             schema::check::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
             schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
             let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
-            geometry::check_reference(&reference, &meshes, faults);
             geometry::check_materials(folder, &scene, faults);
+            if !geometry::is_reference(&reference, &meshes, faults) {
+                return;
+            }
             World::new(Arc::new(reference))
         }
         false => World::new(Arc::new(geometry::opaque(&meshes))),
     };
     let Some(world) = faults.read("ground_truth/reference", world) else { return };
-    if world.scene().surfaces.len() == scene.instances.len() {
-        pictures::check(folder, &scene, &meshes, &world, faults);
-    }
+    pictures::check(folder, &scene, &meshes, &world, faults);
     if let Some(renderer) = &dataset.scored_renderer {
         renders::check(folder, &scene, renderer, faults);
     }

@@ -1,15 +1,16 @@
 //! The pictures of every view against meshes, ids and each other.
 
-use glam::DVec2;
-use mateval_image::{Mask, Normal, Picture, exr_io, png_io};
+use std::path::Path;
+
+use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_tracer::World;
-use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
 use super::Faults;
 use super::geometry::Meshes;
+use crate::views::{ViewPixel, ViewScene};
 
 /// Every so many-th column and row is traced again; prime, so that no pattern of the picture hides between.
 const STRIDE: usize = 7;
@@ -31,16 +32,20 @@ struct ViewPictures {
 }
 
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, meshes: &Meshes, world: &World, faults: &mut Faults) {
+    let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
+    let part_index = |part: &usize| scene.parts[*part].index.0.get();
+    let parts: Vec<Vec<u16>> =
+        meshes.part_of_triangle.iter().map(|of_triangles| of_triangles.iter().map(part_index).collect()).collect();
+    let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
+    let made_anew = ViewScene::new(world.scene(), world, &instances, &parts, &scored);
     for view in &scene.views {
         let Some(pictures) = read(folder, view, faults) else { continue };
         let at = |file: &str| format!("views/{}/{file}", view.id);
         check_ids(scene, &pictures, &at, faults);
         check_masks(scene, &pictures, &at, faults);
-        check_normals(&pictures, view, &at, faults);
-        check_against_meshes(scene, meshes, world, view, &pictures, &at, faults);
-        if folder.truth().is_dir() {
-            check_truth(folder, view, &pictures, faults);
-        }
+        check_normals(&pictures, &at, faults);
+        let truth = if folder.truth().is_dir() { check_truth(folder, view, &pictures, faults) } else { None };
+        check_against_meshes(&made_anew, [view, &scene.views[0]], &pictures, truth.as_ref(), &at, faults);
     }
 }
 
@@ -144,33 +149,22 @@ fn check_masks(scene: &SceneFile, pictures: &ViewPictures, at: &dyn Fn(&str) -> 
     }
 }
 
-fn check_normals(pictures: &ViewPictures, view: &View, at: &dyn Fn(&str) -> String, faults: &mut Faults) {
-    let (width, height) = (pictures.depth.width(), pictures.depth.height());
+fn check_normals(pictures: &ViewPictures, at: &dyn Fn(&str) -> String, faults: &mut Faults) {
+    let size = (pictures.depth.width(), pictures.depth.height());
     let (instance, normal) = (pictures.instance.pixels(), pictures.normal.pixels());
-    let length = |p: usize| glam::Vec3::from_array(normal[p].0).length();
     let rule = "a normal must be of unit length where there is an instance, else 0";
-    first_of(faults, "bad_normal", &at("normal.exr"), (width, height), rule, |p| {
+    first_of(faults, "bad_normal", &at("normal.exr"), size, rule, |p| {
         let expected = if instance[p] == 0 { 0.0 } else { 1.0 };
-        (length(p) - expected).abs() > NORMAL_SLACK
+        (glam::Vec3::from_array(normal[p].0).length() - expected).abs() > NORMAL_SLACK
     });
-    // A shading normal may lean away a little where the surface turns from the camera; half of all may not.
-    let away = (0..width * height).filter(|p| {
-        let direction = view.camera.direction(DVec2::new((p % width) as f64 + 0.5, (p / width) as f64 + 0.5));
-        instance[*p] != 0 && glam::Vec3::from_array(normal[*p].0).as_dvec3().dot(direction) > 0.5
-    });
-    let count = away.count();
-    if count as f64 > STRAYS * (width * height) as f64 {
-        faults.add("bad_normal", &at("normal.exr"), "", format!("{count} normals point away from the camera"));
-    }
 }
 
-/// Rays through a grid of pixel centres must find the ids, the depth and the observed region that the pictures hold.
+/// A view made anew at a grid of pixels must be what the pictures hold.
 fn check_against_meshes(
-    scene: &SceneFile,
-    meshes: &Meshes,
-    world: &World,
-    view: &View,
+    scene: &ViewScene<'_>,
+    [view, input]: [&View; 2],
     pictures: &ViewPictures,
+    truth: Option<&TruthAlbedo>,
     at: &dyn Fn(&str) -> String,
     faults: &mut Faults,
 ) {
@@ -179,48 +173,66 @@ fn check_against_meshes(
         .step_by(STRIDE)
         .flat_map(|y| (STRIDE / 2..width).step_by(STRIDE).map(move |x| (x, y)))
         .collect();
-    let input = &scene.views[0].camera;
-    let same_centre = input.position() == view.camera.position();
-    let strays: Vec<[bool; 4]> = places
+    let strays: Vec<[bool; NAMES.len()]> = places
         .par_iter()
-        .map(|(x, y)| {
-            let pixel = DVec2::new(*x as f64 + 0.5, *y as f64 + 0.5);
-            let hit = hit_through(world, &view.camera, pixel);
-            let instance = hit.as_ref().map_or(0, |hit| scene.instances[hit.surface.0].index.0.get());
-            let part = hit
-                .as_ref()
-                .map_or(0, |hit| scene.parts[meshes.part_of_triangle[hit.surface.0][hit.triangle]].index.0.get());
-            let depth = hit.as_ref().map_or(0.0, |hit| hit.depth);
-            let found = f64::from(pictures.depth.get(*x, *y));
-            let in_input = same_centre
-                && depth > 0.0
-                && input.project(view.camera.unproject(pixel, depth)).is_some_and(|(place, _)| input.holds(place));
-            let wrongly_unobserved = pictures.unobserved.as_ref().is_some_and(|mask| mask.get(*x, *y) && in_input);
-            [
-                instance != pictures.instance.get(*x, *y),
-                part != pictures.part.get(*x, *y),
-                (depth - found).abs() > DEPTH_SLACK * depth.max(found),
-                wrongly_unobserved,
-            ]
-        })
+        .map(|(x, y)| strays(&scene.pixel(&view.camera, &input.camera, *x, *y), pictures, truth, *x, *y))
         .collect();
-    let names = [
-        ("instance.png", "instance ids"),
-        ("part.png", "part ids"),
-        ("depth.exr", "depths"),
-        ("unobserved.png", "unobserved marks"),
-    ];
-    for (which, (file, what)) in names.into_iter().enumerate() {
+    for (which, (file, what)) in NAMES.into_iter().enumerate() {
         let count = strays.iter().filter(|stray| stray[which]).count();
         if count as f64 > STRAYS * places.len() as f64 {
             let message = format!("{count} of {} {what} are not what the camera sees of the meshes", places.len());
-            faults.add("not_reprojected", &at(file), "", message);
+            let file = if which < GEOMETRY { at(file) } else { format!("ground_truth/{}", at(file)) };
+            faults.add("not_reprojected", &file, "", message);
         }
     }
 }
 
-/// The truth's pictures are there, of the same size, in range.
-fn check_truth(folder: &SceneFolder, view: &View, pictures: &ViewPictures, faults: &mut Faults) {
+/// The pictures that are made anew: those of geometry, then those of the ground truth.
+const NAMES: [(&str, &str); 7] = [
+    ("instance.png", "instance ids"),
+    ("part.png", "part ids"),
+    ("depth.exr", "depths"),
+    ("normal.exr", "normals"),
+    ("valid.png", "valid marks"),
+    ("unobserved.png", "unobserved marks"),
+    ("albedo.exr", "albedos"),
+];
+/// How many of them are not of the ground truth.
+const GEOMETRY: usize = 6;
+
+/// Which of the pictures differ from the pixel made anew. What depends on materials is held against them only where the
+/// ground truth is there.
+fn strays(
+    expected: &ViewPixel,
+    pictures: &ViewPictures,
+    truth: Option<&TruthAlbedo>,
+    x: usize,
+    y: usize,
+) -> [bool; NAMES.len()] {
+    let depth = pictures.depth.get(x, y);
+    let normal = pictures.normal.get(x, y).0;
+    let far = |a: [f32; 3], b: [f32; 3], slack: f32| a.iter().zip(b).any(|(a, b)| (a - b).abs() > slack);
+    let materials = truth.is_some();
+    let unobserved = pictures.unobserved.as_ref().is_some_and(|mask| mask.get(x, y) != expected.unobserved);
+    [
+        expected.instance != pictures.instance.get(x, y),
+        expected.part != pictures.part.get(x, y),
+        f64::from((expected.depth - depth).abs()) > DEPTH_SLACK * f64::from(expected.depth.max(depth)),
+        far(expected.normal, normal, NORMAL_SLACK),
+        materials && expected.valid != pictures.valid.get(x, y),
+        materials && unobserved,
+        truth.is_some_and(|truth| far(expected.truth.albedo, truth.get(x, y).0, ALBEDO_SLACK)),
+    ]
+}
+
+/// How far a channel of the albedo may be off.
+const ALBEDO_SLACK: f32 = 1e-4;
+
+type TruthAlbedo = Picture<LinearRgb>;
+
+/// The truth's pictures are there, of the same size, in range; gives the albedo if it is.
+fn check_truth(folder: &SceneFolder, view: &View, pictures: &ViewPictures, faults: &mut Faults) -> Option<TruthAlbedo> {
+    let mut albedo = None;
     let hidden = folder.truth_view(&view.id);
     let at = |file: &str| format!("ground_truth/views/{}/{file}", view.id);
     let size = (pictures.depth.width(), pictures.depth.height());
@@ -233,6 +245,7 @@ fn check_truth(folder: &SceneFolder, view: &View, pictures: &ViewPictures, fault
         first_of(faults, "out_of_range", &at(file), size, "an albedo must not be negative", |p| {
             picture.pixels()[p].0.iter().any(|v| *v < 0.0)
         });
+        albedo = albedo.or(Some(picture));
     }
     for file in ["roughness.exr", "metallic.exr"] {
         let Some(picture) = faults.read(&at(file), exr_io::read_scalar(&hidden.join(file))) else { continue };
@@ -244,15 +257,18 @@ fn check_truth(folder: &SceneFolder, view: &View, pictures: &ViewPictures, fault
             !(-1e-6..=1.0 + 1e-6).contains(&picture.pixels()[p])
         });
     }
-    let Some(region) = faults.read(&at("specular_region.png"), png_io::read_mask(&hidden.join("specular_region.png")))
-    else {
-        return;
-    };
+    check_specular(&hidden.join("specular_region.png"), &at("specular_region.png"), pictures, faults);
+    albedo
+}
+
+fn check_specular(path: &Path, file: &str, pictures: &ViewPictures, faults: &mut Faults) {
+    let size = (pictures.depth.width(), pictures.depth.height());
+    let Some(region) = faults.read(file, png_io::read_mask(path)) else { return };
     if !region.same_size(&pictures.valid) {
-        faults.add("wrong_size", &at("specular_region.png"), "", format!("expected {}x{} pixels", size.0, size.1));
+        faults.add("wrong_size", file, "", format!("expected {}x{} pixels", size.0, size.1));
         return;
     }
-    first_of(faults, "bad_mask", &at("specular_region.png"), size, "a specular pixel must be valid", |p| {
+    first_of(faults, "bad_mask", file, size, "a specular pixel must be valid", |p| {
         region.pixels()[p] && !pictures.valid.pixels()[p]
     });
 }

@@ -1,13 +1,14 @@
 //! The scored renders: there for every view, of its size, and what the input view shows.
 
 use mateval_image::exr_io;
+use mateval_scene::RendererId;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::{INPUT, SceneFolder};
 
 use super::{Faults, schema};
 use crate::render::RenderFile;
 
-pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &str, faults: &mut Faults) {
+pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
     for view in &scene.views {
         if folder.truth().is_dir() {
             let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);

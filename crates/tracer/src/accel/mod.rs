@@ -136,7 +136,7 @@ impl Accel {
         Ok(starts == self.starts && self.triangles.iter().all(|t| t.corners == corners[t.global as usize]))
     }
 
-    #[inline]
+    #[inline(always)]
     fn intersect(&self, slot: u32, ray: &ShearedRay, max_distance: f32) -> Option<Hit> {
         let triangle = &self.triangles[slot as usize];
         let found = ray.intersect(&triangle.corners, max_distance)?;

@@ -49,12 +49,14 @@ impl SlabRay {
     }
 
     /// The distance at which the ray enters the box, if it does before `max_distance`.
-    #[inline]
+    #[inline(always)]
     fn enter(&self, bounds: &[[f32; 3]; 2], max_distance: f32) -> Option<f32> {
         let (mut enter, mut leave) = (0.0_f32, max_distance);
         for axis in 0..3 {
-            let near = (bounds[self.near[axis]][axis] - self.near_origin[axis]) * self.inverse[axis];
-            let far = (bounds[1 - self.near[axis]][axis] - self.far_origin[axis]) * self.inverse[axis];
+            // `& 1` shows the compiler that both indices are in range.
+            let (nearer, farther) = (self.near[axis] & 1, 1 ^ (self.near[axis] & 1));
+            let near = (bounds[nearer][axis] - self.near_origin[axis]) * self.inverse[axis];
+            let far = (bounds[farther][axis] - self.far_origin[axis]) * self.inverse[axis];
             enter = if near > enter { near } else { enter };
             leave = if far < leave { far } else { leave };
         }
@@ -134,7 +136,7 @@ pub(super) fn traverse(accel: &Accel, ray: &Ray, any: bool, accept: impl Fn(&Hit
 }
 
 /// Pushes the children that the ray meets, the nearer one last.
-#[inline]
+#[inline(always)]
 fn open(node: &Node, slab: &SlabRay, limit: f32, stack: &mut Stack) {
     let enters = [slab.enter(&node.bounds[0], limit), slab.enter(&node.bounds[1], limit)];
     match enters {

@@ -48,3 +48,40 @@ fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
     let rows = &transform.0;
     Vec2::new(du * rows[0][0] + dv * rows[1][0], du * rows[0][1] + dv * rows[1][1])
 }
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::{Texels, Wrap};
+    use mateval_scene::material::{TextureIndex, UvTransform};
+    use mateval_scene::reference::SurfaceIndex;
+
+    use super::*;
+    use crate::accel::TriangleIndex;
+    use crate::surface_hit::Facing;
+
+    /// Heights rise by 1 m over the texture, which covers 2 m of a square: a slope of one half. With the texture repeated
+    /// twice or turned a quarter, the slope is twice as steep or runs along v; on a mesh that is turned over, likewise.
+    #[test]
+    fn a_ramp_tilts_the_normal_by_its_slope() {
+        let ramp = (0..16 * 16).map(|k| (k % 16) as f32 / 16.0).collect();
+        let textures = [Texture::new(16, 16, Texels::Grey(ramp), Wrap::Repeat).unwrap()];
+        let mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 2.0, 0.0)],
+            normals: None,
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE]),
+            triangles: vec![[0, 1, 2]],
+        };
+        let bent = |uv: [[f32; 3]; 2], scale: f32| {
+            let height = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: UvTransform(uv) };
+            let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, Vec3::new(0.45, 0.25, 0.3), 2.0);
+            bumped_normal(&BumpMap { height, scale }, &textures, &mesh, &hit)
+        };
+        let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let is = |found: Vec3, expected: Vec3| assert!((found - expected.normalize()).length() < 1e-5, "{found}");
+        is(bent(straight, 1.0), Vec3::new(-0.5, 0.0, 1.0));
+        is(bent(straight, -3.0), Vec3::new(1.5, 0.0, 1.0));
+        is(bent([[2.0, 0.0, 0.2], [0.0, 1.0, 0.0]], 1.0), Vec3::new(-1.0, 0.0, 1.0));
+        is(bent([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 1.0), Vec3::new(0.0, -0.5, 1.0));
+        is(bent(straight, 0.0), Vec3::Z);
+    }
+}

@@ -323,6 +323,7 @@ fn sides() {
     use std::sync::Arc;
 
     use crate::accel::TriangleIndex;
+    use crate::surface_hit::Facing;
     use mateval_scene::TriangleMesh;
     use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
 
@@ -338,7 +339,8 @@ fn sides() {
         let scene = ReferenceScene { surfaces: vec![surface], materials: vec![material], ..Default::default() };
         World::new(Arc::new(scene)).unwrap()
     };
-    let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, Vec3::splat(1.0 / 3.0), 1.0);
+    let facing = Facing::new(&mesh, TriangleIndex(0), 1.0);
+    let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, Vec3::splat(1.0 / 3.0));
     let (wo, wi) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.6, 0.0, -0.8));
     let mirrored = |w: Vec3| Vec3::new(w.x, w.y, -w.z);
     let (one, two) = (world(false), world(true));
@@ -357,13 +359,7 @@ fn copper(distribution: Distribution) -> MaterialModel {
 }
 
 fn brown_plastic(nonlinear: bool, microfacets: Option<Microfacets>) -> MaterialModel {
-    MaterialModel::Plastic {
-        eta: 1.5,
-        nonlinear,
-        diffuse_reflectance: BROWN,
-        specular_reflectance: WHITE,
-        microfacets,
-    }
+    MaterialModel::Plastic { eta: 1.5, nonlinear, diffuse_reflectance: BROWN, specular_reflectance: WHITE, microfacets }
 }
 
 fn brown_principled(roughness: f32, metallic: f32) -> MaterialModel {

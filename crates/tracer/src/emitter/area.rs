@@ -6,7 +6,7 @@ use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
 
 use super::distribution::Distribution;
 use crate::accel::TriangleIndex;
-use crate::surface_hit::{SurfaceHit, front_normal};
+use crate::surface_hit::{Facing, SurfaceHit};
 use crate::warp;
 
 /// One or more surfaces of one light group, sampled together.
@@ -19,6 +19,8 @@ pub(crate) struct AreaEmitter {
     /// For each of `surfaces` the number of triangles before it.
     starts: Vec<usize>,
     triangles: Distribution,
+    /// Of all triangles, surface by surface.
+    facings: Vec<Facing>,
     centre: Vec3,
     radius2: f32,
     /// The common front normal of all triangles, if they have one and only the front glows.
@@ -32,6 +34,7 @@ impl AreaEmitter {
         radiance: [f32; 3],
         two_sided: bool,
         surfaces: Vec<SurfaceIndex>,
+        scene_size: f32,
     ) -> Self {
         let meshes: Vec<&TriangleMesh> = surfaces.iter().map(|surface| &scene.surfaces[surface.0].mesh).collect();
         let mut starts = vec![0];
@@ -39,13 +42,18 @@ impl AreaEmitter {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
         let areas = meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| area(mesh, t)));
+        let facings: Vec<Facing> = meshes
+            .iter()
+            .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| Facing::new(mesh, TriangleIndex(t), scene_size)))
+            .collect();
         let (centre, radius2) = bounding_sphere(&meshes);
         Self {
             light,
             radiance: Vec3::from_array(radiance),
             two_sided,
             triangles: Distribution::new(areas),
-            facing: common_normal(&meshes).filter(|_| !two_sided),
+            facing: common_normal(&facings).filter(|_| !two_sided),
+            facings,
             surfaces,
             starts,
             centre,
@@ -68,12 +76,13 @@ impl AreaEmitter {
     }
 
     /// A place, uniform over the area.
-    pub(crate) fn sample(&self, scene: &ReferenceScene, scene_size: f32, choice: f32, u: [f32; 2]) -> SurfaceHit {
+    pub(crate) fn sample(&self, scene: &ReferenceScene, choice: f32, u: [f32; 2]) -> SurfaceHit {
         let (triangle, _) = self.triangles.sample(choice);
+        let facing = &self.facings[triangle];
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
         let surface = self.surfaces[which];
         let triangle = TriangleIndex(triangle - self.starts[which]);
-        SurfaceHit::new(surface, triangle, &scene.surfaces[surface.0].mesh, warp::triangle(u), scene_size)
+        SurfaceHit::new(surface, triangle, &scene.surfaces[surface.0].mesh, facing, warp::triangle(u))
     }
 
     /// Whether the side of `hit` towards `direction` glows.
@@ -96,9 +105,7 @@ fn bounding_sphere(meshes: &[&TriangleMesh]) -> (Vec3, f32) {
     (centre, positions().map(|p| p.distance_squared(centre)).fold(0.0, f32::max))
 }
 
-fn common_normal(meshes: &[&TriangleMesh]) -> Option<Vec3> {
-    let mut normals =
-        meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| front_normal(mesh, TriangleIndex(t))));
-    let first = normals.next()?;
-    normals.all(|normal| normal.dot(first) > 0.9999).then_some(first)
+fn common_normal(facings: &[Facing]) -> Option<Vec3> {
+    let first = facings.first()?.normal;
+    facings.iter().all(|facing| facing.normal.dot(first) > 0.9999).then_some(first)
 }

@@ -73,6 +73,7 @@ const UNIFORM_SHARE: f32 = 0.2;
 const SEPARATE_SURFACES: usize = 64;
 
 impl Emitters {
+    /// `scene_size` is the scene's largest coordinate.
     pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
         let mut emitters = Self {
             areas: Vec::new(),
@@ -109,7 +110,14 @@ impl Emitters {
                     if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
                 for part in parts {
                     self.claim(part)?;
-                    self.areas.push(AreaEmitter::new(scene, light, *radiance, *two_sided, part.to_vec()));
+                    self.areas.push(AreaEmitter::new(
+                        scene,
+                        light,
+                        *radiance,
+                        *two_sided,
+                        part.to_vec(),
+                        self.scene_size,
+                    ));
                 }
             }
             Emission::Environment { texture, scale, world_from_environment } => {
@@ -178,7 +186,7 @@ impl Emitters {
     ) -> Option<EmitterSample> {
         let (which, rest, probability) = self.choose_area(from, choice)?;
         let area = &self.areas[which];
-        let place = area.sample(scene, self.scene_size, rest, u);
+        let place = area.sample(scene, rest, u);
         let towards = place.position - from;
         let direction = towards.try_normalize()?;
         let cos = place.geometric_normal.dot(direction).abs();
@@ -284,4 +292,67 @@ impl DistantEmitter {
 fn check_radiance(radiance: &[f32; 3]) -> Result<(), String> {
     let sound = radiance.iter().all(|&v| v.is_finite() && v >= 0.0);
     if sound { Ok(()) } else { Err(format!("radiance {radiance:?}, expected finite and not negative")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::TriangleMesh;
+    use mateval_scene::reference::{LightGroup, MaterialIndex, Surface};
+
+    use super::*;
+
+    fn triangle(at: Vec3, size: f32) -> Surface {
+        let positions = vec![at, at + Vec3::X * size, at + Vec3::Y * size];
+        let mesh = TriangleMesh { positions, triangles: vec![[0, 1, 2]], ..Default::default() };
+        Surface { name: String::new(), mesh, material: MaterialIndex(0) }
+    }
+
+    fn emitters(surfaces: usize, distant: bool) -> (ReferenceScene, Emitters) {
+        let mut scene = ReferenceScene::default();
+        let mut light = |emission: Emission| {
+            scene.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
+        };
+        for k in 0..surfaces {
+            let surfaces = vec![SurfaceIndex(k)];
+            light(Emission::Area { surfaces, radiance: [1.0; 3], two_sided: k % 2 == 0 });
+        }
+        if distant {
+            light(Emission::Constant { radiance: [1.0; 3] });
+            light(Emission::Constant { radiance: [2.0; 3] });
+        }
+        let place = |k: usize| triangle(Vec3::new(k as f32 - 2.0, 0.3 * k as f32, -3.0), 0.2 + 0.2 * k as f32);
+        scene.surfaces = (0..surfaces).map(place).collect();
+        let emitters = Emitters::new(&scene, &[], 5.0).unwrap();
+        (scene, emitters)
+    }
+
+    /// What a sample says of its density is what finding the same light by chance says, for all mixes of emitters and with
+    /// surfaces sampled each by itself or by group.
+    #[test]
+    fn sampled_and_found_densities_agree() {
+        for (surfaces, distant) in [(1, false), (5, false), (5, true), (70, true), (0, true)] {
+            let (scene, emitters) = emitters(surfaces, distant);
+            let from = Vec3::new(0.2, -0.1, 0.5);
+            let mut lights = std::collections::BTreeSet::new();
+            for index in 0..2000 {
+                let [a, b, c, _] = sobol_burley::sample_4d(index, 0, 3);
+                let Some(sample) = emitters.sample(&scene, from, [a, b, c], |_| 1.0) else { continue };
+                let found = match &sample.place {
+                    Some(place) => emitters.emitted(place, from).unwrap(),
+                    None => emitters.from_outside(sample.direction).find(|f| f.light == sample.light).unwrap(),
+                };
+                assert!((found.density / sample.density - 1.0).abs() < 1e-3, "{surfaces} {sample:?} {found:?}");
+                assert_eq!((found.light, found.radiance), (sample.light, sample.radiance));
+                lights.insert(sample.light.0);
+            }
+            assert_eq!(lights.len(), if surfaces == 70 { lights.len() } else { scene.lights.len() });
+        }
+    }
+
+    #[test]
+    fn no_emitters_give_no_light() {
+        let (scene, emitters) = emitters(0, false);
+        assert!(emitters.sample(&scene, Vec3::ZERO, [0.5; 3], |_| 1.0).is_none());
+        assert_eq!(emitters.from_outside(Vec3::X).count(), 0);
+    }
 }

@@ -134,8 +134,7 @@ fn clear_glass() {
     let sheet = quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0);
     let wall = quad(Vec3::new(-5.0, -5.0, -3.0), Vec3::X * 10.0, Vec3::Y * 10.0);
     let thin = MaterialModel::ThinDielectric { eta: 1.5, specular_reflectance: WHITE, specular_transmittance: WHITE };
-    let world =
-        Builder::default().surface(sheet, material(thin)).surface(wall, grey(0.0)).glowing([1.0; 3]).world();
+    let world = Builder::default().surface(sheet, material(thin)).surface(wall, grey(0.0)).glowing([1.0; 3]).world();
     assert_is(mean(&world, &camera([0.0; 3], [0.0, 0.0, -2.0], 8, 1.0), 256, 4), 1.0 - 0.08 / 1.04);
 
     let ball = sphere(Vec3::new(0.0, 0.0, -3.0), 1.0, 48);

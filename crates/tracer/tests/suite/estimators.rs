@@ -57,7 +57,10 @@ fn scene(brightness: f32) -> ReferenceScene {
     }
     let mut scene = builder
         .surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.5, 16), material(metal))
-        .surface(sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12), material(principled(0.3, 1.0, PrincipledFlavour::Mitsuba)))
+        .surface(
+            sphere(Vec3::new(-0.5, -0.7, 0.2), 0.25, 12),
+            material(principled(0.3, 1.0, PrincipledFlavour::Mitsuba)),
+        )
         .surface(quad(Vec3::new(-0.9, -0.4, 0.3), Vec3::X * 0.6, Vec3::Y * 0.8), material(frosted))
         .surface(quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8), grey(0.0))
         .glowing([4.0 * brightness; 3])

@@ -1,0 +1,170 @@
+//! The crates' arrows (one way, no others) and everybody's licences, as `cargo metadata` tells them.
+
+use std::collections::BTreeSet;
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
+
+/// Which of our crates each may use, from user to used.
+const ARROWS: [(&str, &[&str]); 8] = [
+    ("mateval-image", &[]),
+    ("mateval-scene", &["mateval-image"]),
+    ("mateval-metrics", &["mateval-image"]),
+    ("mateval-tracer", &["mateval-scene", "mateval-image"]),
+    ("mateval-prep", &["mateval-scene", "mateval-image", "mateval-metrics", "mateval-tracer"]),
+    ("mateval-baselines", &["mateval-scene", "mateval-image", "mateval-tracer"]),
+    ("mateval-eval", &["mateval-scene", "mateval-image", "mateval-metrics", "mateval-tracer"]),
+    (
+        "mateval",
+        &[
+            "mateval-image",
+            "mateval-scene",
+            "mateval-metrics",
+            "mateval-tracer",
+            "mateval-prep",
+            "mateval-baselines",
+            "mateval-eval",
+        ],
+    ),
+];
+
+/// What may be linked into a program that is itself MIT or Apache-2.0.
+const LICENCES: [&str; 13] = [
+    "MIT",
+    "MIT-0",
+    "Apache-2.0",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "0BSD",
+    "Zlib",
+    "MPL-2.0",
+    "Unicode-3.0",
+    "Unicode-DFS-2016",
+    "ISC",
+    "CC0-1.0",
+    "Unlicense",
+];
+
+/// Packages as they are for this machine; others' are not fetched for it.
+fn metadata() -> Metadata {
+    let version = std::process::Command::new("rustc").arg("-vV").output().unwrap();
+    let text = String::from_utf8(version.stdout).unwrap();
+    let host = text.lines().find_map(|line| line.strip_prefix("host: ")).unwrap().to_owned();
+    let options = ["--locked".to_owned(), "--filter-platform".to_owned(), host];
+    MetadataCommand::new()
+        .manifest_path(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))
+        .other_options(options)
+        .exec()
+        .unwrap()
+}
+
+/// The arrows of a package that nobody allowed.
+fn forbidden(package: &str, used: &[&str]) -> Vec<String> {
+    let allowed = ARROWS.iter().find(|(name, _)| *name == package).map(|(_, allowed)| *allowed);
+    let Some(allowed) = allowed else { return vec![format!("'{package}' is a crate that DESIGN does not know")] };
+    let wrong = used.iter().filter(|name| !allowed.contains(name));
+    wrong.map(|name| format!("{package} -> {name}")).collect()
+}
+
+/// What the package uses of ours when it is built (not when it is tested).
+fn uses(package: &Package) -> Vec<&str> {
+    let used = package.dependencies.iter().filter(|dependency| dependency.kind != DependencyKind::Development);
+    used.map(|dependency| dependency.name.as_str()).filter(|name| name.starts_with("mateval")).collect()
+}
+
+#[test]
+fn the_arrows_are_those_of_the_design() {
+    let metadata = metadata();
+    let members = metadata.workspace_packages();
+    let names: BTreeSet<&str> = members.iter().map(|package| package.name.as_str()).collect();
+    assert_eq!(names, ARROWS.iter().map(|(name, _)| *name).collect());
+    let wrong: Vec<String> = members.iter().flat_map(|package| forbidden(&package.name, &uses(package))).collect();
+    assert_eq!(wrong, [""; 0]);
+    let all: usize = members.iter().map(|package| uses(package).len()).sum();
+    assert!(all > 15, "only {all} arrows seen");
+}
+
+/// The twin: arrows that point back.
+#[test]
+fn an_arrow_back_is_found() {
+    assert_eq!(forbidden("mateval-image", &["mateval-scene"]), ["mateval-image -> mateval-scene"]);
+    assert_eq!(forbidden("mateval-metrics", &["mateval-image", "mateval-scene"]), ["mateval-metrics -> mateval-scene"]);
+    assert_eq!(forbidden("mateval-eval", &["mateval-prep"]), ["mateval-eval -> mateval-prep"]);
+    assert_eq!(forbidden("mateval-utils", &[]).len(), 1);
+}
+
+/// Only one module may name obvhs, so only one crate may use it.
+#[test]
+fn only_the_tracer_uses_obvhs() {
+    let metadata = metadata();
+    let uses_obvhs = |package: &&&Package| package.dependencies.iter().any(|dependency| dependency.name == "obvhs");
+    let members = metadata.workspace_packages();
+    let users: Vec<&str> = members.iter().filter(uses_obvhs).map(|package| package.name.as_str()).collect();
+    assert_eq!(users, ["mateval-tracer"]);
+}
+
+#[test]
+fn every_package_has_a_licence_that_we_may_use() {
+    let metadata = metadata();
+    let offered = |package: &&Package| package.license.as_deref().is_some_and(offers);
+    let wrong = metadata.packages.iter().filter(|package| !offered(package));
+    let wrong: Vec<String> = wrong.map(|package| format!("{} {:?}", package.name, package.license)).collect();
+    assert_eq!(wrong, [""; 0]);
+    assert!(metadata.packages.len() > 150, "only {} packages seen", metadata.packages.len());
+}
+
+#[test]
+fn licence_expressions_are_understood() {
+    let good = [
+        "MIT",
+        "MIT/Apache-2.0",
+        "MIT OR GPL-3.0",
+        "(MIT OR GPL-3.0) AND Unicode-3.0",
+        "Apache-2.0 WITH LLVM-exception OR GPL-2.0",
+    ];
+    for text in good {
+        assert!(offers(text), "{text}");
+    }
+    let bad = ["GPL-3.0", "MIT AND GPL-3.0", "LGPL-2.1-or-later", "", "MIT AND (GPL-3.0 OR SSPL-1.0)", "(MIT", "MIT)"];
+    for text in bad {
+        assert!(!offers(text), "{text}");
+    }
+}
+
+/// Whether an SPDX expression can be met with [`LICENCES`] alone. What does not read as one cannot.
+fn offers(expression: &str) -> bool {
+    let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
+    let words: Vec<&str> = spaced.split_whitespace().collect();
+    matches!(any_of(&words), Some((true, [])))
+}
+
+/// `a OR b ...`: whether it can be met, and the words after it.
+fn any_of<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
+    let (mut met, mut rest) = all_of(words)?;
+    while let ["OR", after @ ..] = rest {
+        let (other, after) = all_of(after)?;
+        (met, rest) = (met || other, after);
+    }
+    Some((met, rest))
+}
+
+/// `a AND b ...`.
+fn all_of<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
+    let (mut met, mut rest) = one(words)?;
+    while let ["AND", after @ ..] = rest {
+        let (other, after) = one(after)?;
+        (met, rest) = (met && other, after);
+    }
+    Some((met, rest))
+}
+
+/// A licence (an exception to it only gives more), or an expression in brackets.
+fn one<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
+    match words {
+        ["(", rest @ ..] => match any_of(rest)? {
+            (met, [")", rest @ ..]) => Some((met, rest)),
+            _ => None,
+        },
+        [licence, "WITH", _, rest @ ..] | [licence, rest @ ..] => Some((LICENCES.contains(licence), rest)),
+        [] => None,
+    }
+}

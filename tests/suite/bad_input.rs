@@ -1,0 +1,227 @@
+//! Bad input: a clear error with the path and exit code 2 where the job cannot be done, a finding where it can; never a
+//! crash, and never something half-written where a finished file should be.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::{LinearRgb, Picture};
+
+use super::command::{Run, baseline, build, mateval, render, run, score, verify};
+use super::sample::{copied_dataset, dataset, files_below, json, write_source};
+
+/// The input view alone, as small as may be.
+const TINY: &str = "resolution = [32, 24]\natlas_size = 64\nviews = []";
+
+/// The sample's source, to be damaged, and where its dataset should come.
+struct Source {
+    folder: tempfile::TempDir,
+    recipe: PathBuf,
+}
+
+impl Source {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let recipe = write_source(&folder.path().join("source"), TINY, &["room"]);
+        Self { folder, recipe }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join("source/room").join(name)
+    }
+
+    fn edit(&self, name: &str, change: impl FnOnce(String) -> String) {
+        let text = std::fs::read_to_string(self.file(name)).unwrap();
+        let changed = change(text.clone());
+        assert_ne!(changed, text, "nothing was changed in {name}");
+        std::fs::write(self.file(name), changed).unwrap();
+    }
+
+    fn out(&self) -> PathBuf {
+        self.folder.path().join("dataset")
+    }
+
+    fn build(&self) -> Run {
+        run(&mut build(&self.recipe, &self.out()))
+    }
+
+    /// The dataset is made and sound, and says what was wrong: on stderr and in scene.json, with code and file.
+    #[track_caller]
+    fn gives_finding(&self, code: &str, file: &str, message: &str) {
+        let told = format!("room: warning [{code}] '{file}'");
+        self.build().ends_with(0).says(&told).says(message);
+        let scene = json(&self.out().join("scenes/room/scene.json"));
+        let findings = scene["findings"].as_array().unwrap();
+        assert!(findings.iter().any(|finding| finding["code"] == code && finding["file"] == file), "{findings:?}");
+        run(&mut verify(&self.out())).ends_with(0);
+    }
+
+    /// Nothing is made, and the error names the path.
+    #[track_caller]
+    fn gives_error(&self, parts: &[&str]) {
+        let refused = self.build().ends_with(2);
+        assert_eq!(refused.stdout, "");
+        assert!(!self.out().join("dataset.json").exists() && !self.out().join("MANIFEST.sha256").exists());
+        for part in parts {
+            assert!(refused.error().contains(part), "'{part}' not in {}", refused.stderr);
+        }
+    }
+}
+
+/// The twin of all below: what is not damaged has no warnings.
+#[test]
+fn the_whole_sample_has_no_findings() {
+    let built = Source::new().build().ends_with(0);
+    assert!(!built.stderr.contains("warning") && built.error().is_empty(), "{}", built.stderr);
+}
+
+#[test]
+fn a_truncated_texture() {
+    let source = Source::new();
+    let path = source.file("textures/planks.png");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    source.gives_finding("unreadable_texture", "textures/planks.png", "planks.png");
+}
+
+#[test]
+fn a_texture_of_a_hundred_thousand_squared() {
+    let source = Source::new();
+    let path = source.file("textures/planks.png");
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[16..20].copy_from_slice(&100_000_u32.to_be_bytes());
+    bytes[20..24].copy_from_slice(&100_000_u32.to_be_bytes());
+    let check = crc32(&bytes[12..29]);
+    bytes[29..33].copy_from_slice(&check.to_be_bytes());
+    std::fs::write(&path, bytes).unwrap();
+    source.gives_finding("unreadable_texture", "textures/planks.png", "100000x100000");
+}
+
+/// The CRC of PNG's chunks (PNG specification, annex D).
+fn crc32(bytes: &[u8]) -> u32 {
+    let shift = |crc: u32| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+    !bytes.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| shift(crc)))
+}
+
+#[test]
+fn a_texture_that_holds_nan() {
+    let source = Source::new();
+    let mut picture = Picture::filled(8, 8, LinearRgb([0.5; 3]));
+    picture.set(3, 2, LinearRgb([0.5, f32::NAN, 0.5]));
+    exr_io::write_linear(&source.file("textures/planks.exr"), &picture, Precision::Float).unwrap();
+    source.edit("scene.xml", |text| text.replace("planks.png", "planks.exr"));
+    source.gives_finding("unreadable_texture", "textures/planks.exr", "pixel (3, 2) is NaN or infinite");
+}
+
+#[test]
+fn an_obj_with_an_index_out_of_range() {
+    let source = Source::new();
+    source.edit("models/rug.obj", |text| text + "f 999999 1 2\n");
+    source.gives_finding("bad_mesh", "models/rug.obj", "");
+}
+
+#[test]
+fn a_missing_model() {
+    let source = Source::new();
+    std::fs::remove_file(source.file("models/rug.obj")).unwrap();
+    source.gives_finding("missing_file", "models/rug.obj", "left the shape out");
+}
+
+#[test]
+fn xml_nested_ten_thousand_deep() {
+    let source = Source::new();
+    let deep = format!("<scene version=\"3.0.0\">{}{}</scene>", "<bsdf>".repeat(10_000), "</bsdf>".repeat(10_000));
+    std::fs::write(source.file("scene.xml"), deep).unwrap();
+    source.gives_error(&["scene.xml"]);
+}
+
+#[test]
+fn xml_that_ends_early_is_none_or_is_binary() {
+    let source = Source::new();
+    source.edit("scene.xml", |text| text[..text.len() / 2].to_owned());
+    source.gives_error(&["scene.xml"]);
+    std::fs::write(source.file("scene.xml"), "").unwrap();
+    source.gives_error(&["scene.xml"]);
+    std::fs::write(source.file("scene.xml"), [0xff, 0x00, 0xfe, 0x3c]).unwrap();
+    source.gives_error(&["scene.xml"]);
+}
+
+#[test]
+fn a_recipe_that_names_a_scene_that_is_not_there() {
+    let source = Source::new();
+    std::fs::remove_file(source.file("scene.xml")).unwrap();
+    source.gives_error(&["recipe.toml", "scene 'room': there is no file", "room/scene.xml", "--source"]);
+    assert!(!source.out().exists(), "whatever can fail early must");
+}
+
+#[test]
+fn a_recipe_with_unknown_words_or_none() {
+    let source = Source::new();
+    let text = std::fs::read_to_string(&source.recipe).unwrap();
+    std::fs::write(&source.recipe, text.replace("resolution", "resolutoin")).unwrap();
+    source.gives_error(&["recipe.toml", "resolutoin"]);
+    std::fs::write(&source.recipe, [0xff, 0xfe]).unwrap();
+    source.gives_error(&["recipe.toml"]);
+    std::fs::remove_file(&source.recipe).unwrap();
+    source.gives_error(&["recipe.toml"]);
+    assert!(!source.out().exists());
+}
+
+#[test]
+fn a_folder_that_is_no_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    let (none, out) = (folder.path().join("none"), folder.path().join("out"));
+    std::fs::create_dir(&none).unwrap();
+    std::fs::write(none.join("notes.txt"), "mine").unwrap();
+    let commands = [
+        verify(&none),
+        render(&none, 1),
+        baseline("gt", &none, &out),
+        baseline("grey", &none, &out),
+        score(&none, &none, &out),
+    ];
+    for mut command in commands {
+        let refused = run(&mut command).ends_with(2);
+        assert!(refused.error().contains("none") && refused.error().contains("dataset.json"), "{}", refused.stderr);
+        assert_eq!(refused.stdout, "");
+    }
+    assert_eq!(files_below(folder.path()), [Path::new("none/notes.txt")]);
+}
+
+/// Nothing is overwritten without `--force`, and even with it nothing that is not what would be made.
+#[test]
+fn outputs_that_are_there() {
+    let source = Source::new();
+    std::fs::create_dir(source.out()).unwrap();
+    std::fs::write(source.out().join("notes.txt"), "mine").unwrap();
+    let out = source.out();
+    for words in [&[][..], &["--force"]] {
+        run(build(&source.recipe, &out).args(words)).ends_with(2).says("is no dataset");
+        run(baseline("grey", dataset(), &out).args(words)).ends_with(2).says("dataset'");
+    }
+    run(mateval().arg("sample").arg(&out)).ends_with(2).says("is already there");
+    assert_eq!(files_below(&out), [Path::new("notes.txt")]);
+
+    let result = out.join("RESULT.json");
+    std::fs::write(&result, "mine").unwrap();
+    let submission = out.join("grey");
+    run(&mut baseline("grey", dataset(), &submission)).ends_with(0);
+    run(&mut baseline("grey", dataset(), &submission)).ends_with(2).says("is already there").says("--force");
+    run(&mut score(&submission, dataset(), &result)).ends_with(2).says("is already there").says("--force");
+    assert_eq!(std::fs::read_to_string(&result).unwrap(), "mine");
+    run(score(&submission, dataset(), &result).arg("--force")).ends_with(0);
+    assert!(json(&result).is_object());
+}
+
+/// A damaged dataset cannot be scored on: the error names the file, and there is no result.
+#[test]
+fn a_dataset_with_a_truncated_picture() {
+    let copy = copied_dataset();
+    let folder = tempfile::tempdir().unwrap();
+    let submission = folder.path().join("grey");
+    run(&mut baseline("grey", copy.path(), &submission)).ends_with(0);
+    let albedo = copy.path().join("scenes/room/ground_truth/views/up_left/albedo.exr");
+    std::fs::write(&albedo, &std::fs::read(&albedo).unwrap()[..500]).unwrap();
+    let result = folder.path().join("RESULT.json");
+    run(&mut score(&submission, copy.path(), &result)).ends_with(2).says("up_left/albedo.exr");
+    assert!(!result.exists());
+}

@@ -1,0 +1,92 @@
+//! The command, run as a user runs it.
+
+use std::ffi::OsStr;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// How a run ended and what it printed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Run {
+    /// Its exit code; none where a signal ended it.
+    pub code: Option<i32>,
+    /// All of stdout.
+    pub stdout: String,
+    /// All of stderr.
+    pub stderr: String,
+}
+
+/// `mateval`, still to be given its words.
+pub fn mateval() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mateval"));
+    command.stdin(std::process::Stdio::null());
+    command
+}
+
+/// Runs what was put together.
+pub fn run(command: &mut Command) -> Run {
+    let Output { status, stdout, stderr } = command.output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    Run { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
+}
+
+/// `mateval` with these words.
+pub fn run_words<W: AsRef<OsStr>>(words: impl IntoIterator<Item = W>) -> Run {
+    run(mateval().args(words))
+}
+
+impl Run {
+    /// Panics with all that was printed where the exit code is another one.
+    #[track_caller]
+    pub fn ends_with(self, code: i32) -> Self {
+        assert_eq!(self.code, Some(code), "stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr);
+        self
+    }
+
+    /// Panics where stderr does not hold the text.
+    #[track_caller]
+    pub fn says(self, text: &str) -> Self {
+        assert!(self.stderr.contains(text), "expected '{text}' in stderr:\n{}", self.stderr);
+        self
+    }
+
+    /// The one line of stderr that starts with `error:` (and all that follows it); empty where there is none.
+    pub fn error(&self) -> &str {
+        self.stderr.find("error:").map_or("", |at| &self.stderr[at..])
+    }
+}
+
+/// `mateval prep build RECIPE --out DATASET`.
+pub fn build(recipe: &Path, dataset: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["prep", "build"]).arg(recipe).arg("--out").arg(dataset);
+    command
+}
+
+/// `mateval prep render DATASET --samples SAMPLES`.
+pub fn render(dataset: &Path, samples: u32) -> Command {
+    let mut command = mateval();
+    command.args(["prep", "render", "--samples", &samples.to_string()]).arg(dataset);
+    command
+}
+
+/// `mateval prep verify DATASET --format json`.
+pub fn verify(dataset: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["prep", "verify", "--format", "json"]).arg(dataset);
+    command
+}
+
+/// `mateval baseline NAME --dataset DATASET --out SUBMISSION`.
+pub fn baseline(name: &str, dataset: &Path, submission: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["baseline", name, "--dataset"]).arg(dataset).arg("--out").arg(submission);
+    command
+}
+
+/// `mateval eval score SUBMISSION --dataset DATASET --out RESULT` under both protocols.
+pub fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["eval", "score", "--protocol", "mateval-1", "--protocol", "paper"]).arg(submission);
+    command.arg("--dataset").arg(dataset).arg("--out").arg(result);
+    command
+}

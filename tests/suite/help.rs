@@ -1,0 +1,83 @@
+//! What a user reads: exit code, stdout and stderr of short runs, whole.
+
+use super::command::{Run, mateval, run};
+
+/// Runs the command in a folder of its own and holds all that it gives against `expected`; nothing may be left there.
+#[track_caller]
+fn check(words: &[&str], code: i32, stdout: &str, stderr: &str) {
+    let folder = tempfile::tempdir().unwrap();
+    let found = run(mateval().current_dir(folder.path()).args(words));
+    assert_eq!(found, Run { code: Some(code), stdout: stdout.to_owned(), stderr: stderr.to_owned() }, "{words:?}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{words:?} left something");
+}
+
+#[test]
+fn the_version() {
+    check(&["--version"], 0, concat!("mateval ", env!("CARGO_PKG_VERSION"), "\n"), "");
+}
+
+#[test]
+fn what_is_not_there() {
+    let not_there = "No such file or directory (os error 2)\n";
+    let cases: [(&[&str], &str); 5] = [
+        (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
+        (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
+        (&["eval", "image", "a.png", "b.png"], "cannot read 'a.png': "),
+        (&["eval", "tables", "RESULT.json"], "cannot read 'RESULT.json': "),
+        (
+            &["eval", "score", "grey", "--dataset", "nowhere", "--out", "RESULT.json"],
+            "cannot open the dataset: cannot read 'nowhere/dataset.json': ",
+        ),
+    ];
+    for (words, error) in cases {
+        check(words, 2, "", &format!("error: {error}{not_there}"));
+    }
+}
+
+#[test]
+fn what_is_no_dataset() {
+    let error = "error: cannot verify 'nowhere': 'nowhere' holds no dataset.json: no dataset, or an unfinished \
+                 `prep build` (run it again)\n";
+    check(&["prep", "verify", "nowhere"], 2, "", error);
+}
+
+#[test]
+fn words_that_are_not_known() {
+    let error = "error: invalid value 'gray' for '<NAME>'\n  [possible values: gt, grey]\n\n  \
+                 tip: a similar value exists: 'grey'\n\nFor more information, try '--help'.\n";
+    check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
+    let error = "error: invalid value '../up' for '--scene <SCENES>': '../up' is not an id: expected \
+                 ^[a-z0-9][a-z0-9_-]{0,63}$\n\nFor more information, try '--help'.\n";
+    check(&["prep", "render", "d", "--scene", "../up"], 2, "", error);
+}
+
+#[test]
+fn words_that_are_missing() {
+    let error = "error: the following required arguments were not provided:\n  --dataset <DATASET>\n  --out <OUT>\n  \
+                 <SUBMISSIONS>...\n\nUsage: mateval eval score --dataset <DATASET> --out <OUT> <SUBMISSIONS>...\n\n\
+                 For more information, try '--help'.\n";
+    check(&["eval", "score"], 2, "", error);
+}
+
+/// Every subcommand can say what it is for.
+#[test]
+fn every_subcommand_has_help() {
+    let subcommands: [&[&str]; 10] = [
+        &["demo"],
+        &["sample"],
+        &["prep"],
+        &["prep", "build"],
+        &["prep", "render"],
+        &["prep", "verify"],
+        &["baseline"],
+        &["eval", "image"],
+        &["eval", "score"],
+        &["eval", "tables"],
+    ];
+    for words in subcommands {
+        let shown = run(mateval().args(words).arg("--help")).ends_with(0);
+        let usage = format!("Usage: mateval {}", words.join(" "));
+        assert!(shown.stdout.contains(&usage) && shown.stderr.is_empty(), "{words:?}:\n{}", shown.stdout);
+    }
+    run(mateval().arg("no-such-thing")).ends_with(2).says("unrecognized subcommand 'no-such-thing'");
+}

@@ -1,0 +1,122 @@
+//! A build or a render that is killed goes on when it is started again, and ends as if nothing had been.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use super::command::{build, render, run, verify};
+use super::sample::{SMALL, copied_dataset, dataset, kept_folder, manifest, recipe_text, write_source};
+
+/// A source whose recipe has two scenes, and the manifest of its whole dataset.
+struct Whole {
+    recipe: PathBuf,
+    manifest: String,
+}
+
+static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
+    let folder = kept_folder("resume");
+    let recipe = write_source(&folder.join("source"), SMALL, &["first", "second"]);
+    let dataset = folder.join("dataset");
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    Whole { recipe, manifest: manifest(&dataset) }
+});
+
+/// Starts the command and kills it (SIGKILL) once `is_time`. Panics where it ends by itself.
+fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
+    let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let start = Instant::now();
+    while !is_time() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it could be killed");
+        assert!(start.elapsed() < Duration::from_secs(120), "the time to kill it never came");
+        std::thread::sleep(Duration::from_micros(200));
+    }
+    child.kill().unwrap();
+    assert!(child.wait().unwrap().code().is_none(), "it ended before it could be killed");
+}
+
+/// Nothing that is there may be taken for a finished dataset.
+fn assert_unfinished(out: &Path) {
+    assert!(!out.join("dataset.json").exists());
+    run(&mut verify(out)).ends_with(2).says("no dataset.json");
+}
+
+#[test]
+fn killed_after_the_first_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("dataset");
+    let mark = out.join(".build/first.json");
+    kill_when(&mut build(&WHOLE.recipe, &out), || mark.is_file());
+    assert_unfinished(&out);
+    run(&mut build(&WHOLE.recipe, &out)).ends_with(0).says("scene 'first' was already made by an earlier run");
+    assert!(manifest(&out) == WHOLE.manifest);
+    assert!(!out.join(".build").exists());
+    run(&mut verify(&out)).ends_with(0);
+}
+
+#[test]
+fn killed_at_once_and_within_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("dataset");
+    let work = out.join("scenes/.first.partial");
+    let moments: [&dyn Fn() -> bool; 3] = [&|| out.exists(), &|| work.join("views/input/depth.exr").is_file(), &|| {
+        work.join("geometry/parts.glb").is_file()
+    }];
+    for is_time in moments {
+        // What the last run left must not be taken for this one's.
+        let _ = std::fs::remove_dir_all(&work);
+        kill_when(&mut build(&WHOLE.recipe, &out), is_time);
+        assert_unfinished(&out);
+        assert!(!out.join("scenes/first").exists());
+    }
+    let second = run(&mut build(&WHOLE.recipe, &out)).ends_with(0);
+    assert!(!second.stderr.contains("already made"), "{}", second.stderr);
+    assert!(manifest(&out) == WHOLE.manifest);
+}
+
+/// A scene's folder without its mark, whole or not, is what a kill between two steps leaves: it is made again.
+#[test]
+fn half_written_scenes_are_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("dataset");
+    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/first.json").is_file());
+    std::fs::remove_file(out.join(".build/first.json")).unwrap();
+    std::fs::write(out.join("scenes/first/views/input/depth.exr"), "half").unwrap();
+    std::fs::create_dir_all(out.join("scenes/second")).unwrap();
+    std::fs::write(out.join("scenes/second/scene.json"), "{").unwrap();
+    std::fs::write(out.join(".build/second.json"), "[").unwrap();
+    std::fs::write(out.join("scenes/second/stray"), "half").unwrap();
+    let again = run(&mut build(&WHOLE.recipe, &out)).ends_with(0);
+    assert!(!again.stderr.contains("already made"), "{}", again.stderr);
+    assert!(manifest(&out) == WHOLE.manifest);
+}
+
+#[test]
+fn another_recipe_does_not_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("dataset");
+    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/first.json").is_file());
+    let other = WHOLE.recipe.with_file_name("other.toml");
+    std::fs::write(&other, recipe_text("resolution = [80, 60]\natlas_size = 128", &["first", "second"])).unwrap();
+    run(&mut build(&other, &out)).ends_with(2).says("unfinished build of another recipe").says("--force");
+    assert_unfinished(&out);
+    assert!(out.join(".build/first.json").is_file(), "the refusal changed the folder");
+
+    let forced = run(build(&other, &out).arg("--force")).ends_with(0);
+    assert!(!forced.stderr.contains("already made"), "{}", forced.stderr);
+    assert!(manifest(&out) != WHOLE.manifest);
+    run(&mut verify(&out)).ends_with(0);
+    run(&mut build(&other, &out)).ends_with(2).says("holds a finished dataset").says("--force");
+}
+
+#[test]
+fn a_killed_render_goes_on() {
+    let copy = copied_dataset();
+    let renders = copy.path().join("scenes/room/ground_truth/renders/builtin");
+    std::fs::remove_dir_all(&renders).unwrap();
+    kill_when(&mut render(copy.path(), 1), || renders.join("up_left/rgb_a.exr").is_file());
+    let again = run(&mut render(copy.path(), 1)).ends_with(0);
+    let kept: usize = again.stdout.split(", ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((1..5).contains(&kept), "{}", again.stdout);
+    assert!(manifest(copy.path()) == manifest(dataset()));
+}

@@ -1,0 +1,122 @@
+//! The built-in sample as a small dataset: made once and shared; a test that damages it takes a copy.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use super::command::{build, render, run, run_words};
+
+/// 96x72 pixels and atlases of 128 texels: all five views are built and rendered within seconds.
+pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";
+
+static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("sample");
+    let recipe = write_source(&folder.join("source"), SMALL, &["room"]);
+    let dataset = folder.join("dataset");
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    run(&mut render(&dataset, 1)).ends_with(0);
+    dataset
+});
+
+/// The shared dataset, rendered with one sample; nobody writes to it.
+pub fn dataset() -> &'static Path {
+    &DATASET
+}
+
+/// A copy of the shared dataset that may be damaged.
+pub fn copied_dataset() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_folder(dataset(), folder.path());
+    folder
+}
+
+/// Writes the sample's source with a recipe that has these lines in its head and the room once for each id. Gives the
+/// recipe's path.
+pub fn write_source(source: &Path, head: &str, ids: &[&str]) -> PathBuf {
+    run_words([Path::new("sample"), source]).ends_with(0);
+    let recipe = source.join("recipe.toml");
+    std::fs::write(&recipe, recipe_text(head, ids)).unwrap();
+    recipe
+}
+
+/// A recipe of the sample's room.
+pub fn recipe_text(head: &str, ids: &[&str]) -> String {
+    let scene = |id: &&str| format!("\n[[scene]]\nid = \"{id}\"\nbitterli = \"room/scene.xml\"\nhouse = \"sample\"\n");
+    format!("name = \"sample\"\n{head}\n{}", ids.iter().map(scene).collect::<String>())
+}
+
+/// A folder that outlives the tests of this run (nothing drops a static), in the build's own folder for such things.
+/// What earlier runs left there is removed.
+pub fn kept_folder(name: &str) -> PathBuf {
+    const OLD: std::time::Duration = std::time::Duration::from_secs(3600);
+    let root = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
+        let modified = entry.metadata().and_then(|metadata| metadata.modified());
+        if modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > OLD)) {
+            // Another run may be removing it too.
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
+    tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
+}
+
+/// Copies all files below `from`.
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let place = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &place);
+        } else {
+            std::fs::copy(entry.path(), place).unwrap();
+        }
+    }
+}
+
+/// Every file below `root`, relative, sorted.
+pub fn files_below(root: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut folders = vec![root.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                files.push(path.strip_prefix(root).unwrap().to_owned());
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// MANIFEST.sha256 as text.
+pub fn manifest(dataset: &Path) -> String {
+    std::fs::read_to_string(dataset.join("MANIFEST.sha256")).unwrap()
+}
+
+/// A JSON file as it stands.
+pub fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// The folder of the real inputs: `MATEVAL_DATA`, or `shared/data` beside the repository. Where `file` is not in it that
+/// is said, past the test runner's capture, and none is given.
+pub fn real_data(file: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    say_skipped(&format!("no '{file}' in MATEVAL_DATA or ../shared/data"));
+    None
+}
+
+/// Says that a test, or a piece of it, was not run: straight to stderr, past the test runner's capture.
+pub fn say_skipped(why: &str) {
+    use std::io::Write as _;
+    let thread = std::thread::current();
+    let line = format!("SKIPPED: {}: {why}\n", thread.name().unwrap_or("a test"));
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
+}

@@ -1,0 +1,188 @@
+//! `eval score` on the sample: the truth scores high, grey scores its pinned values, tables keep what cannot be compared
+//! apart, and what is missing is said.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_image::transfer::linear_from_srgb_byte;
+use mateval_image::{exr_io, png_io};
+use serde_json::Value;
+
+use super::command::{baseline, build, mateval, run, score};
+use super::sample::{dataset, json, kept_folder, say_skipped, write_source};
+
+/// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen by the
+/// tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
+static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("scores");
+    let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
+    run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
+    for name in ["gt", "grey"] {
+        run(&mut baseline(name, &folder.join("dataset"), &folder.join(name))).ends_with(0);
+        let result = folder.join(name).with_extension("json");
+        run(&mut score_without_lpips(&folder.join(name), &folder.join("dataset"), &result)).ends_with(0);
+    }
+    folder
+});
+
+fn score_without_lpips(submission: &Path, dataset: &Path, result: &Path) -> std::process::Command {
+    let mut command = score(submission, dataset, result);
+    command.env("MATEVAL_CACHE", submission.join("no-such-folder"));
+    command
+}
+
+fn summary(method: &str, protocol: &str) -> Value {
+    json(&SCORED.join(method).with_extension("json"))["protocols"][protocol]["summary"].clone()
+}
+
+fn value(summary: &Value, key: &str) -> f64 {
+    summary[key].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
+}
+
+/// What grey scores under `mateval-1` and under `paper`. Computed once by a script that shares nothing with this project:
+/// albedo.exr, valid.png and unobserved.png of each view read with OpenEXR 3 and scikit-image 0.26, the prediction a
+/// picture of the one colour that sRGB byte 188 stands for, SSIM by `skimage.metrics.structural_similarity`
+/// (gaussian_weights, sigma 1.5, population covariance; its full map averaged over windows wholly inside for `mateval-1`,
+/// both pictures black outside for `paper`), means over the views.
+#[rustfmt::skip]
+const GREY: [(&str, f64, f64); 18] = [
+    ("albedo.input.mse", 0.106455741, 0.094882310),
+    ("albedo.input.psnr", 9.72830913, 10.22814752),
+    ("albedo.input.ssim", 0.316150564, 0.440457659),
+    ("albedo_aligned.input.mse", 0.074382430, 0.060424038),
+    ("albedo_aligned.input.psnr", 11.28529638, 12.18790258),
+    ("albedo_aligned.input.ssim", 0.330347847, 0.439446855),
+    ("albedo.novel.mse", 0.105818689, 0.093000362),
+    ("albedo.novel.psnr", 9.76767717, 10.35622510),
+    ("albedo.novel.ssim", 0.351712918, 0.446880188),
+    ("albedo_aligned.novel.mse", 0.076481694, 0.061086831),
+    ("albedo_aligned.novel.psnr", 11.19709601, 12.15950300),
+    ("albedo_aligned.novel.ssim", 0.363287931, 0.448240668),
+    ("albedo.unobserved.mse", 0.082353450, 0.067068753),
+    ("albedo.unobserved.psnr", 11.03884793, 12.69150329),
+    ("albedo.unobserved.ssim", 0.516586379, 0.940203659),
+    ("albedo_aligned.unobserved.mse", 0.066068298, 0.043791454),
+    ("albedo_aligned.unobserved.psnr", 12.33852168, 13.71001935),
+    ("albedo_aligned.unobserved.ssim", 0.520950828, 0.943911735),
+];
+
+/// Keys whose value is not within a millionth of the pinned one.
+fn off_grey(method: &str) -> Vec<String> {
+    let summaries = ["mateval-1", "paper"].map(|protocol| summary(method, protocol));
+    let mut off = Vec::new();
+    for (key, ours, paper) in GREY {
+        for (summary, expected) in summaries.iter().zip([ours, paper]) {
+            let found = value(summary, key);
+            if (found - expected).abs() > 1e-6 * expected {
+                off.push(format!("{key}: {found}, expected {expected}"));
+            }
+        }
+    }
+    off
+}
+
+#[test]
+fn grey_scores_its_pinned_values() {
+    assert_eq!(off_grey("grey"), [""; 0]);
+    let keys: usize = ["mateval-1", "paper"].map(|p| summary("grey", p).as_object().unwrap().len()).iter().sum();
+    assert_eq!(keys, 2 * GREY.len(), "a key that nobody pinned");
+    // The twin: the truth scores none of them.
+    assert_eq!(off_grey("gt").len(), 2 * GREY.len());
+}
+
+/// The error of a picture of one colour, from the files alone.
+#[test]
+fn greys_error_is_that_of_one_colour() {
+    let room = SCORED.join("dataset/scenes/room");
+    let albedo = exr_io::read_linear(&room.join("ground_truth/views/input/albedo.exr")).unwrap();
+    let valid = png_io::read_mask(&room.join("views/input/valid.png")).unwrap();
+    let error_of = |byte: u8| {
+        let grey = f64::from(linear_from_srgb_byte(byte));
+        let pixels = albedo.pixels().iter().zip(valid.pixels()).filter(|(_, counts)| **counts);
+        let errors: Vec<f64> = pixels.flat_map(|(rgb, _)| rgb.0.map(|v| (f64::from(v) - grey).powi(2))).collect();
+        errors.iter().sum::<f64>() / errors.len() as f64
+    };
+    let found = value(&summary("grey", "mateval-1"), "albedo.input.mse");
+    assert!((found - error_of(188)).abs() < 1e-6 * found, "{found}, expected {}", error_of(188));
+    assert!((found - error_of(187)).abs() > 1e-4 * found);
+}
+
+#[test]
+fn the_truth_is_far_above_grey() {
+    for protocol in ["mateval-1", "paper"] {
+        let [gt, grey] = ["gt", "grey"].map(|method| summary(method, protocol));
+        for views in ["input", "novel", "unobserved"] {
+            let [raw, aligned] = ["albedo", "albedo_aligned"].map(|p| value(&gt, &format!("{p}.{views}.psnr")));
+            assert!(raw >= 38.0, "{protocol} {views}: {raw} dB");
+            assert!((raw - aligned).abs() < 0.1, "{protocol} {views}: {raw} dB raw, {aligned} dB aligned");
+            assert!(value(&grey, &format!("albedo.{views}.psnr")) < raw - 25.0);
+            assert!(value(&grey, &format!("albedo.{views}.ssim")) < value(&gt, &format!("albedo.{views}.ssim")));
+        }
+    }
+}
+
+#[test]
+fn tables_show_both_and_refuse_other_fingerprints() {
+    let result = |name: &str| SCORED.join(name).with_extension("json");
+    let shown = run(mateval().args(["eval", "tables"]).args([result("gt"), result("grey")])).ends_with(0);
+    let row = shown.stdout.lines().find(|line| line.starts_with("| grey")).unwrap();
+    assert!(row.starts_with("| grey | <u>106.456</u> | <u>9.73</u> | <u>0.3162</u> | missing |"), "{row}");
+    let row = shown.stdout.lines().find(|line| line.starts_with("| gt")).unwrap();
+    assert!(row.starts_with("| gt | **0.0") && row.contains("| missing |"), "{row}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.json");
+    run(&mut baseline("grey", dataset(), &folder.path().join("grey"))).ends_with(0);
+    run(&mut score_without_lpips(&folder.path().join("grey"), dataset(), &other)).ends_with(0);
+    let refused = run(mateval().args(["eval", "tables"]).args([&result("gt"), &other])).ends_with(2);
+    assert_eq!(refused.stdout, "");
+    refused.says("different fingerprints").says("score both again");
+    run(mateval().args(["eval", "tables"]).arg(other)).ends_with(0);
+}
+
+#[test]
+fn lpips_without_weights_is_missing_and_says_what_mends_it() {
+    const MEND: &str = "python3 tools/fetch_lpips_weights.py";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("RESULT.json");
+    let mut command = score(&SCORED.join("grey"), &SCORED.join("dataset"), &out);
+    run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0).says("lpips_alex is missing").says(MEND);
+    let result = json(&out);
+    assert_eq!(result["missing"][0]["metric"], "lpips_alex");
+    assert_eq!(result["missing"][0]["mend"], MEND);
+    assert_eq!(result["lpips_weights"], serde_json::json!({ "alex": null }));
+    for protocol in ["mateval-1", "paper"] {
+        let summary = result["protocols"][protocol]["summary"].as_object().unwrap();
+        assert!(!summary.keys().any(|key| key.contains("lpips")));
+    }
+    // The tables say it too.
+    run(mateval().args(["eval", "tables"]).arg(&out)).ends_with(0).says(MEND);
+}
+
+/// The twin of the test above: with the weights, the distance is there and the fingerprint is another one.
+#[test]
+fn lpips_with_weights_is_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("RESULT.json");
+    let scored = run(&mut score(&SCORED.join("grey"), &SCORED.join("dataset"), &out)).ends_with(0);
+    let result = json(&out);
+    if result["missing"] != serde_json::json!([]) {
+        say_skipped(&scored.stderr);
+        return;
+    }
+    let ours = &result["protocols"]["mateval-1"];
+    for key in ["albedo.input.lpips_alex", "albedo_aligned.novel.lpips_alex", "albedo.unobserved.lpips_alex"] {
+        let distance = value(&ours["summary"], key);
+        assert!(distance > 0.05 && distance < 2.0, "{key} {distance}");
+    }
+    // Single values are stored in steps of a millionth.
+    let pictures = ours["pictures"].as_array().unwrap();
+    for picture in pictures.iter().filter(|picture| picture["metric"] == "lpips_alex") {
+        let steps = picture["value"].as_f64().unwrap() * 1e6;
+        assert!((steps - steps.round()).abs() < 1e-6, "{picture}");
+    }
+    let without = json(&SCORED.join("grey.json"));
+    assert_ne!(ours["fingerprint"], without["protocols"]["mateval-1"]["fingerprint"]);
+    let refused = run(mateval().args(["eval", "tables"]).args([&out, &SCORED.join("gt.json")]));
+    refused.ends_with(2).says("different fingerprints");
+}

@@ -1,0 +1,121 @@
+//! Submissions with faults: each is named, and what cannot be used scores exactly as grey 0.5 would.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::{LinearRgb, Picture, png_io};
+use serde_json::Value;
+
+use super::command::{baseline, mateval, run, score};
+use super::sample::{dataset, json};
+
+/// `gt` on the shared dataset, to be damaged.
+fn truth(folder: &Path, name: &str) -> PathBuf {
+    let submission = folder.join(name);
+    run(&mut baseline("gt", dataset(), &submission)).ends_with(0);
+    submission
+}
+
+fn base_color(submission: &Path, instance: &str, ending: &str) -> PathBuf {
+    submission.join("scenes/room").join(instance).join("base_color").with_extension(ending)
+}
+
+/// Scores it; without LPIPS, which would only take time.
+fn scored(submission: &Path) -> Value {
+    let out = submission.with_extension("json");
+    run(score(submission, dataset(), &out).env("MATEVAL_CACHE", submission)).ends_with(0);
+    json(&out)
+}
+
+/// Puts a grey EXR, as large as the least that is allowed, in the place of the map.
+fn make_grey(submission: &Path, instance: &str) {
+    std::fs::remove_file(base_color(submission, instance, "png")).unwrap();
+    let grey = Picture::filled(64, 64, LinearRgb([0.5; 3]));
+    exr_io::write_linear(&base_color(submission, instance, "exr"), &grey, Precision::Float).unwrap();
+}
+
+type Fault = (&'static str, &'static str, fn(&Path));
+
+/// An instance, the finding's code, and what is done to `gt`.
+const FAULTS: [Fault; 7] = [
+    ("floor", "missing_map", |root| std::fs::remove_file(base_color(root, "floor", "png")).unwrap()),
+    ("rug", "unsound_map", |root| {
+        png_io::write_rgb_bytes(&base_color(root, "rug", "png"), &Picture::filled(32, 32, [9; 3])).unwrap();
+    }),
+    ("sofa", "unsound_map", |root| {
+        png_io::write_rgb_bytes(&base_color(root, "sofa", "png"), &Picture::filled(128, 64, [9; 3])).unwrap();
+    }),
+    ("wall_paper", "ambiguous_map", |root| {
+        let grey = Picture::filled(64, 64, LinearRgb([0.1; 3]));
+        exr_io::write_linear(&base_color(root, "wall_paper", "exr"), &grey, Precision::Half).unwrap();
+    }),
+    ("shelf", "unsound_map", |root| {
+        let path = base_color(root, "shelf", "png");
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+    }),
+    ("table", "unsound_map", |root| {
+        std::fs::remove_file(base_color(root, "table", "png")).unwrap();
+        let nothing = Picture::filled(64, 64, LinearRgb([f32::NAN; 3]));
+        exr_io::write_linear(&base_color(root, "table", "exr"), &nothing, Precision::Float).unwrap();
+    }),
+    ("bowl", "missing_map", |root| std::fs::remove_dir_all(root.join("scenes/room/bowl")).unwrap()),
+];
+
+#[test]
+fn what_cannot_be_used_scores_as_grey() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = scored(&truth(folder.path(), "whole"));
+    assert_eq!(whole["findings"], Value::Array(Vec::new()));
+    for (instance, code, damage) in FAULTS {
+        let damaged = truth(folder.path(), &format!("damaged_{instance}"));
+        damage(&damaged);
+        let damaged = scored(&damaged);
+        let findings = damaged["findings"].as_array().unwrap();
+        assert_eq!(findings.len(), 1, "{instance}: {findings:?}");
+        assert_eq!(findings[0]["code"], code, "{instance}");
+        let file = findings[0]["file"].as_str().unwrap();
+        assert!(file.starts_with(&format!("scenes/room/{instance}/base_color.")), "{file}");
+
+        let grey = truth(folder.path(), &format!("grey_{instance}"));
+        make_grey(&grey, instance);
+        let grey = scored(&grey);
+        assert_eq!(grey["findings"], Value::Array(Vec::new()), "{instance}");
+        assert_eq!(damaged["protocols"], grey["protocols"], "{instance}");
+        // The twin: the map itself scores something else.
+        assert_ne!(damaged["protocols"], whole["protocols"], "{instance}");
+    }
+}
+
+#[test]
+fn findings_are_told_on_stderr_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let submission = truth(folder.path(), "gt");
+    std::fs::remove_file(base_color(&submission, "floor", "png")).unwrap();
+    let run = run(&mut score(&submission, dataset(), &folder.path().join("RESULT.json"))).ends_with(0);
+    run.says("gt: warning [missing_map] 'scenes/room/floor/base_color.png'").says("scored as base colour 0.5");
+}
+
+#[test]
+fn another_datasets_submission_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let submission = truth(folder.path(), "gt");
+    super::planted::edit_json(&submission.join("submission.json"), |file| {
+        file["dataset_manifest_sha256"] = "0".repeat(64).into();
+    });
+    assert_eq!(scored(&submission)["findings"][0]["code"], "other_dataset");
+}
+
+#[test]
+fn what_is_no_submission_cannot_be_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("RESULT.json");
+    run(&mut score(folder.path(), dataset(), &out)).ends_with(2).says("submission.json");
+    let submission = truth(folder.path(), "gt");
+    let unknown = run(score(&submission, dataset(), &out).args(["--scene", "kitchen"])).ends_with(2);
+    unknown.says("no scene 'kitchen'").says("room");
+    let mut command = mateval();
+    command.args(["eval", "score", "--protocol", "mine", "--dataset"]).arg(dataset()).arg("--out").arg(&out);
+    run(command.arg(&submission)).ends_with(2).says("no protocol 'mine'");
+    assert!(!out.exists());
+}

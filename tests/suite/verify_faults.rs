@@ -1,0 +1,371 @@
+//! `prep verify`: it passes a sound dataset and names each of many planted faults.
+
+use std::path::Path;
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::{LinearRgb, Normal, Picture, png_io};
+use mateval_scene::camera::Camera;
+use serde_json::Value;
+
+use super::command::{Run, run, verify};
+use super::planted::{Room, edit_json, rehash, roll};
+use super::sample::{copied_dataset, dataset};
+
+/// A fault, and what must be said of it.
+struct Fault {
+    what: &'static str,
+    /// Code and file of the finding.
+    expected: (&'static str, &'static str),
+    /// Damages the dataset in this folder.
+    plant: fn(&Path),
+}
+
+fn findings(run: &Run) -> Vec<(String, String)> {
+    let found: Value = serde_json::from_str(&run.stdout).unwrap();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    found.as_array().unwrap().iter().map(|finding| (text(&finding["code"]), text(&finding["file"]))).collect()
+}
+
+/// Plants the fault in a copy, with or without new hashes, and looks for its finding.
+fn check(fault: &Fault, new_hashes: bool) {
+    let copy = copied_dataset();
+    (fault.plant)(copy.path());
+    if new_hashes {
+        rehash(copy.path());
+    }
+    let verdict = run(&mut verify(copy.path())).ends_with(1);
+    let found = findings(&verdict);
+    let (code, file) = fault.expected;
+    assert!(found.iter().any(|(c, f)| c == code && f == file), "{}: {code} {file} not in {found:?}", fault.what);
+    if new_hashes {
+        let of_hashes = ["changed_file", "missing_file", "unlisted_file", "wrong_manifest"];
+        assert!(!found.iter().any(|(code, _)| of_hashes.contains(&code.as_str())), "{}: {found:?}", fault.what);
+    }
+}
+
+fn check_all(faults: &[Fault], new_hashes: bool, expected: usize) {
+    assert_eq!(faults.len(), expected);
+    for fault in faults {
+        check(fault, new_hashes);
+    }
+}
+
+/// The twin of all others: new hashes alone are no fault, and neither is a dataset without its ground truth.
+#[test]
+fn sound_datasets_pass() {
+    let passed = run(&mut verify(dataset())).ends_with(0);
+    assert_eq!(passed.stdout, "[]\n");
+    let copy = copied_dataset();
+    rehash(copy.path());
+    assert_eq!(findings(&run(&mut verify(copy.path())).ends_with(0)), []);
+    std::fs::remove_dir_all(copy.path().join("scenes/room/ground_truth")).unwrap();
+    rehash(copy.path());
+    assert_eq!(findings(&run(&mut verify(copy.path())).ends_with(0)), []);
+}
+
+#[test]
+fn hashes() {
+    let faults = [
+        Fault {
+            what: "a changed byte",
+            expected: ("changed_file", "scenes/room/views/input/depth.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("views/input/depth.exr");
+                let mut bytes = std::fs::read(&path).unwrap();
+                *bytes.last_mut().unwrap() ^= 1;
+                std::fs::write(path, bytes).unwrap();
+            },
+        },
+        Fault {
+            what: "a missing file",
+            expected: ("missing_file", "scenes/room/views/up_left/part.png"),
+            plant: |root| std::fs::remove_file(Room::of(root).file("views/up_left/part.png")).unwrap(),
+        },
+        Fault {
+            what: "a file too many",
+            expected: ("unlisted_file", "scenes/room/notes.txt"),
+            plant: |root| std::fs::write(Room::of(root).file("notes.txt"), "x").unwrap(),
+        },
+        Fault {
+            what: "a line taken from the manifest",
+            expected: ("wrong_manifest", "dataset.json"),
+            plant: |root| {
+                let text = super::sample::manifest(root);
+                std::fs::write(root.join("MANIFEST.sha256"), text.split_once('\n').unwrap().1).unwrap();
+            },
+        },
+    ];
+    check_all(&faults, false, 4);
+}
+
+#[test]
+fn json_files() {
+    let faults = [
+        Fault {
+            what: "a string for a number",
+            expected: ("breaks_schema", "scenes/room/scene.json"),
+            plant: |root| Room::of(root).edit_scene(|scene| scene["exposure"] = Value::from("1")),
+        },
+        Fault {
+            what: "a word that the format does not know",
+            expected: ("breaks_schema", "targets.json"),
+            plant: |root| edit_json(&root.join("targets.json"), |file| file["target"] = Value::from(1)),
+        },
+        Fault {
+            what: "targets that name a view that is not there",
+            expected: ("dangling_reference", "targets.json"),
+            plant: |root| {
+                edit_json(&root.join("targets.json"), |file| file["targets"][1]["view"] = "upside_down".into())
+            },
+        },
+        Fault {
+            what: "a target twice",
+            expected: ("duplicate_target", "targets.json"),
+            plant: |root| {
+                edit_json(&root.join("targets.json"), |file| file["targets"][1] = file["targets"][0].clone());
+            },
+        },
+        Fault {
+            what: "a part of an instance that is not there",
+            expected: ("dangling_reference", "scenes/room/scene.json"),
+            plant: |root| Room::of(root).edit_scene(|scene| scene["parts"][0]["instance"] = "nobody".into()),
+        },
+    ];
+    check_all(&faults, true, 5);
+}
+
+#[test]
+fn cameras() {
+    let faults = [
+        Fault {
+            what: "one view's camera rolled",
+            expected: ("bad_camera", "scenes/room/scene.json"),
+            plant: |root| Room::of(root).edit_scene(|scene| roll(&mut scene["views"][1], 3.0)),
+        },
+        Fault {
+            what: "all cameras rolled together: each is still the turned input camera",
+            expected: ("not_reprojected", "scenes/room/views/input/instance.png"),
+            plant: |root| {
+                Room::of(root).edit_scene(|scene| {
+                    roll(&mut scene["views"][0], 3.0);
+                    let input: Camera = serde_json::from_value(scene["views"][0]["camera"].clone()).unwrap();
+                    for view in scene["views"].as_array_mut().unwrap() {
+                        let turned = input.turned(view["x_deg"].as_f64().unwrap(), view["y_deg"].as_f64().unwrap());
+                        view["camera"] = serde_json::to_value(turned).unwrap();
+                    }
+                });
+            },
+        },
+        Fault {
+            what: "a matrix that is no rotation",
+            expected: ("bad_camera", "scenes/room/scene.json"),
+            plant: |root| {
+                Room::of(root).edit_scene(|s| s["views"][0]["camera"]["world_from_camera"][0][0] = Value::from(2.0));
+            },
+        },
+    ];
+    check_all(&faults, true, 3);
+}
+
+#[test]
+fn pictures() {
+    let faults = [
+        Fault {
+            what: "depth times 1.01",
+            expected: ("not_reprojected", "scenes/room/views/up_right/depth.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("views/up_right/depth.exr");
+                let scaled = exr_io::read_scalar(&path).unwrap().map(|depth| depth * 1.01);
+                exr_io::write_scalar(&path, &scaled, Precision::Float).unwrap();
+            },
+        },
+        Fault {
+            what: "an instance beyond the list",
+            expected: ("bad_id", "scenes/room/views/input/instance.png"),
+            plant: |root| Room::of(root).edit_ids("views/input/instance.png", |id| if id == 1 { 60_000 } else { id }),
+        },
+        Fault {
+            what: "the parts shuffled",
+            expected: ("bad_id", "scenes/room/views/input/part.png"),
+            plant: |root| Room::of(root).edit_ids("views/input/part.png", |id| if id < 2 { id } else { id - 1 }),
+        },
+        Fault {
+            what: "the parts of one instance shuffled",
+            expected: ("not_reprojected", "scenes/room/views/input/part.png"),
+            plant: shuffle_the_sofa,
+        },
+        Fault {
+            what: "unobserved where nothing is valid",
+            expected: ("bad_mask", "scenes/room/views/up_left/unobserved.png"),
+            plant: |root| {
+                let room = Room::of(root);
+                let valid = png_io::read_mask(&room.file("views/up_left/valid.png")).unwrap();
+                room.edit_mask("views/up_left/unobserved.png", |x, y, counts| counts || !valid.get(x, y));
+            },
+        },
+        Fault {
+            what: "unobserved where the input view looks",
+            expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
+            plant: |root| {
+                let room = Room::of(root);
+                let valid = png_io::read_mask(&room.file("views/up_left/valid.png")).unwrap();
+                room.edit_mask("views/up_left/unobserved.png", |x, y, _| valid.get(x, y));
+            },
+        },
+        Fault {
+            what: "nothing unobserved",
+            expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
+            plant: |root| Room::of(root).edit_mask("views/up_left/unobserved.png", |_, _, _| false),
+        },
+        Fault {
+            what: "nothing valid",
+            expected: ("not_reprojected", "scenes/room/views/input/valid.png"),
+            plant: |root| Room::of(root).edit_mask("views/input/valid.png", |_, _, _| false),
+        },
+        Fault {
+            what: "normals that all point up",
+            expected: ("not_reprojected", "scenes/room/views/input/normal.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("views/input/normal.exr");
+                let normals = exr_io::read_normal(&path).unwrap();
+                let up = normals.map(|normal| if normal.0 == [0.0; 3] { normal } else { Normal([0.0, 1.0, 0.0]) });
+                exr_io::write_normal(&path, &up, Precision::Half).unwrap();
+            },
+        },
+        Fault {
+            what: "normals of no length",
+            expected: ("bad_normal", "scenes/room/views/down_left/normal.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("views/down_left/normal.exr");
+                let zero = exr_io::read_normal(&path).unwrap().map(|_| Normal::default());
+                exr_io::write_normal(&path, &zero, Precision::Half).unwrap();
+            },
+        },
+        Fault {
+            what: "a picture of another size",
+            expected: ("wrong_size", "scenes/room/views/input/valid.png"),
+            plant: |root| {
+                let path = Room::of(root).file("views/input/valid.png");
+                png_io::write_mask(&path, &Picture::filled(96, 71, true)).unwrap();
+            },
+        },
+    ];
+    check_all(&faults, true, 11);
+}
+
+/// Gives the sofa's parts each other's ids in the input view.
+fn shuffle_the_sofa(root: &Path) {
+    let room = Room::of(root);
+    let scene = super::sample::json(&room.file("scene.json"));
+    let parts = scene["parts"].as_array().unwrap();
+    let own = parts.iter().filter(|part| part["instance"] == "sofa");
+    let ids: Vec<u16> = own.map(|part| part["index"].as_u64().unwrap() as u16).collect();
+    assert!(ids.len() > 1, "the sofa has {} parts", ids.len());
+    let next = |id: u16| ids.iter().position(|own| *own == id).map_or(id, |at| ids[(at + 1) % ids.len()]);
+    room.edit_ids("views/input/part.png", next);
+}
+
+#[test]
+fn meshes() {
+    let faults =
+        [
+            Fault {
+                what: "a uv outside of the atlas",
+                expected: ("bad_uv", "scenes/room/geometry/instances.glb"),
+                plant: |root| {
+                    let instances = "geometry/instances.glb";
+                    Room::of(root).edit_glb(instances, "rug", "TEXCOORD_0", |at, uv| if at == 0 { 1.5 } else { uv });
+                },
+            },
+            Fault {
+                what: "a vertex moved in one file",
+                expected: ("bad_parts", "scenes/room/geometry/parts.glb"),
+                plant: |root| {
+                    Room::of(root).edit_glb("geometry/instances.glb", "rug", "POSITION", |at, x| {
+                        if at == 0 { x + 0.1 } else { x }
+                    });
+                },
+            },
+            Fault {
+                what: "the rug moved in both files",
+                expected: ("wrong_geometry", "scenes/room/ground_truth/reference/geometry.glb"),
+                plant: |root| {
+                    let room = Room::of(root);
+                    let scene = super::sample::json(&room.file("scene.json"));
+                    let of_rug = |part: &&Value| part["instance"] == "rug";
+                    let raised = |at: usize, x: f32| if at % 3 == 1 { x + 0.1 } else { x };
+                    room.edit_glb("geometry/instances.glb", "rug", "POSITION", raised);
+                    for part in scene["parts"].as_array().unwrap().iter().filter(of_rug) {
+                        room.edit_glb("geometry/parts.glb", part["id"].as_str().unwrap(), "POSITION", raised);
+                    }
+                },
+            },
+            Fault {
+                what: "instances in the place of parts",
+                expected: ("wrong_nodes", "scenes/room/geometry/parts.glb"),
+                plant: |root| {
+                    let room = Room::of(root);
+                    std::fs::copy(room.file("geometry/instances.glb"), room.file("geometry/parts.glb")).unwrap();
+                },
+            },
+        ];
+    check_all(&faults, true, 4);
+}
+
+#[test]
+fn ground_truth() {
+    let faults = [
+        Fault {
+            what: "a baked map of another size",
+            expected: ("wrong_size", "scenes/room/ground_truth/materials/sofa/base_color.png"),
+            plant: |root| {
+                let path = Room::of(root).file("ground_truth/materials/sofa/base_color.png");
+                png_io::write_rgb_bytes(&path, &Picture::filled(64, 64, [9; 3])).unwrap();
+            },
+        },
+        Fault {
+            what: "an albedo of another view",
+            expected: ("not_reprojected", "scenes/room/ground_truth/views/input/albedo.exr"),
+            plant: |root| {
+                let other = Room::of(root).file("ground_truth/views/up_left/albedo.exr");
+                std::fs::copy(other, Room::of(root).file("ground_truth/views/input/albedo.exr")).unwrap();
+            },
+        },
+        Fault {
+            what: "an albedo that is not a number",
+            expected: ("unreadable", "scenes/room/ground_truth/views/input/albedo.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("ground_truth/views/input/albedo.exr");
+                let mut albedo = exr_io::read_linear(&path).unwrap();
+                albedo.set(5, 5, LinearRgb([f32::NAN; 3]));
+                exr_io::write_linear(&path, &albedo, Precision::Float).unwrap();
+            },
+        },
+        Fault {
+            what: "a metallic above one",
+            expected: ("out_of_range", "scenes/room/ground_truth/views/input/metallic.exr"),
+            plant: |root| {
+                let path = Room::of(root).file("ground_truth/views/input/metallic.exr");
+                let raised = exr_io::read_scalar(&path).unwrap().map(|value| value + 0.5);
+                exr_io::write_scalar(&path, &raised, Precision::Float).unwrap();
+            },
+        },
+        Fault {
+            what: "an input picture that is another view's",
+            expected: ("wrong_input", "scenes/room/views/input/rgb.exr"),
+            plant: |root| {
+                let room = Room::of(root);
+                let other = room.file("ground_truth/renders/builtin/up_left/rgb.exr");
+                std::fs::copy(other, room.file("views/input/rgb.exr")).unwrap();
+            },
+        },
+        Fault {
+            what: "a render that is not there",
+            expected: ("unreadable", "scenes/room/ground_truth/renders/builtin/down_right/rgb_b.exr"),
+            plant: |root| {
+                std::fs::remove_file(Room::of(root).file("ground_truth/renders/builtin/down_right/rgb_b.exr")).unwrap();
+            },
+        },
+    ];
+    check_all(&faults, true, 6);
+}
