@@ -15,6 +15,7 @@ mod suite {
     mod help;
     mod images;
     mod planted;
+    mod readme;
     mod real_scenes;
     mod reprojection;
     mod resume;

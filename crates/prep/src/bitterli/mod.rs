@@ -82,7 +82,7 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, BitterliE
     let mut log = Log::new(name, limits.findings);
     let document = Document::parse(xml_path, &text, limits, &mut log)?;
     let ids = document.ids(&mut log);
-    let licence = read_licence(&mut source);
+    let licence = read_licence(&mut source, &mut log);
     let mut reader = Reader {
         ids,
         major_version: document.major_version,
@@ -129,13 +129,19 @@ fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, Stri
     Ok((source, name, text))
 }
 
-fn read_licence(source: &mut SourceFolder) -> Option<LicenceText> {
+/// The licence beside the scene. It must travel with it, so one that cannot be read is a finding.
+fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<LicenceText> {
     let file = ["LICENSE.txt", "LICENSE", "license.txt"].into_iter().find(|name| source.path(name).is_ok())?;
-    let text = String::from_utf8_lossy(&source.read(file).ok()?).into_owned();
-    Some(LicenceText { file: file.to_owned(), text })
+    match source.read(file) {
+        Ok(bytes) => Some(LicenceText { file: file.to_owned(), text: String::from_utf8_lossy(&bytes).into_owned() }),
+        Err(fault) => {
+            let action = "left it out; carry it along by hand";
+            log.push(mateval_scene::Severity::Warning, fault.code, file, "", fault.message, action);
+            None
+        }
+    }
 }
 
-/// What a `LICENSE.txt` of Bitterli's says between "version of" and the comma, else the name of the folder.
 fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
     let first = licence.and_then(|licence| licence.text.lines().next()).unwrap_or("");
     let named = first.split_once("version of ").map(|(_, rest)| rest.split(',').next().unwrap_or(rest).trim());

@@ -58,7 +58,7 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     );
     let mut optimizer = ReinsertionOptimizer::default();
     optimizer.run(&mut tree, params.reinsertion_batch_ratio, None);
-    collapse(&mut tree, params.max_prims_per_leaf, params.collapse_traversal_cost);
+    collapse(&mut tree, 4, 1.0);
     let second = params.reinsertion_batch_ratio * params.post_collapse_reinsertion_batch_ratio_multiplier;
     optimizer.run(&mut tree, second, None);
     tree
