@@ -37,6 +37,11 @@ pub(super) struct Tree {
     pub(super) order: Vec<u32>,
 }
 
+/// Triangles in a leaf, at most.
+const LARGEST_LEAF: u32 = 4;
+/// What visiting a node costs, in triangle tests: ours, in f64, is no cheaper than a pair of boxes.
+const NODE_COST: f32 = 1.0;
+
 /// Builds over at least one triangle with finite corners.
 pub(super) fn build(triangles: &[[Vec3; 3]]) -> Tree {
     let boxes: Vec<Aabb> = triangles.iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
@@ -58,7 +63,7 @@ fn binary_tree(boxes: &[Aabb]) -> Bvh2 {
     );
     let mut optimizer = ReinsertionOptimizer::default();
     optimizer.run(&mut tree, params.reinsertion_batch_ratio, None);
-    collapse(&mut tree, 4, 1.0);
+    collapse(&mut tree, LARGEST_LEAF, NODE_COST);
     let second = params.reinsertion_batch_ratio * params.post_collapse_reinsertion_batch_ratio_multiplier;
     optimizer.run(&mut tree, second, None);
     tree

@@ -167,9 +167,14 @@ fn flatten(meshes: &[&TriangleMesh]) -> Result<(Vec<[Vec3; 3]>, Vec<u32>), Trace
     Ok((corners, starts))
 }
 
+/// Each coordinate by itself: a maximum would pass over NaN.
+fn is_within_reach(position: Vec3) -> bool {
+    position.to_array().iter().all(|v| v.abs() <= LARGEST_COORDINATE)
+}
+
 fn check_positions(surface: usize, mesh: &TriangleMesh) -> Result<(), TracerError> {
     let invalid = |what: String| Err(TracerError::Invalid(format!("surface {surface}: {what}")));
-    if let Some(vertex) = mesh.positions.iter().position(|p| !(p.abs().max_element() <= LARGEST_COORDINATE)) {
+    if let Some(vertex) = mesh.positions.iter().position(|p| !is_within_reach(*p)) {
         return invalid(format!("vertex {vertex} is at {}, expected within 1e7 m", mesh.positions[vertex]));
     }
     let count = mesh.positions.len();

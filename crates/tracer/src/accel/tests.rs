@@ -137,7 +137,9 @@ fn bad_meshes_are_refused() {
     let sound = ball(4);
     let dangling = TriangleMesh { triangles: vec![[0, 1, 99]], ..sound.clone() };
     let infinite = TriangleMesh { positions: vec![Vec3::INFINITY; 14], ..sound.clone() };
-    for mesh in [&dangling, &infinite] {
+    let mut nan = sound.clone();
+    nan.positions[3].y = f32::NAN;
+    for mesh in [&dangling, &infinite, &nan] {
         assert!(
             matches!(Accel::build(&[&sound, mesh]), Err(TracerError::Invalid(what)) if what.starts_with("surface 1"))
         );

@@ -31,9 +31,9 @@ impl SlabRay {
     fn new(ray: &Ray, bounds: &[[f32; 3]; 2]) -> Self {
         let origin = ray.origin().to_array();
         let mut reach = 0.0_f32;
-        for axis in 0..3 {
-            let farthest = (bounds[0][axis] - origin[axis]).abs().max((bounds[1][axis] - origin[axis]).abs());
-            reach = reach.max(farthest + origin[axis].abs());
+        for ((low, high), at) in bounds[0].iter().zip(bounds[1]).zip(origin) {
+            let farthest = (low - at).abs().max((high - at).abs());
+            reach = reach.max(farthest + at.abs());
         }
         let pad = reach * PADDING;
         let mut slab = Self { near: [0; 3], near_origin: origin, far_origin: origin, inverse: [0.0; 3] };

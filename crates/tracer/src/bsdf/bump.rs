@@ -73,7 +73,9 @@ mod tests {
         };
         let bent = |uv: [[f32; 3]; 2], scale: f32| {
             let height = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: UvTransform(uv) };
-            let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, Vec3::new(0.45, 0.25, 0.3), 2.0);
+            let facing = Facing::new(&mesh, TriangleIndex(0), 2.0);
+            let weights = Vec3::new(0.45, 0.25, 0.3);
+            let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, weights);
             bumped_normal(&BumpMap { height, scale }, &textures, &mesh, &hit)
         };
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
