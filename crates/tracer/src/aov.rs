@@ -112,6 +112,7 @@ mod tests {
             textures: vec![SourceTexture { name: String::new(), sha256: None, texture }],
             lights: Vec::new(),
         }))
+        .unwrap()
     }
 
     fn camera() -> Camera {

@@ -50,6 +50,7 @@ impl SlabRay {
 
     /// The distance at which the ray enters the box, if it does before `max_distance`.
     #[inline(always)]
+    #[allow(clippy::needless_range_loop, reason = "five arrays of three are indexed alike")]
     fn enter(&self, bounds: &[[f32; 3]; 2], max_distance: f32) -> Option<f32> {
         let (mut enter, mut leave) = (0.0_f32, max_distance);
         for axis in 0..3 {
