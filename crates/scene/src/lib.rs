@@ -3,7 +3,7 @@
 //! In: what `prep` converted, or a dataset folder on disk. Out: the same on disk, or as checked Rust values.
 //!
 //! Between: [`ids`] and [`findings`] are the words that everything shares; [`camera`] is the one camera model;
-//! [`mesh`], [`material`] and [`reference`] describe a scene as its makers meant it.
+//! [`mesh`], [`material`] and [`mod@reference`] describe a scene as its makers meant it.
 
 pub mod camera;
 pub mod dataset;

@@ -121,7 +121,7 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
     json::write(&folder.lights(), &LightsFile { format, groups: scene.lights.clone() })
 }
 
-/// Reads what [`write`] wrote; every place that leads nowhere is a finding of the error.
+/// Reads what [`write()`] wrote; every place that leads nowhere is a finding of the error.
 pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
     let reference = folder.reference();
     let path = reference.join("reference.json");

@@ -33,7 +33,8 @@ pub struct PixelHit {
     pub depth: f64,
     /// World-space shading normal, unit length, turned towards the camera.
     pub normal: Vec3,
-    /// Whether the side is seen from which the triangle's corners run counter-clockwise.
+    /// Whether the front is seen: the side of the vertex normals, or else the one from which the triangle's corners run
+    /// counter-clockwise. That is the side that a one-sided emitter glows on.
     pub front: bool,
 }
 
@@ -53,7 +54,7 @@ pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Pixel
     let triangle = hit.triangle.0;
     let corners = mesh.corners(triangle).map(|corner| corner.as_dvec3());
     let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-    let front = geometric.dot(direction) < 0.0;
+    let front = world.surface_hit(&hit).is_front(-direction.as_vec3());
     // From the corners, not from the distance along the ray: as exact as the mesh is.
     let weights = hit.barycentrics.as_dvec3();
     let point = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;

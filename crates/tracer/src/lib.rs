@@ -1,8 +1,8 @@
 //! Traces light through a scene.
 //!
 //! In: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and a
-//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render`]), and first hits ([`World::first_hit`]) for depth, normals, ids and
-//! material pictures.
+//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render()`]), and first hits ([`World::first_hit`],
+//! [`aov`]) for depth, normals, ids and material pictures.
 //!
 //! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
 //! [`SurfaceHit`]; the surface's material there becomes a [`Bsdf`]; [`emitter`] samples what shines on it; [`sampler`]
