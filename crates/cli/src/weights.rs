@@ -24,7 +24,7 @@ pub fn load(net: Net) -> LpipsWeights {
     match Lpips::load(net, &cache_folder().join(net.file_name())) {
         Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
         Err(error) => {
-            say(&format!("warning: {} is missing: {error}", net.key()));
+            say(&format!("warning: {} is missing: {error}; run: {MEND}", net.key()));
             LpipsWeights::Missing { reason: error.to_string(), mend: MEND.to_owned() }
         }
     }
