@@ -42,14 +42,11 @@ fn albedo_row(
 ) -> Vec<Vec<LinearRgb>> {
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
     for x in 0..width {
-        let lookups: Vec<Option<(usize, Vec2)>> = subpixels(x, y)
-            .into_iter()
-            .map(|place| {
-                let hit = hit_through(world, camera, place)?;
-                let mesh = &atlases[hit.surface.0];
-                Some((hit.surface.0, hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?)))
-            })
-            .collect();
+        let lookups = subpixels(x, y).map(|place| {
+            let hit = hit_through(world, camera, place)?;
+            let mesh = &atlases[hit.surface.0];
+            Some((hit.surface.0, hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?)))
+        });
         for (row, submission) in rows.iter_mut().zip(submissions) {
             row.push(mean_base_color(submission, &lookups));
         }
