@@ -24,7 +24,7 @@ pub mod surface_hit;
 mod warp;
 pub mod world;
 
-pub use accel::{Accel, Hit, TriangleIndex};
+pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use error::TracerError;
 pub use ray::Ray;
