@@ -1,4 +1,5 @@
 //! Interleaved timing: load on the machine hits all contestants alike.
+#![allow(dead_code, reason = "benchmarks share it, and not each uses all")]
 
 use cpu_time::ProcessTime;
 

@@ -1,6 +1,6 @@
 //! Walks a ray through the hierarchy.
 
-use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, key_child};
+use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles};
 use super::wide::{Block, Child, Node, WIDTH, Wide};
 use crate::ray::Ray;
 
@@ -52,7 +52,12 @@ pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
         if !child.is_block() {
             let node = &wide.nodes[child.place()];
             let boxes = kernel.boxes(node, &box_ray, limit);
-            next = nearest_first(kernel, wide, node, &boxes, &mut stack).or_else(|| stack.pop(limit));
+            let child = if ANY {
+                in_any_order(kernel, wide, node, boxes.met, &mut stack)
+            } else {
+                nearest_first(kernel, wide, node, &boxes, &mut stack)
+            };
+            next = child.or_else(|| stack.pop(limit));
             continue;
         }
         let block = &wide.blocks[child.place()];
@@ -83,28 +88,33 @@ fn nearest_first<K: Kernel>(
     boxes: &Boxes<K::Lanes>,
     stack: &mut Stack,
 ) -> Option<Child> {
-    let child = |lane: usize| node.children[lane & (WIDTH - 1)];
     match boxes.met.count_ones() {
         0 => None,
-        1 => Some(child(boxes.met.trailing_zeros() as usize)),
-        2 => {
-            let enter = kernel.numbers(boxes.enter);
-            let first = boxes.met.trailing_zeros() as usize & (WIDTH - 1);
-            let second = 31 - boxes.met.leading_zeros() as usize & (WIDTH - 1);
-            let (near, far) = if enter[second] < enter[first] { (second, first) } else { (first, second) };
-            stack.push(enter[far].to_bits(), child(far));
-            prefetch(kernel, wide, child(far));
-            Some(child(near))
-        }
-        count => {
-            let keys = kernel.sorted(boxes);
-            for &key in keys[1..count as usize & 15].iter().rev() {
-                stack.push(key & !7, child(key_child(key)));
+        1 => Some(node.children[boxes.met.trailing_zeros() as usize & (WIDTH - 1)]),
+        _ => {
+            kernel.push_sorted(node, boxes, stack);
+            let nearest = stack.pop(f32::INFINITY);
+            if let Some(next) = stack.top() {
+                prefetch(kernel, wide, next);
             }
-            prefetch(kernel, wide, child(key_child(keys[1])));
-            Some(child(key_child(keys[0])))
+            nearest
         }
     }
+}
+
+/// One of the children met, if any; the others are pushed.
+#[inline(always)]
+fn in_any_order<K: Kernel>(kernel: K, wide: &Wide, node: &Node, met: u32, stack: &mut Stack) -> Option<Child> {
+    let child = |met: u32| node.children[met.trailing_zeros() as usize & (WIDTH - 1)];
+    let mut rest = met;
+    while rest & rest.wrapping_sub(1) != 0 {
+        stack.push(0, child(rest));
+        rest &= rest - 1;
+    }
+    if rest != met {
+        prefetch(kernel, wide, child(met));
+    }
+    (met != 0).then(|| child(rest))
 }
 
 #[inline(always)]

@@ -3,7 +3,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{BoxRay, Boxes, Kernel, TriangleRay, Triangles, WIDENED};
+use super::{BoxRay, Boxes, Kernel, Portable, Stack, TriangleRay, Triangles, WIDENED};
 use crate::accel::wide::{Block, Node, WIDTH};
 
 /// The proof that this processor has them all: there is no other way to get one than [`Self::detect`].
@@ -42,13 +42,8 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn numbers(self, lanes: Self::Lanes) -> [f32; WIDTH] {
-        unsafe { store(lanes) }
-    }
-
-    #[inline(always)]
-    fn sorted(self, boxes: &Boxes<Self::Lanes>) -> [u32; WIDTH] {
-        unsafe { sorted(boxes.met, boxes.enter) }
+    fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack) {
+        unsafe { push_sorted(node, boxes, stack) }
     }
 
     #[inline(always)]
@@ -101,36 +96,55 @@ fn boxes(node: &Node, ray: &BoxRay, limit: f32) -> Boxes<__m256> {
     Boxes { met: met & node.filled, enter }
 }
 
-/// Batcher's bitonic network: six rounds of compare and exchange.
+/// Sorts all eight lanes, pushes all, and then takes those that were met as pushed: no branch depends on their number.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
-fn sorted(met: u32, enter: __m256) -> [u32; WIDTH] {
+fn push_sorted(node: &Node, boxes: &Boxes<__m256>, stack: &mut Stack) {
+    let keys = sorted(boxes.met, boxes.enter);
+    let Some(room) = stack.room() else { return Portable.push_sorted(node, &boxes.numbers(), stack) };
+    // SAFETY: a child is a number of 32 bits; eight of them behind references.
+    unsafe {
+        let children = _mm256_loadu_si256(node.children.as_ptr().cast());
+        _mm256_storeu_si256(room.children.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, keys));
+        _mm256_storeu_si256(room.enters.as_mut_ptr().cast(), _mm256_andnot_si256(_mm256_set1_epi32(7), keys));
+    }
+    // SAFETY: there was room, and all eight entries are written.
+    unsafe { stack.fill(boxes.met.count_ones() as usize) };
+}
+
+/// The keys of the boxes met, the farthest first, then those of the others. Batcher's bitonic network: six rounds of
+/// compare and exchange.
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+#[inline]
+fn sorted(met: u32, enter: __m256) -> __m256i {
     let lanes = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-    let keys = _mm256_or_si256(_mm256_and_si256(_mm256_castps_si256(enter), _mm256_set1_epi32(!7)), lanes);
+    let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(enter)), lanes);
     let one_bit = _mm256_sllv_epi32(_mm256_set1_epi32(1), lanes);
     let wanted = _mm256_and_si256(_mm256_set1_epi32(met as i32), one_bit);
-    let missed = _mm256_cmpeq_epi32(wanted, _mm256_setzero_si256());
-    // What was missed becomes all ones: the largest unsigned number.
-    let keys = _mm256_or_si256(keys, missed);
-    // The bits say which lanes keep the larger of a pair.
+    // What was missed becomes -1: less than every distance.
+    let keys = _mm256_or_si256(keys, _mm256_cmpeq_epi32(wanted, _mm256_setzero_si256()));
+    // The bits say which lanes keep the lesser of a pair.
     let keys = exchange::<0b0110_0110>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
     let keys = exchange::<0b0011_1100>(keys, _mm256_shuffle_epi32::<0b01_00_11_10>(keys));
     let keys = exchange::<0b0101_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
     let keys = exchange::<0b1111_0000>(keys, _mm256_permute2x128_si256::<1>(keys, keys));
     let keys = exchange::<0b1100_1100>(keys, _mm256_shuffle_epi32::<0b01_00_11_10>(keys));
-    let keys = exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
-    let mut sorted = [0_u32; WIDTH];
-    // SAFETY: eight integers behind a reference.
-    unsafe { _mm256_storeu_si256(sorted.as_mut_ptr().cast(), keys) };
-    sorted
+    exchange::<0b1010_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys))
 }
 
-/// Lane by lane the lesser of two keys, or the larger where bit `LARGER` of the lane is set.
+impl Boxes<__m256> {
+    fn numbers(&self) -> Boxes<[f32; WIDTH]> {
+        // SAFETY: there are no `__m256` in these boxes but those that `Avx2` made.
+        Boxes { met: self.met, enter: unsafe { store(self.enter) } }
+    }
+}
+
+/// Lane by lane the larger of two keys, or the lesser where bit `LESSER` of the lane is set.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
-fn exchange<const LARGER: i32>(keys: __m256i, partners: __m256i) -> __m256i {
-    let (least, most) = (_mm256_min_epu32(keys, partners), _mm256_max_epu32(keys, partners));
-    _mm256_blend_epi32::<LARGER>(least, most)
+fn exchange<const LESSER: i32>(keys: __m256i, partners: __m256i) -> __m256i {
+    let (least, most) = (_mm256_min_epi32(keys, partners), _mm256_max_epi32(keys, partners));
+    _mm256_blend_epi32::<LESSER>(most, least)
 }
 
 /// Three lanes of vectors.
@@ -158,11 +172,7 @@ fn sheared(corner: &[[f32; WIDTH]; 3], ray: &TriangleRay) -> Vectors {
     let z = _mm256_sub_ps(load(&corner[axis_z]), _mm256_set1_ps(ray.origin[axis_z]));
     let x = _mm256_sub_ps(load(&corner[axis_x]), _mm256_set1_ps(ray.origin[axis_x]));
     let y = _mm256_sub_ps(load(&corner[axis_y]), _mm256_set1_ps(ray.origin[axis_y]));
-    [
-        _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[0]), z, x),
-        _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[1]), z, y),
-        z,
-    ]
+    [_mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[0]), z, x), _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[1]), z, y), z]
 }
 
 /// See `portable::difference`.

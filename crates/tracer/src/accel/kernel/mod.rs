@@ -56,11 +56,9 @@ pub(super) trait Kernel: Copy {
 
     fn boxes(self, node: &Node, ray: &BoxRay, limit: f32) -> Boxes<Self::Lanes>;
 
-    /// The lanes as numbers.
-    fn numbers(self, lanes: Self::Lanes) -> [f32; WIDTH];
-
-    /// Keys of the boxes met, nearest first: distance (its last three bits lost) and child, see [`key`].
-    fn sorted(self, boxes: &Boxes<Self::Lanes>) -> [u32; WIDTH];
+    /// Pushes the children met, of which there is at least one, the farthest first; distances may lose their last three
+    /// bits.
+    fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack);
 
     /// Triangles at a distance above 0 and up to `limit`; none of those seen edge-on.
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles;
@@ -69,16 +67,10 @@ pub(super) trait Kernel: Copy {
     fn prefetch<T>(self, place: &T);
 }
 
-/// Distances are not negative, so their bits are ordered as they are; the last three give way to the child.
+/// Distances are not negative, so their bits are ordered as they are; the last three give way to the child's number.
 #[inline(always)]
 fn key(distance: f32, child: u32) -> u32 {
     distance.to_bits() & !7 | child
-}
-
-/// The child of a key.
-#[inline(always)]
-pub(super) fn key_child(key: u32) -> usize {
-    (key & 7) as usize
 }
 
 /// What of a ray the box test needs.

@@ -1,6 +1,6 @@
 //! The kernel for every processor: the formulas, one lane after the other.
 
-use super::{BoxRay, Boxes, Kernel, TriangleRay, Triangles, WIDENED, key};
+use super::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, WIDENED, key};
 use crate::accel::wide::{Block, Node, WIDTH};
 
 /// Works everywhere.
@@ -34,17 +34,17 @@ impl Kernel for Portable {
         boxes
     }
 
-    fn numbers(self, lanes: Self::Lanes) -> [f32; WIDTH] {
-        lanes
-    }
-
-    fn sorted(self, boxes: &Boxes<Self::Lanes>) -> [u32; WIDTH] {
-        let mut keys = [u32::MAX; WIDTH];
+    fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack) {
+        let mut keys = [0; WIDTH];
+        let mut count = 0;
         for lane in (0..WIDTH).filter(|lane| boxes.met & (1 << lane) != 0) {
-            keys[lane] = key(boxes.enter[lane], lane as u32);
+            keys[count] = key(boxes.enter[lane], lane as u32);
+            count += 1;
         }
-        keys.sort_unstable();
-        keys
+        keys[..count].sort_unstable_by(|a, b| b.cmp(a));
+        for key in &keys[..count] {
+            stack.push(key & !7, node.children[(key & 7) as usize]);
+        }
     }
 
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {

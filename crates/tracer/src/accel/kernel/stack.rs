@@ -4,33 +4,58 @@
 use std::mem::MaybeUninit;
 
 use super::WIDENED;
-use crate::accel::wide::Child;
+use crate::accel::wide::{Child, WIDTH};
 
-/// Children still to be visited and the bits of the distance where the ray enters them: a fixed array, and a vector for
-/// what it cannot hold.
+/// Children still to be visited and the bits of the distance where the ray enters them: fixed arrays, and a vector for
+/// what they cannot hold.
 pub(in crate::accel) struct Stack {
-    /// The first `len` entries have been written.
-    fixed: [MaybeUninit<(u32, Child)>; FIXED],
+    /// The first `len` entries of both arrays have been written.
+    enters: [MaybeUninit<u32>; FIXED],
+    children: [MaybeUninit<Child>; FIXED],
     len: usize,
     spilled: Vec<(u32, Child)>,
 }
 
-const FIXED: usize = 96;
+const FIXED: usize = 128;
 
 impl Stack {
     #[inline(always)]
     pub(in crate::accel) fn new() -> Self {
-        Self { fixed: [const { MaybeUninit::uninit() }; FIXED], len: 0, spilled: Vec::new() }
+        Self {
+            enters: [const { MaybeUninit::uninit() }; FIXED],
+            children: [const { MaybeUninit::uninit() }; FIXED],
+            len: 0,
+            spilled: Vec::new(),
+        }
     }
 
     #[inline(always)]
     pub(in crate::accel) fn push(&mut self, enter_bits: u32, child: Child) {
-        if let Some(slot) = self.fixed.get_mut(self.len) {
-            slot.write((enter_bits, child));
+        if self.len < FIXED {
+            self.enters[self.len].write(enter_bits);
+            self.children[self.len].write(child);
             self.len += 1;
         } else {
             self.spill(enter_bits, child);
         }
+    }
+
+    /// Room for eight more entries, for [`Self::fill`]; none where there is not so much left.
+    #[inline(always)]
+    pub(super) fn room(&mut self) -> Option<Room<'_>> {
+        let enters = self.enters.get_mut(self.len..)?.first_chunk_mut()?;
+        let children = self.children.get_mut(self.len..)?.first_chunk_mut()?;
+        Some(Room { enters, children })
+    }
+
+    /// Takes the first `count` entries (at most eight) of the room as pushed.
+    ///
+    /// # Safety
+    ///
+    /// [`Self::room`] has given room, and its first `count` entries have been written since the last push.
+    #[inline(always)]
+    pub(super) unsafe fn fill(&mut self, count: usize) {
+        self.len += count;
     }
 
     #[cold]
@@ -45,6 +70,14 @@ impl Stack {
         self.spilled.pop()
     }
 
+    /// The child pushed last.
+    #[inline(always)]
+    pub(in crate::accel) fn top(&self) -> Option<Child> {
+        let last = self.len.checked_sub(1)?;
+        // SAFETY: as in `pop`.
+        Some(unsafe { self.children[last].assume_init() })
+    }
+
     /// The child pushed last of those that the ray enters before `limit`.
     #[inline(always)]
     pub(in crate::accel) fn pop(&mut self, limit: f32) -> Option<Child> {
@@ -53,15 +86,21 @@ impl Stack {
                 self.unspill()?
             } else {
                 self.len = self.len.checked_sub(1)?;
-                // SAFETY: `len` grows only where `push` writes the entry at its old value, so every entry below the old
-                // `len` has been written.
-                unsafe { self.fixed[self.len].assume_init() }
+                // SAFETY: `len` grows only where an entry is written at its old value (`push`), or when as many have been
+                // written there (`fill`); so every entry below the old `len` has been written.
+                unsafe { (self.enters[self.len].assume_init(), self.children[self.len].assume_init()) }
             };
             if f32::from_bits(enter_bits) <= limit * WIDENED {
                 return Some(child);
             }
         }
     }
+}
+
+/// Where the next eight entries of a stack will be.
+pub(super) struct Room<'s> {
+    pub(super) enters: &'s mut [MaybeUninit<u32>; WIDTH],
+    pub(super) children: &'s mut [MaybeUninit<Child>; WIDTH],
 }
 
 #[cfg(test)]
