@@ -3,6 +3,8 @@
 
 #[path = "suite/bench_room.rs"]
 mod bench_room;
+#[path = "suite/bench_scene.rs"]
+mod bench_scene;
 #[path = "suite/closed_forms.rs"]
 mod closed_forms;
 #[path = "suite/estimators.rs"]

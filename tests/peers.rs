@@ -1,0 +1,18 @@
+//! The tracer against other renderers: the same scenes, made by the same code, rendered by both.
+//!
+//! `tools/test_peers.sh` installs the renderers, sets `MATEVAL_PEERS_PYTHON` to the Python that has them, and runs this.
+
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+#![allow(clippy::print_stderr, reason = "what was measured is told, and what is left out")]
+#![allow(dead_code, reason = "the tracer's own tests use more of the shared modules than these do")]
+
+#[path = "../crates/tracer/tests/suite/bench_scene.rs"]
+mod bench_scene;
+#[path = "../crates/tracer/tests/suite/scenes.rs"]
+mod scenes;
+#[path = "../crates/tracer/tests/suite/statistics.rs"]
+mod statistics;
+
+mod peers {
+    mod python;
+}
