@@ -14,5 +14,6 @@ mod scenes;
 mod statistics;
 
 mod peers {
+    mod blender;
     mod python;
 }

@@ -3,10 +3,12 @@
 //! Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (EGSR 2007); shadowing and masking are
 //! separable (Smith), as in Mitsuba. All vectors are in the frame whose z is the surface normal.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 
 use glam::{Vec2, Vec3};
 use mateval_scene::material::Distribution;
+
+use crate::warp;
 
 /// A rough surface's facets.
 #[derive(Clone, Copy, Debug)]
@@ -86,7 +88,7 @@ impl Facets {
         let stretched = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u[0]) * (1.0 + stretched.z) - stretched.z;
         let radius = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = libm::sincosf(TAU * u[1]);
+        let (sin, cos) = warp::circle(u[1]);
         let half = Vec3::new(radius * cos, radius * sin, z) + stretched;
         Vec3::new(self.alpha * half.x, self.alpha * half.y, half.z.max(0.0)).normalize_or(Vec3::Z)
     }
@@ -96,7 +98,7 @@ impl Facets {
         let tan2 = -self.alpha * self.alpha * libm::logf(1.0 - u[0]);
         let z = 1.0 / (1.0 + tan2).sqrt();
         let radius = (1.0 - z * z).max(0.0).sqrt();
-        let (sin, cos) = libm::sincosf(TAU * u[1]);
+        let (sin, cos) = warp::circle(u[1]);
         (Vec2::new(cos, sin) * radius).extend(z)
     }
 }
@@ -108,6 +110,8 @@ pub(crate) fn reflect(w: Vec3, m: Vec3) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
+    use std::f32::consts::TAU;
+
     use super::*;
 
     /// The facets' areas, projected on the surface, add up to the surface; those visible from w, projected on w, to its

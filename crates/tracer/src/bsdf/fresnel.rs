@@ -19,6 +19,15 @@ pub(crate) fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
     (if reflected.is_nan() { 0.0 } else { reflected }, beyond)
 }
 
+/// The first of [`dielectric`], from the side of the lower index (`eta` of at least 1), at a single division. `cos` is
+/// above 0. Cook and Torrance, "A Reflectance Model for Computer Graphics" (1982).
+pub(crate) fn dielectric_from_thinner(cos: f32, eta: f32) -> f32 {
+    let g = (eta * eta - 1.0 + cos * cos).sqrt();
+    let (above, below) = (cos * (g + cos) - 1.0, cos * (g - cos) + 1.0);
+    let quotient = (g - cos) / ((g + cos) * below);
+    0.5 * quotient * quotient * (above * above + below * below)
+}
+
 /// The share of uniform light from one side that a smooth dielectric boundary reflects: 2 * integral of F(mu) mu dmu.
 pub(crate) fn diffuse_reflectance(eta: f32) -> f32 {
     const STEPS: u32 = 4096;
@@ -73,6 +82,16 @@ mod tests {
         assert_eq!(dielectric(0.7, 1.0 / 1.5), (1.0, 0.0));
         // Diffuse reflectance of eta 1.5: 0.0918 (Egan and Hilgeman 1973, table).
         assert!((diffuse_reflectance(1.5) - 0.0918).abs() < 2e-4, "{}", diffuse_reflectance(1.5));
+    }
+
+    #[test]
+    fn one_division_is_enough() {
+        for eta in [1.01, 1.5, 3.0] {
+            for cos in [1e-3, 0.1, 0.5, 0.9, 1.0] {
+                let (found, expected) = (dielectric_from_thinner(cos, eta), dielectric(cos, eta).0);
+                assert!((found - expected).abs() < 2e-6, "{eta} {cos}: {found} {expected}");
+            }
+        }
     }
 
     /// What a boundary lets through is the same from both sides: (1 - R(1/eta)) * eta^2 = 1 - R(eta).

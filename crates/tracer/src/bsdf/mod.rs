@@ -13,6 +13,7 @@ mod fresnel;
 mod lobe;
 mod plastic;
 mod principled;
+mod principled_tables;
 mod rough_boundary;
 mod tables;
 #[cfg(test)]

@@ -1,24 +1,25 @@
 //! base_color, roughness, metallic: Disney's model in two flavours, front side only, alpha = roughness^2 with GGX.
 //!
+//! Both are one bounce off GGX facets, whose Fresnel term is Schlick's with base_color (weight metallic) and the exact
+//! dielectric one (weight 1 - metallic), over a diffuse base (weight 1 - metallic).
+//!
 //! - Mitsuba: Burley, "Physically Based Shading at Disney" (2012) and "Extending the Disney BRDF to a BSDF" (2015), as
 //!   Mitsuba 3 documents `principled`, with everything but base_color, roughness, metallic and specular at its default:
-//!   an exact dielectric Fresnel term (weight 1 - metallic) and Schlick's with base_color (weight metallic) over one
-//!   GGX lobe, and Disney's diffuse with retro-reflection (weight 1 - metallic), not reduced by what the lobe reflects.
-//! - Blender: an approximation of Blender 4.x that is not certified against it yet. The same GGX lobe and Fresnel terms;
-//!   Lambert's diffuse times (1 - metallic) times (1 - what the dielectric lobe reflects towards the viewer, from a
-//!   table that we integrate). So it is not reciprocal, as Blender's is not. Not modelled: multiple scattering between
-//!   facets, Blender's own fit of that table, its F82 tint (at its default, white, that is Schlick's).
+//!   separable masking, and Disney's base with retro-reflection, not reduced by what the facets reflect.
+//! - Blender: what Cycles of Blender 4.5 computes for Principled BSDF with base_color, roughness, metallic and specular
+//!   IOR level set and everything else at its default. Masking knows heights; both Fresnel terms are scaled up by what
+//!   further bounces bring (Kulla and Conty 2017); the base is Lambert's, reduced by what the dielectric facets reflect
+//!   towards the viewer. So it is not reciprocal, as Blender's is not. Held against Blender itself by `tests/peers`.
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 use mateval_scene::material::{Distribution, PrincipledFlavour};
 
-use super::conductor::{reflection, reflection_density};
 use super::facets::{Facets, reflect};
 use super::fresnel;
 use super::lobe::LocalSample;
-use super::rough_boundary::RoughReflection;
+use super::principled_tables::{BlenderTables, Kept};
 use crate::warp;
 
 /// The material at one place.
@@ -35,76 +36,202 @@ pub(crate) struct Principled<'w> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Style<'w> {
     Mitsuba,
-    Blender(&'w RoughReflection),
+    Blender(&'w BlenderTables),
 }
 
-/// Mitsuba's and Disney's; keeps the peak of a mirror finite.
-const SMALLEST_ALPHA: f32 = 1e-3;
+/// The material at one place, seen from one direction: all that does not depend on the light's is worked out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PrincipledView {
+    wo: Vec3,
+    alpha: f32,
+    /// See [`slope`], for the viewer.
+    slope: f32,
+    eta: f32,
+    /// Weight of the dielectric Fresnel term.
+    dielectric: f32,
+    /// Of Schlick's term: the value head on, and how far it rises towards grazing.
+    metal: Vec3,
+    metal_rise: Vec3,
+    base: Base,
+    /// The probability with which the facets are sampled.
+    facet_share: f32,
+}
 
-/// The index of refraction that Disney's `specular` stands for: F0 = 0.08 * specular.
+/// The diffuse part's value over the cosine, and the masking of the facets above it.
+#[derive(Clone, Copy, Debug)]
+enum Base {
+    /// Blender's: Lambert's, masking with heights.
+    Lambert(Vec3),
+    /// Mitsuba's: Disney's, separable masking. `fresnel` is Schlick's weight for the viewer.
+    Disney { color: Vec3, roughness: f32, fresnel: f32 },
+}
+
+/// Keeps the peak of a mirror finite: Mitsuba's and Disney's limit, and what f32 can hold.
+const SMALLEST_ALPHA: [f32; 2] = [1e-3, 1e-4];
+
+/// What a base of any colour counts when a lobe is chosen, and the least share of the facets there.
+const TYPICAL_BASE: f32 = 0.5;
+const LEAST_FACET_SHARE: f32 = 0.25;
+
+/// The index of refraction that Disney's `specular` stands for: F0 = 0.08 * specular. Blender's IOR level says the same.
 pub(crate) fn eta_from_specular(specular: f32) -> f32 {
     2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
 }
 
 impl<'w> Principled<'w> {
-    pub(crate) fn style(flavour: PrincipledFlavour, table: Option<&'w RoughReflection>) -> Style<'w> {
-        match (flavour, table) {
-            (PrincipledFlavour::Blender, Some(table)) => Style::Blender(table),
+    pub(crate) fn style(flavour: PrincipledFlavour, tables: Option<&'w BlenderTables>) -> Style<'w> {
+        match (flavour, tables) {
+            (PrincipledFlavour::Blender, Some(tables)) => Style::Blender(tables),
             _ => Style::Mitsuba,
         }
     }
 
-    fn alpha(&self) -> f32 {
-        (self.roughness * self.roughness).max(SMALLEST_ALPHA)
-    }
-
-    fn facets(&self) -> Facets {
-        Facets::new(Distribution::Ggx, self.alpha())
-    }
-
-    /// Which share of samples goes to the lobe: 1 against 1 - metallic for the diffuse part, whatever the colour.
-    fn lobe_share(&self) -> f32 {
-        1.0 / (2.0 - self.metallic)
+    /// The value with the cosine, a channel; and the density with which [`Self::sample`] finds `wi`.
+    pub(crate) fn evaluate(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
+        self.seen_from(wo).evaluate(wi)
     }
 
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        let Some(m) = (wo + wi).try_normalize() else { return Vec3::ZERO };
-        let cos = wo.dot(m).clamp(0.0, 1.0);
-        self.fresnel(cos) * reflection(&self.facets(), wo, wi, m) + self.diffuse(wo, wi, cos)
-    }
-
-    fn fresnel(&self, cos: f32) -> Vec3 {
-        let schlick = self.base_color + (Vec3::ONE - self.base_color) * fresnel::schlick_weight(cos);
-        schlick * self.metallic + Vec3::splat((1.0 - self.metallic) * fresnel::dielectric(cos, self.eta).0)
-    }
-
-    fn diffuse(&self, wo: Vec3, wi: Vec3, cos_difference: f32) -> Vec3 {
-        let share = match self.style {
-            Style::Mitsuba => self.disney_diffuse(wo.z, wi.z, cos_difference),
-            Style::Blender(table) => 1.0 - table.reflected(wo.z, self.alpha()),
-        };
-        self.base_color * ((1.0 - self.metallic) * share * FRAC_1_PI * wi.z)
-    }
-
-    /// Burley 2015, equation 4, without subsurface.
-    fn disney_diffuse(&self, cos_o: f32, cos_i: f32, cos_difference: f32) -> f32 {
-        let (fo, fi) = (fresnel::schlick_weight(cos_o), fresnel::schlick_weight(cos_i));
-        let retro = 2.0 * self.roughness * cos_difference * cos_difference;
-        (1.0 - 0.5 * fo) * (1.0 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1.0))
+        self.evaluate(wo, wi).0
     }
 
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let share = self.lobe_share();
-        share * reflection_density(&self.facets(), wo, wi) + (1.0 - share) * warp::cosine_density(wi.z)
+        self.evaluate(wo, wi).1
     }
 
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
-        let wi = if u[0] < self.lobe_share() {
-            reflect(wo, self.facets().sample(wo, [u[1], u[2]]))
+        self.seen_from(wo).sample(u)
+    }
+
+    /// What can be said before the light's direction is known.
+    pub(crate) fn seen_from(&self, wo: Vec3) -> PrincipledView {
+        match self.style {
+            Style::Mitsuba => self.mitsuba(wo),
+            Style::Blender(tables) => self.blender(tables, wo),
+        }
+    }
+
+    fn mitsuba(&self, wo: Vec3) -> PrincipledView {
+        let alpha = (self.roughness * self.roughness).max(SMALLEST_ALPHA[0]);
+        let matt = 1.0 - self.metallic;
+        PrincipledView {
+            wo,
+            alpha,
+            slope: slope(wo.z, alpha * alpha),
+            eta: self.eta,
+            dielectric: matt,
+            metal: self.base_color * self.metallic,
+            metal_rise: (Vec3::ONE - self.base_color) * self.metallic,
+            base: Base::Disney {
+                color: self.base_color * (matt * FRAC_1_PI),
+                roughness: self.roughness,
+                fresnel: fresnel::schlick_weight(wo.z),
+            },
+            facet_share: 1.0 / (1.0 + matt),
+        }
+    }
+
+    fn blender(&self, tables: &BlenderTables, wo: Vec3) -> PrincipledView {
+        let alpha = (self.roughness * self.roughness).max(SMALLEST_ALPHA[1]);
+        let kept = tables.kept(self.roughness, wo.z);
+        let matt = 1.0 - self.metallic;
+        // The dielectric facets, and what they leave for the base.
+        let gain = kept.gain(tables.mean_fresnel());
+        let reflected = kept.share * gain * (tables.f0() + (1.0 - tables.f0()) * tables.rise(self.roughness, wo.z));
+        let passed = matt * (1.0 - reflected).max(0.0);
+        let (metal, metal_rise) = self.blender_metal(&kept);
+        // Facets of metal count by what they keep, whatever their colour.
+        let facets = self.metallic * kept.share + matt * reflected;
+        PrincipledView {
+            wo,
+            alpha,
+            slope: slope(wo.z, alpha * alpha),
+            eta: self.eta,
+            dielectric: matt * gain,
+            metal,
+            metal_rise,
+            base: Base::Lambert(self.base_color * (passed * FRAC_1_PI)),
+            facet_share: (facets / (facets + TYPICAL_BASE * passed)).max(LEAST_FACET_SHARE),
+        }
+    }
+
+    /// Schlick's value head on and its rise, both with what further bounces bring. Its mean over all directions is
+    /// F0 + (1 - F0) / 21. Blender's tint at 82 degrees (Kutz et al. 2021) is white by default: this, exactly.
+    fn blender_metal(&self, kept: &Kept) -> (Vec3, Vec3) {
+        if self.metallic == 0.0 {
+            return (Vec3::ZERO, Vec3::ZERO);
+        }
+        let f0 = self.base_color.clamp(Vec3::ZERO, Vec3::ONE);
+        let gain = Vec3::from_array(f0.to_array().map(|f0| self.metallic * kept.gain(f0 + (1.0 - f0) / 21.0)));
+        (gain * f0, gain * (Vec3::ONE - f0))
+    }
+}
+
+impl PrincipledView {
+    /// The value with the cosine, a channel; and the density with which [`Self::sample`] finds `wi`. Both directions lie
+    /// above the surface.
+    pub(crate) fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
+        let half = self.wo + wi;
+        let length2 = half.length_squared();
+        let cos = 0.5 * length2.sqrt();
+        let alpha2 = self.alpha * self.alpha;
+        // Walter et al. 2007, equation 33, for half / |half|.
+        let stretched = length2 / (half.x * half.x + half.y * half.y + alpha2 * (half.z * half.z));
+        let facets = 0.5 * FRAC_1_PI * alpha2 * stretched * stretched;
+
+        let density =
+            self.facet_share * facets / (self.wo.z + self.slope) + (1.0 - self.facet_share) * FRAC_1_PI * wi.z;
+        let bounce = facets * wi.z * self.unmasked(wi.z, alpha2);
+        (self.fresnel(cos) * bounce + self.base(wi.z, cos) * wi.z, density)
+    }
+
+    /// Smith's masking and shadowing over twice the product of the cosines, by [`slope`] instead of Lambda: with heights
+    /// (Heitz, JCGT 2014, equation 99) or as a product (Walter et al. 2007, equation 34).
+    fn unmasked(&self, cos_i: f32, alpha2: f32) -> f32 {
+        let (cos_o, slope_o, slope_i) = (self.wo.z, self.slope, slope(cos_i, alpha2));
+        match self.base {
+            Base::Lambert(_) => 1.0 / (cos_i * slope_o + cos_o * slope_i),
+            Base::Disney { .. } => 2.0 / ((cos_o + slope_o) * (cos_i + slope_i)),
+        }
+    }
+
+    fn fresnel(&self, cos: f32) -> Vec3 {
+        let mut sum = self.metal + self.metal_rise * fresnel::schlick_weight(cos);
+        if self.dielectric > 0.0 {
+            sum += self.dielectric * fresnel::dielectric_from_thinner(cos, self.eta);
+        }
+        sum
+    }
+
+    /// The base's value over the cosine: Lambert's, or Burley 2015, equation 4, without subsurface.
+    fn base(&self, cos_i: f32, cos_difference: f32) -> Vec3 {
+        match self.base {
+            Base::Lambert(value) => value,
+            Base::Disney { color, roughness, fresnel: fo } => {
+                let fi = fresnel::schlick_weight(cos_i);
+                let retro = 2.0 * roughness * cos_difference * cos_difference;
+                color * ((1.0 - 0.5 * fo) * (1.0 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1.0)))
+            }
+        }
+    }
+
+    /// A direction above the surface; none where the facets send the draw below it.
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<LocalSample> {
+        let wi = if u[0] < self.facet_share {
+            reflect(self.wo, Facets::new(Distribution::Ggx, self.alpha).sample(self.wo, [u[1], u[2]]))
         } else {
             warp::cosine_hemisphere([u[1], u[2]])
         };
-        let density = self.density(wo, wi);
-        (wi.z > 0.0 && density > 0.0).then(|| LocalSample::spread(wi, self.eval(wo, wi), density))
+        if wi.z <= 0.0 {
+            return None;
+        }
+        let (value, density) = self.evaluate(wi);
+        (density > 0.0).then(|| LocalSample::spread(wi, value, density))
     }
+}
+
+/// The cosine times 1 + 2 Lambda of GGX, Smith's function (Heitz 2014, equation 72).
+fn slope(cos: f32, alpha2: f32) -> f32 {
+    let cos2 = cos * cos;
+    (cos2 + alpha2 * (1.0 - cos2)).max(0.0).sqrt()
 }

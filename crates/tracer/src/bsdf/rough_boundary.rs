@@ -9,13 +9,6 @@ use mateval_scene::material::Distribution;
 use super::facets::{Facets, reflect};
 use super::fresnel;
 
-/// The reflected share of light from a direction, over the cosine and the facets' width.
-#[derive(Clone, Debug)]
-pub(crate) struct RoughReflection {
-    widths: Widths,
-    reflected: Vec<Row>,
-}
-
 /// The coat of rough plastic: what passes into it, and what cannot leave.
 #[derive(Clone, Debug)]
 pub(crate) struct RoughCoat {
@@ -67,18 +60,6 @@ impl Widths {
             std::array::from_fn(|k| share(&facets, cosine(k).max(1e-6)))
         };
         self.0.iter().map(row).collect()
-    }
-}
-
-impl RoughReflection {
-    pub(crate) fn new(distribution: Distribution, eta: f32, widths: Widths) -> Self {
-        let reflected = widths.rows(distribution, |facets, cos| reflected_share(facets, eta, cos, GRID));
-        Self { widths, reflected }
-    }
-
-    /// The share of light reflected from (or towards) the cosine `cos`.
-    pub(crate) fn reflected(&self, cos: f32, alpha: f32) -> f32 {
-        self.widths.interpolate(alpha, |row| lookup(&self.reflected[row], cos))
     }
 }
 
@@ -164,12 +145,9 @@ mod tests {
 
     #[test]
     fn a_nearly_smooth_boundary_does_what_fresnel_says() {
-        let widths = || Widths::uniform(1e-3);
-        let reflection = RoughReflection::new(Distribution::Ggx, 1.5, widths());
-        let coat = RoughCoat::new(Distribution::Ggx, 1.5, widths());
+        let coat = RoughCoat::new(Distribution::Ggx, 1.5, Widths::uniform(1e-3));
         for cos in [0.3, 0.6, 1.0] {
             let expected = fresnel::dielectric(cos, 1.5).0;
-            assert!((reflection.reflected(cos, 1e-3) - expected).abs() < 2e-3, "{cos}");
             assert!((coat.transmitted(cos, 1e-3) - (1.0 - expected)).abs() < 2e-3, "{cos}");
         }
         // The sum's own 1.5 %.
@@ -178,11 +156,14 @@ mod tests {
 
     #[test]
     fn the_table_over_widths_agrees_with_one_made_for_a_width() {
-        let varying = RoughReflection::new(Distribution::Ggx, 1.5, Widths::varying());
+        let varying = RoughCoat::new(Distribution::Ggx, 1.5, Widths::varying());
         for alpha in [0.04, 0.21, 0.7] {
-            let exact = RoughReflection::new(Distribution::Ggx, 1.5, Widths::uniform(alpha));
+            let exact = RoughCoat::new(Distribution::Ggx, 1.5, Widths::uniform(alpha));
             for cos in [0.1, 0.4, 0.9] {
-                assert!((varying.reflected(cos, alpha) - exact.reflected(cos, alpha)).abs() < 2e-3, "{alpha} {cos}");
+                assert!(
+                    (varying.transmitted(cos, alpha) - exact.transmitted(cos, alpha)).abs() < 2e-3,
+                    "{alpha} {cos}"
+                );
             }
         }
     }

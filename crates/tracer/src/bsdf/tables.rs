@@ -11,7 +11,8 @@ use mateval_scene::reference::ReferenceScene;
 
 use super::fresnel;
 use super::principled::eta_from_specular;
-use super::rough_boundary::{RoughCoat, RoughReflection, Widths};
+use super::principled_tables::BlenderTables;
+use super::rough_boundary::{RoughCoat, Widths};
 use crate::error::TracerError;
 
 /// One entry a material.
@@ -22,7 +23,7 @@ pub(crate) struct MaterialTables(Vec<Table>);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     /// For Blender's principled.
-    pub(crate) reflection: Option<Arc<RoughReflection>>,
+    pub(crate) reflection: Option<Arc<BlenderTables>>,
     /// For rough plastic.
     pub(crate) coat: Option<Arc<RoughCoat>>,
     /// For smooth plastic: the share of uniform light from inside that its coat reflects back.
@@ -33,7 +34,7 @@ pub(crate) struct Table {
 #[derive(Default)]
 struct Known {
     /// By the bits of eta.
-    reflections: BTreeMap<u32, Arc<RoughReflection>>,
+    reflections: BTreeMap<u32, Arc<BlenderTables>>,
     /// By whether it is GGX, the bits of eta, those of alpha where it is the same everywhere.
     coats: BTreeMap<(bool, u32, Option<u32>), Arc<RoughCoat>>,
 }
@@ -72,8 +73,8 @@ fn table(material: &Material, known: &mut Known) -> Table {
 }
 
 impl Known {
-    fn reflection(&mut self, eta: f32) -> Arc<RoughReflection> {
-        let make = || Arc::new(RoughReflection::new(Distribution::Ggx, eta, Widths::varying()));
+    fn reflection(&mut self, eta: f32) -> Arc<BlenderTables> {
+        let make = || Arc::new(BlenderTables::new(eta));
         self.reflections.entry(eta.to_bits()).or_insert_with(make).clone()
     }
 

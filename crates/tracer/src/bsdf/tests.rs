@@ -223,9 +223,9 @@ fn weights_are_value_over_density() {
     }
 }
 
-/// White materials send on no more than they get. Three exceptions, each as its model has it: radiance grows inside glass
-/// by the square of the index; Mitsuba's principled adds a specular lobe to a full diffuse one; Oren-Nayar's and rough
-/// plastic's formulas are fits and exceed one by little.
+/// White materials send on no more than they get. Four exceptions, each as its model has it: radiance grows inside glass
+/// by the square of the index; Mitsuba's principled adds a specular lobe to a full diffuse one; Blender's is interpolated
+/// between few cosines; Oren-Nayar's and rough plastic's formulas are fits and exceed one by little.
 #[test]
 fn no_more_light_leaves_than_came() {
     for model in models() {
@@ -235,6 +235,7 @@ fn no_more_light_leaves_than_came() {
                     MaterialModel::Dielectric { eta, .. } if wo.z > 0.0 => (1.0 / (eta * eta)).max(1.0),
                     MaterialModel::Dielectric { eta, .. } => (eta * eta).max(1.0),
                     MaterialModel::Principled { flavour: PrincipledFlavour::Mitsuba, .. } => 2.2,
+                    MaterialModel::Principled { flavour: PrincipledFlavour::Blender, .. } => 1.006,
                     MaterialModel::Diffuse { alpha: Some(_), .. } => 1.05,
                     MaterialModel::Plastic { microfacets: Some(_), .. } => 1.03,
                     _ => 1.0,
