@@ -1,8 +1,9 @@
 //! Five views from one set of paths against five renders, and what such views promise.
 
 use glam::DVec3;
-use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::Camera;
+use mateval_image::{LinearRgb, png_io};
+use mateval_scene::reference::Emission;
+use mateval_scene::{Camera, Intrinsics};
 use mateval_tracer::shared_centre::share_centre;
 use mateval_tracer::{LightGroups, RenderSettings, ViewsRender, World, render_views};
 
@@ -49,7 +50,7 @@ fn compare(a: &Renders, b: &Renders) -> [f64; 3] {
 }
 
 /// Splatted views and separate renders have one mean, as wholes, in 8x8 tiles and pixel by pixel, by both variances; a
-/// view turned by a tenth of a pixel more has not, nor has one 3 % brighter.
+/// view turned by half a pixel more has not, nor has one 3 % brighter.
 #[test]
 #[allow(clippy::print_stderr, reason = "how near it came")]
 fn splatted_views_are_renders() {
@@ -73,64 +74,90 @@ fn splatted_views_are_renders() {
     assert!(!agree(turned) && !agree(brighter), "a twin passes: {turned:?} {brighter:?}");
 }
 
-/// Of every pixel, the variance of one estimate, from independent ones, channels summed.
+/// Of every pixel and channel, the variance of one estimate, from independent ones.
 fn variances(renders: &Renders) -> Vec<f64> {
     let n = renders.pictures().len() as f64;
-    let of_channel = |place: usize, channel: usize| {
+    let of = |place: usize, channel: usize| {
         let values = renders.pictures().iter().map(|p| f64::from(p.pixels()[place].0[channel]));
         let mean = values.clone().sum::<f64>() / n;
         values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0)
     };
-    (0..SIZE * SIZE).map(|place| (0..3).map(|channel| of_channel(place, channel)).sum()).collect()
+    (0..SIZE * SIZE).flat_map(|place| (0..3).map(move |channel| of(place, channel))).collect()
 }
 
-/// A splatted view is about as noisy as a render of its own with as many samples a pixel.
+/// The noise of `found` over that of `own`, where the room is seen and where a lamp or the sky is.
+fn noise_ratios(found: &Renders, own: &Renders) -> [f64; 2] {
+    let mean = own.picture();
+    let lamp = |place: usize| mean.pixels()[place / 3].0.iter().any(|&v| v > 1.0);
+    let (found, own) = (variances(found), variances(own));
+    [false, true].map(|wanted| {
+        let sum = |variances: &[f64]| -> f64 {
+            variances.iter().enumerate().filter(|(place, _)| lamp(*place) == wanted).map(|(_, v)| v).sum()
+        };
+        sum(&found) / sum(&own)
+    })
+}
+
+/// How noisy a splatted view is against a render of its own with as many samples a pixel. In this smooth room, where even
+/// samples gain most, 1.4 times where a view's pixels do not match the plane's and 0.9 where they do; a lamp in view
+/// shows the number of paths a pixel, which a render keeps exact: 2.5 times. A quarter of the samples is beyond bounds.
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn splatting_adds_little_noise() {
     let world = lit_world([[1.0; 3]; 4]);
-    for samples in [4, 16, 64] {
-        let together = estimates(&rendered(&world, &views(), samples, 0..12));
-        for (index, camera) in views().iter().enumerate().take(2) {
-            let settings = RenderSettings { seed: 9, ..settings(samples) };
-            let separate = Renders::new(&world, camera, settings, 12);
-            let alone = estimates(&rendered(&world, std::slice::from_ref(camera), samples, 0..12));
-            let mean = separate.picture();
-            let (va, vt, vs) = (variances(&alone[0]), variances(&together[index]), variances(&separate));
-            for (name, lo, hi) in [("all", 0.0, 1e9), ("dark", 0.0, 1e-9), ("room", 1e-9, 1.0), ("bright", 1.0, 1e9)] {
-                let sum = |v: &[f64]| -> f64 { (0..v.len()).filter(|&i| { let m = mean.pixels()[i].0[1]; m >= lo && m < hi }).map(|i| v[i]).sum() };
-                let (a, t, s) = (sum(&va), sum(&vt), sum(&vs));
-                eprintln!("{samples} samples, view {index} {name}: separate {s:.4} splatted x{:.3}, alone x{:.3}", t / s, a / s);
-            }
-            let mut r: Vec<f64> = vt.iter().zip(&vs).filter(|(_, s)| **s > 0.0).map(|(t, s)| t / s).collect();
-            r.sort_by(f64::total_cmp);
-            eprintln!("   median ratio {:.3}, p10 {:.3} p90 {:.3}", r[r.len()/2], r[r.len()/10], r[r.len()*9/10]);
-        }
+    let splatted = |samples: u32| estimates(&rendered(&world, &views(), samples, 0..12));
+    let (together, fewer) = (splatted(64), splatted(16));
+    for (index, bound) in [(0, 1.1), (1, 1.6)] {
+        let settings = RenderSettings { seed: 9, ..settings(64) };
+        let own = Renders::new(&world, &views()[index], settings, 12);
+        let [room, lamps] = noise_ratios(&together[index], &own);
+        eprintln!("view {index}: {room:.3} of the variance of a render, lamps and sky {lamps:.3}");
+        assert!(room < bound && lamps < 3.5, "view {index}: {room} {lamps}");
+        assert!(noise_ratios(&fewer[index], &own)[0] > 2.0 * bound, "the twin passes");
     }
 }
 
-/// Errors of two seeds are uncorrelated in every view.
+/// Under an even sky radiance is the same everywhere, and all noise is that of the number of paths a pixel: its variance
+/// is far under that of random places (the number itself) and grows as Sobol points' does.
+#[test]
+#[allow(clippy::print_stderr, reason = "a measurement")]
+fn the_number_of_paths_a_pixel_varies_little() {
+    let world = super::scenes::Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();
+    for (samples, bound) in [(16, 1.5), (64, 2.5)] {
+        let [own, turned] = [0, 1].map(|index| {
+            let all = variances(&estimates(&rendered(&world, &views(), samples, 0..12))[index]);
+            all.iter().sum::<f64>() / all.len() as f64 * f64::from(samples * samples)
+        });
+        eprintln!("{samples} samples: the number's variance is {own:.3} in the first view, {turned:.3} in another");
+        assert!(own < 1e-8 && turned < bound && turned > 0.1, "{own} {turned}");
+    }
+}
+
+/// Errors of two seeds are uncorrelated in every view; those of one with itself are not.
 #[test]
 fn halves_are_independent() {
     let world = lit_world([[1.0; 3]; 4]);
     let done = rendered(&world, &views(), 2, 0..40);
     for view in &estimates(&done) {
-        let mean = view.picture();
-        // Against the mean of all n, errors of two of them have the correlation -1 / (n - 1).
-        let error = |seed: usize, place: usize, channel: usize| {
-            f64::from(view.pictures()[seed].pixels()[place].0[channel] - mean.pixels()[place].0[channel])
+        let (mean, variances) = (view.picture(), variances(view));
+        let error = |seed: usize, place: usize| {
+            let value = view.pictures()[seed].pixels()[place].0[1] - mean.pixels()[place].0[1];
+            f64::from(value) / variances[3 * place + 1].sqrt()
         };
-        let correlation = |pairs: &dyn Fn(usize) -> [usize; 2]| {
-            let mut sums = [0.0; 3];
-            for (place, pair) in (0..SIZE * SIZE).flat_map(|place| (0..20).map(move |pair| (place, pair))) {
-                let [a, b] = pairs(pair).map(|seed| error(seed, place, 1));
-                sums = [sums[0] + a * b, sums[1] + a * a, sums[2] + b * b];
-            }
+        let correlation = |second: &dyn Fn(usize) -> usize| {
+            // A pixel of even sky has rounding for noise.
+            let noisy = (0..SIZE * SIZE).filter(|place| variances[3 * place + 1] > 1e-9);
+            let pairs = noisy.flat_map(|place| (0..20).map(move |pair| (place, pair)));
+            let sums = pairs.fold([0.0; 3], |[ab, aa, bb], (place, pair)| {
+                let (a, b) = (error(2 * pair, place), error(second(pair), place));
+                [ab + a * b, aa + a * a, bb + b * b]
+            });
             sums[0] / (sums[1] * sums[2]).sqrt()
         };
-        let found = correlation(&|pair| [2 * pair, 2 * pair + 1]);
-        assert!((found + 1.0 / 39.0).abs() < 0.03, "{found}");
-        assert!(correlation(&|pair| [pair, pair]) > 0.99, "the twin passes");
+        // Against the mean of all n, errors of two of them have the correlation -1 / (n - 1).
+        let found = correlation(&|pair| 2 * pair + 1) + 1.0 / 39.0;
+        assert!(found.abs() < 0.03, "{found}");
+        assert!(correlation(&|pair| 2 * pair) > 0.99, "the twin passes");
     }
 }
 
@@ -139,14 +166,14 @@ fn halves_are_independent() {
 fn every_pixel_gets_its_samples() {
     let world = lit_world([[1.0; 3]; 4]);
     let wide =
-        |offset: [f64; 2]| super::scenes::camera([0.1, 0.1, 2.2], [0.0; 3], 48, 70.0).turned(offset[0], offset[1]);
+        |offset: [f64; 2]| super::scenes::camera([0.1, 0.1, 1.6], [0.0; 3], 48, 70.0).turned(offset[0], offset[1]);
     let done = rendered(&world, &OFFSETS.map(wide), 64, 3..4);
     assert_eq!(done.passes, 1);
     for (index, view) in done.views.iter().enumerate() {
         let counts = view.halves[0].counts.pixels();
         let mean = counts.iter().sum::<u32>() as f64 / counts.len() as f64;
         let (least, most) = (*counts.iter().min().unwrap(), *counts.iter().max().unwrap());
-        assert!(least >= 54 && most <= 110 && mean >= 64.0 && mean < 80.0, "view {index}: {least} {mean} {most}");
+        assert!(least >= 54 && most <= 128 && (64.0..80.0).contains(&mean), "view {index}: {least} {mean} {most}");
         if let Some(out) = std::env::var_os("MATEVAL_TEST_PICTURES") {
             let folder = std::path::Path::new(&out);
             let gray = view.halves[0].counts.map(|n| LinearRgb([n as f32 / 128.0; 3])).to_srgb();
@@ -155,9 +182,9 @@ fn every_pixel_gets_its_samples() {
             png_io::write_srgb(&folder.join(format!("splatted_{index}.png")), &picture).unwrap();
         }
     }
-    // Five views cost less than two: the union of the pictures and the surplus where they are stretched.
+    // The union of the pictures, and the surplus where the plane is stretched: five views for 1.73 views' paths.
     let share = done.stats.paths as f64 / (48.0 * 48.0 * 64.0);
-    assert!(share > 1.2 && share < 1.7, "{share}");
+    assert!(share > 1.2 && share < 1.8, "{share}");
 }
 
 #[test]
@@ -200,8 +227,7 @@ fn other_view_sets_fall_back_to_one_pass_a_view() {
 #[test]
 fn views_may_differ_in_size() {
     let world = lit_world([[1.0; 3]; 4]);
-    let fine =
-        Camera { intrinsics: mateval_scene::Intrinsics::from_fov_x(48, 40, 0.5), ..view(SIZE as u32).turned(2.0, 9.0) };
+    let fine = Camera { intrinsics: Intrinsics::from_fov_x(48, 40, 0.5), ..view(SIZE as u32).turned(2.0, 9.0) };
     let done = rendered(&world, &[view(SIZE as u32), fine], 8, 0..8);
     assert_eq!(done.passes, 1);
     let counts = &done.views[1].halves[0].counts;
