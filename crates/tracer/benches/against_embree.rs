@@ -62,22 +62,35 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
     let short = rays::shortened(&random, 1.5);
     println!("{:22} {:>9} {:>9} {:>9} {:>9} {:>9}", "", "Embree", "robust", "ours fast", "watertight", "differ");
     for (kind, set) in [("coherent", &coherent), ("bounce 1", &bounce), ("bounce 2", &second), ("random", &random)] {
-        let differing = set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
-        row(kind, set.len(), differing, rounds, [
-            Box::new(|| sum(set, |ray| embree.closest(ray).map(|hit| hit.2))),
-            Box::new(|| sum(set, |ray| embree_robust.closest(ray).map(|hit| hit.2))),
-            Box::new(|| sum(set, |ray| fast.closest(ray).map(|hit| hit.distance))),
-            Box::new(|| sum(set, |ray| robust.closest(ray).map(|hit| hit.distance))),
-        ]);
+        let differing =
+            set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
+        row(
+            kind,
+            set.len(),
+            differing,
+            rounds,
+            [
+                Box::new(|| sum(set, |ray| embree.closest(ray).map(|hit| hit.2))),
+                Box::new(|| sum(set, |ray| embree_robust.closest(ray).map(|hit| hit.2))),
+                Box::new(|| sum(set, |ray| fast.closest(ray).map(|hit| hit.distance))),
+                Box::new(|| sum(set, |ray| robust.closest(ray).map(|hit| hit.distance))),
+            ],
+        );
     }
     for (kind, set) in [("shadow 1", &shadow), ("shadow 2", &shadow_2), ("occlusion to 1.5 m", &short)] {
         let differing = set.iter().filter(|ray| robust.occluded(ray) != embree.occluded(ray)).count();
-        row(kind, set.len(), differing, rounds, [
-            Box::new(|| sum(set, |ray| embree.occluded(ray).then_some(1.0))),
-            Box::new(|| sum(set, |ray| embree_robust.occluded(ray).then_some(1.0))),
-            Box::new(|| sum(set, |ray| fast.occluded(ray).then_some(1.0))),
-            Box::new(|| sum(set, |ray| robust.occluded(ray).then_some(1.0))),
-        ]);
+        row(
+            kind,
+            set.len(),
+            differing,
+            rounds,
+            [
+                Box::new(|| sum(set, |ray| embree.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| embree_robust.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| fast.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| robust.occluded(ray).then_some(1.0))),
+            ],
+        );
     }
 }
 
@@ -105,7 +118,10 @@ fn builds(meshes: &[&TriangleMesh]) {
         seconds.push(start.elapsed().as_secs_f64());
     }
     let (theirs, ours) = (timing::median(&embree_seconds), timing::median(&seconds));
-    println!("build: Embree {theirs:.3} s, ours {ours:.3} s: {:.2} times as long", 1.0 / timing::speedup(&embree_seconds, &seconds));
+    println!(
+        "build: Embree {theirs:.3} s, ours {ours:.3} s: {:.2} times as long",
+        1.0 / timing::speedup(&embree_seconds, &seconds)
+    );
 }
 
 fn sum(rays: &[Ray], value: impl Fn(&Ray) -> Option<f32>) {

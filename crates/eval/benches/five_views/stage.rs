@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use cpu_time::ProcessTime;
+
 use crate::Run;
 
 /// CPU seconds of all threads and wall seconds of one stage.
@@ -18,9 +20,9 @@ pub struct Stage {
 impl Stage {
     /// Does `work` and tells what it took.
     pub fn measure<T>(name: &str, samples: u32, work: impl FnOnce() -> T) -> (T, Self) {
-        let (cpu, wall) = (cpu_seconds(), Instant::now());
+        let (cpu, wall) = (ProcessTime::now(), Instant::now());
         let done = work();
-        let (cpu, wall) = (cpu_seconds() - cpu, wall.elapsed().as_secs_f64());
+        let (cpu, wall) = (cpu.elapsed().as_secs_f64(), wall.elapsed().as_secs_f64());
         (done, Self { name: name.to_owned(), samples, iterations: 0, cpu, wall })
     }
 
@@ -48,14 +50,4 @@ impl Stage {
 /// The stage of that name, and of that number of samples if one is given.
 pub fn find<'a>(stages: &'a [Stage], name: &str, samples: Option<u32>) -> Option<&'a Stage> {
     stages.iter().find(|stage| stage.name == name && samples.is_none_or(|samples| stage.samples == samples))
-}
-
-/// Of this process, all threads, from Linux' `/proc`, in ticks of 10 ms; not a number elsewhere.
-fn cpu_seconds() -> f64 {
-    let ticks = |text: String| {
-        // The second field is the command in brackets and may hold spaces; times are fields 14 and 15.
-        let rest = text.rsplit(')').next()?.split_whitespace().skip(11).take(2);
-        rest.map(|field| field.parse::<f64>().ok()).sum::<Option<f64>>()
-    };
-    std::fs::read_to_string("/proc/self/stat").ok().and_then(ticks).map_or(f64::NAN, |ticks| ticks / 100.0)
 }

@@ -26,7 +26,8 @@ pub(super) enum BinaryNode {
 impl BinaryTree {
     /// Over at least one triangle with finite corners.
     pub(super) fn build(triangles: &[[Vec3; 3]]) -> Self {
-        let boxes: Vec<Aabb> = triangles.par_iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
+        let boxes: Vec<Aabb> =
+            triangles.par_iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
         let params = BvhBuildParams::medium_build();
         let indices = (0..boxes.len() as u32).collect();
         let mut tree = PlocBuilder::with_capacity(boxes.len()).build(

@@ -103,7 +103,8 @@ impl Accel {
     pub fn build(meshes: &[&TriangleMesh]) -> Result<Self, TracerError> {
         let (corners, starts) = flatten(meshes)?;
         let points = || corners.iter().flatten().copied();
-        let (low, high) = (points().reduce(Vec3::min).unwrap_or_default(), points().reduce(Vec3::max).unwrap_or_default());
+        let (low, high) =
+            (points().reduce(Vec3::min).unwrap_or_default(), points().reduce(Vec3::max).unwrap_or_default());
         let wide = (!corners.is_empty()).then(|| Wide::collapse(&BinaryTree::build(&corners), &corners, &starts));
         Ok(Self {
             wide,

@@ -158,11 +158,7 @@ fn sheared(corner: &[[f32; WIDTH]; 3], ray: &TriangleRay) -> Vectors {
     let z = _mm256_sub_ps(load(&corner[axis_z]), _mm256_set1_ps(ray.origin[axis_z]));
     let x = _mm256_sub_ps(load(&corner[axis_x]), _mm256_set1_ps(ray.origin[axis_x]));
     let y = _mm256_sub_ps(load(&corner[axis_y]), _mm256_set1_ps(ray.origin[axis_y]));
-    [
-        _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[0]), z, x),
-        _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[1]), z, y),
-        z,
-    ]
+    [_mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[0]), z, x), _mm256_fnmadd_ps(_mm256_set1_ps(ray.shear[1]), z, y), z]
 }
 
 /// See `portable::difference`.
