@@ -14,5 +14,8 @@ mod scenes;
 mod statistics;
 
 mod peers {
+    mod mitsuba;
+    mod mitsuba_small;
     mod python;
+    mod z_test;
 }

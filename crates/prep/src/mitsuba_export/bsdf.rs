@@ -23,7 +23,11 @@ pub(super) fn bsdf(
     let inner = match &material.bump {
         // The same height everywhere bends nothing.
         Some(bump) if matches!(bump.height, ScalarInput::Texture { .. }) => {
-            let around = Element::plugin("bsdf", "bumpmap").float("scale", bump.scale);
+            // Mitsuba's softer terminator and its repair of bent normals came after the scenes that this is for.
+            let around = Element::plugin("bsdf", "bumpmap")
+                .float("scale", bump.scale)
+                .boolean("use_shadowing_function", false)
+                .boolean("flip_invalid_normals", false);
             writer.files.scalar(around, "height", &bump.height)?.child(inner)
         }
         _ => inner,
