@@ -15,5 +15,8 @@ mod statistics;
 
 mod peers {
     mod blender;
+    mod mitsuba;
+    mod mitsuba_small;
     mod python;
+    mod z_test;
 }

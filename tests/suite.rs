@@ -14,6 +14,7 @@ mod suite {
     mod full_disk;
     mod help;
     mod images;
+    mod mitsuba_export;
     mod planted;
     mod readme;
     mod real_scenes;

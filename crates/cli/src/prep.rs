@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::Context as _;
 use mateval_prep::build::{BuildOptions, BuildReport};
+use mateval_prep::mitsuba_export::ExportOptions;
 use mateval_prep::render::RenderOptions;
-use mateval_scene::{SceneId, Severity};
+use mateval_scene::{SceneId, Severity, ViewId};
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -20,6 +21,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
     Verify(VerifyArgs),
+    /// Writes a view with its ground truth as a scene for Mitsuba 3; exit code 1 where Mitsuba cannot say all of it.
+    Mitsuba(MitsubaArgs),
 }
 
 /// What `prep build` is given.
@@ -80,12 +83,35 @@ enum Format {
     Json,
 }
 
+/// What `prep mitsuba` is given.
+#[derive(clap::Args)]
+pub struct MitsubaArgs {
+    /// The dataset's folder.
+    dataset: PathBuf,
+    /// The scene.
+    #[arg(long)]
+    scene: SceneId,
+    /// The view.
+    #[arg(long, default_value = "input")]
+    view: ViewId,
+    /// Folder to write scene.xml, meshes and textures to.
+    #[arg(long)]
+    out: PathBuf,
+    /// Samples a pixel; the recipe's if absent.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    samples: Option<u32>,
+    /// Replace a folder that is there.
+    #[arg(long)]
+    force: bool,
+}
+
 /// Runs one of them.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Build(args) => build(args),
         Command::Render(args) => render(args),
         Command::Verify(args) => verify(args),
+        Command::Mitsuba(args) => mitsuba(args),
     }
 }
 
@@ -152,4 +178,22 @@ fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
         }
     }
     Ok(if errors == 0 { Outcome::Good } else { Outcome::No })
+}
+
+fn mitsuba(args: &MitsubaArgs) -> anyhow::Result<Outcome> {
+    let options = ExportOptions {
+        dataset: args.dataset.clone(),
+        scene: args.scene.clone(),
+        view: args.view.clone(),
+        samples: args.samples,
+        out: args.out.clone(),
+        force: args.force,
+    };
+    let findings = mateval_prep::mitsuba_export::export_view(&options).context("cannot export to Mitsuba")?;
+    say_findings(args.scene.as_str(), &findings);
+    let unsaid = findings.iter().filter(|finding| finding.severity != Severity::Note).count();
+    let verdict = if unsaid == 0 { "means the same" } else { "does NOT mean the same" };
+    let file = args.out.join("scene.xml");
+    print(&format!("{}: {verdict} in Mitsuba, {unsaid} things that it cannot say\n", file.display()))?;
+    Ok(if unsaid == 0 { Outcome::Good } else { Outcome::No })
 }

@@ -42,6 +42,11 @@ pub fn write_scalar(path: &Path, picture: &Picture<f32>, precision: Precision) -
     write_channels(path, picture.width(), picture.height(), vec![("V", picture.pixels().to_vec())], precision)
 }
 
+/// Writes channel `Y`, as other programs expect a grey picture.
+pub fn write_grey(path: &Path, picture: &Picture<f32>, precision: Precision) -> Result<(), ImageError> {
+    write_channels(path, picture.width(), picture.height(), vec![("Y", picture.pixels().to_vec())], precision)
+}
+
 /// Reads channels `R`, `G`, `B` of the first layer. Every value must be finite.
 pub fn read_linear(path: &Path) -> Result<Picture<LinearRgb>, ImageError> {
     Ok(read_triples(path, ["R", "G", "B"])?.map(LinearRgb))

@@ -14,6 +14,7 @@ pub mod build;
 pub mod build_scene;
 pub mod error;
 pub mod instances;
+pub mod mitsuba_export;
 pub mod parts;
 pub mod recipe;
 pub mod render;

@@ -32,21 +32,27 @@ fn tangents(mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 2]> {
     tangents.iter().all(|t| t.is_finite()).then_some(tangents)
 }
 
-/// How the height changes with the surface's u and v: central differences over one texel.
+/// How the height changes with the surface's u and v: the slope of the bilinear lookup itself, which jumps from texel to
+/// texel, as Mitsuba has it.
 fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
     let ScalarInput::Texture { texture, channel, uv: transform } = height else { return Vec2::ZERO };
     let map = &textures[texture.0];
     let at = transform.apply(uv);
-    let difference = |step: Vec2| {
-        let value = |uv: Vec2| map.sample(uv.to_array())[*channel];
-        value(at + step) - value(at - step)
-    };
+    let value = |uv: Vec2| map.sample(uv.to_array())[*channel];
     let (width, height) = (map.width() as f32, map.height() as f32);
     // In the texture's own uv first, then by the chain rule.
-    let du = difference(Vec2::new(0.5 / width, 0.0)) * width;
-    let dv = difference(Vec2::new(0.0, 0.5 / height)) * height;
+    let [left, right] = centres_around(at.x, width);
+    let du = (value(Vec2::new(right, at.y)) - value(Vec2::new(left, at.y))) * width;
+    let [below, above] = centres_around(at.y, height);
+    let dv = (value(Vec2::new(at.x, above)) - value(Vec2::new(at.x, below))) * height;
     let rows = &transform.0;
     Vec2::new(du * rows[0][0] + dv * rows[1][0], du * rows[0][1] + dv * rows[1][1])
+}
+
+/// The two texel centres between which a coordinate lies, for `count` texels from 0 to 1.
+fn centres_around(at: f32, count: f32) -> [f32; 2] {
+    let lower = (at * count - 0.5).floor();
+    [(lower + 0.5) / count, (lower + 1.5) / count]
 }
 
 #[cfg(test)]

@@ -59,6 +59,12 @@ pub fn grey(reflectance: f32) -> Material {
 #[derive(Default)]
 pub struct Builder(ReferenceScene);
 
+impl From<ReferenceScene> for Builder {
+    fn from(scene: ReferenceScene) -> Self {
+        Self(scene)
+    }
+}
+
 impl Builder {
     /// Adds a mesh made of `material`.
     pub fn surface(mut self, mesh: TriangleMesh, material: Material) -> Self {

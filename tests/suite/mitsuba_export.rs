@@ -1,0 +1,60 @@
+//! `prep mitsuba`: a view of the sample for Mitsuba 3.
+
+use std::path::Path;
+
+use super::command::{Run, mateval, run};
+use super::sample::{copied_dataset, dataset, files_below};
+
+fn export(dataset: &Path, scene: &str, view: &str, out: &Path, more: &[&str]) -> Run {
+    let words = ["--scene", scene, "--view", view, "--samples", "4"];
+    run(mateval().args(["prep", "mitsuba"]).arg(dataset).args(words).arg("--out").arg(out).args(more))
+}
+
+#[test]
+fn the_sample_means_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let done = export(dataset(), "room", "up_left", &out, &[]).ends_with(0);
+    let expected =
+        format!("{}: means the same in Mitsuba, 0 things that it cannot say\n", out.join("scene.xml").display());
+    assert_eq!(done.stdout, expected);
+    let files = files_below(&out);
+    let text = std::fs::read_to_string(out.join("scene.xml")).unwrap();
+    assert!(
+        files.len() > 20
+            && files.iter().all(|file| text.contains(&file.display().to_string()) || file.ends_with("scene.xml"))
+    );
+    assert!(text.contains("<integer name=\"sample_count\" value=\"4\"/>"));
+
+    // Again: refused, then forced, with the same bytes.
+    export(dataset(), "room", "up_left", &out, &[]).ends_with(2).says("is already there");
+    export(dataset(), "room", "up_left", &out, &["--force"]).ends_with(0);
+    assert_eq!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
+    // Another view has another camera.
+    export(dataset(), "room", "input", &out, &["--force"]).ends_with(0);
+    assert_ne!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
+}
+
+#[test]
+fn what_is_not_there_is_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    export(dataset(), "attic", "input", &out, &[]).ends_with(2).says("has no scene 'attic'");
+    export(dataset(), "room", "behind", &out, &[]).ends_with(2).says("has no view 'behind' of the scene 'room'");
+    let withheld = copied_dataset();
+    std::fs::remove_dir_all(withheld.path().join("scenes/room/ground_truth")).unwrap();
+    let shown = export(withheld.path(), "room", "input", &out, &[]).ends_with(2);
+    assert!(shown.error().contains("ground_truth"), "{}", shown.stderr);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// Ground truth that was changed since is not exported as if it were the dataset's.
+#[test]
+fn changed_truth_is_refused() {
+    let changed = copied_dataset();
+    let lights = changed.path().join("scenes/room/ground_truth/lights.json");
+    let text = std::fs::read_to_string(&lights).unwrap();
+    std::fs::write(&lights, text.replacen("\"camera_visible\": true", "\"camera_visible\": false", 1)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    export(changed.path(), "room", "input", &folder.path().join("out"), &[]).ends_with(2).says("lights.json");
+}
