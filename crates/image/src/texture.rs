@@ -121,10 +121,25 @@ impl Texture {
     }
 
     /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
+    #[inline]
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
+        // One decision a lookup, not one a texel.
+        match self.texels.as_ref() {
+            Texels::Srgb8(v) => self.bilinear(uv, |at| v[at].map(linear_from_srgb_byte)),
+            Texels::Srgb16(v) => self.bilinear(uv, |at| v[at].map(linear_from_srgb_word)),
+            Texels::Linear8(v) => self.bilinear(uv, |at| v[at].map(|byte| f32::from(byte) / 255.0)),
+            Texels::Grey8(v) => self.bilinear(uv, |at| [f32::from(v[at]) / 255.0; 3]),
+            Texels::Linear(v) => self.bilinear(uv, |at| v[at]),
+            Texels::Grey(v) => self.bilinear(uv, |at| [v[at]; 3]),
+        }
+    }
+
+    #[inline(always)]
+    fn bilinear(&self, uv: [f32; 2], texel: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
         let [(x0, x1, fx), (y0, y1, fy)] = self.footprint(uv);
-        let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
-        let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
+        let (upper, lower) = (y0 * self.width, y1 * self.width);
+        let (a, b) = (texel(upper + x0), texel(upper + x1));
+        let (c, d) = (texel(lower + x0), texel(lower + x1));
         std::array::from_fn(|k| {
             let top = a[k] + fx * (b[k] - a[k]);
             let bottom = c[k] + fx * (d[k] - c[k]);
@@ -133,6 +148,7 @@ impl Texture {
     }
 
     /// The two columns and the two rows around `uv`, with the weight of the second of each.
+    #[inline(always)]
     fn footprint(&self, uv: [f32; 2]) -> [(usize, usize, f32); 2] {
         // Beyond 1e9 an f32 cannot tell one texel from the next.
         let sane = |v: f32| if v.abs() < 1e9 { v } else { 0.0 };
@@ -141,6 +157,7 @@ impl Texture {
         [self.neighbours(x, self.width), self.neighbours(y, self.height)]
     }
 
+    #[inline(always)]
     fn neighbours(&self, position: f32, size: usize) -> (usize, usize, f32) {
         let lower = position.floor();
         // i64 holds every f32 that a uv can give here; the cast saturates beyond.
@@ -148,8 +165,16 @@ impl Texture {
         (self.wrapped(index, size), self.wrapped(index.saturating_add(1), size), position - lower)
     }
 
+    #[inline(always)]
     fn wrapped(&self, index: i64, size: usize) -> usize {
         let size = size as i64;
+        if (0..size).contains(&index) {
+            return index as usize;
+        }
+        self.wrapped_from_outside(index, size)
+    }
+
+    fn wrapped_from_outside(&self, index: i64, size: i64) -> usize {
         let inside = match self.wrap {
             Wrap::Repeat => index.rem_euclid(size),
             Wrap::Clamp => index.clamp(0, size - 1),
