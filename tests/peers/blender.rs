@@ -250,8 +250,7 @@ fn furnished(roughness: f32, metallic: f32) -> Shot {
             quad(Vec3::new(-0.9, -0.4, -0.5), Vec3::Z * 0.6, Vec3::X * 0.8),
             principled([0.4, 0.3, 0.6], roughness, metallic),
         );
-    let builder =
-        lamp(Vec3::new(-0.5, 0.9, -0.5), Vec3::X, Vec3::Z, [4.0, 3.8, 3.5], builder);
+    let builder = lamp(Vec3::new(-0.5, 0.9, -0.5), Vec3::X, Vec3::Z, [4.0, 3.8, 3.5], builder);
     Shot {
         name: format!("room, roughness {roughness}, metallic {metallic}"),
         scene: builder.scene(),

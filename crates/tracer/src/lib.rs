@@ -24,6 +24,7 @@ pub mod render;
 pub mod sampler;
 pub mod shared_centre;
 pub mod surface_hit;
+mod triangle_record;
 mod warp;
 pub mod world;
 

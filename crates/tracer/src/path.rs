@@ -65,7 +65,7 @@ impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
     /// Follows `ray` to its end, adds what it finds there, and scatters.
     fn advance(&mut self, ray: &Ray, scatterings: u32) -> Option<Ray> {
         self.counts.rays += 1;
-        let Some(hit) = self.world.closest(ray, self.sampler.salt(2 * scatterings)) else {
+        let Some(hit) = self.world.closest(ray, || self.sampler.salt(2 * scatterings)) else {
             self.add_outside(ray.direction());
             return None;
         };
@@ -84,8 +84,8 @@ impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
             self.counts.capped_throughput += f64::from(self.throughput.element_sum() / 3.0);
             return None;
         }
-        self.add_sampled(&bsdf, &place, wo, scatterings);
-        self.scatter(&bsdf, &place, wo, scatterings)
+        self.add_sampled(&bsdf, &place, scatterings);
+        self.scatter(&bsdf, &place, scatterings)
     }
 
     /// Adds what the surface itself sends back along `ray`. True if the surface is nothing but a lamp to this ray: an
@@ -124,15 +124,15 @@ impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
     }
 
     /// Samples an emitter and adds its light if nothing is in between.
-    fn add_sampled(&mut self, bsdf: &Bsdf, place: &SurfaceHit, wo: Vec3, scatterings: u32) {
+    fn add_sampled(&mut self, bsdf: &Bsdf, place: &SurfaceHit, scatterings: u32) {
         if bsdf.is_delta() || self.settings.light_sampling == LightSampling::Bsdf {
             return;
         }
         let [a, b, c, _] = self.sampler.set(1 + 2 * scatterings);
         let world = self.world;
         let opacity = |place: &SurfaceHit| world.opacity_at(place);
-        let Some(light) = world.emitters().sample(world.scene(), place.position, [a, b, c], opacity) else { return };
-        let value = bsdf.eval(wo, light.direction);
+        let Some(light) = world.emitters().sample(place.position, [a, b, c], opacity) else { return };
+        let (value, density) = bsdf.evaluate(light.direction);
         if value == Vec3::ZERO {
             return;
         }
@@ -141,19 +141,19 @@ impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
             None => Some(place.spawn(light.direction)),
         };
         self.counts.shadow_rays += 1;
-        if shadow.is_none_or(|ray| world.occluded(&ray, self.sampler.salt(2 * scatterings + 1))) {
+        if shadow.is_none_or(|ray| world.occluded(&ray, || self.sampler.salt(2 * scatterings + 1))) {
             return;
         }
         let weight = match self.settings.light_sampling {
             LightSampling::Emitters => 1.0,
-            _ => power_heuristic(light.density, bsdf.density(wo, light.direction)),
+            _ => power_heuristic(light.density, density),
         };
         self.contribute(light.light, self.throughput * value * light.radiance * (weight / light.density));
     }
 
     /// The ray that the path goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
     /// length of paths follows from geometry alone.
-    fn scatter(&mut self, bsdf: &Bsdf, place: &SurfaceHit, wo: Vec3, scatterings: u32) -> Option<Ray> {
+    fn scatter(&mut self, bsdf: &Bsdf, place: &SurfaceHit, scatterings: u32) -> Option<Ray> {
         let [a, b, c, roulette] = self.sampler.set(2 + 2 * scatterings);
         if scatterings >= self.settings.roulette_start {
             if roulette >= self.settings.roulette_survival {
@@ -161,7 +161,7 @@ impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
             }
             self.throughput /= self.settings.roulette_survival;
         }
-        let sample = bsdf.sample(wo, [a, b, c])?;
+        let sample = bsdf.sample([a, b, c])?;
         self.throughput *= sample.weight;
         if self.throughput == Vec3::ZERO {
             return None;

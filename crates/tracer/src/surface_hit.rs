@@ -1,11 +1,11 @@
 //! What is known of a surface at the place where a ray met it.
 
-use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::TriangleMesh;
+use glam::{Vec2, Vec3};
 use mateval_scene::reference::SurfaceIndex;
 
 use crate::accel::TriangleIndex;
 use crate::ray::Ray;
+use crate::triangle_record::TriangleRecord;
 
 /// A place on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,43 +28,40 @@ pub struct SurfaceHit {
 }
 
 /// 2^-24, half the spacing of f32 at 1.
-const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
+pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
 impl SurfaceHit {
-    /// The place with weights `weights` in a triangle of a mesh, whose facing is `facing`.
-    pub(crate) fn new(
-        surface: SurfaceIndex,
-        triangle: TriangleIndex,
-        mesh: &TriangleMesh,
-        facing: &Facing,
-        weights: Vec3,
-    ) -> Self {
-        let [a, b, c] = mesh.triangles[triangle.0].map(|vertex| vertex as usize);
-        let blend = |values: &[Vec3]| values[a] * weights.x + values[b] * weights.y + values[c] * weights.z;
-        let uv = |uvs: &Vec<Vec2>| uvs[a] * weights.x + uvs[b] * weights.y + uvs[c] * weights.z;
-        let shading = mesh.normals.as_ref().and_then(|normals| blend(normals).try_normalize());
+    /// The place with weights `weights` in a triangle, of which `record` tells all.
+    #[inline]
+    pub(crate) fn new(surface: SurfaceIndex, triangle: TriangleIndex, record: &TriangleRecord, weights: Vec3) -> Self {
+        let blend = |[a, b, c]: [Vec3; 3]| a * weights.x + b * weights.y + c * weights.z;
+        let shading = if record.smooth { blend(record.normals).try_normalize() } else { None };
+        let [a, b, c] = record.uvs;
         Self {
             surface,
             triangle,
-            position: blend(&mesh.positions),
-            geometric_normal: facing.normal,
-            shading_normal: shading.filter(|normal| normal.dot(facing.normal) > 0.0).unwrap_or(facing.normal),
-            uv: mesh.uvs.as_ref().map_or(Vec2::ZERO, uv),
-            offset: facing.offset,
+            position: blend(record.positions),
+            geometric_normal: record.normal,
+            shading_normal: shading.filter(|normal| normal.dot(record.normal) > 0.0).unwrap_or(record.normal),
+            uv: a * weights.x + b * weights.y + c * weights.z,
+            offset: record.offset,
         }
     }
 
     /// Whether `direction`, away from the surface, leaves on its front.
+    #[inline]
     pub fn is_front(&self, direction: Vec3) -> bool {
         self.geometric_normal.dot(direction) > 0.0
     }
 
     /// A ray from here along `direction`, that does not meet this triangle again.
+    #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {
         Ray::endless(self.beside(direction), direction)
     }
 
     /// A ray from here to just before `other`, for asking whether something lies between; none if they coincide.
+    #[inline]
     pub fn spawn_to(&self, other: &SurfaceHit) -> Option<Ray> {
         let towards = other.position - self.position;
         let (from, to) = (self.beside(towards), other.beside(-towards));
@@ -84,38 +81,10 @@ impl SurfaceHit {
     }
 }
 
-/// What is the same all over a triangle; 16 bytes each, worked out once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Facing {
-    /// [`SurfaceHit::geometric_normal`].
-    pub(crate) normal: Vec3,
-    offset: f32,
-}
-
-impl Facing {
-    /// Of a triangle of a mesh. `scene_size` is the scene's largest coordinate.
-    pub(crate) fn new(mesh: &TriangleMesh, triangle: TriangleIndex, scene_size: f32) -> Self {
-        let corners = mesh.corners(triangle.0);
-        let [a, b, c] = corners.map(|corner| corner.as_dvec3());
-        let normal = (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::Z).as_vec3();
-        let turned = mesh.normals.as_ref().is_some_and(|normals| {
-            let sum: Vec3 = mesh.triangles[triangle.0].iter().map(|&vertex| normals[vertex as usize]).sum();
-            sum.dot(normal) < 0.0
-        });
-        Self { normal: if turned { -normal } else { normal }, offset: offset(corners, scene_size) }
-    }
-}
-
-/// The hit is off its triangle by 4 roundings of the corners' coordinates (interpolation), the next ray's triangle test
-/// moves corners by 6 roundings of distances of up to twice them along two axes (17 in all), the sum rounds once; 32
-/// leaves a margin. A neighbour in the same plane may be as large as the scene, which the second term is for.
-fn offset(corners: [Vec3; 3], scene_size: f32) -> f32 {
-    let largest = corners.iter().fold(0.0_f32, |size, corner| size.max(corner.abs().max_element()));
-    ROUNDING * (32.0 * largest + 4.0 * scene_size)
-}
-
 #[cfg(test)]
 mod tests {
+    use mateval_scene::TriangleMesh;
+
     use super::*;
     use crate::accel::Accel;
 
@@ -143,8 +112,8 @@ mod tests {
                 let (b, c) = if x + y > 1.0 { (1.0 - x, 1.0 - y) } else { (x, y) };
                 let weights = Vec3::new(1.0 - b - c, b, c);
                 let triangle = TriangleIndex((index % 2) as usize);
-                let facing = Facing::new(&mesh, triangle, 3.0 * size);
-                let hit = SurfaceHit::new(SurfaceIndex(0), triangle, &mesh, &facing, weights);
+                let record = TriangleRecord::new(&mesh, triangle, 3.0 * size);
+                let hit = SurfaceHit::new(SurfaceIndex(0), triangle, &record, weights);
                 assert!(hit.offset < 1e-5 * size);
                 let frame = crate::frame::Frame::around(hit.geometric_normal);
                 // Elevations from a millionth of a radian to a right angle, on both sides.
@@ -165,17 +134,17 @@ mod tests {
     #[test]
     fn vertex_normals_say_where_the_front_is() {
         let mut mesh = square(1.0);
-        let by_winding = Facing::new(&mesh, TriangleIndex(0), 3.0).normal;
+        let by_winding = TriangleRecord::new(&mesh, TriangleIndex(0), 3.0).normal;
         mesh.normals = Some(vec![-by_winding; 4]);
-        assert_eq!(Facing::new(&mesh, TriangleIndex(0), 3.0).normal, -by_winding);
+        assert_eq!(TriangleRecord::new(&mesh, TriangleIndex(0), 3.0).normal, -by_winding);
     }
 
     #[test]
     fn a_bad_vertex_normal_is_replaced() {
         let mut mesh = square(1.0);
         mesh.normals = Some(vec![Vec3::ZERO; 4]);
-        let facing = Facing::new(&mesh, TriangleIndex(0), 3.0);
-        let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, Vec3::splat(1.0 / 3.0));
+        let record = TriangleRecord::new(&mesh, TriangleIndex(0), 3.0);
+        let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &record, Vec3::splat(1.0 / 3.0));
         assert_eq!(hit.shading_normal, hit.geometric_normal);
     }
 }

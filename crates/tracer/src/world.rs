@@ -7,6 +7,7 @@ use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::Material;
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
+use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex};
 use crate::bsdf::MaterialTables;
@@ -14,7 +15,8 @@ use crate::emitter::Emitters;
 use crate::error::TracerError;
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
-use crate::surface_hit::{Facing, SurfaceHit};
+use crate::surface_hit::SurfaceHit;
+use crate::triangle_record::TriangleRecord;
 
 /// A scene, its triangles in a hierarchy, its lights in tables.
 #[derive(Debug)]
@@ -27,7 +29,7 @@ pub struct World {
     /// Whether any material has an opacity.
     masked: bool,
     /// Of all triangles, surface by surface.
-    facings: Vec<Facing>,
+    records: Vec<TriangleRecord>,
 }
 
 /// From this opacity on a surface counts as there, for pictures without light.
@@ -59,11 +61,14 @@ impl World {
         let textures = scene.texture_list();
         let [low, high] = accel.bounds();
         let size = low.abs().max(high.abs()).max_element();
-        let facings = meshes(&scene).into_iter().flat_map(|mesh| {
-            (0..mesh.triangles.len()).map(move |triangle| Facing::new(mesh, TriangleIndex(triangle), size))
-        });
+        let records: Vec<TriangleRecord> = meshes(&scene)
+            .into_par_iter()
+            .flat_map_iter(|mesh| {
+                (0..mesh.triangles.len()).map(move |triangle| TriangleRecord::new(mesh, TriangleIndex(triangle), size))
+            })
+            .collect();
         Ok(Self {
-            facings: facings.collect(),
+            records,
             emitters: Emitters::new(&scene, &textures, size)?,
             tables: MaterialTables::new(&scene, &textures)?,
             masked: scene.materials.iter().any(|material| material.opacity.is_some()),
@@ -102,16 +107,22 @@ impl World {
         self.closest_above(ray, |_| OPACITY_THRESHOLD)
     }
 
-    /// The nearest hit; a surface of opacity o is met with probability o. Equal `salt`, ray and scene give equal hits.
-    pub fn closest(&self, ray: &Ray, salt: u32) -> Option<Hit> {
+    /// The nearest hit; a surface of opacity o is met with probability o. Equal `salt`, ray and scene give equal hits; it
+    /// is asked for where there are opacities.
+    pub fn closest(&self, ray: &Ray, salt: impl FnOnce() -> u32) -> Option<Hit> {
+        if !self.masked {
+            return self.accel.closest(ray);
+        }
+        let salt = salt();
         self.closest_above(ray, |hit| opacity_draw(salt, hit))
     }
 
     /// Whether the ray is stopped; a surface of opacity o stops it with probability o, as `salt` says.
-    pub fn occluded(&self, ray: &Ray, salt: u32) -> bool {
+    pub fn occluded(&self, ray: &Ray, salt: impl FnOnce() -> u32) -> bool {
         if !self.masked {
             return self.accel.occluded(ray);
         }
+        let salt = salt();
         self.accel.occluded_where(ray, |hit| self.opacity(hit) >= opacity_draw(salt, hit))
     }
 
@@ -147,16 +158,13 @@ impl World {
 
     /// The surface's own uv at a hit; zero where it has none.
     pub fn source_uv(&self, hit: &Hit) -> Vec2 {
-        let mesh = self.mesh(hit.surface);
-        let Some(uvs) = &mesh.uvs else { return Vec2::ZERO };
-        let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
+        let [a, b, c] = self.records[hit.global as usize].uvs;
         a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
     }
 
     /// What is known of the surface at a hit.
     pub fn surface_hit(&self, hit: &Hit) -> SurfaceHit {
-        let facing = &self.facings[hit.global as usize];
-        SurfaceHit::new(hit.surface, hit.triangle, self.mesh(hit.surface), facing, hit.barycentrics)
+        SurfaceHit::new(hit.surface, hit.triangle, &self.records[hit.global as usize], hit.barycentrics)
     }
 
     pub(crate) fn mesh(&self, surface: SurfaceIndex) -> &TriangleMesh {

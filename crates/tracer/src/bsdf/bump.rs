@@ -63,7 +63,7 @@ mod tests {
 
     use super::*;
     use crate::accel::TriangleIndex;
-    use crate::surface_hit::Facing;
+    use crate::triangle_record::TriangleRecord;
 
     /// Heights rise by 1 m over the texture, which covers 2 m of a square: a slope of one half. With the texture repeated
     /// twice or turned a quarter, the slope is twice as steep or runs along v; on a mesh that is turned over, likewise.
@@ -79,9 +79,9 @@ mod tests {
         };
         let bent = |uv: [[f32; 3]; 2], scale: f32| {
             let height = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: UvTransform(uv) };
-            let facing = Facing::new(&mesh, TriangleIndex(0), 2.0);
+            let record = TriangleRecord::new(&mesh, TriangleIndex(0), 2.0);
             let weights = Vec3::new(0.45, 0.25, 0.3);
-            let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, weights);
+            let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &record, weights);
             bumped_normal(&BumpMap { height, scale }, &textures, &mesh, &hit)
         };
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

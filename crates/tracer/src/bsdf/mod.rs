@@ -25,6 +25,7 @@ use crate::frame::Frame;
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 use lobe::Lobe;
+use principled::PrincipledView;
 pub(crate) use tables::MaterialTables;
 
 /// A surface's scattering at one place.
@@ -33,7 +34,11 @@ pub struct Bsdf<'w> {
     frame: Frame,
     /// The triangle's normal on the side of the frame's.
     geometric: Vec3,
+    /// Towards the viewer, in the frame.
+    wo: Vec3,
     lobe: Lobe<'w>,
+    /// For principled materials, which most are: what follows from `wo` already.
+    principled: Option<PrincipledView>,
 }
 
 /// A sampled direction.
@@ -41,7 +46,7 @@ pub struct Bsdf<'w> {
 pub struct BsdfSample {
     /// Where the light comes from.
     pub wi: Vec3,
-    /// [`Bsdf::eval`] over `density`.
+    /// The value of [`Bsdf::evaluate`] over `density`.
     pub weight: Vec3,
     /// Per solid angle; for a single direction (`delta`), its probability.
     pub density: f32,
@@ -75,27 +80,39 @@ impl<'w> Bsdf<'w> {
         }
         let seen_side = if front || !lobe.transmits() { 1.0 } else { -1.0 };
         let normal = turned_to(normal * seen_side, wo) * seen_side;
-        Self { frame: Frame::around(normal), geometric, lobe }
+        let frame = Frame::around(normal);
+        let wo = frame.local_from_world(wo);
+        let principled = match &lobe {
+            Lobe::Principled(principled) if wo.z > 0.0 => Some(principled.seen_from(wo)),
+            _ => None,
+        };
+        Self { frame, geometric, wo, lobe, principled }
     }
 
-    /// Value times the cosine of `wi`, a channel; single directions left out.
-    pub fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        match self.local(wo, wi) {
-            Some([wo, wi]) => self.lobe.eval(wo, wi),
-            None => Vec3::ZERO,
+    /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
+    /// single directions left out.
+    ///
+    /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's or the reverse: such light
+    /// would come through the surface.
+    pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
+        let local = self.frame.local_from_world(wi);
+        if self.geometric.dot(wi) * local.z <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        match &self.principled {
+            Some(_) if local.z <= 0.0 => (Vec3::ZERO, 0.0),
+            Some(principled) => principled.evaluate(local),
+            None => (self.lobe.eval(self.wo, local), self.lobe.density(self.wo, local)),
         }
     }
 
-    /// The density with which [`Self::sample`] finds `wi`, per solid angle; single directions left out.
-    pub fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.local(wo, wi).map_or(0.0, |[wo, wi]| self.lobe.density(wo, wi))
-    }
-
     /// A direction for `wo`, from three numbers in [0, 1); none where the draw sends light nowhere.
-    pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        let sample = self.lobe.sample(self.frame.local_from_world(wo), u)?;
+    pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample> {
+        let sample = match &self.principled {
+            Some(principled) => principled.sample(u)?,
+            None => self.lobe.sample(self.wo, u)?,
+        };
         let wi = self.frame.world_from_local(sample.wi).normalize();
-        // Unlike `local`, this tests `wi` alone: whether `wo` is seen was settled when the normal was turned to it.
         (self.geometric.dot(wi) * sample.wi.z > 0.0).then_some(BsdfSample {
             wi,
             weight: sample.weight,
@@ -112,13 +129,6 @@ impl<'w> Bsdf<'w> {
     /// Whether nothing is sent back at all.
     pub fn is_black(&self) -> bool {
         matches!(self.lobe, Lobe::Black)
-    }
-
-    /// Both directions in the shading frame; none where `wi` lies above the shading normal's plane and below the
-    /// triangle's or the reverse: such light would come through the surface.
-    fn local(&self, wo: Vec3, wi: Vec3) -> Option<[Vec3; 2]> {
-        let local = self.frame.local_from_world(wi);
-        (self.geometric.dot(wi) * local.z > 0.0).then(|| [self.frame.local_from_world(wo), local])
     }
 }
 

@@ -324,7 +324,7 @@ fn sides() {
     use std::sync::Arc;
 
     use crate::accel::TriangleIndex;
-    use crate::surface_hit::Facing;
+    use crate::triangle_record::TriangleRecord;
     use mateval_scene::TriangleMesh;
     use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
 
@@ -340,15 +340,15 @@ fn sides() {
         let scene = ReferenceScene { surfaces: vec![surface], materials: vec![material], ..Default::default() };
         World::new(Arc::new(scene)).unwrap()
     };
-    let facing = Facing::new(&mesh, TriangleIndex(0), 1.0);
-    let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &mesh, &facing, Vec3::splat(1.0 / 3.0));
+    let record = TriangleRecord::new(&mesh, TriangleIndex(0), 1.0);
+    let hit = SurfaceHit::new(SurfaceIndex(0), TriangleIndex(0), &record, Vec3::splat(1.0 / 3.0));
     let (wo, wi) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.6, 0.0, -0.8));
     let mirrored = |w: Vec3| Vec3::new(w.x, w.y, -w.z);
     let (one, two) = (world(false), world(true));
     assert!(Bsdf::new(&one, &hit, wo).is_black());
-    assert_eq!(Bsdf::new(&one, &hit, mirrored(wo)).eval(mirrored(wo), wi), Vec3::ZERO);
-    let front = Bsdf::new(&two, &hit, mirrored(wo)).eval(mirrored(wo), mirrored(wi));
-    let back = Bsdf::new(&two, &hit, wo).eval(wo, wi);
+    assert_eq!(Bsdf::new(&one, &hit, mirrored(wo)).evaluate(wi), (Vec3::ZERO, 0.0));
+    let front = Bsdf::new(&two, &hit, mirrored(wo)).evaluate(mirrored(wi)).0;
+    let back = Bsdf::new(&two, &hit, wo).evaluate(wi).0;
     assert!(front.x > 0.1 && (front - back).length() < 1e-6, "{front} {back}");
 }
 

@@ -6,7 +6,8 @@ use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
 
 use super::distribution::Distribution;
 use crate::accel::TriangleIndex;
-use crate::surface_hit::{Facing, SurfaceHit};
+use crate::surface_hit::SurfaceHit;
+use crate::triangle_record::TriangleRecord;
 use crate::warp;
 
 /// One or more surfaces of one light group, sampled together.
@@ -20,11 +21,32 @@ pub(crate) struct AreaEmitter {
     starts: Vec<usize>,
     triangles: Distribution,
     /// Of all triangles, surface by surface.
-    facings: Vec<Facing>,
+    records: Vec<TriangleRecord>,
+    pub(crate) outline: Outline,
+}
+
+/// Enough of an emitter to say roughly how much of the view it takes up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Outline {
+    /// Of a sphere around it.
     centre: Vec3,
+    /// Of that sphere, and squared; above 0.
+    radius: f32,
     radius2: f32,
-    /// The common front normal of all triangles, if they have one and only the front glows.
-    facing: Option<Vec3>,
+    /// Square metres.
+    area: f32,
+    /// The common front normal of all triangles, if they have one and only the front glows; else zero.
+    facing: Vec3,
+}
+
+impl Outline {
+    /// Roughly the solid angle, seen from `from`; 0 from behind.
+    #[inline]
+    pub(crate) fn solid_angle(&self, from: Vec3) -> f32 {
+        let away = from - self.centre;
+        let seen = if self.facing.dot(away) + self.radius < 0.0 { 0.0 } else { self.area };
+        seen / away.length_squared().max(self.radius2)
+    }
 }
 
 impl AreaEmitter {
@@ -42,47 +64,42 @@ impl AreaEmitter {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
         let areas = meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| area(mesh, t)));
-        let facings: Vec<Facing> = meshes
+        let records: Vec<TriangleRecord> = meshes
             .iter()
-            .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| Facing::new(mesh, TriangleIndex(t), scene_size)))
+            .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| TriangleRecord::new(mesh, TriangleIndex(t), scene_size)))
             .collect();
         let (centre, radius2) = bounding_sphere(&meshes);
+        let triangles = Distribution::new(areas);
+        let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !two_sided));
         Self {
             light,
             radiance: Vec3::from_array(radiance),
             two_sided,
-            triangles: Distribution::new(areas),
-            facing: common_normal(&facings).filter(|_| !two_sided),
-            facings,
+            triangles,
+            records,
             surfaces,
             starts,
-            centre,
-            radius2,
+            outline: Outline {
+                centre,
+                radius2: radius2.max(f32::MIN_POSITIVE),
+                area: total as f32,
+                facing: facing.unwrap_or(Vec3::ZERO),
+                radius: radius2.sqrt(),
+            },
         }
     }
 
     /// Square metres.
     pub(crate) fn area(&self) -> f32 {
-        self.triangles.total() as f32
-    }
-
-    /// Roughly the solid angle it takes up, seen from `from`; the weight with which it is chosen.
-    pub(crate) fn importance(&self, from: Vec3) -> f32 {
-        let away = from - self.centre;
-        if self.facing.is_some_and(|normal| normal.dot(away) + self.radius2.sqrt() < 0.0) {
-            return 0.0;
-        }
-        self.area() / away.length_squared().max(self.radius2).max(f32::MIN_POSITIVE)
+        self.outline.area
     }
 
     /// A place, uniform over the area.
-    pub(crate) fn sample(&self, scene: &ReferenceScene, choice: f32, u: [f32; 2]) -> SurfaceHit {
+    pub(crate) fn sample(&self, choice: f32, u: [f32; 2]) -> SurfaceHit {
         let (triangle, _) = self.triangles.sample(choice);
-        let facing = &self.facings[triangle];
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
-        let surface = self.surfaces[which];
-        let triangle = TriangleIndex(triangle - self.starts[which]);
-        SurfaceHit::new(surface, triangle, &scene.surfaces[surface.0].mesh, facing, warp::triangle(u))
+        let index = TriangleIndex(triangle - self.starts[which]);
+        SurfaceHit::new(self.surfaces[which], index, &self.records[triangle], warp::triangle(u))
     }
 
     /// Whether the side of `hit` towards `direction` glows.
@@ -105,7 +122,7 @@ fn bounding_sphere(meshes: &[&TriangleMesh]) -> (Vec3, f32) {
     (centre, positions().map(|p| p.distance_squared(centre)).fold(0.0, f32::max))
 }
 
-fn common_normal(facings: &[Facing]) -> Option<Vec3> {
-    let first = facings.first()?.normal;
-    facings.iter().all(|facing| facing.normal.dot(first) > 0.9999).then_some(first)
+fn common_normal(records: &[TriangleRecord]) -> Option<Vec3> {
+    let first = records.first()?.normal;
+    records.iter().all(|record| record.normal.dot(first) > 0.9999).then_some(first)
 }

@@ -161,24 +161,17 @@ impl Emitters {
 
     /// Light for the place `from`, from three numbers in [0, 1); none when there is none to be had. `opacity` is asked
     /// for the coverage of a glowing surface.
-    pub fn sample(
-        &self,
-        scene: &ReferenceScene,
-        from: Vec3,
-        u: [f32; 3],
-        opacity: impl Fn(&SurfaceHit) -> f32,
-    ) -> Option<EmitterSample> {
+    pub fn sample(&self, from: Vec3, u: [f32; 3], opacity: impl Fn(&SurfaceHit) -> f32) -> Option<EmitterSample> {
         let distant_share = self.distant_share();
         if u[0] < distant_share {
             return self.sample_distant((u[0] / distant_share).min(1.0 - f32::EPSILON), [u[1], u[2]], distant_share);
         }
         let choice = ((u[0] - distant_share) / (1.0 - distant_share)).clamp(0.0, 1.0 - f32::EPSILON);
-        self.sample_area(scene, from, choice, [u[1], u[2]], opacity)
+        self.sample_area(from, choice, [u[1], u[2]], opacity)
     }
 
     fn sample_area(
         &self,
-        scene: &ReferenceScene,
         from: Vec3,
         choice: f32,
         u: [f32; 2],
@@ -186,7 +179,7 @@ impl Emitters {
     ) -> Option<EmitterSample> {
         let (which, rest, probability) = self.choose_area(from, choice)?;
         let area = &self.areas[which];
-        let place = area.sample(scene, rest, u);
+        let place = area.sample(rest, u);
         let towards = place.position - from;
         let direction = towards.try_normalize()?;
         let cos = place.geometric_normal.dot(direction).abs();
@@ -256,10 +249,24 @@ impl Emitters {
 
     /// The area emitter for `choice` in [0, 1), the part of the choice within it, and its probability among them.
     fn choose_area(&self, from: Vec3, choice: f32) -> Option<(usize, f32, f32)> {
-        let total: f32 = self.areas.iter().map(|area| area.importance(from)).sum();
-        let (mut before, last) = (0.0_f32, self.areas.len().checked_sub(1)?);
+        let last = self.areas.len().checked_sub(1)?;
+        // Most scenes have few emitters: what they weigh is kept for the second look.
+        let mut weights = [0.0_f32; SEPARATE_SURFACES];
+        let mut total = 0.0_f32;
         for (which, area) in self.areas.iter().enumerate() {
-            let probability = self.mixed(area.importance(from), total);
+            let weight = area.outline.solid_angle(from);
+            if let Some(kept) = weights.get_mut(which) {
+                *kept = weight;
+            }
+            total += weight;
+        }
+        let weight = |which: usize| match weights.get(which) {
+            Some(kept) => *kept,
+            None => self.areas[which].outline.solid_angle(from),
+        };
+        let mut before = 0.0_f32;
+        for which in 0..=last {
+            let probability = self.mixed(weight(which), total);
             if choice < before + probability || which == last {
                 let rest = ((choice - before) / probability).clamp(0.0, 1.0 - f32::EPSILON);
                 return (probability > 0.0).then_some((which, rest, probability));
@@ -270,13 +277,14 @@ impl Emitters {
     }
 
     fn area_probability(&self, which: usize, from: Vec3) -> f32 {
-        let total: f32 = self.areas.iter().map(|area| area.importance(from)).sum();
-        self.mixed(self.areas[which].importance(from), total)
+        let total: f32 = self.areas.iter().fold(0.0, |total, area| total + area.outline.solid_angle(from));
+        self.mixed(self.areas[which].outline.solid_angle(from), total)
     }
 
-    fn mixed(&self, importance: f32, total: f32) -> f32 {
+    #[inline]
+    fn mixed(&self, weight: f32, total: f32) -> f32 {
         let alike = 1.0 / self.areas.len() as f32;
-        if total > 0.0 { UNIFORM_SHARE * alike + (1.0 - UNIFORM_SHARE) * importance / total } else { alike }
+        if total > 0.0 { UNIFORM_SHARE * alike + weight * ((1.0 - UNIFORM_SHARE) / total) } else { alike }
     }
 }
 
@@ -336,7 +344,7 @@ mod tests {
             let mut lights = std::collections::BTreeSet::new();
             for index in 0..2000 {
                 let [a, b, c, _] = sobol_burley::sample_4d(index, 0, 3);
-                let Some(sample) = emitters.sample(&scene, from, [a, b, c], |_| 1.0) else { continue };
+                let Some(sample) = emitters.sample(from, [a, b, c], |_| 1.0) else { continue };
                 let found = match &sample.place {
                     Some(place) => emitters.emitted(place, from).unwrap(),
                     None => emitters.from_outside(sample.direction).find(|f| f.light == sample.light).unwrap(),
@@ -351,8 +359,8 @@ mod tests {
 
     #[test]
     fn no_emitters_give_no_light() {
-        let (scene, emitters) = emitters(0, false);
-        assert!(emitters.sample(&scene, Vec3::ZERO, [0.5; 3], |_| 1.0).is_none());
+        let (_, emitters) = emitters(0, false);
+        assert!(emitters.sample(Vec3::ZERO, [0.5; 3], |_| 1.0).is_none());
         assert_eq!(emitters.from_outside(Vec3::X).count(), 0);
     }
 }
