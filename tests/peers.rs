@@ -15,5 +15,7 @@ mod statistics;
 
 mod peers {
     mod blender;
+    mod blender_job;
     mod python;
+    mod tiles;
 }
