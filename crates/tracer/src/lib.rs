@@ -1,7 +1,8 @@
 //! Traces light through a scene.
 //!
 //! In: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and a
-//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render()`]), and first hits ([`World::first_hit`],
+//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render()`]), of several views
+//! and apart by lights ([`render_views`]), and first hits ([`World::first_hit`],
 //! [`aov`]) for depth, normals, ids and material pictures.
 //!
 //! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
@@ -16,19 +17,23 @@ pub mod emitter;
 pub mod error;
 pub mod film;
 mod frame;
+pub mod light_basis;
 mod path;
 pub mod ray;
 pub mod render;
 pub mod sampler;
+pub mod shared_centre;
 pub mod surface_hit;
 mod warp;
 pub mod world;
 
-pub use accel::{Accel, Hit, TriangleIndex};
+pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use error::TracerError;
+pub use light_basis::{LightBasis, LightGroups};
 pub use ray::Ray;
 pub use render::{LightSampling, Render, RenderSettings, RenderStats, render};
 pub use sampler::Sampler;
+pub use shared_centre::{HalfLight, ViewLight, ViewsRender, render_views};
 pub use surface_hit::SurfaceHit;
 pub use world::World;

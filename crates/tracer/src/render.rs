@@ -105,7 +105,7 @@ pub fn render(
     Ok(Render { picture, stats: stats(paths, &counts) })
 }
 
-fn check(settings: &RenderSettings) -> Result<(), TracerError> {
+pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
     let RenderSettings { samples, roulette_survival, .. } = *settings;
     if samples == 0 || !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
         return Err(TracerError::Invalid(format!(
@@ -138,7 +138,7 @@ fn pixel(
     sum.map(|channel| channel / f64::from(settings.samples))
 }
 
-fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {
+pub(crate) fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
     let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput).sum();
     let all = paths.max(1) as f64;

@@ -9,7 +9,11 @@ mod bench_scene;
 mod closed_forms;
 #[path = "suite/estimators.rs"]
 mod estimators;
+#[path = "suite/light_basis.rs"]
+mod light_basis;
 #[path = "suite/scenes.rs"]
 mod scenes;
+#[path = "suite/shared_centre.rs"]
+mod shared_centre;
 #[path = "suite/statistics.rs"]
 mod statistics;

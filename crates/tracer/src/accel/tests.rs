@@ -66,6 +66,17 @@ proptest! {
         let refused = accel.closest_where(&ray, odd);
         prop_assert_eq!(accel.occluded_where(&ray, odd), refused.is_some());
         prop_assert!(refused.is_none_or(|hit| expected.is_some_and(|nearest| nearest.distance <= hit.distance)));
+        // Whatever the processor.
+        let portable = accel.with_instructions(InstructionSet::Portable).unwrap();
+        prop_assert_eq!(portable.closest(&ray), expected);
+        prop_assert_eq!(portable.occluded(&ray), expected.is_some());
+        prop_assert_eq!(portable.closest_where(&ray, odd), refused);
+        // The fast test's roundings have no bound that boxes could be padded by; but they are the same everywhere.
+        let portable = portable.with_test(TriangleTest::Fast);
+        let found = (portable.closest(&ray), portable.occluded(&ray));
+        if let Some(avx2) = portable.with_instructions(InstructionSet::Avx2) {
+            prop_assert_eq!((avx2.closest(&ray), avx2.occluded(&ray)), found);
+        }
     }
 }
 
@@ -166,5 +177,5 @@ fn deep_trees_are_walked() {
 fn memory_is_what_the_documentation_says() {
     let mesh = ball(60);
     let accel = Accel::build(&[&mesh]).unwrap();
-    assert!(accel.memory_bytes() <= 112 * accel.triangle_count(), "{}", accel.memory_bytes());
+    assert!(accel.memory_bytes() <= 100 * accel.triangle_count(), "{}", accel.memory_bytes());
 }

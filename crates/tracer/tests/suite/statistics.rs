@@ -46,6 +46,16 @@ impl Renders {
         Self((0..count).map(one).collect())
     }
 
+    /// Pictures that are independent estimates of one.
+    pub fn from_pictures(pictures: impl Iterator<Item = Picture<LinearRgb>>) -> Self {
+        Self(pictures.collect())
+    }
+
+    /// The single renders.
+    pub fn pictures(&self) -> &[Picture<LinearRgb>] {
+        &self.0
+    }
+
     /// Mean of all channels over the rectangle of pixels.
     pub fn region(&self, x: std::ops::Range<usize>, y: std::ops::Range<usize>) -> Estimate {
         let mean = |picture: &Picture<LinearRgb>| {

@@ -1,0 +1,144 @@
+//! The hierarchy against Debian's Embree 3.13 (`apt-get install libembree-dev`), the same rays in the same process, run in
+//! turns: `cargo bench -p mateval-tracer --features bench-embree --bench against_embree [-- ROUNDS]`.
+//!
+//! Scenes: `bench/dense` where the shared data is, and the built-in room at 20 thousand, 1 million and 3 million triangles.
+//! CPU time of one thread. A number above 1 says that ours is so many times faster than Embree's medium mode.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
+
+#[path = "../tests/suite/bench_scene.rs"]
+mod bench_scene;
+#[path = "support/embree.rs"]
+mod embree;
+#[path = "support/rays.rs"]
+mod rays;
+#[path = "support/room.rs"]
+mod room;
+#[path = "support/timing.rs"]
+mod timing;
+
+use glam::{DVec3, Vec3};
+use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_tracer::{Accel, Ray, TriangleTest};
+
+use embree::{Embree, Mode};
+
+const SIDE: u32 = 724;
+
+fn main() {
+    let rounds = std::env::args().skip(1).find_map(|word| word.parse().ok()).unwrap_or(9);
+    // One thread: what a ray costs, not how well threads share.
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().unwrap();
+    if let Some(folder) = bench_scene::folder("dense") {
+        let (scene, camera) = bench_scene::read(&folder, SIDE);
+        compare("bench/dense", scene.surfaces.into_iter().map(|s| s.mesh).collect(), &camera, rounds);
+    } else {
+        println!("SKIPPED: bench/dense is not here; set MATEVAL_DATA");
+    }
+    for triangles in [20_000, 1_000_000, 3_000_000] {
+        let intrinsics = Intrinsics::from_fov_x(SIDE, SIDE, 1.2);
+        let (from, to) = (DVec3::new(0.2, 0.2, 1.7), DVec3::new(4.0, 3.5, 0.8));
+        let camera = Camera::look_at(from, to, DVec3::Z, intrinsics).unwrap();
+        compare("room", room::room(triangles), &camera, rounds);
+    }
+}
+
+fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize) {
+    let meshes: Vec<&TriangleMesh> = meshes.iter().collect();
+    let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    println!("\n{name}, {triangles} triangles");
+    builds(&meshes);
+    let robust = Accel::build(&meshes).unwrap();
+    let fast = Accel::build(&meshes).unwrap().with_test(TriangleTest::Fast);
+    let embree = Embree::new(&meshes, Mode::Medium, 1, &mut |build| build());
+    let embree_robust = Embree::new(&meshes, Mode::Robust, 1, &mut |build| build());
+    println!("{:.1} bytes a triangle", robust.memory_bytes() as f64 / triangles as f64);
+
+    let coherent = rays::coherent(camera);
+    let bounce = rays::bounced(&robust, &coherent);
+    let second = rays::bounced(&robust, &bounce);
+    let random = rays::uniform(&robust, SIDE * SIDE);
+    let shadow = rays::towards_ceiling(&robust, &coherent, Vec3::Z);
+    let shadow_2 = rays::towards_ceiling(&robust, &bounce, Vec3::Z);
+    let short = rays::shortened(&random, 1.5);
+    println!("{:22} {:>9} {:>9} {:>9} {:>9} {:>9}", "", "Embree", "robust", "ours fast", "watertight", "differ");
+    for (kind, set) in [("coherent", &coherent), ("bounce 1", &bounce), ("bounce 2", &second), ("random", &random)] {
+        let differing =
+            set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
+        row(
+            kind,
+            set.len(),
+            differing,
+            rounds,
+            [
+                Box::new(|| sum(set, |ray| embree.closest(ray).map(|hit| hit.2))),
+                Box::new(|| sum(set, |ray| embree_robust.closest(ray).map(|hit| hit.2))),
+                Box::new(|| sum(set, |ray| fast.closest(ray).map(|hit| hit.distance))),
+                Box::new(|| sum(set, |ray| robust.closest(ray).map(|hit| hit.distance))),
+            ],
+        );
+    }
+    for (kind, set) in [("shadow 1", &shadow), ("shadow 2", &shadow_2), ("occlusion to 1.5 m", &short)] {
+        let differing = set.iter().filter(|ray| robust.occluded(ray) != embree.occluded(ray)).count();
+        row(
+            kind,
+            set.len(),
+            differing,
+            rounds,
+            [
+                Box::new(|| sum(set, |ray| embree.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| embree_robust.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| fast.occluded(ray).then_some(1.0))),
+                Box::new(|| sum(set, |ray| robust.occluded(ray).then_some(1.0))),
+            ],
+        );
+    }
+}
+
+/// Distances that differ by more than rounding.
+fn differs(ours: Option<f32>, theirs: Option<(usize, usize, f32)>) -> bool {
+    match (ours, theirs) {
+        (Some(ours), Some((_, _, theirs))) => (ours - theirs).abs() > 1e-4 * theirs.max(1.0),
+        (None, None) => false,
+        _ => true,
+    }
+}
+
+fn builds(meshes: &[&TriangleMesh]) {
+    let mut embree_seconds = Vec::new();
+    let mut seconds = Vec::new();
+    for _ in 0..5 {
+        let mut timed = |build: &mut dyn FnMut()| {
+            let start = cpu_time::ProcessTime::now();
+            build();
+            embree_seconds.push(start.elapsed().as_secs_f64());
+        };
+        Embree::new(meshes, Mode::Medium, 1, &mut timed);
+        let start = cpu_time::ProcessTime::now();
+        Accel::build(meshes).unwrap();
+        seconds.push(start.elapsed().as_secs_f64());
+    }
+    let (theirs, ours) = (timing::median(&embree_seconds), timing::median(&seconds));
+    println!(
+        "build: Embree {theirs:.3} s, ours {ours:.3} s: {:.2} times as long",
+        1.0 / timing::speedup(&embree_seconds, &seconds)
+    );
+}
+
+fn sum(rays: &[Ray], value: impl Fn(&Ray) -> Option<f32>) {
+    std::hint::black_box(rays.iter().filter_map(|ray| value(ray)).map(f64::from).sum::<f64>());
+}
+
+fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 4]) {
+    let names = ["medium", "robust", "fast", "watertight"];
+    let mut contestants: Vec<timing::Contestant> = names.into_iter().zip(runs).collect();
+    let seconds = timing::interleaved(rounds, &mut contestants);
+    let rate = |seconds: &[f64]| count as f64 / timing::median(seconds) / 1e6;
+    let ratio = |which: usize| timing::speedup(&seconds[0], &seconds[which]);
+    println!(
+        "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {differing:9}",
+        rate(&seconds[0]),
+        ratio(1),
+        ratio(2),
+        ratio(3)
+    );
+}

@@ -1,0 +1,52 @@
+//! A furnished room of any number of triangles, made in code.
+
+use glam::{Vec2, Vec3};
+use mateval_scene::TriangleMesh;
+
+/// A room of 6 x 5 x 3 m (z up), open to no side, with bumpy balls on its floor: about `triangles` in all, one mesh a ball.
+pub fn room(triangles: usize) -> Vec<TriangleMesh> {
+    const BALLS: usize = 24;
+    let rings = ((triangles as f32 / (4 * BALLS) as f32).sqrt().round() as u32).max(3);
+    let mut meshes = vec![shell(Vec3::new(6.0, 5.0, 3.0))];
+    for k in 0..BALLS {
+        let [x, y, z, size] = sobol_burley::sample_4d(k as u32, 0, 11);
+        let radius = 0.15 + 0.35 * size;
+        let centre = Vec3::new(0.6 + 4.8 * x, 0.6 + 3.8 * y, radius + (2.6 - radius) * z * z);
+        meshes.push(ball(centre, radius, rings, k as f32));
+    }
+    meshes
+}
+
+fn shell(size: Vec3) -> TriangleMesh {
+    let corner = |k: u32| size * Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2) as f32);
+    let faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]];
+    TriangleMesh {
+        positions: (0..8).map(corner).collect(),
+        triangles: faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        ..Default::default()
+    }
+}
+
+/// 4 * rings^2 triangles, its surface waved.
+fn ball(centre: Vec3, radius: f32, rings: u32, phase: f32) -> TriangleMesh {
+    let sectors = 2 * rings;
+    let mut mesh = TriangleMesh { uvs: Some(Vec::new()), ..Default::default() };
+    for ring in 0..=rings {
+        for sector in 0..=sectors {
+            let uv = Vec2::new(sector as f32 / sectors as f32, ring as f32 / rings as f32);
+            let (sin_t, cos_t) = libm::sincosf(std::f32::consts::PI * uv.y);
+            let (sin_p, cos_p) = libm::sincosf(std::f32::consts::TAU * uv.x);
+            let wave = 1.0 + 0.1 * libm::sinf(9.0 * sin_t * cos_p + phase) * libm::sinf(7.0 * cos_t - phase);
+            mesh.positions.push(centre + Vec3::new(sin_t * cos_p, sin_t * sin_p, cos_t) * (radius * wave));
+            mesh.uvs.get_or_insert_default().push(uv);
+        }
+    }
+    let at = |ring: u32, sector: u32| ring * (sectors + 1) + sector;
+    for r in 0..rings {
+        for s in 0..sectors {
+            mesh.triangles.push([at(r, s), at(r + 1, s), at(r, s + 1)]);
+            mesh.triangles.push([at(r + 1, s), at(r + 1, s + 1), at(r, s + 1)]);
+        }
+    }
+    mesh
+}

@@ -1,0 +1,125 @@
+//! What a ray has still to visit.
+#![allow(unsafe_code, reason = "clearing the array would cost a tenth of a short ray")]
+
+use std::mem::MaybeUninit;
+
+use super::WIDENED;
+use crate::accel::wide::{Child, WIDTH};
+
+/// Children still to be visited and the bits of the distance where the ray enters them: fixed arrays, and a vector for
+/// what they cannot hold.
+pub(in crate::accel) struct Stack {
+    /// The first `len` entries of both arrays have been written.
+    enters: [MaybeUninit<u32>; FIXED],
+    children: [MaybeUninit<Child>; FIXED],
+    len: usize,
+    spilled: Vec<(u32, Child)>,
+}
+
+const FIXED: usize = 128;
+
+impl Stack {
+    #[inline(always)]
+    pub(in crate::accel) fn new() -> Self {
+        Self {
+            enters: [const { MaybeUninit::uninit() }; FIXED],
+            children: [const { MaybeUninit::uninit() }; FIXED],
+            len: 0,
+            spilled: Vec::new(),
+        }
+    }
+
+    #[inline(always)]
+    pub(in crate::accel) fn push(&mut self, enter_bits: u32, child: Child) {
+        if self.len < FIXED {
+            self.enters[self.len].write(enter_bits);
+            self.children[self.len].write(child);
+            self.len += 1;
+        } else {
+            self.spill(enter_bits, child);
+        }
+    }
+
+    /// Room for eight more entries, for [`Self::fill`]; none where there is not so much left.
+    #[inline(always)]
+    pub(super) fn room(&mut self) -> Option<Room<'_>> {
+        let enters = self.enters.get_mut(self.len..)?.first_chunk_mut()?;
+        let children = self.children.get_mut(self.len..)?.first_chunk_mut()?;
+        Some(Room { enters, children })
+    }
+
+    /// Takes the first `count` entries (at most eight) of the room as pushed.
+    ///
+    /// # Safety
+    ///
+    /// [`Self::room`] has given room, and its first `count` entries have been written since the last push.
+    #[inline(always)]
+    pub(super) unsafe fn fill(&mut self, count: usize) {
+        self.len += count;
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn spill(&mut self, enter_bits: u32, child: Child) {
+        self.spilled.push((enter_bits, child));
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn unspill(&mut self) -> Option<(u32, Child)> {
+        self.spilled.pop()
+    }
+
+    /// The child pushed last.
+    #[inline(always)]
+    pub(in crate::accel) fn top(&self) -> Option<Child> {
+        let last = self.len.checked_sub(1)?;
+        // SAFETY: as in `pop`.
+        Some(unsafe { self.children[last].assume_init() })
+    }
+
+    /// The child pushed last of those that the ray enters before `limit`.
+    #[inline(always)]
+    pub(in crate::accel) fn pop(&mut self, limit: f32) -> Option<Child> {
+        loop {
+            let (enter_bits, child) = if self.len == FIXED && !self.spilled.is_empty() {
+                self.unspill()?
+            } else {
+                self.len = self.len.checked_sub(1)?;
+                // SAFETY: `len` grows only where an entry is written at its old value (`push`), or when as many have been
+                // written there (`fill`); so every entry below the old `len` has been written.
+                unsafe { (self.enters[self.len].assume_init(), self.children[self.len].assume_init()) }
+            };
+            if f32::from_bits(enter_bits) <= limit * WIDENED {
+                return Some(child);
+            }
+        }
+    }
+}
+
+/// Where the next eight entries of a stack will be.
+pub(super) struct Room<'s> {
+    pub(super) enters: &'s mut [MaybeUninit<u32>; WIDTH],
+    pub(super) children: &'s mut [MaybeUninit<Child>; WIDTH],
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_in_is_the_first_out_however_many() {
+        let mut stack = Stack::new();
+        let count = 3 * FIXED as u32;
+        for k in 0..count {
+            stack.push((k as f32).to_bits(), Child(k));
+        }
+        for k in (0..count).rev() {
+            assert_eq!(stack.pop(f32::INFINITY), Some(Child(k)));
+        }
+        assert_eq!(stack.pop(f32::INFINITY), None);
+        stack.push(2.0_f32.to_bits(), Child(7));
+        stack.push(5.0_f32.to_bits(), Child(8));
+        assert_eq!(stack.pop(3.0), Some(Child(7)));
+    }
+}

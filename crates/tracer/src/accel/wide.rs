@@ -1,0 +1,245 @@
+//! The hierarchy as rays walk it: nodes of eight boxes, leaves of one block of up to eight triangles.
+//!
+//! Which nodes of the binary tree become children of one wide node, and which subtrees one block, minimises the surface
+//! area cost by dynamic programming (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+//! Compressed Wide BVHs", HPG 2017, section 4.1). About 90 bytes a triangle.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::build::{BinaryNode, BinaryTree};
+
+/// Boxes of a node, triangles of a block.
+pub(super) const WIDTH: usize = 8;
+
+/// Eight boxes and what they hold: four cache lines.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// `bounds[0]` are the lower corners, `[1]` the upper ones; then axis, then child.
+    pub(super) bounds: [[[f32; WIDTH]; 3]; 2],
+    pub(super) children: [Child; WIDTH],
+    /// Bit k is set where child k exists.
+    pub(super) filled: u32,
+}
+
+/// Up to eight triangles: 352 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// Corner, then axis, then triangle. Triangles ascend; places that are not filled hold one point thrice, which no ray
+    /// hits.
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
+    pub(super) triangles: [u32; WIDTH],
+    /// The surface of each.
+    pub(super) surfaces: [u32; WIDTH],
+}
+
+/// A node (its place) or a block (its place, and the highest bit).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(transparent)]
+pub(super) struct Child(pub(super) u32);
+
+impl Child {
+    const BLOCK: u32 = 1 << 31;
+
+    #[inline(always)]
+    pub(super) fn is_block(self) -> bool {
+        self.0 & Self::BLOCK != 0
+    }
+
+    /// Its place among the nodes or among the blocks.
+    #[inline(always)]
+    pub(super) fn place(self) -> usize {
+        (self.0 & !Self::BLOCK) as usize
+    }
+}
+
+/// The whole hierarchy.
+#[derive(Debug)]
+pub(super) struct Wide {
+    pub(super) nodes: Vec<Node>,
+    pub(super) blocks: Vec<Block>,
+    pub(super) root: Child,
+}
+
+impl Block {
+    /// The corners of one triangle.
+    pub(super) fn corners_of(&self, lane: usize) -> [Vec3; 3] {
+        self.corners.map(|axes| Vec3::from_array(axes.map(|values| values[lane])))
+    }
+
+    fn new(triangles: &[[Vec3; 3]], starts: &[u32], members: &[u32]) -> Self {
+        let nowhere = [triangles[members[0] as usize][0]; 3];
+        let mut block = Self { corners: [[[0.0; WIDTH]; 3]; 3], triangles: [u32::MAX; WIDTH], surfaces: [0; WIDTH] };
+        for lane in 0..WIDTH {
+            let corners = members.get(lane).map_or(nowhere, |&triangle| triangles[triangle as usize]);
+            for (axes, corner) in block.corners.iter_mut().zip(corners) {
+                for (values, value) in axes.iter_mut().zip(corner.to_array()) {
+                    values[lane] = value;
+                }
+            }
+        }
+        block.triangles[..members.len()].copy_from_slice(members);
+        for (surface, triangle) in block.surfaces.iter_mut().zip(members) {
+            *surface = (starts.partition_point(|start| start <= triangle) - 1) as u32;
+        }
+        block
+    }
+}
+
+/// What visiting a node costs, against visiting a block.
+const NODE_COST: f32 = 1.0;
+const BLOCK_COST: f32 = 0.6;
+
+/// The least cost of a subtree as 1 to 7 children of a wide node above it: `[k]` with up to k + 1 of them. The last entry
+/// is the number of triangles.
+type Costs = [f32; WIDTH];
+
+struct Collapse<'t> {
+    tree: &'t BinaryTree,
+    costs: Vec<Costs>,
+}
+
+impl Wide {
+    /// From a binary tree over `triangles`; `starts` says how many lie before each surface.
+    pub(super) fn collapse(tree: &BinaryTree, triangles: &[[Vec3; 3]], starts: &[u32]) -> Self {
+        let collapse = Collapse { tree, costs: costs(tree) };
+        let (mut nodes, mut roots) = (Vec::new(), Vec::new());
+        let root = collapse.child(0, &mut roots);
+        // Nodes whose boxes are not filled in yet, with their place in the binary tree.
+        let mut open = Vec::new();
+        if !root.is_block() {
+            nodes.push(EMPTY);
+            open.push((0, 0));
+        }
+        while let Some((binary, place)) = open.pop() {
+            let mut members = Members::default();
+            collapse.expand(binary, WIDTH, &mut members);
+            for (lane, &member) in members.places[..members.count].iter().enumerate() {
+                let mut child = collapse.child(member, &mut roots);
+                if !child.is_block() {
+                    child = Child(nodes.len() as u32);
+                    nodes.push(EMPTY);
+                    open.push((member, child.place()));
+                }
+                nodes[place].put(lane, tree.bounds(member), child);
+            }
+        }
+        let block = |&root: &usize| Block::new(triangles, starts, &triangles_below(tree, root));
+        let blocks = roots.par_iter().map(block).collect();
+        Self { nodes, blocks, root }
+    }
+
+    /// Bytes held.
+    pub(super) fn memory_bytes(&self) -> usize {
+        self.nodes.len() * size_of::<Node>() + self.blocks.len() * size_of::<Block>()
+    }
+}
+
+const EMPTY: Node = Node { bounds: [[[0.0; WIDTH]; 3]; 2], children: [Child(0); WIDTH], filled: 0 };
+
+impl Node {
+    fn put(&mut self, lane: usize, bounds: [Vec3; 2], child: Child) {
+        for (axes, corner) in self.bounds.iter_mut().zip(bounds) {
+            for (values, value) in axes.iter_mut().zip(corner.to_array()) {
+                values[lane] = value;
+            }
+        }
+        self.children[lane] = child;
+        self.filled |= 1 << lane;
+    }
+}
+
+/// Nodes of the binary tree that become children of one wide node.
+#[derive(Default)]
+struct Members {
+    places: [usize; WIDTH],
+    count: usize,
+}
+
+impl Collapse<'_> {
+    /// The child that a node of the binary tree becomes: a block that is noted in `roots`, or a node without a place yet.
+    fn child(&self, node: usize, roots: &mut Vec<usize>) -> Child {
+        if self.costs[node][WIDTH - 1] > WIDTH as f32 {
+            return Child(0);
+        }
+        roots.push(node);
+        Child((roots.len() - 1) as u32 | Child::BLOCK)
+    }
+
+    /// Splits `node` into up to `slots` children, as the costs say.
+    fn expand(&self, node: usize, slots: usize, members: &mut Members) {
+        let is_root = slots == WIDTH;
+        match self.tree.node(node) {
+            BinaryNode::Inner(children) if slots > 1 => {
+                let (cheapest, left) = cheapest_split(&children.map(|child| self.costs[child]), slots);
+                if is_root || cheapest < self.costs[node][slots - 2] {
+                    self.expand(children[0], left, members);
+                    self.expand(children[1], slots - left, members);
+                } else {
+                    self.expand(node, slots - 1, members);
+                }
+            }
+            _ => {
+                members.places[members.count] = node;
+                members.count += 1;
+            }
+        }
+    }
+}
+
+/// Of all nodes.
+fn costs(tree: &BinaryTree) -> Vec<Costs> {
+    let leaf = |node: usize| {
+        let mut costs = [tree.half_area(node) * BLOCK_COST; WIDTH];
+        costs[WIDTH - 1] = 1.0;
+        costs
+    };
+    let mut costs: Vec<Costs> = (0..tree.len()).into_par_iter().map(leaf).collect();
+    for node in tree.inner_nodes().into_iter().rev().map(|node| node as usize) {
+        if let BinaryNode::Inner(children) = tree.node(node) {
+            costs[node] = inner_costs(tree.half_area(node), &children.map(|child| costs[child]));
+        }
+    }
+    costs
+}
+
+fn inner_costs(area: f32, children: &[Costs; 2]) -> Costs {
+    // Counts are exact as far as they matter, up to 8.
+    let count = children[0][WIDTH - 1] + children[1][WIDTH - 1];
+    let mut costs = [0.0; WIDTH];
+    costs[0] =
+        if count <= WIDTH as f32 { area * BLOCK_COST } else { area * NODE_COST + cheapest_split(children, WIDTH).0 };
+    for slots in 2..WIDTH {
+        costs[slots - 1] = cheapest_split(children, slots).0.min(costs[slots - 2]);
+    }
+    costs[WIDTH - 1] = count;
+    costs
+}
+
+/// The least cost of sharing `slots` slots between two subtrees, and how many the first then gets.
+#[inline]
+fn cheapest_split(children: &[Costs; 2], slots: usize) -> (f32, usize) {
+    let mut best = (f32::INFINITY, 1);
+    for left in 1..slots {
+        let cost = children[0][left - 1] + children[1][slots - left - 1];
+        if cost < best.0 {
+            best = (cost, left);
+        }
+    }
+    best
+}
+
+/// The triangles of a subtree, ascending.
+fn triangles_below(tree: &BinaryTree, root: usize) -> Vec<u32> {
+    let (mut open, mut found) = (vec![root], Vec::with_capacity(WIDTH));
+    while let Some(node) = open.pop() {
+        match tree.node(node) {
+            BinaryNode::Inner(children) => open.extend(children),
+            BinaryNode::Leaf(triangle) => found.push(triangle),
+        }
+    }
+    found.sort_unstable();
+    found
+}

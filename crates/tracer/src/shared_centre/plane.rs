@@ -1,0 +1,198 @@
+//! The image plane over which paths for several views of one centre are drawn.
+
+use std::ops::Range;
+
+use glam::{DMat3, DVec2, DVec3};
+use mateval_scene::{Camera, Intrinsics};
+
+/// The first camera's image plane, as far as any view sees it, in cells of that camera's pixels.
+#[derive(Clone, Debug)]
+pub(super) struct Plane {
+    camera: Camera,
+    views: Vec<PlaneView>,
+    samples: u32,
+    /// Cells, in pixels of the camera: negative left of its picture or above it.
+    columns: Range<i32>,
+    rows: Range<i32>,
+}
+
+/// A view as the plane sees it.
+#[derive(Clone, Debug)]
+pub(super) struct PlaneView {
+    pub(super) intrinsics: Intrinsics,
+    /// None for the plane's own camera, whose pixels are the cells.
+    turn: Option<DMat3>,
+    /// Pixels of the view to a pixel of the plane's camera where both look the same way.
+    scale: f64,
+}
+
+/// Where a point of the plane lies in a view's picture, and how many of that view's pixels one cell covers there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Seen {
+    pub(super) place: DVec2,
+    pub(super) pixels: f64,
+}
+
+/// A rectangle of cells or pixels: columns and rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Window {
+    pub(super) columns: Range<i32>,
+    pub(super) rows: Range<i32>,
+}
+
+/// Cells along a tile's side.
+const TILE: usize = 16;
+/// The cosine of 75 degrees: beyond, a plane stretches a picture too far to be of use.
+const WIDEST: f64 = 0.258_819_045_102_520_74;
+/// Half the spacing of f32 at 1: what a ray's origin is rounded by.
+const ORIGIN_ROUNDING: f64 = 1.0 / (1 << 24) as f64;
+
+impl Plane {
+    /// None if the cameras have no centre in common, or one looks too far away from where the first does.
+    pub(super) fn new(cameras: &[Camera], samples: u32) -> Option<Self> {
+        let first = cameras.first()?;
+        let mut plane = Self::alone(first, samples);
+        for camera in &cameras[1..] {
+            plane.include(camera)?;
+        }
+        Some(plane)
+    }
+
+    /// A plane for one view.
+    pub(super) fn alone(camera: &Camera, samples: u32) -> Self {
+        let intrinsics = camera.intrinsics;
+        let (columns, rows) = (0..intrinsics.width as i32, 0..intrinsics.height as i32);
+        let view = PlaneView { intrinsics, turn: None, scale: 1.0 };
+        Self { camera: *camera, views: vec![view], samples, columns, rows }
+    }
+
+    fn include(&mut self, camera: &Camera) -> Option<()> {
+        let centre = self.camera.position();
+        if centre.distance(camera.position()) > ORIGIN_ROUNDING * centre.abs().max_element().max(1.0) {
+            return None;
+        }
+        let plane_from_view = self.camera.rotation().transpose() * camera.rotation();
+        let Intrinsics { width, height, fx, fy, .. } = camera.intrinsics;
+        let own = self.camera.intrinsics;
+        for corner in [[0, 0], [width, 0], [0, height], [width, height]] {
+            let corner = DVec2::new(f64::from(corner[0]), f64::from(corner[1]));
+            self.grow(plane_from_view * camera.camera_direction(corner).normalize())?;
+        }
+        let scale = fx * fy / (own.fx * own.fy);
+        let turn = Some(plane_from_view.transpose());
+        self.views.push(PlaneView { intrinsics: camera.intrinsics, turn, scale });
+        Some(())
+    }
+
+    /// Makes the plane hold `direction`, in the plane's camera's space.
+    fn grow(&mut self, direction: DVec3) -> Option<()> {
+        if -direction.z < WIDEST {
+            return None;
+        }
+        let place = place(&self.camera.intrinsics, direction);
+        let widen = |range: &mut Range<i32>, at: f64| {
+            *range = range.start.min(at.floor() as i32)..range.end.max(at.ceil() as i32);
+        };
+        widen(&mut self.columns, place.x);
+        widen(&mut self.rows, place.y);
+        Some(())
+    }
+
+    pub(super) fn views(&self) -> &[PlaneView] {
+        &self.views
+    }
+
+    pub(super) fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// All parts of the plane, row by row.
+    pub(super) fn tiles(&self) -> Vec<Window> {
+        let parts = |range: &Range<i32>| {
+            let end = range.end;
+            range.clone().step_by(TILE).map(move |start| start..end.min(start + TILE as i32))
+        };
+        parts(&self.rows)
+            .flat_map(|rows| parts(&self.columns).map(move |columns| Window { columns, rows: rows.clone() }))
+            .collect()
+    }
+
+    /// Paths for the cell, as many as the view that needs most: so many that each of its pixels there gets the samples
+    /// asked for. 0 where no view sees the cell.
+    pub(super) fn paths(&self, [x, y]: [i32; 2]) -> u32 {
+        let cell = Window { columns: x..x + 1, rows: y..y + 1 };
+        let middle = self.ray_place([x, y], [0.5, 0.5]);
+        let needs = self.views.iter().enumerate().filter(|(index, _)| self.window(*index, &cell).is_some());
+        let most = needs.map(|(_, view)| self.seen(view, middle).pixels).fold(0.0, f64::max);
+        // A millionth less, so that rounding does not ask for one more.
+        (most * f64::from(self.samples) * (1.0 - 1e-6)).ceil() as u32
+    }
+
+    /// The most paths that any cell may have.
+    pub(super) fn most_paths(&self) -> u32 {
+        let cells = self.tiles().into_iter().flat_map(|tile| tile.cells().collect::<Vec<_>>());
+        cells.map(|cell| self.paths(cell)).max().unwrap_or(0).max(1)
+    }
+
+    /// The point `offset` of the cell, in pixels of the plane's camera.
+    pub(super) fn ray_place(&self, cell: [i32; 2], offset: [f32; 2]) -> DVec2 {
+        DVec2::new(f64::from(cell[0]) + f64::from(offset[0]), f64::from(cell[1]) + f64::from(offset[1]))
+    }
+
+    /// Where `view` sees the point `at` of the plane.
+    ///
+    /// Between image planes of one centre the area changes by the cube of the ratio of depths: dA/d(solid angle) is
+    /// focal^2 / cos^3 of the angle to the plane's axis.
+    pub(super) fn seen(&self, view: &PlaneView, at: DVec2) -> Seen {
+        let Some(turn) = view.turn else { return Seen { place: at, pixels: 1.0 } };
+        let direction = turn * self.camera.camera_direction(at);
+        let depth = -direction.z;
+        Seen { place: place(&view.intrinsics, direction), pixels: view.scale / (depth * depth * depth) }
+    }
+
+    /// The pixels of view `index` that may hold points of `part`; none if there are none.
+    pub(super) fn window(&self, index: usize, part: &Window) -> Option<Window> {
+        let view = &self.views[index];
+        let corner = |x: i32, y: i32| self.seen(view, DVec2::new(f64::from(x), f64::from(y))).place;
+        let Window { columns, rows } = part;
+        let corners = [(columns.start, rows.start), (columns.end, rows.start), (columns.start, rows.end)];
+        let last = corner(columns.end, rows.end);
+        let (low, high) = corners.iter().fold((last, last), |(low, high), &(x, y)| {
+            let corner = corner(x, y);
+            (low.min(corner), high.max(corner))
+        });
+        // A pixel more on each side, for what rounding may do to a point at the edge; the plane's own are exact.
+        let margin = if view.turn.is_some() { 1.0 } else { 0.0 };
+        let span = |low: f64, high: f64, size: u32| {
+            let start = (low - margin).floor().max(0.0);
+            let end = (high + margin).ceil().min(f64::from(size));
+            (start < end).then_some(start as i32..end as i32)
+        };
+        let columns = span(low.x, high.x, view.intrinsics.width)?;
+        Some(Window { columns, rows: span(low.y, high.y, view.intrinsics.height)? })
+    }
+}
+
+impl Window {
+    /// All places in the window, row by row.
+    pub(super) fn cells(&self) -> impl Iterator<Item = [i32; 2]> + use<> {
+        let columns = self.columns.clone();
+        self.rows.clone().flat_map(move |y| columns.clone().map(move |x| [x, y]))
+    }
+
+    /// Places in a row.
+    pub(super) fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// How many places there are.
+    pub(super) fn area(&self) -> usize {
+        self.columns.len() * self.rows.len()
+    }
+}
+
+/// Where a direction in camera space, in front of the camera, lies in the picture.
+fn place(k: &Intrinsics, direction: DVec3) -> DVec2 {
+    let depth = -direction.z;
+    DVec2::new(k.cx + k.fx * direction.x / depth, k.cy - k.fy * direction.y / depth)
+}

@@ -1,0 +1,195 @@
+//! Paths of a plane, put into every view that sees their direction.
+
+use mateval_image::Picture;
+use mateval_scene::reference::LightIndex;
+use rayon::prelude::*;
+
+use super::HalfLight;
+use super::cell_points::{Numbering, cell_points};
+use super::plane::{Plane, Window};
+use crate::light_basis::{LightBasis, LightGroups};
+use crate::path::{PathCounts, trace};
+use crate::ray::Ray;
+use crate::render::RenderSettings;
+use crate::world::World;
+
+/// What happened in one tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TileCounts {
+    pub(super) paths: u64,
+    pub(super) path: PathCounts,
+}
+
+/// Tiles in the making, for each thread: more leave threads less idle at the end of a batch and take more memory.
+const TILES_A_THREAD: usize = 4;
+
+/// All views of `plane` with the seed of `settings`. What happened in each tile is added to `counts`.
+pub(super) fn expose(
+    world: &World,
+    plane: &Plane,
+    groups: &LightGroups,
+    settings: &RenderSettings,
+    counts: &mut Vec<TileCounts>,
+    done: &(impl Fn() + Sync),
+) -> Vec<HalfLight> {
+    let exposure = Exposure { world, plane, groups, settings, numbering: Numbering::new(plane.most_paths()) };
+    let mut films = exposure.blank_films();
+    // Tiles are merged in their order whichever is done first; batches bound how many wait.
+    for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
+        let exposed: Vec<ExposedTile> = batch
+            .par_iter()
+            .map(|tile| {
+                let exposed = exposure.tile(tile);
+                done();
+                exposed
+            })
+            .collect();
+        for tile in exposed {
+            counts.push(tile.counts);
+            for (film, part) in films.iter_mut().zip(tile.parts) {
+                part.into_iter().for_each(|part| part.merge_into(film));
+            }
+        }
+    }
+    films
+}
+
+struct Exposure<'a> {
+    world: &'a World,
+    plane: &'a Plane,
+    groups: &'a LightGroups,
+    settings: &'a RenderSettings,
+    numbering: Numbering,
+}
+
+/// A tile's share of every view that sees any of it.
+struct ExposedTile {
+    parts: Vec<Option<Part>>,
+    counts: TileCounts,
+}
+
+/// A piece of one view: sums of all groups, pixel by pixel.
+struct Part {
+    window: Window,
+    sums: Vec<[f64; 3]>,
+    counts: Vec<u32>,
+}
+
+/// What one path found, by group.
+struct Found {
+    sums: Vec<[f64; 3]>,
+    /// The groups that have got something, in the order of their first.
+    touched: Vec<usize>,
+}
+
+impl Exposure<'_> {
+    fn blank_films(&self) -> Vec<HalfLight> {
+        let blank = |(width, height): (usize, usize)| HalfLight {
+            basis: LightBasis::black(width, height, self.groups.groups().len()),
+            counts: Picture::filled(width, height, 0),
+        };
+        let size = |view: &super::plane::PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
+        self.plane.views().iter().map(size).map(blank).collect()
+    }
+
+    fn tile(&self, tile: &Window) -> ExposedTile {
+        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.groups.groups().len()));
+        let parts = (0..self.plane.views().len()).map(part).collect();
+        let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
+        let mut found = Found { sums: vec![[0.0; 3]; self.groups.groups().len()], touched: Vec::new() };
+        let mut points = Vec::new();
+        for cell in tile.cells() {
+            cell_points(self.settings.seed, cell, self.plane.paths(cell), &mut points);
+            for (rank, &point) in points.iter().enumerate() {
+                self.path(cell, rank as u32, point, &mut found, &mut exposed.counts);
+                self.splat(cell, point, points.len(), &found, &mut exposed.parts);
+                found.clear();
+            }
+        }
+        exposed
+    }
+
+    fn path(&self, cell: [i32; 2], rank: u32, point: [f32; 2], found: &mut Found, counts: &mut TileCounts) {
+        let camera = self.plane.camera();
+        let direction = camera.direction(self.plane.ray_place(cell, point));
+        let ray = Ray::endless(camera.position().as_vec3(), direction.as_vec3());
+        let sampler = self.numbering.path_sampler(self.settings.seed, cell, rank);
+        counts.paths += 1;
+        trace(self.world, self.settings, &sampler, ray, &mut counts.path, |light, value| {
+            found.add(self.groups, light, value.to_array());
+        });
+    }
+
+    /// Adds what one of `count` paths of the cell found to the views that see it.
+    fn splat(&self, cell: [i32; 2], point: [f32; 2], count: usize, found: &Found, parts: &mut [Option<Part>]) {
+        let at = self.plane.ray_place(cell, point);
+        for (view, part) in self.plane.views().iter().zip(parts) {
+            let Some(part) = part else { continue };
+            let seen = self.plane.seen(view, at);
+            if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
+                part.add(pixel, found, seen.pixels / count as f64);
+            }
+        }
+    }
+}
+
+impl Found {
+    fn add(&mut self, groups: &LightGroups, light: LightIndex, value: [f32; 3]) {
+        let group = groups.of(light);
+        if !self.touched.contains(&group) {
+            self.touched.push(group);
+        }
+        add(&mut self.sums[group], value.map(f64::from), 1.0);
+    }
+
+    fn clear(&mut self) {
+        for group in self.touched.drain(..) {
+            self.sums[group] = [0.0; 3];
+        }
+    }
+}
+
+impl Part {
+    fn new(window: Window, groups: usize) -> Self {
+        let area = window.area();
+        Self { window, sums: vec![[0.0; 3]; area * groups], counts: vec![0; area] }
+    }
+
+    /// The place in the piece of the pixel that holds (x, y); none outside.
+    fn pixel(&self, x: f64, y: f64) -> Option<usize> {
+        let (x, y) = (x.floor(), y.floor());
+        let holds = |range: &std::ops::Range<i32>, v: f64| v >= f64::from(range.start) && v < f64::from(range.end);
+        let Window { columns, rows } = &self.window;
+        (holds(columns, x) && holds(rows, y))
+            .then(|| (y as i32 - rows.start) as usize * self.window.width() + (x as i32 - columns.start) as usize)
+    }
+
+    fn add(&mut self, pixel: usize, found: &Found, weight: f64) {
+        self.counts[pixel] += 1;
+        let first = pixel * found.sums.len();
+        for &group in &found.touched {
+            add(&mut self.sums[first + group], found.sums[group], weight);
+        }
+    }
+
+    /// Adds the piece to its view. A pixel gets few pieces, always in the order of the tiles.
+    fn merge_into(self, film: &mut HalfLight) {
+        let groups = film.basis.pictures().len();
+        for (place, [x, y]) in self.window.cells().enumerate() {
+            let (x, y) = (x as usize, y as usize);
+            film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
+            for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
+                let mut pixel = picture.get(x, y);
+                let sum = self.sums[place * groups + group];
+                pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
+                picture.set(x, y, pixel);
+            }
+        }
+    }
+}
+
+fn add(sum: &mut [f64; 3], value: [f64; 3], weight: f64) {
+    for channel in 0..3 {
+        sum[channel] += weight * value[channel];
+    }
+}

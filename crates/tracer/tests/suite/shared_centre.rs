@@ -1,0 +1,252 @@
+//! Five views from one set of paths against five renders, and what such views promise.
+
+use glam::DVec3;
+use mateval_image::{LinearRgb, png_io};
+use mateval_scene::reference::Emission;
+use mateval_scene::{Camera, Intrinsics};
+use mateval_tracer::shared_centre::share_centre;
+use mateval_tracer::{LightGroups, RenderSettings, ViewsRender, World, render_views};
+
+use super::light_basis::{lit_world, view};
+use super::statistics::Renders;
+
+const SIZE: usize = 32;
+const OFFSETS: [[f64; 2]; 5] = [[0.0, 0.0], [5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
+
+fn views() -> Vec<Camera> {
+    OFFSETS.map(|[x, y]| view(SIZE as u32).turned(x, y)).to_vec()
+}
+
+fn settings(samples: u32) -> RenderSettings {
+    RenderSettings { samples, max_bounces: 6, ..Default::default() }
+}
+
+fn rendered(world: &World, cameras: &[Camera], samples: u32, seeds: std::ops::Range<u64>) -> ViewsRender {
+    let seeds: Vec<u64> = seeds.collect();
+    let groups = LightGroups::together(world.scene().lights.len());
+    let done = render_views(world, cameras, &groups, &settings(samples), &seeds, &|_, _| ()).unwrap();
+    assert_eq!(done.stats.not_finite, 0);
+    done
+}
+
+/// Each view's estimates, one a seed.
+fn estimates(done: &ViewsRender) -> Vec<Renders> {
+    let of = |view: &mateval_tracer::ViewLight| Renders::from_pictures(view.halves.iter().map(|half| half.basis.sum()));
+    done.views.iter().map(of).collect()
+}
+
+/// The largest distance between whole pictures in standard errors, and mean squared distances of 8x8 tiles and of pixels.
+fn compare(a: &Renders, b: &Renders) -> [f64; 3] {
+    let mean_square = |side: usize| {
+        let places = (0..SIZE / side).flat_map(|y| (0..SIZE / side).map(move |x| (x * side, y * side)));
+        let z = |(x, y): (usize, usize)| {
+            let region = |r: &Renders| r.region(x..x + side, y..y + side);
+            region(a).z_against(&region(b)).powi(2)
+        };
+        let squares: Vec<f64> = places.map(z).collect();
+        squares.iter().sum::<f64>() / squares.len() as f64
+    };
+    [a.whole().z_against(&b.whole()).abs(), mean_square(8), mean_square(1)]
+}
+
+/// Splatted views and separate renders have one mean, as wholes, in 8x8 tiles and pixel by pixel, by both variances; a
+/// view turned by half a pixel more has not, nor has one 3 % brighter.
+#[test]
+#[allow(clippy::print_stderr, reason = "how near it came")]
+fn splatted_views_are_renders() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let splatted = estimates(&rendered(&world, &views(), 16, 0..16));
+    let separate = |world: &World, camera: &Camera, seed: u64| {
+        Renders::new(world, camera, RenderSettings { seed, ..settings(16) }, 16)
+    };
+    // The squares of Student's t with about 30 degrees of freedom average to 1.07; 16 tiles leave a deviation of 0.36,
+    // 1024 pixels of 0.045.
+    let agree = |[whole, tiles, pixels]: [f64; 3]| whole < 4.0 && tiles < 2.5 && pixels < 1.25;
+    for (index, camera) in views().iter().enumerate() {
+        let z = compare(&splatted[index], &separate(&world, camera, 50 + index as u64));
+        eprintln!("view {index}: whole {:.2}, tiles {:.3}, pixels {:.3}", z[0], z[1], z[2]);
+        assert!(agree(z), "view {index}: {z:?}");
+    }
+    let pixel_deg = 50.0 / SIZE as f64;
+    let turned = compare(&splatted[1], &separate(&world, &views()[1].turned(0.0, 0.5 * pixel_deg), 61));
+    let brighter = compare(&splatted[1], &separate(&lit_world([[1.03; 3]; 4]), &views()[1], 62));
+    eprintln!("twins: {turned:?} {brighter:?}");
+    assert!(!agree(turned) && !agree(brighter), "a twin passes: {turned:?} {brighter:?}");
+}
+
+/// Of every pixel and channel, the variance of one estimate, from independent ones.
+fn variances(renders: &Renders) -> Vec<f64> {
+    let n = renders.pictures().len() as f64;
+    let of = |place: usize, channel: usize| {
+        let values = renders.pictures().iter().map(|p| f64::from(p.pixels()[place].0[channel]));
+        let mean = values.clone().sum::<f64>() / n;
+        values.map(|v| (v - mean) * (v - mean)).sum::<f64>() / (n - 1.0)
+    };
+    (0..SIZE * SIZE).flat_map(|place| (0..3).map(move |channel| of(place, channel))).collect()
+}
+
+/// The noise of `found` over that of `own`, where the room is seen and where a lamp or the sky is.
+fn noise_ratios(found: &Renders, own: &Renders) -> [f64; 2] {
+    let mean = own.picture();
+    let lamp = |place: usize| mean.pixels()[place / 3].0.iter().any(|&v| v > 1.0);
+    let (found, own) = (variances(found), variances(own));
+    [false, true].map(|wanted| {
+        let sum = |variances: &[f64]| -> f64 {
+            variances.iter().enumerate().filter(|(place, _)| lamp(*place) == wanted).map(|(_, v)| v).sum()
+        };
+        sum(&found) / sum(&own)
+    })
+}
+
+/// How noisy a splatted view is against a render of its own with as many samples a pixel. In this smooth room, where even
+/// samples gain most, 1.4 times where a view's pixels do not match the plane's and 0.9 where they do; a lamp in view
+/// shows the number of paths a pixel, which a render keeps exact: 2.5 times. A quarter of the samples is beyond bounds.
+#[test]
+#[allow(clippy::print_stderr, reason = "a measurement")]
+fn splatting_adds_little_noise() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let splatted = |samples: u32| estimates(&rendered(&world, &views(), samples, 0..12));
+    let (together, fewer) = (splatted(64), splatted(16));
+    for (index, bound) in [(0, 1.1), (1, 1.6)] {
+        let settings = RenderSettings { seed: 9, ..settings(64) };
+        let own = Renders::new(&world, &views()[index], settings, 12);
+        let [room, lamps] = noise_ratios(&together[index], &own);
+        eprintln!("view {index}: {room:.3} of the variance of a render, lamps and sky {lamps:.3}");
+        assert!(room < bound && lamps < 3.5, "view {index}: {room} {lamps}");
+        assert!(noise_ratios(&fewer[index], &own)[0] > 2.0 * bound, "the twin passes");
+    }
+}
+
+/// Under an even sky radiance is the same everywhere, and all noise is that of the number of paths a pixel: its variance
+/// is far under that of random places (the number itself) and grows as Sobol points' does.
+#[test]
+#[allow(clippy::print_stderr, reason = "a measurement")]
+fn the_number_of_paths_a_pixel_varies_little() {
+    let world = super::scenes::Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();
+    for (samples, bound) in [(16, 1.5), (64, 2.5)] {
+        let [own, turned] = [0, 1].map(|index| {
+            let all = variances(&estimates(&rendered(&world, &views(), samples, 0..12))[index]);
+            all.iter().sum::<f64>() / all.len() as f64 * f64::from(samples * samples)
+        });
+        eprintln!("{samples} samples: the number's variance is {own:.3} in the first view, {turned:.3} in another");
+        assert!(own < 1e-8 && turned < bound && turned > 0.1, "{own} {turned}");
+    }
+}
+
+/// Errors of two seeds are uncorrelated in every view; those of one with itself are not.
+#[test]
+fn halves_are_independent() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let done = rendered(&world, &views(), 2, 0..40);
+    for view in &estimates(&done) {
+        let (mean, variances) = (view.picture(), variances(view));
+        let error = |seed: usize, place: usize| {
+            let value = view.pictures()[seed].pixels()[place].0[1] - mean.pixels()[place].0[1];
+            f64::from(value) / variances[3 * place + 1].sqrt()
+        };
+        let correlation = |second: &dyn Fn(usize) -> usize| {
+            // A pixel of even sky has rounding for noise.
+            let noisy = (0..SIZE * SIZE).filter(|place| variances[3 * place + 1] > 1e-9);
+            let pairs = noisy.flat_map(|place| (0..20).map(move |pair| (place, pair)));
+            let sums = pairs.fold([0.0; 3], |[ab, aa, bb], (place, pair)| {
+                let (a, b) = (error(2 * pair, place), error(second(pair), place));
+                [ab + a * b, aa + a * a, bb + b * b]
+            });
+            sums[0] / (sums[1] * sums[2]).sqrt()
+        };
+        // Against the mean of all n, errors of two of them have the correlation -1 / (n - 1).
+        let found = correlation(&|pair| 2 * pair + 1) + 1.0 / 39.0;
+        assert!(found.abs() < 0.03, "{found}");
+        assert!(correlation(&|pair| 2 * pair) > 0.99, "the twin passes");
+    }
+}
+
+/// Every pixel gets about the samples asked for, none less than 8/10 of them, and the mean is above what was asked.
+#[test]
+fn every_pixel_gets_its_samples() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let wide =
+        |offset: [f64; 2]| super::scenes::camera([0.1, 0.1, 1.6], [0.0; 3], 48, 70.0).turned(offset[0], offset[1]);
+    let done = rendered(&world, &OFFSETS.map(wide), 64, 3..4);
+    assert_eq!(done.passes, 1);
+    for (index, view) in done.views.iter().enumerate() {
+        let counts = view.halves[0].counts.pixels();
+        let mean = counts.iter().sum::<u32>() as f64 / counts.len() as f64;
+        let (least, most) = (*counts.iter().min().unwrap(), *counts.iter().max().unwrap());
+        assert!(least >= 54 && most <= 128 && (64.0..80.0).contains(&mean), "view {index}: {least} {mean} {most}");
+        if let Some(out) = std::env::var_os("MATEVAL_TEST_PICTURES") {
+            let folder = std::path::Path::new(&out);
+            let gray = view.halves[0].counts.map(|n| LinearRgb([n as f32 / 128.0; 3])).to_srgb();
+            png_io::write_srgb(&folder.join(format!("counts_{index}.png")), &gray).unwrap();
+            let picture = view.halves[0].basis.sum().to_srgb();
+            png_io::write_srgb(&folder.join(format!("splatted_{index}.png")), &picture).unwrap();
+        }
+    }
+    // The union of the pictures, and the surplus where the plane is stretched: five views for 1.73 views' paths.
+    let share = done.stats.paths as f64 / (48.0 * 48.0 * 64.0);
+    assert!(share > 1.2 && share < 1.8, "{share}");
+}
+
+#[test]
+fn the_same_bytes_for_any_number_of_threads() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let groups = LightGroups::apart(4);
+    let on_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| render_views(&world, &views(), &groups, &settings(3), &[4, 5], &|_, _| ()).unwrap())
+    };
+    let one = on_threads(1);
+    assert_eq!(one, on_threads(2));
+    assert_eq!(one, on_threads(7));
+    let other = render_views(&world, &views(), &groups, &settings(3), &[4, 6], &|_, _| ()).unwrap();
+    assert_eq!(one.views[0].halves[0], other.views[0].halves[0]);
+    assert_ne!(one.views[0].halves[1], other.views[0].halves[1]);
+}
+
+/// Cameras in different places, or looking different ways, get a pass each, with the pixels that they get alone.
+#[test]
+fn other_view_sets_fall_back_to_one_pass_a_view() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let first = view(SIZE as u32);
+    let moved = Camera::from_rotation(first.rotation(), first.position() + DVec3::X * 1e-3, first.intrinsics);
+    let back = first.turned(0.0, 120.0);
+    let rounded = Camera::from_rotation(first.rotation(), first.position() + DVec3::X * 1e-9, first.intrinsics);
+    assert!(share_centre(&[first, rounded]) && share_centre(&views()));
+    for other in [moved, back] {
+        assert!(!share_centre(&[first, other]));
+        let pair = rendered(&world, &[first, other], 2, 0..2);
+        assert_eq!(pair.passes, 2);
+        for (index, camera) in [first, other].iter().enumerate() {
+            let alone = rendered(&world, &[*camera], 2, 0..2);
+            assert_eq!(pair.views[index], alone.views[0]);
+        }
+    }
+}
+
+/// Views of other sizes and focal lengths share the paths too, each pixel with the samples asked for.
+#[test]
+fn views_may_differ_in_size() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let fine = Camera { intrinsics: Intrinsics::from_fov_x(48, 40, 0.5), ..view(SIZE as u32).turned(2.0, 9.0) };
+    let done = rendered(&world, &[view(SIZE as u32), fine], 8, 0..8);
+    assert_eq!(done.passes, 1);
+    let counts = &done.views[1].halves[0].counts;
+    assert_eq!((counts.width(), counts.height()), (48, 40));
+    let mean = counts.pixels().iter().sum::<u32>() as f64 / (48.0 * 40.0);
+    assert!(mean > 7.9 && mean < 11.0, "{mean}");
+    let separate = Renders::new(&world, &fine, RenderSettings { seed: 7, ..settings(8) }, 8);
+    let z = estimates(&done)[1].whole().z_against(&separate.whole());
+    assert!(z.abs() < 4.0, "{z}");
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let message = |groups: &LightGroups, samples: u32, seeds: &[u64]| {
+        let done = render_views(&world, &views(), groups, &settings(samples), seeds, &|_, _| ());
+        done.unwrap_err().to_string()
+    };
+    assert!(message(&LightGroups::apart(4), 1, &[3, 4, 3]).contains("seed 3 occurs twice"));
+    assert!(message(&LightGroups::apart(3), 1, &[3]).contains("groups of 3 lights for a scene of 4"));
+    assert!(message(&LightGroups::apart(4), 0, &[3]).contains("0 samples"));
+}
