@@ -64,8 +64,6 @@ enum Twin {
     Mitsuba,
     /// Every roughness 0.05 more.
     Rougher,
-    /// Every roughness 0.1 more.
-    MuchRougher,
     /// Every lamp one percent brighter.
     Brighter,
     /// Lamps that the camera sees.
@@ -84,7 +82,6 @@ impl Twin {
             match self {
                 Self::Mitsuba => *flavour = PrincipledFlavour::Mitsuba,
                 Self::Rougher => *roughness += 0.05,
-                Self::MuchRougher => *roughness += 0.1,
                 Self::Brighter | Self::Seen => (),
             }
         }
@@ -178,10 +175,10 @@ fn lambert_everywhere() {
 /// One bounce, mostly: 0.5 %, of dielectrics and metals.
 #[test]
 fn balls() {
-    use Twin::{Mitsuba, MuchRougher, Rougher};
+    use Twin::{Mitsuba, Rougher};
     let looks: [(f32, f32, &[Twin]); 7] = [
-        // 0.05 more change no tile by more than 0.5 %.
-        (0.1, 0.0, &[Mitsuba, MuchRougher]),
+        // Here 0.05 more roughness change hardly a tile by 0.5 %; the same facets in metal show it.
+        (0.1, 0.0, &[Mitsuba]),
         (0.5, 0.0, &[Mitsuba, Rougher]),
         (0.9, 0.0, &[Mitsuba, Rougher]),
         (0.3, 0.5, &[Mitsuba, Rougher]),

@@ -185,6 +185,7 @@ fn samples_of_another_density_are_found_out() {
         (conductor(facets(Distribution::Beckmann, 0.3)), conductor(facets(Distribution::Ggx, 0.3))),
         (dielectric(1.5, facets(Distribution::Ggx, 0.3)), dielectric(1.6, facets(Distribution::Ggx, 0.3))),
         (principled(PrincipledFlavour::Mitsuba, 0.5, 0.0), principled(PrincipledFlavour::Mitsuba, 0.5, 0.3)),
+        (principled(PrincipledFlavour::Blender, 0.5, 0.0), principled(PrincipledFlavour::Blender, 0.5, 0.3)),
     ];
     for (sampled, described) in pairs {
         let expected = with_lobe(&described, |lobe| expected(lobe, wo));
