@@ -15,8 +15,10 @@ mod statistics;
 
 mod peers {
     mod blender;
+    mod blender_job;
     mod mitsuba;
     mod mitsuba_small;
     mod python;
+    mod tiles;
     mod z_test;
 }

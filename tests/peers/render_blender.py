@@ -80,10 +80,11 @@ def add_mesh(*, surface: Job, made_of: bpy.types.Material) -> None:
 
 
 def material(*, spec: Job) -> bpy.types.Material:
-    """A material that reflects, glows, or does the one to the camera and the other to all else."""
+    """A material that reflects, and may glow, or reflect for the camera and glow for all else."""
     made = bpy.data.materials.new("material")
     made.use_nodes = True
     made.cycles.emission_sampling = "FRONT_BACK"
+    made.cycles.use_bump_map_correction = False
     tree = made.node_tree
     tree.nodes.clear()
     output = tree.nodes.new("ShaderNodeOutputMaterial")
@@ -91,12 +92,18 @@ def material(*, spec: Job) -> bpy.types.Material:
     if spec["radiance"] is not None:
         emission = tree.nodes.new("ShaderNodeEmission")
         emission.inputs["Color"].default_value = (*spec["radiance"], 1.0)
-        if spec["camera_visible"]:
-            shader = emission
-        else:
-            shader = hidden_from_camera(tree=tree, surface=shader, emission=emission)
+        combine = glowing if spec["camera_visible"] else hidden_from_camera
+        shader = combine(tree=tree, surface=shader, emission=emission)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return made
+
+
+def glowing(*, tree: bpy.types.NodeTree, surface: bpy.types.Node, emission: bpy.types.Node) -> bpy.types.Node:
+    """A surface that reflects and glows."""
+    add = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(emission.outputs[0], add.inputs[0])
+    tree.links.new(surface.outputs[0], add.inputs[1])
+    return add
 
 
 def hidden_from_camera(

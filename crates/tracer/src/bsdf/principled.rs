@@ -55,6 +55,9 @@ pub(crate) struct PrincipledView {
     base: Base,
     /// The probability with which the facets are sampled.
     facet_share: f32,
+    /// The shares' densities: the first over half the facets' own, the second over the cosine.
+    facet_density: f32,
+    base_density: f32,
 }
 
 /// The diffuse part's value over the cosine, and the masking of the facets above it.
@@ -114,10 +117,11 @@ impl<'w> Principled<'w> {
     fn mitsuba(&self, wo: Vec3) -> PrincipledView {
         let alpha = (self.roughness * self.roughness).max(SMALLEST_ALPHA[0]);
         let matt = 1.0 - self.metallic;
+        let (slope, facet_share) = (slope(wo.z, alpha * alpha), 1.0 / (1.0 + matt));
         PrincipledView {
             wo,
             alpha,
-            slope: slope(wo.z, alpha * alpha),
+            slope,
             eta: self.eta,
             dielectric: matt,
             metal: self.base_color * self.metallic,
@@ -127,7 +131,9 @@ impl<'w> Principled<'w> {
                 roughness: self.roughness,
                 fresnel: fresnel::schlick_weight(wo.z),
             },
-            facet_share: 1.0 / (1.0 + matt),
+            facet_share,
+            facet_density: facet_share / (wo.z + slope),
+            base_density: (1.0 - facet_share) * FRAC_1_PI,
         }
     }
 
@@ -142,16 +148,20 @@ impl<'w> Principled<'w> {
         let (metal, metal_rise) = self.blender_metal(&kept);
         // Facets of metal count by what they keep, whatever their colour.
         let facets = self.metallic * kept.share + matt * reflected;
+        let facet_share = (facets / (facets + TYPICAL_BASE * passed)).max(LEAST_FACET_SHARE);
+        let slope = slope(wo.z, alpha * alpha);
         PrincipledView {
             wo,
             alpha,
-            slope: slope(wo.z, alpha * alpha),
+            slope,
             eta: self.eta,
             dielectric: matt * gain,
             metal,
             metal_rise,
             base: Base::Lambert(self.base_color * (passed * FRAC_1_PI)),
-            facet_share: (facets / (facets + TYPICAL_BASE * passed)).max(LEAST_FACET_SHARE),
+            facet_share,
+            facet_density: facet_share / (wo.z + slope),
+            base_density: (1.0 - facet_share) * FRAC_1_PI,
         }
     }
 
@@ -179,8 +189,7 @@ impl PrincipledView {
         let stretched = length2 / (half.x * half.x + half.y * half.y + alpha2 * (half.z * half.z));
         let facets = 0.5 * FRAC_1_PI * alpha2 * stretched * stretched;
 
-        let density =
-            self.facet_share * facets / (self.wo.z + self.slope) + (1.0 - self.facet_share) * FRAC_1_PI * wi.z;
+        let density = facets * self.facet_density + self.base_density * wi.z;
         let bounce = facets * wi.z * self.unmasked(wi.z, alpha2);
         (self.fresnel(cos) * bounce + self.base(wi.z, cos) * wi.z, density)
     }

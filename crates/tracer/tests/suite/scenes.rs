@@ -80,12 +80,6 @@ impl Builder {
         self.light(Emission::Area { surfaces: vec![last], radiance, two_sided: false })
     }
 
-    /// Makes the surface that was added last glow on both sides.
-    pub fn glowing_on_both_sides(self, radiance: [f32; 3]) -> Self {
-        let last = SurfaceIndex(self.0.surfaces.len() - 1);
-        self.light(Emission::Area { surfaces: vec![last], radiance, two_sided: true })
-    }
-
     /// Adds light.
     pub fn light(mut self, emission: Emission) -> Self {
         self.0.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
