@@ -1,8 +1,8 @@
 //! Several views of one centre from one set of paths.
 //!
 //! Radiance along a direction is the same in every view from one place. So paths are drawn once over the union of the
-//! views' pictures, on the image plane of the first camera ([`plane`]), spread evenly ([`cell_points`]) and put into every
-//! view that holds their direction ([`splat`]). A path counts there by how much of that view's picture the path stands
+//! views' pictures, on the image plane of the first camera (`plane`), spread evenly (`cell_points`) and put into every
+//! view that holds their direction (`splat`). A path counts there by how much of that view's picture the path stands
 //! for: the Jacobian between the two planes over the known number of samples. Nothing is divided by sums of weights, so
 //! every pixel's expectation is its radiance under a box filter of one pixel.
 
