@@ -15,6 +15,7 @@ mod statistics;
 
 mod peers {
     mod mitsuba;
+    mod mitsuba_rooms;
     mod mitsuba_small;
     mod python;
     mod z_test;
