@@ -17,6 +17,7 @@ mod peers {
     mod blender;
     mod blender_job;
     mod mitsuba;
+    mod mitsuba_rooms;
     mod mitsuba_small;
     mod python;
     mod tiles;

@@ -92,4 +92,16 @@ mod tests {
         is(bent([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]], 1.0), Vec3::new(0.0, -0.5, 1.0));
         is(bent(straight, 0.0), Vec3::Z);
     }
+
+    /// The slope is that of the interpolated heights at the very place: level between two equal texels, the whole step
+    /// between two that differ; a difference over a wider stretch would mix them.
+    #[test]
+    fn the_slope_jumps_at_texel_centres() {
+        let textures = [Texture::new(4, 1, Texels::Grey(vec![0.0, 0.0, 1.0, 1.0]), Wrap::Clamp).unwrap()];
+        let height = ScalarInput::Texture { texture: TextureIndex(0), channel: 0, uv: UvTransform::default() };
+        let at = |u: f32| slope(&height, &textures, Vec2::new(u, 0.5)).x;
+        for (u, expected) in [(0.2, 0.0), (0.36, 0.0), (0.39, 4.0), (0.61, 4.0), (0.64, 0.0), (0.05, 0.0)] {
+            assert!((at(u) - expected).abs() < 1e-4, "{u}: {}", at(u));
+        }
+    }
 }

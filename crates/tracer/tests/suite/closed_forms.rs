@@ -93,6 +93,24 @@ fn sphere_over_floor() {
     assert_is(lamp_over_floor(lamp, 1.0), 0.8 * 3.0 / 9.0 * 0.9995);
 }
 
+/// A lamp of a square millimetre is a point: L A / d^2 falls straight on the floor below it, less by the cosines elsewhere.
+#[test]
+fn point_like_lamp() {
+    let radiance = 3e6;
+    let lit = |x: f64| -> Estimate {
+        let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
+        let lamp = quad(Vec3::new(-0.0005, 2.0, -0.0005), Vec3::X * 0.001, Vec3::Z * 0.001);
+        let builder = Builder::default().surface(floor, grey(0.8)).surface(lamp, grey(0.0));
+        let world = builder.glowing([radiance; 3]).world();
+        mean(&world, &camera([x, 0.5, 0.3], [x, 0.0, 0.0], 8, 0.05), 16, 2)
+    };
+    for x in [0.0_f64, 1.5] {
+        let distance2 = 4.0 + x * x;
+        let cos = 2.0 / distance2.sqrt();
+        assert_is(lit(x), 0.8 / PI * f64::from(radiance) * 1e-6 * cos * cos / distance2);
+    }
+}
+
 /// One-sided lamps are dark behind; two-sided ones are not.
 #[test]
 fn sides_of_a_lamp() {

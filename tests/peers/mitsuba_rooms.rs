@@ -1,0 +1,65 @@
+//! Rooms: the built-in sample, the shared bench scenes and two of Bitterli's.
+
+use std::path::{Path, PathBuf};
+
+use mateval_prep::bitterli::{self, Limits};
+use mateval_scene::Camera;
+use mateval_scene::reference::ReferenceScene;
+
+use super::mitsuba::{Case, all_agree};
+use crate::bench_scene;
+
+fn case(name: &str, scene: ReferenceScene, camera: Camera, samples: u32) -> Case {
+    Case { name: name.to_owned(), scene, camera, samples }
+}
+
+/// A Mitsuba scene by our reader, its picture `width` pixels wide.
+fn source(name: &str, xml: &Path, width: u32, samples: u32) -> Case {
+    let read = bitterli::read(xml, &Limits::default()).unwrap();
+    let mut camera = read.camera;
+    let scale = f64::from(width) / f64::from(camera.intrinsics.width);
+    let k = &mut camera.intrinsics;
+    // Whole pixels, and the same focal length along both: the picture may lose part of a row.
+    (k.width, k.height) = (width, (f64::from(k.height) * scale) as u32);
+    (k.fx, k.fy, k.cx, k.cy) = (k.fx * scale, k.fy * scale, k.cx * scale, k.cy * scale);
+    case(name, read.scene, camera, samples)
+}
+
+/// The shared data's `file`, or none after saying so.
+fn shared(file: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join(file);
+    if !path.exists() {
+        eprintln!("SKIPPED: no '{file}' in MATEVAL_DATA or ../shared/data");
+    }
+    path.exists().then_some(path)
+}
+
+#[test]
+fn sample_room() {
+    let folder = tempfile::tempdir().unwrap();
+    mateval_prep::sample::write(folder.path()).unwrap();
+    all_agree(vec![source("sample room", &folder.path().join("room/scene.xml"), 80, 32)]);
+}
+
+#[test]
+fn bench_rooms() {
+    for (name, samples) in [("room", 32), ("dense", 16)] {
+        match bench_scene::folder(name) {
+            Some(folder) => {
+                let (scene, camera) = bench_scene::read(&folder, 64);
+                all_agree(vec![case(&format!("bench/{name}"), scene, camera, samples)]);
+            }
+            None => eprintln!("SKIPPED: no 'bench/{name}' in MATEVAL_DATA or ../shared/data"),
+        }
+    }
+}
+
+#[test]
+fn bitterli_rooms() {
+    for (name, samples) in [("staircase2", 32), ("living-room", 32)] {
+        if let Some(xml) = shared(&format!("bitterli/{name}/scene.xml")) {
+            all_agree(vec![source(name, &xml, 80, samples)]);
+        }
+    }
+}
