@@ -247,6 +247,26 @@ mod tests {
         unwrapped.mesh.triangles[triangle].map(|v| uvs[v as usize] * unwrapped.size as f32)
     }
 
+    /// xatlas' own threads can miss their last wake-up and hang; `.cargo/config.toml` builds it without. Threads bear
+    /// the name of the one that made them.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn xatlas_has_no_threads_of_its_own() {
+        let named = |name: &str| {
+            let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+            let names = tasks.filter_map(|task| std::fs::read_to_string(task.unwrap().path().join("comm")).ok());
+            names.filter(|found| found.trim() == name).count()
+        };
+        let count = move || {
+            let atlas = Xatlas::new();
+            let count = named("unwraps-alone");
+            drop(atlas);
+            count
+        };
+        let alone = std::thread::Builder::new().name("unwraps-alone".into()).spawn(count).unwrap();
+        assert_eq!(alone.join().unwrap(), 1);
+    }
+
     #[test]
     fn triangles_keep_their_order_and_place() {
         let mesh = cuboid(Vec3::new(1.0, 0.5, 0.25));

@@ -11,6 +11,8 @@ mod closed_forms;
 mod estimators;
 #[path = "suite/light_basis.rs"]
 mod light_basis;
+#[path = "suite/same_bytes.rs"]
+mod same_bytes;
 #[path = "suite/scenes.rs"]
 mod scenes;
 #[path = "suite/shared_centre.rs"]

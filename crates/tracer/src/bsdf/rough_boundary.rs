@@ -41,7 +41,14 @@ impl Widths {
 
     /// For any width from 0 to 1.
     pub(crate) fn varying() -> Self {
-        Self((0..WIDTHS).map(|step| (step as f32 / (WIDTHS - 1) as f32).powi(2)).collect())
+        Self(
+            (0..WIDTHS)
+                .map(|step| {
+                    let x = step as f32 / (WIDTHS - 1) as f32;
+                    x * x
+                })
+                .collect(),
+        )
     }
 
     /// The value of `at` for the width `alpha`, interpolated between two.

@@ -1,0 +1,75 @@
+//! The same bytes of a picture for any number of threads, for either set of instructions, in every build, on every machine.
+//!
+//! `tools/test.sh` runs this in the dev and in the release profile, against the same stored hashes.
+
+use std::sync::Arc;
+
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::TriangleMesh;
+use mateval_scene::reference::ReferenceScene;
+use mateval_tracer::accel::{Accel, InstructionSet};
+use mateval_tracer::{LightGroups, RenderSettings, World, render, render_views};
+use sha2::{Digest, Sha256};
+
+use super::estimators;
+
+/// Of a picture with every kind of material and light, and of two views of it from one set of paths, light by light.
+/// They change with whatever a picture depends on: then a release's pictures change too, which a change has to say.
+const RENDER: &str = "5bc26b3685f85091bc84af2e92be7c5f1c48b87aba1f20ab34ec834221032866";
+const VIEWS: &str = "ca65b1c418c97dc687c7d1a84fa869efe8d2edb3980a26d2655b782e1e405ccf";
+
+fn hash<'a>(pictures: impl IntoIterator<Item = &'a Picture<LinearRgb>>) -> String {
+    let mut hasher = Sha256::new();
+    for value in pictures.into_iter().flat_map(|picture| picture.pixels()).flat_map(|pixel| pixel.0) {
+        hasher.update(value.to_le_bytes());
+    }
+    hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Both hashes of a world, by `threads`.
+fn hashes(world: &World, threads: usize) -> [String; 2] {
+    let settings = RenderSettings { samples: 4, seed: 3, ..Default::default() };
+    let views = [estimators::view(), estimators::view().turned(5.0, -5.0)];
+    let groups = LightGroups::apart(world.scene().lights.len());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let (picture, views) = pool.install(|| {
+        let picture = render(world, &views[0], &settings, &|_, _| ()).unwrap().picture;
+        (picture, render_views(world, &views, &groups, &settings, &[4, 5], &|_, _| ()).unwrap().views)
+    });
+    let halves = views.iter().flat_map(|view| &view.halves);
+    [hash([&picture]), hash(halves.flat_map(|half| half.basis.pictures()))]
+}
+
+/// The scene in a hierarchy that is walked with the instructions told, none where the machine has not got them.
+fn world(scene: &Arc<ReferenceScene>, instructions: InstructionSet) -> Option<World> {
+    let meshes: Vec<&TriangleMesh> = scene.surfaces.iter().map(|surface| &surface.mesh).collect();
+    let accel = Accel::build(&meshes).unwrap().with_instructions(instructions)?;
+    Some(World::sharing(scene.clone(), Arc::new(accel)).unwrap())
+}
+
+#[test]
+#[allow(clippy::print_stderr, reason = "a machine without AVX2 is told of")]
+fn pictures_are_those_stored() {
+    let scene = Arc::new(estimators::scene(1.0));
+    for instructions in [InstructionSet::Avx2, InstructionSet::Portable] {
+        let Some(world) = world(&scene, instructions) else {
+            eprintln!("SKIPPED: this machine has no {instructions:?}");
+            continue;
+        };
+        for threads in [1, 2, 7] {
+            assert_eq!(hashes(&world, threads), [RENDER, VIEWS], "{instructions:?}, {threads} threads");
+        }
+    }
+}
+
+/// Another seed or a light a millionth brighter is another picture.
+#[test]
+fn what_changes_a_picture_changes_its_hash() {
+    let picture = |brightness, seed| {
+        let world = World::new(Arc::new(estimators::scene(brightness))).unwrap();
+        let settings = RenderSettings { samples: 4, seed, ..Default::default() };
+        hash([&render(&world, &estimators::view(), &settings, &|_, _| ()).unwrap().picture])
+    };
+    assert_ne!(picture(1.0, 3), picture(1.0, 4));
+    assert_ne!(picture(1.0, 3), picture(1.000_001, 3));
+}
