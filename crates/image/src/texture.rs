@@ -134,6 +134,20 @@ impl Texture {
         }
     }
 
+    /// Where in memory the two rows of texels are that [`Self::sample`] reads at `uv`: for asking for them early.
+    #[inline]
+    pub fn addresses(&self, uv: [f32; 2]) -> [*const u8; 2] {
+        let [(x, ..), (upper, lower, _)] = self.footprint(uv);
+        let (start, size) = match self.texels.as_ref() {
+            Texels::Srgb8(v) | Texels::Linear8(v) => (v.as_ptr().cast::<u8>(), 3),
+            Texels::Srgb16(v) => (v.as_ptr().cast(), 6),
+            Texels::Grey8(v) => (v.as_ptr(), 1),
+            Texels::Linear(v) => (v.as_ptr().cast(), 12),
+            Texels::Grey(v) => (v.as_ptr().cast(), 4),
+        };
+        [upper, lower].map(|row| start.wrapping_add((row * self.width + x) * size))
+    }
+
     #[inline(always)]
     fn bilinear(&self, uv: [f32; 2], texel: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
         let [(x0, x1, fx), (y0, y1, fy)] = self.footprint(uv);
@@ -221,6 +235,16 @@ mod tests {
         let one = plain.clone().collapsed();
         assert_eq!((one.width(), one.sample([0.3, 0.9])), (1, plain.sample([0.3, 0.9])));
         assert_eq!(two_by_two(Wrap::Clamp).collapsed(), two_by_two(Wrap::Clamp));
+    }
+
+    #[test]
+    fn addresses_are_those_of_the_texels_read() {
+        let texels: Vec<[u16; 3]> = (0..20).map(|k| [k, 0, 0]).collect();
+        let texture = Texture::new(5, 4, Texels::Srgb16(texels), Wrap::Clamp).unwrap();
+        let Texels::Srgb16(texels) = texture.texels() else { unreachable!() };
+        // Between columns 2 and 3, rows 1 and 2.
+        let expected = [7, 12].map(|at: usize| std::ptr::from_ref(&texels[at]).cast::<u8>());
+        assert_eq!(texture.addresses([0.6, 0.5]), expected);
     }
 
     #[test]

@@ -74,6 +74,12 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
                 Box::new(|| sum(set, |ray| embree_robust.closest(ray).map(|hit| hit.2))),
                 Box::new(|| sum(set, |ray| fast.closest(ray).map(|hit| hit.distance))),
                 Box::new(|| sum(set, |ray| robust.closest(ray).map(|hit| hit.distance))),
+                Box::new(|| {
+                    sum_many(set, |rays, values| fast.closest_many(rays, values), |hit| hit.map(|h| h.distance))
+                }),
+                Box::new(|| {
+                    sum_many(set, |rays, values| robust.closest_many(rays, values), |hit| hit.map(|h| h.distance))
+                }),
             ],
         );
     }
@@ -89,6 +95,8 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
                 Box::new(|| sum(set, |ray| embree_robust.occluded(ray).then_some(1.0))),
                 Box::new(|| sum(set, |ray| fast.occluded(ray).then_some(1.0))),
                 Box::new(|| sum(set, |ray| robust.occluded(ray).then_some(1.0))),
+                Box::new(|| sum_many(set, |rays, values| fast.occluded_many(rays, values), |hit| hit.then_some(1.0))),
+                Box::new(|| sum_many(set, |rays, values| robust.occluded_many(rays, values), |hit| hit.then_some(1.0))),
             ],
         );
     }
@@ -125,20 +133,33 @@ fn builds(meshes: &[&TriangleMesh]) {
 }
 
 fn sum(rays: &[Ray], value: impl Fn(&Ray) -> Option<f32>) {
-    std::hint::black_box(rays.iter().filter_map(|ray| value(ray)).map(f64::from).sum::<f64>());
+    std::hint::black_box(rays.iter().filter_map(value).map(f64::from).sum::<f64>());
 }
 
-fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 4]) {
-    let names = ["medium", "robust", "fast", "watertight"];
+/// The same for batches of as many rays as the path tracer asks for at once.
+fn sum_many<V: Copy>(rays: &[Ray], trace: impl Fn(&[Ray], &mut Vec<V>), value: impl Fn(V) -> Option<f32>) {
+    let mut values = Vec::new();
+    let mut sum = 0.0;
+    for batch in rays.chunks(256) {
+        trace(batch, &mut values);
+        sum += values.iter().filter_map(|v| value(*v)).map(f64::from).sum::<f64>();
+    }
+    std::hint::black_box(sum);
+}
+
+fn row<'a>(kind: &str, count: usize, differing: usize, rounds: usize, runs: [Box<dyn FnMut() + 'a>; 6]) {
+    let names = ["medium", "robust", "fast", "watertight", "fast, many", "watertight, many"];
     let mut contestants: Vec<timing::Contestant> = names.into_iter().zip(runs).collect();
     let seconds = timing::interleaved(rounds, &mut contestants);
     let rate = |seconds: &[f64]| count as f64 / timing::median(seconds) / 1e6;
     let ratio = |which: usize| timing::speedup(&seconds[0], &seconds[which]);
     println!(
-        "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {differing:9}",
+        "{kind:22} {:6.2} M/s {:9.2} {:9.2} {:9.2} {:9.2} {:9.2} {differing:9}",
         rate(&seconds[0]),
         ratio(1),
         ratio(2),
-        ratio(3)
+        ratio(3),
+        ratio(4),
+        ratio(5)
     );
 }

@@ -24,27 +24,30 @@ pub(crate) fn tiles(width: usize, height: usize) -> Vec<Tile> {
         .collect()
 }
 
-/// A picture whose pixel (x, y) is `pixel_at(&mut extra, x, y)`, and every tile's `extra` in the order of the tiles.
+impl Tile {
+    /// Its pixels (x, y), row by row.
+    pub(crate) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> + Clone + use<> {
+        let Self { x, y, width, height } = *self;
+        (y..y + height).flat_map(move |row| (x..x + width).map(move |column| [column, row]))
+    }
+}
+
+/// A picture whose tiles' pixels, row by row, are what `develop_tile` gives, and what it says of each tile beside that.
 ///
 /// Tiles are spread over the threads of the current pool; each pixel is made by one of them, so the result does not depend
 /// on their number. `done` is called after each tile with its place in no particular order.
-pub(crate) fn develop<E: Default + Send>(
+pub(crate) fn develop<E: Send>(
     width: usize,
     height: usize,
-    pixel_at: impl Fn(&mut E, usize, usize) -> [f64; 3] + Sync,
+    develop_tile: impl Fn(&Tile) -> (Vec<[f64; 3]>, E) + Sync,
     done: impl Fn() + Sync,
 ) -> (Picture<LinearRgb>, Vec<E>) {
     let tiles = tiles(width, height);
     let developed: Vec<(Vec<LinearRgb>, E)> = tiles
         .par_iter()
         .map(|tile| {
-            let mut extra = E::default();
-            let mut pixels = Vec::with_capacity(tile.width * tile.height);
-            for y in tile.y..tile.y + tile.height {
-                for x in tile.x..tile.x + tile.width {
-                    pixels.push(LinearRgb(pixel_at(&mut extra, x, y).map(|v| v as f32)));
-                }
-            }
+            let (pixels, extra) = develop_tile(tile);
+            let pixels = pixels.into_iter().map(|pixel| LinearRgb(pixel.map(|v| v as f32))).collect();
             done();
             (pixels, extra)
         })
@@ -67,15 +70,12 @@ mod tests {
 
     #[test]
     fn every_pixel_is_made_once_and_put_in_its_place() {
-        let (picture, counts) = develop(
-            37,
-            18,
-            |count: &mut usize, x, y| {
-                *count += 1;
-                [x as f64, y as f64, 0.0]
-            },
-            || (),
-        );
+        let tile = |tile: &Tile| {
+            let pixels: Vec<[f64; 3]> = tile.pixels().map(|[x, y]| [x as f64, y as f64, 0.0]).collect();
+            let count = pixels.len();
+            (pixels, count)
+        };
+        let (picture, counts) = develop(37, 18, tile, || ());
         assert_eq!(counts.iter().sum::<usize>(), 37 * 18);
         assert_eq!(counts.len(), 6);
         for y in 0..18 {

@@ -1,4 +1,4 @@
-//! One path of light, followed backwards from the camera.
+//! Paths of light, followed backwards from the camera.
 //!
 //! At every surface one emitter is sampled (next-event estimation) and one direction of the surface's own; the two ways of
 //! finding light are weighed against each other by the power heuristic (Veach 1997, section 9.2). Nothing is clamped.
@@ -6,6 +6,7 @@
 use glam::Vec3;
 use mateval_scene::reference::LightIndex;
 
+use crate::accel::Hit;
 use crate::bsdf::Bsdf;
 use crate::emitter::Emitted;
 use crate::ray::Ray;
@@ -32,147 +33,252 @@ struct Scattered {
     delta: bool,
 }
 
-struct Path<'a, F: FnMut(LightIndex, Vec3)> {
-    world: &'a World,
-    settings: &'a RenderSettings,
-    sampler: &'a Sampler,
-    counts: &'a mut PathCounts,
-    add: F,
+/// A path under way.
+#[derive(Clone, Copy)]
+struct Path {
+    /// Its place among the starts.
+    which: usize,
+    sampler: Sampler,
     throughput: Vec3,
     /// None on the camera's ray.
     scattered: Option<Scattered>,
 }
 
-/// Follows the path that starts with `ray` and calls `add` for every light it finds, with what that contributes.
-pub(crate) fn trace(
-    world: &World,
-    settings: &RenderSettings,
-    sampler: &Sampler,
-    ray: Ray,
-    counts: &mut PathCounts,
-    add: impl FnMut(LightIndex, Vec3),
-) {
-    let mut path = Path { world, settings, sampler, counts, add, throughput: Vec3::ONE, scattered: None };
-    let mut next = Some(ray);
-    let mut scatterings = 0;
-    while let Some(ray) = next {
-        next = path.advance(&ray, scatterings);
-        scatterings += 1;
+/// A path that has met a surface which is not a lamp alone.
+struct Arrival {
+    path: Path,
+    place: SurfaceHit,
+    /// Towards where the path came from.
+    wo: Vec3,
+}
+
+/// Light of a path that counts unless its shadow ray is stopped.
+struct Offer {
+    which: usize,
+    sampler: Sampler,
+    light: LightIndex,
+    value: Vec3,
+}
+
+/// Follows paths, all those of a batch by one scattering at a time: each step asks early for the memory of the next, which
+/// a path alone would have to wait for. Keeps its room from one batch to the next.
+pub(crate) struct PathTracer<'w> {
+    world: &'w World,
+    settings: &'w RenderSettings,
+    pub(crate) counts: PathCounts,
+    paths: Vec<Path>,
+    /// Of `paths`, one each.
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    arrivals: Vec<Arrival>,
+    offers: Vec<Offer>,
+    /// Of `offers`, one each.
+    shadow_rays: Vec<Ray>,
+    stopped: Vec<bool>,
+}
+
+impl<'w> PathTracer<'w> {
+    pub(crate) fn new(world: &'w World, settings: &'w RenderSettings) -> Self {
+        Self {
+            world,
+            settings,
+            counts: PathCounts::default(),
+            paths: Vec::new(),
+            rays: Vec::new(),
+            hits: Vec::new(),
+            arrivals: Vec::new(),
+            offers: Vec::new(),
+            shadow_rays: Vec::new(),
+            stopped: Vec::new(),
+        }
+    }
+
+    /// Follows the paths that begin with `starts` and calls `add` for every light that one of them finds: with its place
+    /// among the starts, the light, and what that contributes. For each path the order of calls is that along the path.
+    pub(crate) fn trace(
+        &mut self,
+        starts: impl IntoIterator<Item = (Sampler, Ray)>,
+        mut add: impl FnMut(usize, LightIndex, Vec3),
+    ) {
+        self.paths.clear();
+        self.rays.clear();
+        for (which, (sampler, ray)) in starts.into_iter().enumerate() {
+            self.paths.push(Path { which, sampler, throughput: Vec3::ONE, scattered: None });
+            self.rays.push(ray);
+        }
+        let mut scatterings = 0;
+        while !self.paths.is_empty() {
+            self.arrive(scatterings, &mut add);
+            self.scatter(scatterings);
+            self.take_offers(scatterings, &mut add);
+            scatterings += 1;
+        }
+    }
+
+    /// Follows all rays to their ends and adds what they find there.
+    fn arrive(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, Vec3)) {
+        self.counts.rays += self.rays.len() as u64;
+        let paths = &self.paths;
+        self.world.closest_many(&self.rays, |which| paths[which].sampler.salt(2 * scatterings), &mut self.hits);
+        self.arrivals.clear();
+        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        for ((path, ray), hit) in self.paths.drain(..).zip(&self.rays).zip(&self.hits) {
+            let Some(hit) = hit else {
+                found.add_outside(&path, ray.direction());
+                continue;
+            };
+            let place = self.world.surface_hit(hit);
+            let is_lamp_alone = found.add_emitted(&path, &place, ray);
+            if !is_lamp_alone {
+                self.world.prefetch_texels(&place);
+                self.arrivals.push(Arrival { path, place, wo: -ray.direction() });
+            }
+        }
+    }
+
+    /// Looks for light from where paths have arrived, and sends them on.
+    fn scatter(&mut self, scatterings: u32) {
+        self.rays.clear();
+        self.offers.clear();
+        self.shadow_rays.clear();
+        for Arrival { path, place, wo } in self.arrivals.drain(..) {
+            let bsdf = Bsdf::new(self.world, &place, wo);
+            if bsdf.is_black() {
+                continue;
+            }
+            if scatterings > self.settings.max_bounces {
+                self.counts.capped += 1;
+                self.counts.capped_throughput += f64::from(path.throughput.element_sum() / 3.0);
+                continue;
+            }
+            if self.settings.light_sampling != LightSampling::Bsdf
+                && let Some((ray, offer)) = offered(self.world, self.settings, &path, &bsdf, &place, scatterings)
+            {
+                self.counts.shadow_rays += 1;
+                self.offers.push(offer);
+                self.shadow_rays.push(ray);
+            }
+            if let Some((path, ray)) = scattered(self.settings, path, &bsdf, &place, scatterings) {
+                self.paths.push(path);
+                self.rays.push(ray);
+            }
+        }
+    }
+
+    /// Adds the light on offer that nothing is in the way of.
+    fn take_offers(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, Vec3)) {
+        let offers = &self.offers;
+        let salt = |which: usize| offers[which].sampler.salt(2 * scatterings + 1);
+        self.world.occluded_many(&self.shadow_rays, salt, &mut self.stopped);
+        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        for (offer, _) in self.offers.iter().zip(&self.stopped).filter(|(_, stopped)| !**stopped) {
+            found.contribute(offer.which, offer.light, offer.value);
+        }
     }
 }
 
-impl<F: FnMut(LightIndex, Vec3)> Path<'_, F> {
-    /// Follows `ray` to its end, adds what it finds there, and scatters.
-    fn advance(&mut self, ray: &Ray, scatterings: u32) -> Option<Ray> {
-        self.counts.rays += 1;
-        let Some(hit) = self.world.closest(ray, || self.sampler.salt(2 * scatterings)) else {
-            self.add_outside(ray.direction());
-            return None;
-        };
-        let place = self.world.surface_hit(&hit);
-        let wo = -ray.direction();
-        let is_lamp_alone = self.add_emitted(&place, ray);
-        if is_lamp_alone {
-            return None;
-        }
-        let bsdf = Bsdf::new(self.world, &place, wo);
-        if bsdf.is_black() {
-            return None;
-        }
-        if scatterings > self.settings.max_bounces {
-            self.counts.capped += 1;
-            self.counts.capped_throughput += f64::from(self.throughput.element_sum() / 3.0);
-            return None;
-        }
-        self.add_sampled(&bsdf, &place, scatterings);
-        self.scatter(&bsdf, &place, scatterings)
+/// Samples an emitter: the ray that asks whether anything is in between, and what its light would add.
+fn offered(
+    world: &World,
+    settings: &RenderSettings,
+    path: &Path,
+    bsdf: &Bsdf,
+    place: &SurfaceHit,
+    scatterings: u32,
+) -> Option<(Ray, Offer)> {
+    if bsdf.is_delta() {
+        return None;
     }
+    let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
+    let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
+    let (value, density) = bsdf.evaluate(light.direction);
+    if value == Vec3::ZERO {
+        return None;
+    }
+    let shadow = match &light.place {
+        Some(there) => place.spawn_to(there)?,
+        None => place.spawn(light.direction),
+    };
+    let weight = match settings.light_sampling {
+        LightSampling::Emitters => 1.0,
+        _ => power_heuristic(light.density, density),
+    };
+    let value = path.throughput * value * light.radiance * (weight / light.density);
+    Some((shadow, Offer { which: path.which, sampler: path.sampler, light: light.light, value }))
+}
 
+/// The path and the ray that it goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
+/// length of paths follows from geometry alone.
+fn scattered(
+    settings: &RenderSettings,
+    mut path: Path,
+    bsdf: &Bsdf,
+    place: &SurfaceHit,
+    scatterings: u32,
+) -> Option<(Path, Ray)> {
+    let [a, b, c, roulette] = path.sampler.set(2 + 2 * scatterings);
+    if scatterings >= settings.roulette_start {
+        if roulette >= settings.roulette_survival {
+            return None;
+        }
+        path.throughput /= settings.roulette_survival;
+    }
+    let sample = bsdf.sample([a, b, c])?;
+    path.throughput *= sample.weight;
+    if path.throughput == Vec3::ZERO {
+        return None;
+    }
+    path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
+    Some((path, place.spawn(sample.wi)))
+}
+
+/// Where what paths find goes.
+struct Found<'a, F: FnMut(usize, LightIndex, Vec3)> {
+    world: &'a World,
+    settings: &'a RenderSettings,
+    counts: &'a mut PathCounts,
+    add: &'a mut F,
+}
+
+impl<F: FnMut(usize, LightIndex, Vec3)> Found<'_, F> {
     /// Adds what the surface itself sends back along `ray`. True if the surface is nothing but a lamp to this ray: an
     /// emitter hidden from the camera shows the camera its material and every other ray its light alone.
-    fn add_emitted(&mut self, place: &SurfaceHit, ray: &Ray) -> bool {
+    fn add_emitted(&mut self, path: &Path, place: &SurfaceHit, ray: &Ray) -> bool {
         let emitters = self.world.emitters();
         let Some(light) = emitters.light_of(place.surface) else { return false };
         let hidden = !emitters.is_camera_visible(light);
-        if hidden && self.scattered.is_none() {
+        if hidden && path.scattered.is_none() {
             return false;
         }
-        let from = self.scattered.map_or(ray.origin(), |scattered| scattered.from);
+        let from = path.scattered.map_or(ray.origin(), |scattered| scattered.from);
         if let Some(emitted) = emitters.emitted(place, from) {
-            self.add_found(&emitted);
+            self.add_met(path, &emitted);
         }
         hidden
     }
 
-    fn add_outside(&mut self, direction: Vec3) {
+    fn add_outside(&mut self, path: &Path, direction: Vec3) {
         let emitters = self.world.emitters();
         for emitted in emitters.from_outside(direction) {
-            if self.scattered.is_some() || emitters.is_camera_visible(emitted.light) {
-                self.add_found(&emitted);
+            if path.scattered.is_some() || emitters.is_camera_visible(emitted.light) {
+                self.add_met(path, &emitted);
             }
         }
     }
 
     /// Adds light that the surface's own sampling found.
-    fn add_found(&mut self, emitted: &Emitted) {
-        let weight = match (self.scattered, self.settings.light_sampling) {
+    fn add_met(&mut self, path: &Path, emitted: &Emitted) {
+        let weight = match (path.scattered, self.settings.light_sampling) {
             (None | Some(Scattered { delta: true, .. }), _) | (_, LightSampling::Bsdf) => 1.0,
             (_, LightSampling::Emitters) => 0.0,
             (Some(Scattered { density, .. }), LightSampling::Both) => power_heuristic(density, emitted.density),
         };
-        self.contribute(emitted.light, self.throughput * emitted.radiance * weight);
+        self.contribute(path.which, emitted.light, path.throughput * emitted.radiance * weight);
     }
 
-    /// Samples an emitter and adds its light if nothing is in between.
-    fn add_sampled(&mut self, bsdf: &Bsdf, place: &SurfaceHit, scatterings: u32) {
-        if bsdf.is_delta() || self.settings.light_sampling == LightSampling::Bsdf {
-            return;
-        }
-        let [a, b, c, _] = self.sampler.set(1 + 2 * scatterings);
-        let world = self.world;
-        let opacity = |place: &SurfaceHit| world.opacity_at(place);
-        let Some(light) = world.emitters().sample(place.position, [a, b, c], opacity) else { return };
-        let (value, density) = bsdf.evaluate(light.direction);
-        if value == Vec3::ZERO {
-            return;
-        }
-        let shadow = match &light.place {
-            Some(there) => place.spawn_to(there),
-            None => Some(place.spawn(light.direction)),
-        };
-        self.counts.shadow_rays += 1;
-        if shadow.is_none_or(|ray| world.occluded(&ray, || self.sampler.salt(2 * scatterings + 1))) {
-            return;
-        }
-        let weight = match self.settings.light_sampling {
-            LightSampling::Emitters => 1.0,
-            _ => power_heuristic(light.density, density),
-        };
-        self.contribute(light.light, self.throughput * value * light.radiance * (weight / light.density));
-    }
-
-    /// The ray that the path goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
-    /// length of paths follows from geometry alone.
-    fn scatter(&mut self, bsdf: &Bsdf, place: &SurfaceHit, scatterings: u32) -> Option<Ray> {
-        let [a, b, c, roulette] = self.sampler.set(2 + 2 * scatterings);
-        if scatterings >= self.settings.roulette_start {
-            if roulette >= self.settings.roulette_survival {
-                return None;
-            }
-            self.throughput /= self.settings.roulette_survival;
-        }
-        let sample = bsdf.sample([a, b, c])?;
-        self.throughput *= sample.weight;
-        if self.throughput == Vec3::ZERO {
-            return None;
-        }
-        self.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
-        Some(place.spawn(sample.wi))
-    }
-
-    fn contribute(&mut self, light: LightIndex, value: Vec3) {
+    fn contribute(&mut self, which: usize, light: LightIndex, value: Vec3) {
         if value.is_finite() {
-            (self.add)(light, value);
+            (self.add)(which, light, value);
         } else {
             debug_assert!(false, "a path found {value} from light {}", light.0);
             self.counts.not_finite += 1;

@@ -7,8 +7,8 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
 
 use crate::error::TracerError;
-use crate::film;
-use crate::path::{PathCounts, trace};
+use crate::film::{self, Tile};
+use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
 use crate::sampler::Sampler;
 use crate::world::World;
@@ -98,7 +98,7 @@ pub fn render(
     let (picture, counts) = film::develop(
         width,
         height,
-        |counts: &mut PathCounts, x, y| pixel(world, camera, settings, counts, [x, y]),
+        |tile| develop_tile(world, camera, settings, tile),
         || progress(finished.fetch_add(1, Ordering::Relaxed) + 1, total),
     );
     let paths = (width * height) as u64 * u64::from(settings.samples);
@@ -115,27 +115,27 @@ pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
     Ok(())
 }
 
-/// The mean of the pixel's samples.
-fn pixel(
-    world: &World,
-    camera: &Camera,
-    settings: &RenderSettings,
-    counts: &mut PathCounts,
-    [x, y]: [usize; 2],
-) -> [f64; 3] {
-    let mut sum = [0.0_f64; 3];
+/// The means of the pixels' samples. Each batch of paths holds one a pixel.
+fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile: &Tile) -> (Vec<[f64; 3]>, PathCounts) {
+    let mut tracer = PathTracer::new(world, settings);
+    let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
     for index in 0..settings.samples {
-        let sampler = Sampler::new(settings.seed, [x as u32, y as u32], index);
-        let [dx, dy, ..] = sampler.set(0);
-        let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
-        let ray = Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3());
-        trace(world, settings, &sampler, ray, counts, |_, value| {
-            for (channel, value) in sum.iter_mut().zip(value.to_array()) {
+        let starts = tile.pixels().map(|[x, y]| {
+            let sampler = Sampler::new(settings.seed, [x as u32, y as u32], index);
+            let [dx, dy, ..] = sampler.set(0);
+            let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
+            (sampler, Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
+        });
+        tracer.trace(starts, |pixel, _, value| {
+            for (channel, value) in sums[pixel].iter_mut().zip(value.to_array()) {
                 *channel += f64::from(value);
             }
         });
     }
-    sum.map(|channel| channel / f64::from(settings.samples))
+    for sum in &mut sums {
+        *sum = sum.map(|channel| channel / f64::from(settings.samples));
+    }
+    (sums, tracer.counts)
 }
 
 pub(crate) fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use glam::Vec2;
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
-use mateval_scene::material::Material;
+use mateval_scene::material::{Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
-use crate::accel::{Accel, Hit, TriangleIndex};
+use crate::accel::{Accel, Hit, TriangleIndex, prefetch, prefetch_line};
 use crate::bsdf::MaterialTables;
 use crate::emitter::Emitters;
 use crate::error::TracerError;
@@ -30,6 +30,8 @@ pub struct World {
     masked: bool,
     /// Of all triangles, surface by surface.
     records: Vec<TriangleRecord>,
+    /// For each material what it looks up in textures.
+    lookups: Vec<Vec<Lookup>>,
 }
 
 /// From this opacity on a surface counts as there, for pictures without light.
@@ -69,6 +71,7 @@ impl World {
             .collect();
         Ok(Self {
             records,
+            lookups: scene.materials.iter().map(Material::lookups).collect(),
             emitters: Emitters::new(&scene, &textures, size)?,
             tables: MaterialTables::new(&scene, &textures)?,
             masked: scene.materials.iter().any(|material| material.opacity.is_some()),
@@ -107,23 +110,37 @@ impl World {
         self.closest_above(ray, |_| OPACITY_THRESHOLD)
     }
 
-    /// The nearest hit; a surface of opacity o is met with probability o. Equal `salt`, ray and scene give equal hits; it
-    /// is asked for where there are opacities.
-    pub fn closest(&self, ray: &Ray, salt: impl FnOnce() -> u32) -> Option<Hit> {
-        if !self.masked {
-            return self.accel.closest(ray);
+    /// The nearest hits of many rays; a surface of opacity o is met with probability o. Equal `salt` of a ray's number,
+    /// ray and scene give equal hits; it is asked for where there are opacities. What shading reads of the triangles met
+    /// is asked for.
+    pub fn closest_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, hits: &mut Vec<Option<Hit>>) {
+        if self.masked {
+            let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
+            self.accel.closest_many_where(rays, met, hits);
+        } else {
+            self.accel.closest_many(rays, hits);
         }
-        let salt = salt();
-        self.closest_above(ray, |hit| opacity_draw(salt, hit))
+        for hit in hits.iter().flatten() {
+            prefetch(&self.records[hit.global as usize]);
+        }
     }
 
-    /// Whether the ray is stopped; a surface of opacity o stops it with probability o, as `salt` says.
-    pub fn occluded(&self, ray: &Ray, salt: impl FnOnce() -> u32) -> bool {
-        if !self.masked {
-            return self.accel.occluded(ray);
+    /// Whether rays are stopped; a surface of opacity o stops one with probability o, as its `salt` says.
+    pub fn occluded_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, occluded: &mut Vec<bool>) {
+        if self.masked {
+            let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
+            self.accel.occluded_many_where(rays, met, occluded);
+        } else {
+            self.accel.occluded_many(rays, occluded);
         }
-        let salt = salt();
-        self.accel.occluded_where(ray, |hit| self.opacity(hit) >= opacity_draw(salt, hit))
+    }
+
+    /// Asks for the texels that shading reads at `place`.
+    pub(crate) fn prefetch_texels(&self, place: &SurfaceHit) {
+        for lookup in &self.lookups[self.scene.surfaces[place.surface.0].material.0] {
+            let texture = &self.textures[lookup.texture.0];
+            texture.addresses(lookup.uv.apply(place.uv).to_array()).into_iter().for_each(prefetch_line);
+        }
     }
 
     fn closest_above(&self, ray: &Ray, threshold: impl Fn(&Hit) -> f32) -> Option<Hit> {

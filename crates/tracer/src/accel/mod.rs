@@ -17,6 +17,7 @@ use crate::error::TracerError;
 use crate::ray::Ray;
 use build::BinaryTree;
 use kernel::{BoxRay, Kernel, Portable, TriangleRay};
+pub(crate) use kernel::{prefetch, prefetch_line};
 use traverse::Candidate;
 use wide::{WIDTH, Wide};
 
@@ -151,6 +152,32 @@ impl Accel {
         self.find::<true>(ray, |found| accept(&self.hit(found))).is_some()
     }
 
+    /// [`Self::closest`] of many rays at once, which is faster than one by one: `hits[k]` is that of `rays[k]`.
+    pub fn closest_many(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
+        self.closest_many_where(rays, |_, _| true, hits);
+    }
+
+    /// [`Self::closest_where`] of many rays at once; `accept` is told the number of the ray too.
+    pub fn closest_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, hits: &mut Vec<Option<Hit>>) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        let accept = |which: usize, found: &Candidate| accept(which, &self.hit(found));
+        self.find_many::<false>(rays, accept, |which, found| hits[which] = found.map(|found| self.hit(&found)));
+    }
+
+    /// [`Self::occluded`] of many rays at once.
+    pub fn occluded_many(&self, rays: &[Ray], occluded: &mut Vec<bool>) {
+        self.occluded_many_where(rays, |_, _| true, occluded);
+    }
+
+    /// [`Self::occluded_where`] of many rays at once; `accept` is told the number of the ray too.
+    pub fn occluded_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, occluded: &mut Vec<bool>) {
+        occluded.clear();
+        occluded.resize(rays.len(), false);
+        let accept = |which: usize, found: &Candidate| accept(which, &self.hit(found));
+        self.find_many::<true>(rays, accept, |which, found| occluded[which] = found.is_some());
+    }
+
     /// What [`Self::closest`] answers, found without the hierarchy; for tests and doubts.
     pub fn closest_by_testing_all(&self, ray: &Ray) -> Option<Hit> {
         let wide = self.wide.as_ref().filter(|_| ray.is_usable())?;
@@ -223,6 +250,40 @@ impl Accel {
                 |avx2| traverse::traverse::<_, WATERTIGHT, ANY>(avx2, wide, self.size, ray, accept),
             ),
             Chosen::Portable => traverse::traverse::<_, WATERTIGHT, ANY>(Portable, wide, self.size, ray, accept),
+        }
+    }
+
+    /// [`Self::find`] for many rays; `found` is told of those whose rays are usable.
+    fn find_many<const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        accept: impl Fn(usize, &Candidate) -> bool,
+        found: impl FnMut(usize, Option<Candidate>),
+    ) {
+        let Some(wide) = &self.wide else { return };
+        match self.test {
+            TriangleTest::Watertight => self.find_many_with::<true, ANY>(wide, rays, accept, found),
+            TriangleTest::Fast => self.find_many_with::<false, ANY>(wide, rays, accept, found),
+        }
+    }
+
+    fn find_many_with<const WATERTIGHT: bool, const ANY: bool>(
+        &self,
+        wide: &Wide,
+        rays: &[Ray],
+        accept: impl Fn(usize, &Candidate) -> bool,
+        found: impl FnMut(usize, Option<Candidate>),
+    ) {
+        use traverse::traverse_many;
+        match self.instructions {
+            #[cfg(target_arch = "x86_64")]
+            Chosen::Avx2(avx2) => avx2.run(
+                #[inline(always)]
+                |avx2| traverse_many::<_, WATERTIGHT, ANY>(avx2, wide, self.size, rays, accept, found),
+            ),
+            Chosen::Portable => {
+                traverse_many::<_, WATERTIGHT, ANY>(Portable, wide, self.size, rays, accept, found);
+            }
         }
     }
 

@@ -1,6 +1,8 @@
-//! Walks a ray through the hierarchy.
+//! Walks rays through the hierarchy.
 
-use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles};
+use arrayvec::ArrayVec;
+
+use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, prefetch};
 use super::wide::{Block, Child, Node, WIDTH, Wide};
 use crate::ray::Ray;
 
@@ -32,6 +34,85 @@ impl Candidate {
     }
 }
 
+/// One ray on its way through the hierarchy. With `ANY` the first hit found will do, whichever it is. What costs least
+/// differs for a ray that is `ALONE`: it waits for memory, where many in turn wait for mispredicted branches.
+struct Walk<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> {
+    box_ray: BoxRay,
+    triangle_ray: TriangleRay,
+    best: Option<Candidate>,
+    /// No farther than this.
+    limit: f32,
+    stack: Stack,
+    /// What is visited next; none at the end.
+    next: Option<Child>,
+}
+
+impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT, ANY, ALONE> {
+    #[inline(always)]
+    fn new(wide: &Wide, scene_size: f32, ray: &Ray) -> Self {
+        let box_ray = BoxRay::new(ray, scene_size);
+        Self {
+            triangle_ray: TriangleRay::new(ray, &box_ray),
+            box_ray,
+            best: None,
+            limit: ray.max_distance(),
+            stack: Stack::new(),
+            next: Some(wide.root),
+        }
+    }
+
+    /// The same as new, in its old place: a stack is long and not worth moving.
+    #[inline(always)]
+    fn restart(&mut self, wide: &Wide, scene_size: f32, ray: &Ray) {
+        self.box_ray = BoxRay::new(ray, scene_size);
+        self.triangle_ray = TriangleRay::new(ray, &self.box_ray);
+        self.best = None;
+        self.limit = ray.max_distance();
+        self.stack.clear();
+        self.next = Some(wide.root);
+    }
+
+    /// Visits `child`, which was next.
+    #[inline(always)]
+    fn step<K: Kernel>(&mut self, kernel: K, wide: &Wide, child: Child, accept: impl Fn(&Candidate) -> bool) {
+        if child.is_block() {
+            self.enter_block(kernel, &wide.blocks[child.place()], accept);
+            if ANY && self.best.is_some() {
+                self.next = None;
+                return;
+            }
+            self.next = self.stack.pop(self.limit);
+        } else {
+            let node = &wide.nodes[child.place()];
+            let boxes = kernel.boxes(node, &self.box_ray, self.limit);
+            let inner = if ALONE {
+                nearest_first(kernel, node, &boxes, &mut self.stack)
+            } else {
+                kernel.push_sorted(node, &boxes, &mut self.stack);
+                None
+            };
+            self.next = inner.or_else(|| self.stack.pop(self.limit));
+        }
+    }
+
+    #[inline(always)]
+    fn enter_block<K: Kernel>(&mut self, kernel: K, block: &Block, accept: impl Fn(&Candidate) -> bool) {
+        let found = kernel.triangles::<WATERTIGHT>(block, &self.triangle_ray, self.limit);
+        let mut lanes = found.hit;
+        while lanes != 0 {
+            let candidate = Candidate::new(block, &found, lanes.trailing_zeros() as usize & (WIDTH - 1));
+            lanes &= lanes - 1;
+            if self.best.as_ref().is_none_or(|best| candidate.comes_before(best)) && accept(&candidate) {
+                self.best = Some(candidate);
+                if ANY {
+                    return;
+                }
+                self.limit = candidate.distance;
+            }
+        }
+    }
+}
+
 /// The nearest hit that `accept` takes; among equally near ones that of the lowest triangle. With `ANY` the first one
 /// found, whichever it is.
 #[inline(always)]
@@ -42,86 +123,79 @@ pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     ray: &Ray,
     accept: impl Fn(&Candidate) -> bool,
 ) -> Option<Candidate> {
-    let box_ray = BoxRay::new(ray, scene_size);
-    let triangle_ray = TriangleRay::new(ray, &box_ray);
-    let mut best: Option<Candidate> = None;
-    let mut limit = ray.max_distance();
-    let mut stack = Stack::new();
-    let mut next = Some(wide.root);
-    while let Some(child) = next {
-        if !child.is_block() {
-            let node = &wide.nodes[child.place()];
-            let boxes = kernel.boxes(node, &box_ray, limit);
-            let child = if ANY {
-                in_any_order(kernel, wide, node, boxes.met, &mut stack)
-            } else {
-                nearest_first(kernel, wide, node, &boxes, &mut stack)
-            };
-            next = child.or_else(|| stack.pop(limit));
-            continue;
+    let mut walk = Walk::<WATERTIGHT, ANY, true>::new(wide, scene_size, ray);
+    while let Some(child) = walk.next {
+        walk.step(kernel, wide, child, &accept);
+        if let Some(top) = walk.stack.top() {
+            prefetch_child(wide, top);
         }
-        let block = &wide.blocks[child.place()];
-        let found = kernel.triangles::<WATERTIGHT>(block, &triangle_ray, limit);
-        let mut lanes = found.hit;
-        while lanes != 0 {
-            let candidate = Candidate::new(block, &found, lanes.trailing_zeros() as usize & (WIDTH - 1));
-            lanes &= lanes - 1;
-            if best.as_ref().is_none_or(|best| candidate.comes_before(best)) && accept(&candidate) {
-                if ANY {
-                    return Some(candidate);
+    }
+    walk.best
+}
+
+/// How many rays are under way at once in [`traverse_many`].
+const AT_ONCE: usize = 8;
+
+/// [`traverse`] for many rays; `found` is told of each, in any order. A few rays are under way at once and step in turn:
+/// while one waits for memory, the others work.
+#[inline(always)]
+pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
+    kernel: K,
+    wide: &Wide,
+    scene_size: f32,
+    rays: &[Ray],
+    accept: impl Fn(usize, &Candidate) -> bool,
+    mut found: impl FnMut(usize, Option<Candidate>),
+) {
+    let mut waiting = (0..rays.len()).filter(|&which| rays[which].is_usable());
+    let mut walks: ArrayVec<Walk<WATERTIGHT, ANY, false>, AT_ONCE> = ArrayVec::new();
+    let mut rays_of = [0; AT_ONCE];
+    for which in waiting.by_ref().take(AT_ONCE) {
+        rays_of[walks.len()] = which;
+        walks.push(Walk::new(wide, scene_size, &rays[which]));
+    }
+    while !walks.is_empty() {
+        let mut turn = 0;
+        while turn < walks.len() {
+            let (which, walk) = (rays_of[turn], &mut walks[turn]);
+            if let Some(child) = walk.next {
+                walk.step(kernel, wide, child, |candidate| accept(which, candidate));
+                if let Some(next) = walk.next {
+                    prefetch_child(wide, next);
                 }
-                limit = candidate.distance;
-                best = Some(candidate);
+                turn += 1;
+                continue;
+            }
+            found(which, walk.best);
+            if let Some(another) = waiting.next() {
+                rays_of[turn] = another;
+                walk.restart(wide, scene_size, &rays[another]);
+            } else {
+                rays_of.swap(turn, walks.len() - 1);
+                walks.swap_remove(turn);
             }
         }
-        next = stack.pop(limit);
     }
-    best
 }
 
 /// The nearest child met, if any; the others are pushed, the farthest first.
 #[inline(always)]
-fn nearest_first<K: Kernel>(
-    kernel: K,
-    wide: &Wide,
-    node: &Node,
-    boxes: &Boxes<K::Lanes>,
-    stack: &mut Stack,
-) -> Option<Child> {
+fn nearest_first<K: Kernel>(kernel: K, node: &Node, boxes: &Boxes<K::Lanes>, stack: &mut Stack) -> Option<Child> {
     match boxes.met.count_ones() {
         0 => None,
         1 => Some(node.children[boxes.met.trailing_zeros() as usize & (WIDTH - 1)]),
         _ => {
             kernel.push_sorted(node, boxes, stack);
-            let nearest = stack.pop(f32::INFINITY);
-            if let Some(next) = stack.top() {
-                prefetch(kernel, wide, next);
-            }
-            nearest
+            stack.pop(f32::INFINITY)
         }
     }
 }
 
-/// One of the children met, if any; the others are pushed.
 #[inline(always)]
-fn in_any_order<K: Kernel>(kernel: K, wide: &Wide, node: &Node, met: u32, stack: &mut Stack) -> Option<Child> {
-    let child = |met: u32| node.children[met.trailing_zeros() as usize & (WIDTH - 1)];
-    let mut rest = met;
-    while rest & rest.wrapping_sub(1) != 0 {
-        stack.push(0, child(rest));
-        rest &= rest - 1;
-    }
-    if rest != met {
-        prefetch(kernel, wide, child(met));
-    }
-    (met != 0).then(|| child(rest))
-}
-
-#[inline(always)]
-fn prefetch<K: Kernel>(kernel: K, wide: &Wide, child: Child) {
+fn prefetch_child(wide: &Wide, child: Child) {
     if child.is_block() {
-        kernel.prefetch(&wide.blocks[child.place()]);
+        prefetch(&wide.blocks[child.place()]);
     } else {
-        kernel.prefetch(&wide.nodes[child.place()]);
+        prefetch(&wide.nodes[child.place()]);
     }
 }

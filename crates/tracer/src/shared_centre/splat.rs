@@ -1,16 +1,16 @@
 //! Paths of a plane, put into every view that sees their direction.
 
 use mateval_image::Picture;
-use mateval_scene::reference::LightIndex;
 use rayon::prelude::*;
 
 use super::HalfLight;
 use super::cell_points::{Numbering, cell_points};
 use super::plane::{Plane, Window};
 use crate::light_basis::{LightBasis, LightGroups};
-use crate::path::{PathCounts, trace};
+use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
 use crate::render::RenderSettings;
+use crate::sampler::Sampler;
 use crate::world::World;
 
 /// What happened in one tile.
@@ -75,6 +75,35 @@ struct Part {
     counts: Vec<u32>,
 }
 
+/// Paths that are followed side by side; a few more where a cell has several.
+const BATCH: usize = 256;
+
+/// A path through one of the plane's cells.
+struct PlanePath {
+    cell: [i32; 2],
+    /// Its number among those of the cell.
+    rank: u32,
+    point: [f32; 2],
+    /// How many paths the cell has.
+    count: usize,
+}
+
+/// What a path has got from one light.
+struct Share {
+    path: usize,
+    group: usize,
+    value: [f32; 3],
+}
+
+/// Where a tile's paths wait, are followed and put into views.
+struct Darkroom<'a> {
+    exposure: &'a Exposure<'a>,
+    tracer: PathTracer<'a>,
+    paths: Vec<PlanePath>,
+    shares: Vec<Share>,
+    found: Found,
+}
+
 /// What one path found, by group.
 struct Found {
     sums: Vec<[f64; 3]>,
@@ -96,46 +125,79 @@ impl Exposure<'_> {
         let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.groups.groups().len()));
         let parts = (0..self.plane.views().len()).map(part).collect();
         let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
-        let mut found = Found { sums: vec![[0.0; 3]; self.groups.groups().len()], touched: Vec::new() };
+        let mut darkroom = Darkroom::new(self);
         let mut points = Vec::new();
         for cell in tile.cells() {
             cell_points(self.settings.seed, cell, self.plane.paths(cell), &mut points);
             for (rank, &point) in points.iter().enumerate() {
-                self.path(cell, rank as u32, point, &mut found, &mut exposed.counts);
-                self.splat(cell, point, points.len(), &found, &mut exposed.parts);
-                found.clear();
+                darkroom.paths.push(PlanePath { cell, rank: rank as u32, point, count: points.len() });
+            }
+            if darkroom.paths.len() >= BATCH {
+                darkroom.develop(&mut exposed);
             }
         }
+        darkroom.develop(&mut exposed);
+        exposed.counts.path = darkroom.tracer.counts;
         exposed
     }
 
-    fn path(&self, cell: [i32; 2], rank: u32, point: [f32; 2], found: &mut Found, counts: &mut TileCounts) {
+    fn start(&self, path: &PlanePath) -> (Sampler, Ray) {
         let camera = self.plane.camera();
-        let direction = camera.direction(self.plane.ray_place(cell, point));
+        let direction = camera.direction(self.plane.ray_place(path.cell, path.point));
         let ray = Ray::endless(camera.position().as_vec3(), direction.as_vec3());
-        let sampler = self.numbering.path_sampler(self.settings.seed, cell, rank);
-        counts.paths += 1;
-        trace(self.world, self.settings, &sampler, ray, &mut counts.path, |light, value| {
-            found.add(self.groups, light, value.to_array());
-        });
+        (self.numbering.path_sampler(self.settings.seed, path.cell, path.rank), ray)
     }
 
-    /// Adds what one of `count` paths of the cell found to the views that see it.
-    fn splat(&self, cell: [i32; 2], point: [f32; 2], count: usize, found: &Found, parts: &mut [Option<Part>]) {
-        let at = self.plane.ray_place(cell, point);
+    /// Adds what a path found to the views that see it.
+    fn splat(&self, path: &PlanePath, found: &Found, parts: &mut [Option<Part>]) {
+        let at = self.plane.ray_place(path.cell, path.point);
         for (view, part) in self.plane.views().iter().zip(parts) {
             let Some(part) = part else { continue };
             let seen = self.plane.seen(view, at);
             if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
-                part.add(pixel, found, seen.pixels / count as f64);
+                part.add(pixel, found, seen.pixels / path.count as f64);
             }
         }
     }
 }
 
+impl<'a> Darkroom<'a> {
+    fn new(exposure: &'a Exposure<'a>) -> Self {
+        let groups = exposure.groups.groups().len();
+        Self {
+            exposure,
+            tracer: PathTracer::new(exposure.world, exposure.settings),
+            paths: Vec::new(),
+            shares: Vec::new(),
+            found: Found { sums: vec![[0.0; 3]; groups], touched: Vec::new() },
+        }
+    }
+
+    /// Follows the paths that wait and puts what they find into the tile's views, path by path.
+    fn develop(&mut self, exposed: &mut ExposedTile) {
+        let Self { exposure, tracer, paths, shares, found } = self;
+        let starts = paths.iter().map(|path| exposure.start(path));
+        tracer.trace(starts, |path, light, value| {
+            shares.push(Share { path, group: exposure.groups.of(light), value: value.to_array() });
+        });
+        // Paths were followed side by side; each one's own shares stay in their order.
+        shares.sort_by_key(|share| share.path);
+        let mut rest = shares.as_slice();
+        for (which, path) in paths.iter().enumerate() {
+            let (own, others) = rest.split_at(rest.partition_point(|share| share.path == which));
+            rest = others;
+            own.iter().for_each(|share| found.add(share.group, share.value));
+            exposure.splat(path, found, &mut exposed.parts);
+            found.clear();
+        }
+        exposed.counts.paths += paths.len() as u64;
+        paths.clear();
+        shares.clear();
+    }
+}
+
 impl Found {
-    fn add(&mut self, groups: &LightGroups, light: LightIndex, value: [f32; 3]) {
-        let group = groups.of(light);
+    fn add(&mut self, group: usize, value: [f32; 3]) {
         if !self.touched.contains(&group) {
             self.touched.push(group);
         }

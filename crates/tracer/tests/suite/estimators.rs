@@ -166,7 +166,7 @@ fn light_density(world: &World, from: Vec3) -> Vec<f64> {
             let direction = Vec3::new(cos, sin, 0.0) * (1.0 - z * z).sqrt() + Vec3::Z * z;
             let mut density: f32 = world.emitters().from_outside(direction).map(|found| found.density).sum();
             let mut ray = Ray::endless(from, direction);
-            while let Some(hit) = world.closest(&ray, || 0) {
+            while let Some(hit) = world.accel().closest(&ray) {
                 let place = world.surface_hit(&hit);
                 density += world.emitters().emitted(&place, from).map_or(0.0, |found| found.density);
                 ray = place.spawn(direction);

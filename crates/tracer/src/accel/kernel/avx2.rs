@@ -50,14 +50,6 @@ impl Kernel for Avx2 {
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
         if WATERTIGHT { unsafe { watertight(block, ray, limit) } } else { unsafe { fast(block, ray, limit) } }
     }
-
-    #[inline(always)]
-    fn prefetch<T>(self, place: &T) {
-        let start: *const T = place;
-        for line in 0..size_of::<T>().div_ceil(64).min(4) {
-            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.cast::<i8>().wrapping_add(64 * line)) };
-        }
-    }
 }
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]

@@ -23,6 +23,7 @@
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod portable;
+mod prefetch;
 mod stack;
 
 use super::wide::{Block, Node, WIDTH};
@@ -31,6 +32,7 @@ use crate::ray::Ray;
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx2::Avx2;
 pub(super) use portable::Portable;
+pub(crate) use prefetch::{prefetch, prefetch_line};
 pub(super) use stack::Stack;
 
 /// Which of a node's boxes a ray meets.
@@ -62,9 +64,6 @@ pub(super) trait Kernel: Copy {
 
     /// Triangles at a distance above 0 and up to `limit`; none of those seen edge-on.
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles;
-
-    /// Asks for memory that will be needed soon.
-    fn prefetch<T>(self, place: &T);
 }
 
 /// Distances are not negative, so their bits are ordered as they are; the last three give way to the child's number.

@@ -61,8 +61,6 @@ impl Kernel for Portable {
         }
         found
     }
-
-    fn prefetch<T>(self, _: &T) {}
 }
 
 fn watertight(corners: &[[f32; 3]; 3], ray: &TriangleRay) -> Option<LaneHit> {

@@ -30,6 +30,12 @@ impl Stack {
     }
 
     #[inline(always)]
+    pub(in crate::accel) fn clear(&mut self) {
+        self.len = 0;
+        self.spilled.clear();
+    }
+
+    #[inline(always)]
     pub(in crate::accel) fn push(&mut self, enter_bits: u32, child: Child) {
         if self.len < FIXED {
             self.enters[self.len].write(enter_bits);
