@@ -9,7 +9,7 @@ use mateval_scene::material::{Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
-use crate::accel::{Accel, Hit, TriangleIndex, prefetch, prefetch_line};
+use crate::accel::{Accel, Hit, TriangleIndex, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::MaterialTables;
 use crate::emitter::Emitters;
 use crate::error::TracerError;
@@ -70,7 +70,7 @@ impl World {
             })
             .collect();
         Ok(Self {
-            records,
+            records: on_huge_pages(records),
             lookups: scene.materials.iter().map(Material::lookups).collect(),
             emitters: Emitters::new(&scene, &textures, size)?,
             tables: MaterialTables::new(&scene, &textures)?,

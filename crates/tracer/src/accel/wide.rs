@@ -8,6 +8,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::build::{BinaryNode, BinaryTree};
+use super::kernel::on_huge_pages;
 
 /// Boxes of a node, triangles of a block.
 pub(super) const WIDTH: usize = 8;
@@ -128,7 +129,7 @@ impl Wide {
         }
         let block = |&root: &usize| Block::new(triangles, starts, &triangles_below(tree, root));
         let blocks = roots.par_iter().map(block).collect();
-        Self { nodes, blocks, root }
+        Self { nodes: on_huge_pages(nodes), blocks: on_huge_pages(blocks), root }
     }
 
     /// Bytes held.

@@ -22,8 +22,8 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
+mod memory;
 mod portable;
-mod prefetch;
 mod stack;
 
 use super::wide::{Block, Node, WIDTH};
@@ -31,8 +31,8 @@ use crate::ray::Ray;
 
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx2::Avx2;
+pub(crate) use memory::{on_huge_pages, prefetch, prefetch_line};
 pub(super) use portable::Portable;
-pub(crate) use prefetch::{prefetch, prefetch_line};
 pub(super) use stack::Stack;
 
 /// Which of a node's boxes a ray meets.
