@@ -16,8 +16,8 @@ mod room;
 #[path = "support/timing.rs"]
 mod timing;
 
-use glam::{DVec3, Vec3};
-use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use glam::Vec3;
+use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Accel, Ray, TriangleTest};
 
 use embree::{Embree, Mode};
@@ -35,10 +35,7 @@ fn main() {
         println!("SKIPPED: bench/dense is not here; set MATEVAL_DATA");
     }
     for triangles in [20_000, 1_000_000, 3_000_000] {
-        let intrinsics = Intrinsics::from_fov_x(SIDE, SIDE, 1.2);
-        let (from, to) = (DVec3::new(0.2, 0.2, 1.7), DVec3::new(4.0, 3.5, 0.8));
-        let camera = Camera::look_at(from, to, DVec3::Z, intrinsics).unwrap();
-        compare("room", room::room(triangles), &camera, rounds);
+        compare("room", room::room(triangles), &room::camera(SIDE), rounds);
     }
 }
 

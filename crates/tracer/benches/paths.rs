@@ -1,11 +1,19 @@
-//! Path tracing: samples a pixel and CPU second, of one thread, and what two threads gain.
-//! `cargo bench -p mateval-tracer --bench paths [-- SCENE [ROUNDS]]`, SCENE `room` or `dense` of the shared data.
+//! Path tracing: CPU seconds a sample, of one thread; what two threads gain; and how Mitsuba 3 compares, in turns.
+//! `cargo bench -p mateval-tracer --bench paths [-- ROUNDS [SCENE]]`, SCENE `bench/room` or `bench/dense` of the shared
+//! data, or a number of triangles: that many in a room made here. All of them without it.
 //!
-//! 512x512 pixels, 6 bounces (Mitsuba's max_depth 8), no roulette, as `tests/peers/path_speed_mitsuba.py`.
+//! With `MATEVAL_PEERS_PYTHON` (set it to `target/peers/bin/python`, which `tools/test_peers.sh` installs) `bench/dense` is
+//! rendered by Mitsuba's `scalar_rgb` and `llvm_ad_rgb` too, by one thread each.
+//!
+//! 512x512 pixels, 6 bounces (Mitsuba's max_depth 8), no roulette.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 #[path = "../tests/suite/bench_scene.rs"]
 mod bench_scene;
+#[path = "support/mitsuba.rs"]
+mod mitsuba;
+#[path = "support/room.rs"]
+mod room;
 #[path = "support/timing.rs"]
 mod timing;
 
@@ -13,41 +21,109 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use mateval_scene::Camera;
+use mateval_scene::reference::ReferenceScene;
 use mateval_tracer::{RenderSettings, World, render};
+use mitsuba::Mitsuba;
+use rayon::ThreadPool;
+
+const SIZE: u32 = 512;
+const MAX_BOUNCES: u32 = 6;
+/// A pixel and measurement, of us and of Mitsuba's variants: the latter needs many to be at its best, the scalar one is
+/// the same for any number.
+const SAMPLES: u32 = 4;
+const VARIANTS: [(&str, u32); 2] = [("scalar_rgb", 1), ("llvm_ad_rgb", 16)];
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let scenes = words.first().map_or(vec!["room", "dense"], |scene| vec![scene.as_str()]);
-    let rounds: usize = words.get(1).map_or(5, |word| word.parse().unwrap());
-    for scene in scenes {
-        let Some(folder) = bench_scene::folder(scene) else {
-            println!("SKIPPED: bench/{scene} is not here; set MATEVAL_DATA");
+    let rounds: usize = words.first().map_or(5, |word| word.parse().unwrap());
+    let scenes = ["bench/room", "bench/dense", "20000", "1000000", "3000000"];
+    for scene in words.get(1).map_or(scenes.to_vec(), |scene| vec![scene.as_str()]) {
+        let Some((reference, camera)) = load(scene) else {
+            println!("SKIPPED: {scene} is not here; set MATEVAL_DATA");
             continue;
         };
-        let (reference, camera) = bench_scene::read(&folder, 512);
-        let world = World::new(Arc::new(reference)).unwrap();
-        let settings =
-            RenderSettings { samples: 1, max_bounces: 6, roulette_start: u32::MAX, ..RenderSettings::default() };
-        let (mut alone, mut walls) = (Vec::new(), [Vec::new(), Vec::new()]);
-        let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
-        let mut rays = 0.0;
-        for round in 0..rounds {
-            for (pool, walls) in pools.iter().zip(&mut walls) {
-                let settings = RenderSettings { seed: round as u64, ..settings };
-                let (wall, cpu) = (Instant::now(), ProcessTime::now());
-                let stats = pool.install(|| render(&world, &camera, &settings, &|_, _| ())).unwrap().stats;
-                walls.push(wall.elapsed().as_secs_f64());
-                if pool.current_num_threads() == 1 {
-                    alone.push(cpu.elapsed().as_secs_f64());
-                }
-                rays = (stats.rays + stats.shadow_rays) as f64 / stats.paths as f64;
+        measure(scene, reference, &camera, rounds);
+    }
+}
+
+fn load(scene: &str) -> Option<(ReferenceScene, Camera)> {
+    match scene.strip_prefix("bench/") {
+        Some(name) => Some(bench_scene::read(&bench_scene::folder(name)?, SIZE)),
+        None => Some(room::lit(room::room(scene.parse().unwrap()), SIZE)),
+    }
+}
+
+fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
+    let triangles: usize = scene.surfaces.iter().map(|surface| surface.mesh.triangles.len()).sum();
+    let world = World::new(Arc::new(scene)).unwrap();
+    let mut peers = peers(name);
+    let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
+    let (mut ours, mut walls, mut rays) = (Vec::new(), [Vec::new(), Vec::new()], 0.0);
+    let mut theirs = vec![Vec::new(); peers.len()];
+    for round in 0..rounds {
+        for (pool, walls) in pools.iter().zip(&mut walls) {
+            let run = run(&world, camera, pool, round as u64);
+            walls.push(run.wall);
+            rays = run.rays;
+            if pool.current_num_threads() == 1 {
+                ours.push(run.cpu);
             }
         }
+        for ((mitsuba, (_, samples)), seconds) in peers.iter_mut().zip(VARIANTS).zip(&mut theirs) {
+            seconds.push(mitsuba.render(samples) / f64::from(samples));
+        }
+    }
+    println!(
+        "{name}, {triangles} triangles: {:.3} samples a pixel and CPU second, {:.2} us a sample, {rays:.1} rays a sample; \
+         2 threads {:.2} times 1",
+        1.0 / timing::median(&ours),
+        timing::median(&ours) / f64::from(SIZE * SIZE) * 1e6,
+        timing::speedup(&walls[0], &walls[1]),
+    );
+    for ((variant, _), seconds) in VARIANTS.iter().zip(&theirs) {
         println!(
-            "bench/{scene}: {:.3} samples a pixel and CPU second, {:.2} us a sample, {rays:.1} rays a sample; 2 threads {:.2} times 1",
-            1.0 / timing::median(&alone),
-            timing::median(&alone) / (512.0 * 512.0) * 1e6,
-            timing::speedup(&walls[0], &walls[1]),
+            "  Mitsuba {variant}: {:.3} samples a pixel and CPU second; ours is {:.2} times as fast",
+            1.0 / timing::median(seconds),
+            timing::speedup(seconds, &ours)
         );
+    }
+}
+
+fn peers(scene: &str) -> Vec<Mitsuba> {
+    if scene != "bench/dense" {
+        return Vec::new();
+    }
+    let Some(python) = std::env::var_os("MATEVAL_PEERS_PYTHON") else {
+        println!("SKIPPED: Mitsuba, MATEVAL_PEERS_PYTHON is not set");
+        return Vec::new();
+    };
+    let folder = bench_scene::folder("dense").unwrap();
+    let start = |(variant, samples)| Mitsuba::start(&python, variant, &folder, SIZE, MAX_BOUNCES + 2, samples);
+    VARIANTS.map(start).into()
+}
+
+/// What one picture took, a sample a pixel.
+struct Run {
+    cpu: f64,
+    wall: f64,
+    rays: f64,
+}
+
+fn run(world: &World, camera: &Camera, pool: &ThreadPool, seed: u64) -> Run {
+    let settings = RenderSettings {
+        samples: SAMPLES,
+        seed,
+        max_bounces: MAX_BOUNCES,
+        roulette_start: u32::MAX,
+        ..RenderSettings::default()
+    };
+    let (wall, cpu) = (Instant::now(), ProcessTime::now());
+    let stats = pool.install(|| render(world, camera, &settings, &|_, _| ())).unwrap().stats;
+    let a_sample = |seconds: f64| seconds / f64::from(SAMPLES);
+    Run {
+        cpu: a_sample(cpu.elapsed().as_secs_f64()),
+        wall: a_sample(wall.elapsed().as_secs_f64()),
+        rays: (stats.rays + stats.shadow_rays) as f64 / stats.paths as f64,
     }
 }

@@ -1,7 +1,9 @@
 //! A furnished room of any number of triangles, made in code.
 
-use glam::{Vec2, Vec3};
-use mateval_scene::TriangleMesh;
+use glam::{DVec3, Vec2, Vec3};
+use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 
 /// A room of 6 x 5 x 3 m (z up), open to no side, with bumpy balls on its floor: about `triangles` in all, one mesh a ball.
 pub fn room(triangles: usize) -> Vec<TriangleMesh> {
@@ -49,4 +51,41 @@ fn ball(centre: Vec3, radius: f32, rings: u32, phase: f32) -> TriangleMesh {
         }
     }
     mesh
+}
+
+/// The meshes of [`room`] as a scene that can be rendered: a lamp under the ceiling, grey walls, glossy balls; and a camera of
+/// `size` x `size` pixels.
+#[allow(dead_code, reason = "one benchmark traces rays alone")]
+pub fn lit(meshes: Vec<TriangleMesh>, size: u32) -> (ReferenceScene, Camera) {
+    let principled = |color: f32, roughness: f32| Material {
+        name: String::new(),
+        model: MaterialModel::Principled {
+            base_color: ColorInput::Constant([color, 0.5, 1.0 - color]),
+            roughness: ScalarInput::Constant(roughness),
+            metallic: ScalarInput::Constant(0.0),
+            specular: 0.5,
+            flavour: PrincipledFlavour::Blender,
+        },
+        two_sided: true,
+        opacity: None,
+        bump: None,
+    };
+    let mut scene =
+        ReferenceScene { materials: vec![principled(0.5, 0.9), principled(0.7, 0.3)], ..Default::default() };
+    let corners = [[2.0, 1.5], [4.0, 1.5], [4.0, 3.5], [2.0, 3.5]].map(|[x, y]| Vec3::new(x, y, 2.9));
+    let lamp = TriangleMesh { positions: corners.into(), triangles: vec![[0, 2, 1], [0, 3, 2]], ..Default::default() };
+    for (index, mesh) in meshes.into_iter().chain([lamp]).enumerate() {
+        let material = MaterialIndex(usize::from(index > 0));
+        scene.surfaces.push(Surface { name: String::new(), mesh, material });
+    }
+    let surfaces = vec![SurfaceIndex(scene.surfaces.len() - 1)];
+    let emission = Emission::Area { surfaces, radiance: [8.0; 3], two_sided: false };
+    scene.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
+    (scene, camera(size))
+}
+
+/// From a corner across the room.
+pub fn camera(size: u32) -> Camera {
+    let intrinsics = Intrinsics::from_fov_x(size, size, 1.2);
+    Camera::look_at(DVec3::new(0.2, 0.2, 1.7), DVec3::new(4.0, 3.5, 0.8), DVec3::Z, intrinsics).unwrap()
 }
