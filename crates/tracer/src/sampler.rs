@@ -11,6 +11,9 @@ pub struct Sampler {
     index: u32,
 }
 
+/// Those of the pixel and of three surfaces.
+const LAST_SPREAD_SET: u32 = 6;
+
 /// One sequence holds this many samples; the next ones start another.
 const SEQUENCE_BITS: u32 = 16;
 
@@ -23,9 +26,21 @@ impl Sampler {
         Self { key, index: index & ((1 << SEQUENCE_BITS) - 1) }
     }
 
-    /// Four numbers in [0, 1), well spread over the samples of the pixel. Sets are independent of each other.
+    /// Four numbers in [0, 1), of the first sets well spread over the samples of the pixel. Sets are independent of each
+    /// other.
     pub fn set(&self, set: u32) -> [f32; 4] {
+        if set > LAST_SPREAD_SET {
+            return self.unordered(set);
+        }
         sobol_burley::sample_4d(self.index, 0, mix(self.key ^ u64::from(set)) as u32)
+    }
+
+    /// Four numbers in [0, 1) without order: where a path has scattered often, order no longer shows in a pixel.
+    fn unordered(&self, set: u32) -> [f32; 4] {
+        let first = mix(mix(self.key ^ u64::from(set)) ^ u64::from(self.index));
+        let second = mix(first);
+        let unit = |bits: u64| (bits & 0xff_ffff) as f32 / (1 << 24) as f32;
+        [unit(first), unit(first >> 32), unit(second), unit(second >> 32)]
     }
 
     /// A number for `unit_hash`, another for each `stream`.

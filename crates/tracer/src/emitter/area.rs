@@ -22,7 +22,7 @@ pub(crate) struct AreaEmitter {
     triangles: Distribution,
     /// Of all triangles, surface by surface.
     records: Vec<TriangleRecord>,
-    pub(crate) outline: Outline,
+    outline: Outline,
 }
 
 /// Enough of an emitter to say roughly how much of the view it takes up.
@@ -39,13 +39,68 @@ pub(crate) struct Outline {
     facing: Vec3,
 }
 
-impl Outline {
-    /// Roughly the solid angle, seen from `from`; 0 from behind.
+/// The outlines of all emitters, number by number, so that eight are looked at in one go.
+#[derive(Debug, Default)]
+pub(crate) struct Outlines(Vec<EightOutlines>);
+
+/// Emitters looked at together.
+pub(crate) const TOGETHER: usize = 8;
+
+#[derive(Clone, Copy, Debug)]
+struct EightOutlines {
+    centre: [[f32; TOGETHER]; 3],
+    facing: [[f32; TOGETHER]; 3],
+    radius: [f32; TOGETHER],
+    radius2: [f32; TOGETHER],
+    area: [f32; TOGETHER],
+}
+
+impl EightOutlines {
+    /// Takes up nothing of any view.
+    const NONE: Self = Self {
+        centre: [[0.0; TOGETHER]; 3],
+        facing: [[0.0; TOGETHER]; 3],
+        radius: [0.0; TOGETHER],
+        radius2: [1.0; TOGETHER],
+        area: [0.0; TOGETHER],
+    };
+
+    fn put(&mut self, lane: usize, outline: &Outline) {
+        for axis in 0..3 {
+            self.centre[axis][lane] = outline.centre[axis];
+            self.facing[axis][lane] = outline.facing[axis];
+        }
+        self.radius[lane] = outline.radius;
+        self.radius2[lane] = outline.radius2;
+        self.area[lane] = outline.area;
+    }
+
+    #[inline(always)]
+    fn solid_angles(&self, from: Vec3) -> [f32; TOGETHER] {
+        std::array::from_fn(|lane| {
+            let away = [0, 1, 2].map(|axis| from[axis] - self.centre[axis][lane]);
+            let dot = |other: [f32; 3]| away[0] * other[0] + away[1] * other[1] + away[2] * other[2];
+            let height = dot([0, 1, 2].map(|axis| self.facing[axis][lane]));
+            let seen = if height + self.radius[lane] < 0.0 { 0.0 } else { self.area[lane] };
+            seen / dot(away).max(self.radius2[lane])
+        })
+    }
+}
+
+impl Outlines {
+    pub(crate) fn new(areas: &[AreaEmitter]) -> Self {
+        let eight = |chunk: &[AreaEmitter]| {
+            let mut eight = EightOutlines::NONE;
+            chunk.iter().enumerate().for_each(|(lane, area)| eight.put(lane, &area.outline));
+            eight
+        };
+        Self(areas.chunks(TOGETHER).map(eight).collect())
+    }
+
+    /// Roughly the solid angle of each emitter, seen from `from`; 0 from behind. Eight at a time; zeros follow the last.
     #[inline]
-    pub(crate) fn solid_angle(&self, from: Vec3) -> f32 {
-        let away = from - self.centre;
-        let seen = if self.facing.dot(away) + self.radius < 0.0 { 0.0 } else { self.area };
-        seen / away.length_squared().max(self.radius2)
+    pub(crate) fn solid_angles(&self, from: Vec3) -> impl Iterator<Item = [f32; TOGETHER]> + '_ {
+        self.0.iter().map(move |eight| eight.solid_angles(from))
     }
 }
 

@@ -14,13 +14,15 @@ use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceInde
 
 use crate::error::TracerError;
 use crate::surface_hit::SurfaceHit;
-use area::AreaEmitter;
+use area::{AreaEmitter, Outlines, TOGETHER};
 use environment::EnvironmentMap;
 
 /// All light groups of a scene.
 #[derive(Debug)]
 pub struct Emitters {
     areas: Vec<AreaEmitter>,
+    /// Of `areas`.
+    outlines: Outlines,
     /// For each surface the place in `areas`, if it glows.
     area_of: Vec<Option<usize>>,
     distant: Vec<DistantEmitter>,
@@ -77,6 +79,7 @@ impl Emitters {
     pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
         let mut emitters = Self {
             areas: Vec::new(),
+            outlines: Outlines::default(),
             area_of: vec![None; scene.surfaces.len()],
             distant: Vec::new(),
             camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
@@ -92,6 +95,7 @@ impl Emitters {
                 .add(scene, textures, LightIndex(index), &group.emission, count <= SEPARATE_SURFACES)
                 .map_err(|what| TracerError::Invalid(format!("light {index} '{}': {what}", group.name)))?;
         }
+        emitters.outlines = Outlines::new(&emitters.areas);
         Ok(emitters)
     }
 
@@ -251,22 +255,18 @@ impl Emitters {
     fn choose_area(&self, from: Vec3, choice: f32) -> Option<(usize, f32, f32)> {
         let last = self.areas.len().checked_sub(1)?;
         // Most scenes have few emitters: what they weigh is kept for the second look.
-        let mut weights = [0.0_f32; SEPARATE_SURFACES];
+        let mut kept = [[0.0_f32; TOGETHER]; SEPARATE_SURFACES / TOGETHER];
         let mut total = 0.0_f32;
-        for (which, area) in self.areas.iter().enumerate() {
-            let weight = area.outline.solid_angle(from);
-            if let Some(kept) = weights.get_mut(which) {
-                *kept = weight;
+        for (place, weights) in self.outlines.solid_angles(from).enumerate() {
+            if let Some(kept) = kept.get_mut(place) {
+                *kept = weights;
             }
-            total += weight;
+            total += weights.iter().sum::<f32>();
         }
-        let weight = |which: usize| match weights.get(which) {
-            Some(kept) => *kept,
-            None => self.areas[which].outline.solid_angle(from),
-        };
+        let again = self.outlines.solid_angles(from).skip(kept.len());
         let mut before = 0.0_f32;
-        for which in 0..=last {
-            let probability = self.mixed(weight(which), total);
+        for (which, weight) in kept.into_iter().chain(again).flatten().take(last + 1).enumerate() {
+            let probability = self.mixed(weight, total);
             if choice < before + probability || which == last {
                 let rest = ((choice - before) / probability).clamp(0.0, 1.0 - f32::EPSILON);
                 return (probability > 0.0).then_some((which, rest, probability));
@@ -277,8 +277,14 @@ impl Emitters {
     }
 
     fn area_probability(&self, which: usize, from: Vec3) -> f32 {
-        let total: f32 = self.areas.iter().fold(0.0, |total, area| total + area.outline.solid_angle(from));
-        self.mixed(self.areas[which].outline.solid_angle(from), total)
+        let (mut total, mut own) = (0.0_f32, 0.0);
+        for (place, weights) in self.outlines.solid_angles(from).enumerate() {
+            if place == which / TOGETHER {
+                own = weights[which % TOGETHER];
+            }
+            total += weights.iter().sum::<f32>();
+        }
+        self.mixed(own, total)
     }
 
     #[inline]

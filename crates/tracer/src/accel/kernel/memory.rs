@@ -4,11 +4,11 @@
 /// Bytes that the processor fetches at once.
 const LINE: usize = 64;
 
-/// Asks for the value at `place`, or its first 256 bytes.
+/// Asks for the value at `place`.
 #[inline(always)]
 pub(crate) fn prefetch<T>(place: &T) {
     let start = std::ptr::from_ref(place).cast::<u8>();
-    for line in 0..size_of::<T>().div_ceil(LINE).min(4) {
+    for line in 0..size_of::<T>().div_ceil(LINE) {
         prefetch_line(start.wrapping_add(LINE * line));
     }
 }
