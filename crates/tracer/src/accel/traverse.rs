@@ -134,7 +134,7 @@ pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
 }
 
 /// How many rays are under way at once in [`traverse_many`].
-const AT_ONCE: usize = 8;
+const AT_ONCE: usize = 12;
 
 /// [`traverse`] for many rays; `found` is told of each, in any order. A few rays are under way at once and step in turn:
 /// while one waits for memory, the others work.
