@@ -135,7 +135,8 @@ fn ball(roughness: f32, metallic: f32) -> Shot {
         name: format!("ball, roughness {roughness}, metallic {metallic}"),
         scene: on_both_sides(builder.scene()),
         camera: camera([0.0, 0.5, 5.0], [0.0; 3], SIZE as u32, 26.0),
-        samples: 192,
+        // The lamps in smooth metal are noisier.
+        samples: if metallic == 1.0 { 448 } else { 192 },
     }
 }
 
@@ -177,10 +178,10 @@ fn lambert_everywhere() {
 fn balls() {
     use Twin::{Mitsuba, Rougher};
     let looks: [(f32, f32, &[Twin]); 7] = [
-        // Here 0.05 more roughness change hardly a tile by 0.5 %; the same facets in metal show it.
+        // Here and at 0.9, 0.05 more roughness change hardly a tile by 1 %; the same facets in metal show it.
         (0.1, 0.0, &[Mitsuba]),
         (0.5, 0.0, &[Mitsuba, Rougher]),
-        (0.9, 0.0, &[Mitsuba, Rougher]),
+        (0.9, 0.0, &[Mitsuba]),
         (0.3, 0.5, &[Mitsuba, Rougher]),
         // Smooth metal loses nothing between its facets and has no base: there the flavours are one.
         (0.1, 1.0, &[Rougher]),
