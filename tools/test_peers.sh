@@ -30,4 +30,4 @@ if ! cmp -s "$requirements" "$venv/requirements.txt"; then
     cp "$requirements" "$venv/requirements.txt"
 fi
 
-MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --test peers -- "$@"
+MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --test peers -- --show-output "$@"

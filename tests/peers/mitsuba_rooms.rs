@@ -30,7 +30,7 @@ fn shared(file: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join(file);
     if !path.exists() {
-        eprintln!("SKIPPED: no '{file}' in MATEVAL_DATA or ../shared/data");
+        bench_scene::say_skipped(&format!("no '{file}' in MATEVAL_DATA or ../shared/data"));
     }
     path.exists().then_some(path)
 }
@@ -50,7 +50,7 @@ fn bench_rooms() {
                 let (scene, camera) = bench_scene::read(&folder, 64);
                 all_agree(vec![case(&format!("bench/{name}"), scene, camera, samples)]);
             }
-            None => eprintln!("SKIPPED: no 'bench/{name}' in MATEVAL_DATA or ../shared/data"),
+            None => bench_scene::say_skipped(&format!("no 'bench/{name}' in MATEVAL_DATA or ../shared/data")),
         }
     }
 }

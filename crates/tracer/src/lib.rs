@@ -8,7 +8,7 @@
 //! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
 //! [`SurfaceHit`]; the surface's material there becomes a [`Bsdf`]; [`emitter`] samples what shines on it; [`sampler`]
 //! gives every number from seed, pixel and sample index; [`film`] averages tiles in a fixed order. Trigonometry is the
-//! `libm` crate's, so every machine computes the same bits.
+//! `libm` crate's, or sums and products of `warp`'s own, so every machine computes the same bits.
 
 pub mod accel;
 pub mod aov;

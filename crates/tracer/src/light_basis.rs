@@ -39,7 +39,7 @@ impl LightGroups {
     /// not, as many runs of neighbours in the scene's list as fit, of nearly equal lengths: [`Self::is_merged`].
     ///
     /// The bound counts finished pictures, 12 bytes a pixel; tiles in the making come on top, about 60 kB a view, group and
-    /// thread. Fails if one group alone is too large.
+    /// thread where the views' pixels are of the first one's size, more where they are finer. Fails if one group alone is too large.
     pub fn within(bytes: u64, lights: usize, cameras: &[Camera], halves: usize) -> Result<Self, TracerError> {
         let pixels = |camera: &Camera| u64::from(camera.intrinsics.width) * u64::from(camera.intrinsics.height);
         let group_bytes = PIXEL_BYTES * halves as u64 * cameras.iter().map(pixels).sum::<u64>();

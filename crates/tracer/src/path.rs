@@ -44,7 +44,7 @@ struct Path {
     scattered: Option<Scattered>,
 }
 
-/// A path that has met a surface which is not a lamp alone.
+/// A path that has met a surface, which is not a lamp alone, and may scatter there.
 struct Arrival {
     path: Path,
     place: SurfaceHit,
@@ -129,10 +129,16 @@ impl<'w> PathTracer<'w> {
             };
             let place = self.world.surface_hit(hit);
             let is_lamp_alone = found.add_emitted(&path, &place, ray);
-            if !is_lamp_alone {
-                self.world.prefetch_texels(&place);
-                self.arrivals.push(Arrival { path, place, wo: -ray.direction() });
+            if is_lamp_alone {
+                continue;
             }
+            if scatterings > self.settings.max_bounces {
+                found.counts.capped += 1;
+                found.counts.capped_throughput += f64::from(path.throughput.element_sum() / 3.0);
+                continue;
+            }
+            self.world.prefetch_texels(&place);
+            self.arrivals.push(Arrival { path, place, wo: -ray.direction() });
         }
     }
 
@@ -144,11 +150,6 @@ impl<'w> PathTracer<'w> {
         for Arrival { path, place, wo } in self.arrivals.drain(..) {
             let bsdf = Bsdf::new(self.world, &place, wo);
             if bsdf.is_black() {
-                continue;
-            }
-            if scatterings > self.settings.max_bounces {
-                self.counts.capped += 1;
-                self.counts.capped_throughput += f64::from(path.throughput.element_sum() / 3.0);
                 continue;
             }
             if self.settings.light_sampling != LightSampling::Bsdf
@@ -280,7 +281,6 @@ impl<F: FnMut(usize, LightIndex, Vec3)> Found<'_, F> {
         if value.is_finite() {
             (self.add)(which, light, value);
         } else {
-            debug_assert!(false, "a path found {value} from light {}", light.0);
             self.counts.not_finite += 1;
         }
     }

@@ -67,7 +67,7 @@ pub struct RenderStats {
     pub shadow_rays: u64,
     /// Share of paths that `max_bounces` cut.
     pub capped_share: f64,
-    /// What those still carried, averaged over all paths: times the radiance around them, the light that is missing.
+    /// What those still carried, averaged over all paths: times the radiance around them, the most that is missing.
     pub capped_throughput: f64,
     /// Contributions left out because they were not finite: each is a bug.
     pub not_finite: u64,

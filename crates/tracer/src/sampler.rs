@@ -1,7 +1,7 @@
 //! Random numbers that follow from seed, pixel and sample index alone.
 //!
 //! Owen-scrambled Sobol points (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020) in sets of four dimensions,
-//! each set of each pixel with a seed of its own. Two halves of one sequence are correlated: halves that are to be
+//! each set of each pixel with a seed of its own; after three scatterings plain hashed numbers. Two halves of one sequence are correlated: halves that are to be
 //! independent need two seeds.
 
 /// The numbers of one sample of one pixel.

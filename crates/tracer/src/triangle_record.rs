@@ -42,12 +42,12 @@ impl TriangleRecord {
     }
 }
 
-/// The hit is off its triangle by 4 roundings of the corners' coordinates (interpolation), the next ray's triangle test
-/// moves corners by 6 roundings of distances of up to twice them along two axes (17 in all), the sum rounds once; 32
-/// leaves a margin. A neighbour in the same plane may be as large as the scene, which the second term is for.
+/// A hit is off its triangle by 6 roundings of the corners' coordinates (3 of the weights, 3 of their sum), times the root
+/// of 3 where the triangle is oblique; the next ray's triangle test moves corners by 6 roundings of distances of up to
+/// twice them along two axes; the sum rounds once an axis. That makes 10.4 + 17 + 1.7; 40 leaves a margin. A neighbour in the same plane may be as large as the scene, which the second term is for.
 fn offset(corners: [Vec3; 3], scene_size: f32) -> f32 {
     let largest = corners.iter().fold(0.0_f32, |size, corner| size.max(corner.abs().max_element()));
-    ROUNDING * (32.0 * largest + 4.0 * scene_size)
+    ROUNDING * (40.0 * largest + 4.0 * scene_size)
 }
 
 #[cfg(test)]

@@ -107,13 +107,15 @@ impl World {
 
     /// The nearest hit on a surface whose opacity there is at least one half.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
-        self.closest_above(ray, |_| OPACITY_THRESHOLD)
+        if !self.masked {
+            return self.accel.closest(ray);
+        }
+        self.accel.closest_where(ray, |hit| self.opacity(hit) >= OPACITY_THRESHOLD)
     }
 
-    /// The nearest hits of many rays; a surface of opacity o is met with probability o. Equal `salt` of a ray's number,
-    /// ray and scene give equal hits; it is asked for where there are opacities. What shading reads of the triangles met
-    /// is asked for.
-    pub fn closest_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, hits: &mut Vec<Option<Hit>>) {
+    /// The nearest hits of many rays: `hits[k]` of `rays[k]`. A surface of opacity o is met with probability o, drawn from
+    /// `salt(k)`: the same ray, salt and scene give the same hit. Asks early for what shading reads of the triangles.
+    pub(crate) fn closest_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, hits: &mut Vec<Option<Hit>>) {
         if self.masked {
             let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
             self.accel.closest_many_where(rays, met, hits);
@@ -125,8 +127,8 @@ impl World {
         }
     }
 
-    /// Whether rays are stopped; a surface of opacity o stops one with probability o, as its `salt` says.
-    pub fn occluded_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, occluded: &mut Vec<bool>) {
+    /// Whether each of many rays meets anything, opacities drawn as in [`Self::closest_many`].
+    pub(crate) fn occluded_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, occluded: &mut Vec<bool>) {
         if self.masked {
             let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
             self.accel.occluded_many_where(rays, met, occluded);
@@ -141,13 +143,6 @@ impl World {
             let texture = &self.textures[lookup.texture.0];
             texture.addresses(lookup.uv.apply(place.uv).to_array()).into_iter().for_each(prefetch_line);
         }
-    }
-
-    fn closest_above(&self, ray: &Ray, threshold: impl Fn(&Hit) -> f32) -> Option<Hit> {
-        if !self.masked {
-            return self.accel.closest(ray);
-        }
-        self.accel.closest_where(ray, |hit| self.opacity(hit) >= threshold(hit))
     }
 
     /// The opacity at a hit, 1 where the material has none.

@@ -2,7 +2,7 @@
 //!
 //! `MATEVAL_PEERS_PYTHON=... cargo bench -p mateval-eval --bench five_views -- [quick|full]` on `bench/dense` (864,036
 //! triangles, 15 emitters), 480 x 270 pixels, 6 bounces (Mitsuba's max_depth 8). Ours: a light basis of the input view
-//! (stream C), the fit, and two halves of all five views' light bases in one pass. Mitsuba's: radiances fitted by `prb` and
+//! at 256 x 256 pixels (stream C), the fit, and two halves of all five views' light bases in one pass. Mitsuba's: radiances fitted by `prb` and
 //! Adam, 100 iterations at 256 x 256 pixels and 16 samples (our assumption: nobody published a number), then five renders.
 //! `quick` times 10 iterations and scales; `scalar_rgb` cannot fit, so only its renders count. Tools take turns.
 //!

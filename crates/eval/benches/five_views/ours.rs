@@ -71,20 +71,9 @@ fn mean_of_halves(view: &ViewLight) -> Vec<f32> {
 
 /// The scene's reference picture, by Mitsuba, at the size of the fit.
 pub fn photo(folder: &Path) -> Picture<LinearRgb> {
-    let large = read_npy(&folder.join("mi_principled_d8_64spp.npy"), 2 * FIT_SIZE);
+    let large = bench_scene::reference(folder);
     Picture::from_fn(FIT_SIZE, FIT_SIZE, |x, y| {
         let nested = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dy]| large.get(2 * x + dx, 2 * y + dy).0);
         LinearRgb([0, 1, 2].map(|channel| nested.iter().map(|pixel| pixel[channel]).sum::<f32>() / 4.0))
-    })
-}
-
-/// NumPy's format, version 1, of `size` x `size` x 3 little-endian floats.
-fn read_npy(path: &Path, size: usize) -> Picture<LinearRgb> {
-    let bytes = std::fs::read(path).unwrap();
-    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    assert_eq!(bytes.len() - start, 12 * size * size, "{}", path.display());
-    let float = |at: usize| f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
-    Picture::from_fn(size, size, |x, y| {
-        LinearRgb([0, 1, 2].map(|channel| float(start + 4 * (3 * (y * size + x) + channel))))
     })
 }

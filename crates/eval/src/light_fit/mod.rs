@@ -28,7 +28,7 @@ pub struct LightFit {
 
 /// Fits the basis to `target`, by the pixels in `mask` if there is one.
 ///
-/// Fails where sizes differ, or a picture holds what no light sends: not finite numbers, or negative ones in the basis.
+/// Fails where sizes differ, where no weights are found, or where a picture holds what no light sends: not finite numbers, or negative ones in the basis.
 pub fn fit_lights(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>) -> Result<LightFit, EvalError> {
     check(basis, target, mask)?;
     let target = pooled(target, mask);
@@ -37,8 +37,12 @@ pub fn fit_lights(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<
         let columns: Vec<Vec<f64>> = columns.iter().map(|column| column[channel].clone()).collect();
         solve(&columns, &target[channel])
     });
-    let gaps = channels.iter().zip(&target).map(|(fit, target)| fit.relative_gap(target));
-    let relative_gap = gaps.fold(0.0, f64::max);
+    let gaps = [0, 1, 2].map(|channel| channels[channel].relative_gap(&target[channel]));
+    let numbers = channels.iter().flat_map(|fit| &fit.weights).chain(&gaps);
+    if !numbers.into_iter().all(|v| v.is_finite()) {
+        return Err(EvalError::Invalid("cannot fit lights: the solver broke down; please report this basis".into()));
+    }
+    let relative_gap = gaps.into_iter().fold(0.0, f64::max);
     let weights = (0..columns.len()).map(|group| [0, 1, 2].map(|channel| channels[channel].weights[group]));
     Ok(LightFit { weights: weights.collect(), channels, relative_gap })
 }

@@ -10,7 +10,7 @@ use super::remarks::Remarks;
 
 /// Mitsuba's `max_depth` counts the camera's ray and the last piece of direct light too.
 pub(super) fn integrator(settings: &RenderSettings) -> Element {
-    Element::plugin("integrator", "path").integer("max_depth", settings.max_bounces + 2)
+    Element::plugin("integrator", "path").integer("max_depth", settings.max_bounces.saturating_add(2))
 }
 
 /// The camera with a box filter over pixels and independent samples.

@@ -46,7 +46,7 @@ pub enum TriangleTest {
     /// Nothing passes between triangles with a common edge or corner.
     #[default]
     Watertight,
-    /// As fast, within a few percent; about 6 in 1000 rays aimed at an edge slip through.
+    /// As fast, within a few percent; of rays aimed straight at an edge or a corner up to a fifth slip through.
     Fast,
 }
 

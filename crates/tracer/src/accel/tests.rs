@@ -78,6 +78,38 @@ proptest! {
             prop_assert_eq!((avx2.closest(&ray), avx2.occluded(&ray)), found);
         }
     }
+
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
+
+    /// Rays under way side by side find what each finds alone, unusable ones among them, and any of few or many.
+    #[test]
+    fn many_rays_find_what_each_finds_alone(
+        mesh in mesh(),
+        rays in prop::collection::vec((point(), direction(), prop_oneof![Just(f32::INFINITY), 0.0_f32..3.0]), 0..40),
+    ) {
+        let rays: Vec<Ray> =
+            rays.into_iter().map(|(origin, d, reach)| Ray::new(origin, d.normalize_or_zero(), reach)).collect();
+        let odd = |hit: &Hit| hit.triangle.0 % 2 == 1;
+        // Every third ray takes odd triangles alone.
+        let taken = |which: usize, hit: &Hit| !which.is_multiple_of(3) || odd(hit);
+        for instructions in [InstructionSet::Avx2, InstructionSet::Portable] {
+            let Some(accel) = Accel::build(&[&mesh]).unwrap().with_instructions(instructions) else { continue };
+            let (mut hits, mut occluded) = (Vec::new(), Vec::new());
+            accel.closest_many(&rays, &mut hits);
+            accel.occluded_many(&rays, &mut occluded);
+            prop_assert_eq!(&hits, &rays.iter().map(|ray| accel.closest(ray)).collect::<Vec<_>>());
+            prop_assert_eq!(&occluded, &rays.iter().map(|ray| accel.occluded(ray)).collect::<Vec<_>>());
+            accel.closest_many_where(&rays, taken, &mut hits);
+            accel.occluded_many_where(&rays, taken, &mut occluded);
+            for (which, ray) in rays.iter().enumerate() {
+                prop_assert_eq!(hits[which], accel.closest_where(ray, |hit| taken(which, hit)));
+                prop_assert_eq!(occluded[which], hits[which].is_some());
+            }
+        }
+    }
 }
 
 /// A closed ball of 2 n^2 triangles, its vertices shared.
@@ -107,17 +139,22 @@ fn a_closed_mesh_leaks_nowhere() {
     let mesh = ball(60);
     let accel = Accel::build(&[&mesh]).unwrap();
     let mut shot = 0;
+    // The twin, of which the documentation tells.
+    let fast = Accel::build(&[&mesh]).unwrap().with_test(TriangleTest::Fast);
+    let mut slipped = 0;
     for origin in [Vec3::ZERO, Vec3::new(0.3, -0.2, 0.7), Vec3::new(0.0, 0.9, 0.0), Vec3::new(1e-7, 0.5, -1e-7)] {
         for triangle in &mesh.triangles {
             let [a, b, _] = triangle.map(|vertex| mesh.positions[vertex as usize]);
             for part in [0.0, 0.5, 0.123, 0.999_99] {
                 let ray = Ray::endless(origin, (a + (b - a) * part - origin).normalize());
                 assert!(accel.closest(&ray).is_some(), "{ray:?}");
+                slipped += u32::from(!fast.occluded(&ray));
                 shot += 1;
             }
         }
     }
     assert!(shot > 100_000, "{shot}");
+    assert!((50..300).contains(&(slipped * 1000 / shot)), "{slipped} of {shot}");
 }
 
 #[test]
@@ -157,7 +194,7 @@ fn bad_meshes_are_refused() {
     }
 }
 
-/// A tree as deep as it can be made: triangles ever smaller towards one corner.
+/// A tree as deep as triangles make it that are ever smaller towards one corner: the stack, short in tests, runs over.
 #[test]
 fn deep_trees_are_walked() {
     let mut mesh = TriangleMesh::default();

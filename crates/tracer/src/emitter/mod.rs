@@ -114,6 +114,11 @@ impl Emitters {
                     if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
                 for part in parts {
                     self.claim(part)?;
+                    // What has no triangles is never met, and there is no place on it to sample.
+                    if part.iter().all(|surface| scene.surfaces[surface.0].mesh.triangles.is_empty()) {
+                        part.iter().for_each(|surface| self.area_of[surface.0] = None);
+                        continue;
+                    }
                     self.areas.push(AreaEmitter::new(
                         scene,
                         light,
@@ -127,8 +132,8 @@ impl Emitters {
             Emission::Environment { texture, scale, world_from_environment } => {
                 let map = textures.get(texture.0).ok_or(format!("texture {} of {}", texture.0, textures.len()))?;
                 let numbers = world_from_environment.iter().flatten().chain([scale]);
-                if !numbers.into_iter().all(|v| v.is_finite()) {
-                    return Err("scale or rotation is not finite".into());
+                if !numbers.into_iter().all(|v| v.is_finite()) || *scale < 0.0 {
+                    return Err("scale or rotation is not finite, or the scale negative".into());
                 }
                 let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
                 self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map) });

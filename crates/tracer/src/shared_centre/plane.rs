@@ -123,7 +123,7 @@ impl Plane {
         let cell = Window { columns: x..x + 1, rows: y..y + 1 };
         let middle = self.ray_place([x, y], [0.5, 0.5]);
         let needs = self.views.iter().enumerate().filter(|(index, _)| self.window(*index, &cell).is_some());
-        let most = needs.map(|(_, view)| self.seen(view, middle).pixels).fold(0.0, f64::max);
+        let most = needs.filter_map(|(_, view)| self.seen(view, middle)).map(|seen| seen.pixels).fold(0.0, f64::max);
         // A millionth less, so that rounding does not ask for one more.
         (most * f64::from(self.samples) * (1.0 - 1e-6)).ceil() as u32
     }
@@ -139,28 +139,34 @@ impl Plane {
         DVec2::new(f64::from(cell[0]) + f64::from(offset[0]), f64::from(cell[1]) + f64::from(offset[1]))
     }
 
-    /// Where `view` sees the point `at` of the plane.
+    /// Where `view` sees the point `at` of the plane; none where that lies behind it.
     ///
     /// Between image planes of one centre the area changes by the cube of the ratio of depths: dA/d(solid angle) is
     /// focal^2 / cos^3 of the angle to the plane's axis.
-    pub(super) fn seen(&self, view: &PlaneView, at: DVec2) -> Seen {
-        let Some(turn) = view.turn else { return Seen { place: at, pixels: 1.0 } };
+    pub(super) fn seen(&self, view: &PlaneView, at: DVec2) -> Option<Seen> {
+        let Some(turn) = view.turn else { return Some(Seen { place: at, pixels: 1.0 }) };
         let direction = turn * self.camera.camera_direction(at);
         let depth = -direction.z;
-        Seen { place: place(&view.intrinsics, direction), pixels: view.scale / (depth * depth * depth) }
+        (depth > 0.0)
+            .then(|| Seen { place: place(&view.intrinsics, direction), pixels: view.scale / (depth * depth * depth) })
     }
 
     /// The pixels of view `index` that may hold points of `part`; none if there are none.
     pub(super) fn window(&self, index: usize, part: &Window) -> Option<Window> {
         let view = &self.views[index];
-        let corner = |x: i32, y: i32| self.seen(view, DVec2::new(f64::from(x), f64::from(y))).place;
         let Window { columns, rows } = part;
-        let corners = [(columns.start, rows.start), (columns.end, rows.start), (columns.start, rows.end)];
-        let last = corner(columns.end, rows.end);
-        let (low, high) = corners.iter().fold((last, last), |(low, high), &(x, y)| {
-            let corner = corner(x, y);
-            (low.min(corner), high.max(corner))
-        });
+        let corners =
+            [columns.start, columns.end].map(|x| [rows.start, rows.end].map(|y| DVec2::new(x.into(), y.into())));
+        let seen: Vec<DVec2> =
+            corners.as_flattened().iter().filter_map(|&at| Some(self.seen(view, at)?.place)).collect();
+        let (low, high) = match seen.as_slice() {
+            [] => return None,
+            [first, others @ ..] if others.len() == 3 => {
+                others.iter().fold((*first, *first), |(low, high), corner| (low.min(*corner), high.max(*corner)))
+            }
+            // What lies partly behind the view may be anywhere in its picture.
+            _ => (DVec2::NEG_INFINITY, DVec2::INFINITY),
+        };
         // A pixel more on each side, for what rounding may do to a point at the edge; the plane's own are exact.
         let margin = if view.turn.is_some() { 1.0 } else { 0.0 };
         let span = |low: f64, high: f64, size: u32| {

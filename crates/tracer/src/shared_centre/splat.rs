@@ -153,7 +153,7 @@ impl Exposure<'_> {
         let at = self.plane.ray_place(path.cell, path.point);
         for (view, part) in self.plane.views().iter().zip(parts) {
             let Some(part) = part else { continue };
-            let seen = self.plane.seen(view, at);
+            let Some(seen) = self.plane.seen(view, at) else { continue };
             if let Some(pixel) = part.pixel(seen.place.x, seen.place.y) {
                 part.add(pixel, found, seen.pixels / path.count as f64);
             }

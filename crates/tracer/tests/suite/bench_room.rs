@@ -18,13 +18,13 @@ const RENDERS: u64 = 16;
 /// Both pictures' means agree to 1 % and within noise, all 16x16 tiles of the reference within noise; with lights 3 %
 /// brighter neither does.
 #[test]
-#[allow(clippy::print_stderr, reason = "a test that is left out says so")]
+#[allow(clippy::print_stderr, reason = "what was measured is told")]
 fn agrees_with_mitsuba() {
     let Some(folder) = bench_scene::folder("room") else {
-        eprintln!("SKIPPED: agrees_with_mitsuba: no bench/room; set MATEVAL_DATA");
+        bench_scene::say_skipped("no bench/room; set MATEVAL_DATA");
         return;
     };
-    let reference = read_npy(&folder.join("mi_principled_d8_64spp.npy"), 512);
+    let reference = bench_scene::reference(&folder);
     let found = |brightness: f32| {
         let (mut scene, camera) = bench_scene::read(&folder, SIZE);
         for light in &mut scene.lights {
@@ -73,15 +73,4 @@ fn compare(renders: &Renders, reference: &Picture<LinearRgb>) -> (f64, f64, f64)
     }
     assert_eq!(squares.len(), 1024);
     (whole.mean / expected, whole.z(expected), squares.iter().sum::<f64>() / 1024.0)
-}
-
-/// Little-endian f32 of shape (size, size, 3).
-fn read_npy(path: &Path, size: usize) -> Picture<LinearRgb> {
-    let bytes = std::fs::read(path).unwrap();
-    let start = bytes.len() - size * size * 12;
-    let float = |at: usize| f32::from_le_bytes(bytes[start + 4 * at..start + 4 * at + 4].try_into().unwrap());
-    Picture::from_fn(size, size, |x, y| {
-        let at = 3 * (y * size + x);
-        LinearRgb([float(at), float(at + 1), float(at + 2)])
-    })
 }

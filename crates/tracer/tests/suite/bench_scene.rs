@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
-use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{LinearRgb, Picture, Wrap};
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
@@ -19,6 +19,27 @@ pub fn folder(name: &str) -> Option<PathBuf> {
     let data = std::env::var_os("MATEVAL_DATA").map_or_else(beside_the_project, PathBuf::from);
     let folder = data.join("bench").join(name);
     folder.join("scene.json").is_file().then_some(folder)
+}
+
+/// Tells of a test that is left out, even where the test runner keeps what tests print to itself.
+#[allow(dead_code, reason = "benchmarks print")]
+pub fn say_skipped(why: &str) {
+    use std::io::Write as _;
+    let thread = std::thread::current();
+    let line = format!("SKIPPED: {}: {why}\n", thread.name().unwrap_or("a test"));
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
+}
+
+/// Mitsuba's picture of a scene of 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`, max_depth 8,
+/// 64 samples.
+#[allow(dead_code, reason = "some draw no comparison")]
+pub fn reference(folder: &Path) -> Picture<LinearRgb> {
+    const SIZE: usize = 512;
+    let bytes = std::fs::read(folder.join("mi_principled_d8_64spp.npy")).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let floats: Vec<f32> = bytes[start..].as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    let pixels = floats.as_chunks::<3>().0.iter().map(|rgb| LinearRgb(*rgb)).collect();
+    Picture::new(SIZE, SIZE, pixels).unwrap()
 }
 
 /// The nearest folder above this crate or package that holds `Cargo.lock` is the project's root.

@@ -12,7 +12,7 @@ use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{LightSampling, Ray, RenderSettings, Sampler, World, render};
 
 use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use super::statistics::Renders;
+use super::statistics::{Renders, chi_square_z};
 
 fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
     MaterialModel::Principled {
@@ -204,8 +204,7 @@ fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
         }
     }
     statistic += (pooled[0] - pooled[1]).powi(2) / pooled[1].max(10.0);
-    let (mean, part): (f64, f64) = (statistic / freedom, 2.0 / (9.0 * freedom));
-    (mean.cbrt() - (1.0 - part)) / part.sqrt()
+    chi_square_z(statistic / freedom, freedom)
 }
 
 #[test]
@@ -269,8 +268,31 @@ fn bad_scenes_are_refused() {
         },
         "light 0",
     );
+    refused(
+        |s| {
+            let Emission::Environment { scale, .. } = &mut s.lights[1].emission else { unreachable!() };
+            *scale = -1.0;
+        },
+        "light 1",
+    );
     let dangling = ColorInput::Texture { texture: TextureIndex(5), uv: Default::default() };
     let mut bad = scene(1.0);
     bad.materials[1].model = MaterialModel::Diffuse { reflectance: dangling, alpha: None };
     assert!(World::new(Arc::new(bad)).unwrap_err().to_string().contains("material 1"));
+}
+
+/// A lamp of no triangles lights nothing and stands in nobody's way.
+#[test]
+fn lamps_without_triangles_are_dark() {
+    let mut with = scene(1.0);
+    with.surfaces.push(with.surfaces[0].clone());
+    let last = with.surfaces.len() - 1;
+    with.surfaces[last].mesh = TriangleMesh::default();
+    let mut light = with.lights[0].clone();
+    light.emission = Emission::Area { surfaces: vec![SurfaceIndex(last)], radiance: [1.0; 3], two_sided: false };
+    with.lights.push(light);
+    let settings = RenderSettings { samples: 2, ..Default::default() };
+    let picture =
+        |scene| render(&World::new(Arc::new(scene)).unwrap(), &view(), &settings, &|_, _| ()).unwrap().picture;
+    assert_eq!(picture(with), picture(scene(1.0)));
 }

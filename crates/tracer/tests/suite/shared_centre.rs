@@ -10,6 +10,7 @@ use mateval_tracer::shared_centre::share_centre;
 use mateval_tracer::{LightGroups, RenderSettings, ViewsRender, World, render_views};
 
 use super::light_basis::{lit_world, view};
+use super::scenes::Builder;
 use super::statistics::Renders;
 
 const SIZE: usize = 32;
@@ -121,10 +122,10 @@ fn splatting_adds_little_noise() {
 
 /// The same in a furnished room with textures, where paths themselves are noisy: 1.15 times, lamps left out.
 #[test]
-#[allow(clippy::print_stderr, reason = "a measurement, and what is left out")]
+#[allow(clippy::print_stderr, reason = "a measurement")]
 fn splatting_adds_little_noise_to_a_furnished_room() {
     let Some(folder) = super::bench_scene::folder("room") else {
-        eprintln!("SKIPPED: splatting_adds_little_noise_to_a_furnished_room: no bench/room; set MATEVAL_DATA");
+        super::bench_scene::say_skipped("no bench/room; set MATEVAL_DATA");
         return;
     };
     let (scene, input) = super::bench_scene::read(&folder, SIZE as u32);
@@ -269,4 +270,22 @@ fn what_makes_no_sense_is_refused() {
     assert!(message(&LightGroups::apart(4), 1, &[3, 4, 3]).contains("seed 3 occurs twice"));
     assert!(message(&LightGroups::apart(3), 1, &[3]).contains("groups of 3 lights for a scene of 4"));
     assert!(message(&LightGroups::apart(4), 0, &[3]).contains("0 samples"));
+}
+
+/// Few pixels and much between the views: tiles reach behind views. Under light of one all around every pixel is one.
+#[test]
+fn small_pictures_lose_nothing() {
+    let world = Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();
+    let intrinsics = Intrinsics::from_fov_x(8, 8, 90.0_f64.to_radians());
+    let first = Camera { intrinsics, ..view(8) };
+    let cameras = [first, first.turned(22.0, 0.0), first.turned(-22.0, 0.0)];
+    assert!(share_centre(&cameras));
+    let groups = LightGroups::together(1);
+    let done = render_views(&world, &cameras, &groups, &settings(16), &[1], &|_, _| ()).unwrap();
+    assert_eq!(done.passes, 1);
+    for view in &done.views {
+        for pixel in view.halves[0].basis.sum().pixels() {
+            assert!((pixel.0[0] - 1.0).abs() < 0.3, "{pixel:?}");
+        }
+    }
 }

@@ -34,6 +34,11 @@ impl Estimate {
     }
 }
 
+/// Wilson and Hilferty's approximation: a chi-square over its degrees of freedom as a standard normal.
+pub fn chi_square_z(mean: f64, freedom: f64) -> f64 {
+    (mean.cbrt() - (1.0 - 2.0 / (9.0 * freedom))) / (2.0 / (9.0 * freedom)).sqrt()
+}
+
 impl Renders {
     /// `count` renders with seeds of their own.
     pub fn new(world: &World, camera: &Camera, settings: RenderSettings, count: u64) -> Self {

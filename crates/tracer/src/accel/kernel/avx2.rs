@@ -1,4 +1,5 @@
-//! The kernel for processors with AVX2, FMA and the bit instructions that came with them; see `portable` for the formulas, lane by lane.
+//! The kernel for processors with AVX2, FMA and the bit instructions that came with them; see `portable` for the formulas,
+//! lane by lane.
 #![allow(unsafe_code, reason = "the one place where processor instructions are named")]
 
 use std::arch::x86_64::*;
@@ -32,22 +33,24 @@ fn compiled_for_avx2<R>(kernel: Avx2, work: impl FnOnce(Avx2) -> R) -> R {
     work(kernel)
 }
 
-// SAFETY of the blocks below: `self` proves that the processor has what the functions ask for.
 impl Kernel for Avx2 {
     type Lanes = __m256;
 
     #[inline(always)]
     fn boxes(self, node: &Node, ray: &BoxRay, limit: f32) -> Boxes<Self::Lanes> {
+        // SAFETY: `self` proves that the processor has what the function asks for.
         unsafe { boxes(node, ray, limit) }
     }
 
     #[inline(always)]
     fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack) {
+        // SAFETY: `self` proves that the processor has what the function asks for.
         unsafe { push_sorted(node, boxes, stack) }
     }
 
     #[inline(always)]
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
+        // SAFETY: `self` proves that the processor has what the functions ask for.
         if WATERTIGHT { unsafe { watertight(block, ray, limit) } } else { unsafe { fast(block, ray, limit) } }
     }
 }

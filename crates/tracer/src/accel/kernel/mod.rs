@@ -3,18 +3,19 @@
 //! Both kernels do the same roundings in the same order (fused multiply-adds included), so they give the same bits.
 //!
 //! **Boxes** are padded so that no triangle is lost that the triangle test would find. That test rounds the corners in the
-//! ray's sheared space, which moves them by at most 5 * 2^-24 times their largest coordinate seen from the ray's origin
-//! (one rounding each for the difference and the fused shear, twice for the shear itself, |shear| <= 1), and its distance
-//! is that of the moved triangle to 6 roundings of its farthest corner. So a box padded by 16 * 2^-24 times (farthest
-//! corner of the scene from the origin + the origin's own largest coordinate, for the rounding of the padded origins)
-//! holds the hit; the slabs' own relative rounding is covered by widening the interval by 2^-21. The padding is the same
-//! for the whole ray and is put into its origin: it costs nothing.
+//! ray's sheared space, which moves them by at most 6 * 2^-24 times their largest coordinate seen from the ray's origin
+//! (one rounding each of x and z, two of the shear, |shear| <= 1, and one of a sum of up to twice them), and its distance
+//! is that of the moved triangle to 10 roundings of its farthest corner (2 of the weights, 3 of the weighted sum, 2 of the
+//! sum of weights, 3 of product, reciprocal and quotient). So a box padded by 16 * 2^-24 times (farthest corner of the
+//! scene from the origin + the origin's own largest coordinate, for the rounding of the padded origins) holds the hit;
+//! the slabs' own relative rounding is covered by widening the interval by 2^-21, as are the 10 again. The padding is the
+//! same for the whole ray and is put into its origin: it costs nothing.
 //!
 //! **Triangles**, watertight: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013). Corners are moved
 //! into the ray's own sheared space, where the ray is the z axis, and rounded there. The three edge functions a b - c d are
 //! computed by Kahan's method with fused multiply-adds, whose relative error is below 2^-22 (Jeannerod, Louvet, Muller,
 //! "Further analysis of Kahan's algorithm for the accurate computation of 2x2 determinants", 2013): so their signs are
-//! exact, unless numbers below 1e-19 m are multiplied, and two triangles with a common edge agree about the side on which
+//! exact, unless numbers below 3e-16 m are multiplied, and two triangles with a common edge agree about the side on which
 //! the ray passes; around a common corner there is no gap.
 //!
 //! **Triangles**, fast: Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection" (1997). Rays may slip
@@ -58,7 +59,7 @@ pub(super) trait Kernel: Copy {
 
     fn boxes(self, node: &Node, ray: &BoxRay, limit: f32) -> Boxes<Self::Lanes>;
 
-    /// Pushes the children met, of which there is at least one, the farthest first; distances may lose their last three
+    /// Pushes the children met, if any, the farthest first; distances may lose their last three
     /// bits.
     fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack);
 
