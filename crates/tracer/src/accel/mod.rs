@@ -154,28 +154,22 @@ impl Accel {
 
     /// [`Self::closest`] of many rays at once, which is faster than one by one: `hits[k]` is that of `rays[k]`.
     pub fn closest_many(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
-        self.closest_many_where(rays, |_, _| true, hits);
+        self.closest_of_candidates(rays, |_, _| true, hits);
     }
 
     /// [`Self::closest_where`] of many rays at once; `accept` is told the number of the ray too.
     pub fn closest_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, hits: &mut Vec<Option<Hit>>) {
-        hits.clear();
-        hits.resize(rays.len(), None);
-        let accept = |which: usize, found: &Candidate| accept(which, &self.hit(found));
-        self.find_many::<false>(rays, accept, |which, found| hits[which] = found.map(|found| self.hit(&found)));
+        self.closest_of_candidates(rays, |which, found| accept(which, &self.hit(found)), hits);
     }
 
     /// [`Self::occluded`] of many rays at once.
     pub fn occluded_many(&self, rays: &[Ray], occluded: &mut Vec<bool>) {
-        self.occluded_many_where(rays, |_, _| true, occluded);
+        self.any_of_candidates(rays, |_, _| true, occluded);
     }
 
     /// [`Self::occluded_where`] of many rays at once; `accept` is told the number of the ray too.
     pub fn occluded_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, occluded: &mut Vec<bool>) {
-        occluded.clear();
-        occluded.resize(rays.len(), false);
-        let accept = |which: usize, found: &Candidate| accept(which, &self.hit(found));
-        self.find_many::<true>(rays, accept, |which, found| occluded[which] = found.is_some());
+        self.any_of_candidates(rays, |which, found| accept(which, &self.hit(found)), occluded);
     }
 
     /// What [`Self::closest`] answers, found without the hierarchy; for tests and doubts.
@@ -251,6 +245,23 @@ impl Accel {
             ),
             Chosen::Portable => traverse::traverse::<_, WATERTIGHT, ANY>(Portable, wide, self.size, ray, accept),
         }
+    }
+
+    fn closest_of_candidates(
+        &self,
+        rays: &[Ray],
+        accept: impl Fn(usize, &Candidate) -> bool,
+        hits: &mut Vec<Option<Hit>>,
+    ) {
+        hits.clear();
+        hits.resize(rays.len(), None);
+        self.find_many::<false>(rays, accept, |which, found| hits[which] = found.map(|found| self.hit(&found)));
+    }
+
+    fn any_of_candidates(&self, rays: &[Ray], accept: impl Fn(usize, &Candidate) -> bool, occluded: &mut Vec<bool>) {
+        occluded.clear();
+        occluded.resize(rays.len(), false);
+        self.find_many::<true>(rays, accept, |which, found| occluded[which] = found.is_some());
     }
 
     /// [`Self::find`] for many rays; `found` is told of those whose rays are usable.
