@@ -1,5 +1,5 @@
 #!/bin/sh
-# The tracer against Mitsuba 3 and Blender: installs both into target/peers (1.5 GB), then renders the same scenes with each.
+# The tracer against Mitsuba 3 and Blender: installs both into target/peers (1.2 GB), then renders the same scenes with each.
 # Arguments go to the test runner: tools/test_peers.sh mitsuba
 set -eu
 cd "$(dirname "$0")/.."
