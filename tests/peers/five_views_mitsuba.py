@@ -52,6 +52,8 @@ def scene_dict(*, folder: Path, work: Path) -> dict:
     description = json.loads((folder / "scene.json").read_text())
     vertices, triangles = read_ply(folder / "dense.ply")
     scene: dict = {"type": "scene"}
+    for texture in sorted({part["texture"] for part in description["parts"] if part["texture"]}):
+        scene[texture_id(texture)] = {"type": "bitmap", "filename": str(folder / texture)}
     first = 0
     for part in description["parts"]:
         own = triangles[first : first + part["triangles"]]
@@ -59,15 +61,20 @@ def scene_dict(*, folder: Path, work: Path) -> dict:
         path = work / f"{part['name']}.ply"
         if not path.exists():
             write_ply(path=path, vertices=vertices[own.min() : own.max() + 1], triangles=own - own.min())
-        scene[part["name"]] = shape_dict(part=part, mesh=path, folder=folder)
+        scene[part["name"]] = shape_dict(part=part, mesh=path)
     return scene
 
 
-def shape_dict(*, part: dict, mesh: Path, folder: Path) -> dict:
+def texture_id(file: str) -> str:
+    """The name of a texture in the scene, which may hold no dot; parts share textures, as they do in our reader."""
+    return "texture_" + file.replace(".", "_").replace("/", "_")
+
+
+def shape_dict(*, part: dict, mesh: Path) -> dict:
     """One part: its mesh, its two-sided `principled`, its emission."""
     color = {"type": "rgb", "value": part["base_color"]}
     if part["texture"]:
-        color = {"type": "bitmap", "filename": str(folder / part["texture"])}
+        color = {"type": "ref", "id": texture_id(part["texture"])}
     material = {
         "type": "principled",
         "base_color": color,

@@ -37,6 +37,17 @@ pub enum Texels {
 }
 
 impl Texels {
+    /// As they lie in memory.
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Srgb8(v) | Self::Linear8(v) => v.as_flattened(),
+            Self::Srgb16(v) => bytemuck::cast_slice(v),
+            Self::Grey8(v) => v,
+            Self::Linear(v) => bytemuck::cast_slice(v),
+            Self::Grey(v) => bytemuck::cast_slice(v),
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             Self::Srgb8(v) | Self::Linear8(v) => v.len(),
@@ -138,14 +149,20 @@ impl Texture {
     #[inline]
     pub fn addresses(&self, uv: [f32; 2]) -> [*const u8; 2] {
         let [(x, ..), (upper, lower, _)] = self.footprint(uv);
-        let (start, size) = match self.texels.as_ref() {
-            Texels::Srgb8(v) | Texels::Linear8(v) => (v.as_ptr().cast::<u8>(), 3),
-            Texels::Srgb16(v) => (v.as_ptr().cast(), 6),
-            Texels::Grey8(v) => (v.as_ptr(), 1),
-            Texels::Linear(v) => (v.as_ptr().cast(), 12),
-            Texels::Grey(v) => (v.as_ptr().cast(), 4),
+        // Not from the number of bytes: a division would take longer than the rest.
+        let size = match self.texels.as_ref() {
+            Texels::Grey8(_) => 1,
+            Texels::Srgb8(_) | Texels::Linear8(_) => 3,
+            Texels::Grey(_) => 4,
+            Texels::Srgb16(_) => 6,
+            Texels::Linear(_) => 12,
         };
-        [upper, lower].map(|row| start.wrapping_add((row * self.width + x) * size))
+        [upper, lower].map(|row| self.bytes().as_ptr().wrapping_add((row * self.width + x) * size))
+    }
+
+    /// All texels as they lie in memory.
+    pub fn bytes(&self) -> &[u8] {
+        self.texels.bytes()
     }
 
     #[inline(always)]

@@ -9,7 +9,7 @@ use mateval_scene::material::{Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
-use crate::accel::{Accel, Hit, TriangleIndex, on_huge_pages, prefetch, prefetch_line};
+use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::MaterialTables;
 use crate::emitter::Emitters;
 use crate::error::TracerError;
@@ -33,6 +33,9 @@ pub struct World {
     /// For each material what it looks up in textures.
     lookups: Vec<Vec<Lookup>>,
 }
+
+/// Bytes of texels below which huge pages would save little and cost more.
+const SMALL_TEXTURE: usize = 1 << 16;
 
 /// From this opacity on a surface counts as there, for pictures without light.
 const OPACITY_THRESHOLD: f32 = 0.5;
@@ -61,6 +64,8 @@ impl World {
             check_surface(index, surface, scene.materials.len())?;
         }
         let textures = scene.texture_list();
+        let texels = textures.iter().map(Texture::bytes);
+        texels.filter(|bytes| bytes.len() >= SMALL_TEXTURE).for_each(move_to_huge_pages);
         let [low, high] = accel.bounds();
         let size = low.abs().max(high.abs()).max_element();
         let records: Vec<TriangleRecord> = meshes(&scene)

@@ -17,7 +17,7 @@ use crate::error::TracerError;
 use crate::ray::Ray;
 use build::BinaryTree;
 use kernel::{BoxRay, Kernel, Portable, TriangleRay};
-pub(crate) use kernel::{on_huge_pages, prefetch, prefetch_line};
+pub(crate) use kernel::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use traverse::Candidate;
 use wide::{WIDTH, Wide};
 

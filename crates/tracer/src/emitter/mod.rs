@@ -270,13 +270,23 @@ impl Emitters {
         }
         let again = self.outlines.solid_angles(from).skip(kept.len());
         let mut before = 0.0_f32;
-        for (which, weight) in kept.into_iter().chain(again).flatten().take(last + 1).enumerate() {
-            let probability = self.mixed(weight, total);
-            if choice < before + probability || which == last {
-                let rest = ((choice - before) / probability).clamp(0.0, 1.0 - f32::EPSILON);
-                return (probability > 0.0).then_some((which, rest, probability));
+        for (eight, weights) in kept.into_iter().chain(again).enumerate() {
+            let probabilities = weights.map(|weight| self.mixed(weight, total));
+            let mut end = before;
+            let ends = probabilities.map(|probability| {
+                end += probability;
+                end
+            });
+            // Without a branch for each: which one it is cannot be predicted.
+            let passed = ends.iter().map(|end| usize::from(choice >= *end)).sum::<usize>();
+            let which = (eight * TOGETHER + passed).min(last);
+            let lane = which - eight * TOGETHER;
+            if lane < TOGETHER {
+                let start = if lane == 0 { before } else { ends[lane - 1] };
+                let rest = ((choice - start) / probabilities[lane]).clamp(0.0, 1.0 - f32::EPSILON);
+                return (probabilities[lane] > 0.0).then_some((which, rest, probabilities[lane]));
             }
-            before += probability;
+            before = end;
         }
         None
     }

@@ -98,9 +98,13 @@ fn add_part(scene: &mut ReferenceScene, folder: &Path, part: &Value, mesh: Trian
 
 fn base_color(scene: &mut ReferenceScene, folder: &Path, part: &Value) -> ColorInput {
     let Some(file) = part["texture"].as_str() else { return ColorInput::Constant(rgb(&part["base_color"])) };
-    let texture = read_texture(&folder.join(file), Encoding::Srgb, Wrap::Repeat).unwrap();
-    scene.textures.push(SourceTexture { name: file.to_owned(), sha256: None, texture });
-    ColorInput::Texture { texture: TextureIndex(scene.textures.len() - 1), uv: UvTransform::default() }
+    let known = scene.textures.iter().position(|texture| texture.name == file);
+    let index = known.unwrap_or_else(|| {
+        let texture = read_texture(&folder.join(file), Encoding::Srgb, Wrap::Repeat).unwrap();
+        scene.textures.push(SourceTexture { name: file.to_owned(), sha256: None, texture });
+        scene.textures.len() - 1
+    });
+    ColorInput::Texture { texture: TextureIndex(index), uv: UvTransform::default() }
 }
 
 fn rgb(value: &Value) -> [f32; 3] {

@@ -32,7 +32,7 @@ use crate::ray::Ray;
 
 #[cfg(target_arch = "x86_64")]
 pub(super) use avx2::Avx2;
-pub(crate) use memory::{on_huge_pages, prefetch, prefetch_line};
+pub(crate) use memory::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 pub(super) use portable::Portable;
 pub(super) use stack::Stack;
 
