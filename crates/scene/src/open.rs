@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use crate::ids::SceneId;
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use crate::{SceneError, json, manifest};
+use crate::{Finding, SceneError, Severity, json, manifest};
 
 /// A finished dataset on disk.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ pub struct Dataset {
 
 impl Dataset {
     /// Opens the dataset in `root`. Its JSON must be sound and be what the manifest says, the manifest what `dataset.json`
-    /// names. The other files are not hashed: see [`Dataset::check_files`].
+    /// names; faults of several files are told together. The other files are not hashed: see [`Dataset::check_files`].
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let path = root.join(DATASET);
         let file: DatasetFile = json::read(&path)?;
@@ -37,10 +37,19 @@ impl Dataset {
         }
         let is_json = |path: &str| path == TARGETS || (path.starts_with("scenes/") && path.ends_with("/scene.json"));
         check_hashes(root, is_json)?;
-        let targets: TargetsFile = json::read(&root.join(TARGETS))?;
-        check_format(&root.join(TARGETS), &targets.format)?;
-        let scenes = file.scenes.iter().map(|id| read_scene(root, id)).collect::<Result<Vec<SceneFile>, _>>()?;
-        Ok(Self { root: root.to_owned(), file, targets, scenes })
+        let mut faults = Vec::new();
+        let targets = read_targets(root).map_err(|fault| faults.push((TARGETS.to_owned(), fault))).ok();
+        let mut scenes = Vec::new();
+        for id in &file.scenes {
+            match read_scene(root, id) {
+                Ok(scene) => scenes.push(scene),
+                Err(fault) => faults.push((format!("scenes/{id}/scene.json"), fault)),
+            }
+        }
+        match targets {
+            Some(targets) if faults.is_empty() => Ok(Self { root: root.to_owned(), file, targets, scenes }),
+            _ => Err(together(root, faults)),
+        }
     }
 
     /// Fails where a file of the scene that `concerns` picks, by its path in the scene's folder, is not what the manifest
@@ -54,6 +63,40 @@ impl Dataset {
     pub fn folder(&self, scene: &SceneId) -> SceneFolder {
         SceneFolder::of(&self.root, scene)
     }
+}
+
+/// One error for all faults of the JSON files.
+fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
+    if faults.len() == 1 {
+        return faults.remove(0).1;
+    }
+    let all = faults.into_iter().flat_map(|(file, fault)| match fault {
+        SceneError::Invalid { findings, .. } => {
+            findings.into_iter().map(|finding| Finding { file: file.clone(), ..finding }).collect()
+        }
+        other => vec![unreadable(file, &other)],
+    });
+    let mut findings: Vec<Finding> = all.collect();
+    findings.sort();
+    SceneError::Invalid { path: root.to_owned(), findings }
+}
+
+fn unreadable(file: String, fault: &SceneError) -> Finding {
+    Finding {
+        severity: Severity::Error,
+        code: "unreadable".to_owned(),
+        file,
+        place: String::new(),
+        message: fault.to_string(),
+        action: "`mateval prep verify` lists every fault of a dataset".to_owned(),
+    }
+}
+
+fn read_targets(root: &Path) -> Result<TargetsFile, SceneError> {
+    let path = root.join(TARGETS);
+    let targets: TargetsFile = json::read(&path)?;
+    check_format(&path, &targets.format)?;
+    Ok(targets)
 }
 
 fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, SceneError> {
