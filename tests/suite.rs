@@ -23,6 +23,7 @@ mod suite {
     mod sample;
     mod schemas;
     mod scores;
+    mod stats;
     mod unsound_submissions;
     mod verify_faults;
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture};
 
-use super::command::{Run, baseline, build, mateval, render, run, score, verify};
+use super::command::{Run, baseline, build, mateval, render, run, score, stats, verify};
 use super::sample::{copied_dataset, dataset, files_below, json, write_source};
 
 /// The input view alone, as small as may be.
@@ -174,6 +174,7 @@ fn a_folder_that_is_no_dataset() {
     std::fs::write(none.join("notes.txt"), "mine").unwrap();
     let commands = [
         verify(&none),
+        stats(&none),
         render(&none, 1),
         baseline("gt", &none, &out),
         baseline("grey", &none, &out),

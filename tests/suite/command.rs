@@ -76,6 +76,13 @@ pub fn verify(dataset: &Path) -> Command {
     command
 }
 
+/// `mateval prep stats DATASET`.
+pub fn stats(dataset: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["prep", "stats"]).arg(dataset);
+    command
+}
+
 /// `mateval baseline NAME --dataset DATASET --out SUBMISSION`.
 pub fn baseline(name: &str, dataset: &Path, submission: &Path) -> Command {
     let mut command = mateval();

@@ -19,9 +19,10 @@ fn the_version() {
 #[test]
 fn what_is_not_there() {
     let not_there = "No such file or directory (os error 2)\n";
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 7] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
         (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
+        (&["prep", "stats", "nowhere"], "cannot open the dataset: cannot read 'nowhere/dataset.json': "),
         (
             &["prep", "mitsuba", "nowhere", "--scene", "room", "--out", "out"],
             "cannot export to Mitsuba: cannot read 'nowhere/dataset.json': ",
@@ -66,13 +67,14 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 11] = [
+    let subcommands: [&[&str]; 12] = [
         &["demo"],
         &["sample"],
         &["prep"],
         &["prep", "build"],
         &["prep", "render"],
         &["prep", "verify"],
+        &["prep", "stats"],
         &["prep", "mitsuba"],
         &["baseline"],
         &["eval", "image"],

@@ -1,12 +1,15 @@
 //! `mateval prep`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
+use anyhow::{Context as _, bail};
+use mateval_image::store::write_whole;
 use mateval_prep::build::{BuildOptions, BuildReport};
 use mateval_prep::mitsuba_export::ExportOptions;
 use mateval_prep::render::RenderOptions;
-use mateval_scene::{SceneId, Severity, ViewId};
+use mateval_prep::stats;
+use mateval_scene::open::Dataset;
+use mateval_scene::{SceneId, Severity, ViewId, json};
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -21,6 +24,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
     Verify(VerifyArgs),
+    /// Counts what a dataset holds: the paper's Table I, objects by category, scene by scene.
+    Stats(StatsArgs),
     /// Writes a view with its ground truth as a scene for Mitsuba 3; exit code 1 where Mitsuba cannot say all of it.
     Mitsuba(MitsubaArgs),
 }
@@ -83,6 +88,22 @@ enum Format {
     Json,
 }
 
+/// What `prep stats` is given.
+#[derive(clap::Args)]
+pub struct StatsArgs {
+    /// The dataset's folder.
+    dataset: PathBuf,
+    /// How to print the counts.
+    #[arg(long, value_enum, default_value = "text")]
+    format: Format,
+    /// SVG file to draw them to, outside the dataset.
+    #[arg(long, value_name = "FILE.svg")]
+    picture: Option<PathBuf>,
+    /// Replace a picture that is there.
+    #[arg(long, requires = "picture")]
+    force: bool,
+}
+
 /// What `prep mitsuba` is given.
 #[derive(clap::Args)]
 pub struct MitsubaArgs {
@@ -111,6 +132,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Build(args) => build(args),
         Command::Render(args) => render(args),
         Command::Verify(args) => verify(args),
+        Command::Stats(args) => count(args),
         Command::Mitsuba(args) => mitsuba(args),
     }
 }
@@ -163,7 +185,7 @@ fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     drop(bars);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
     match args.format {
-        Format::Json => print(&mateval_scene::json::to_text(&serde_json::json!({
+        Format::Json => print(&json::to_text(&serde_json::json!({
             "format": "mateval-verify/1",
             "tool": TOOL,
             "sound": errors == 0,
@@ -178,6 +200,42 @@ fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
         }
     }
     Ok(if errors == 0 { Outcome::Good } else { Outcome::No })
+}
+
+fn count(args: &StatsArgs) -> anyhow::Result<Outcome> {
+    if let Some(picture) = &args.picture {
+        check_picture_place(picture, args)?;
+    }
+    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
+    if let Some(picture) = &args.picture {
+        write_whole(picture, stats::picture::picture(&counted).as_bytes())?;
+    }
+    match (args.format, &args.picture) {
+        (Format::Json, _) => print(&json::to_text(&counted))?,
+        (Format::Text, None) => print(&stats::text::text(&counted))?,
+        (Format::Text, Some(picture)) => print(&format!("{}\n{}\n", stats::text::text(&counted), picture.display()))?,
+    }
+    Ok(Outcome::Good)
+}
+
+/// A picture replaces nothing unasked, and is no part of the dataset, whose manifest would not know it.
+fn check_picture_place(picture: &Path, args: &StatsArgs) -> anyhow::Result<()> {
+    let shown = picture.display();
+    if picture.is_dir() {
+        bail!("'{shown}' is a folder; expected the name of a picture file");
+    }
+    if picture.exists() && !args.force {
+        bail!("'{shown}' is already there; choose another --picture, or add --force to replace it");
+    }
+    let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(folder) = folder.canonicalize() else {
+        bail!("the folder of '{shown}' is not there; make it, or choose another --picture");
+    };
+    if args.dataset.canonicalize().is_ok_and(|dataset| folder.starts_with(dataset)) {
+        bail!("'{shown}' would lie in the dataset, whose manifest does not list it; choose another --picture");
+    }
+    Ok(())
 }
 
 fn mitsuba(args: &MitsubaArgs) -> anyhow::Result<Outcome> {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
 use mateval_prep::render::RenderFile;
+use mateval_prep::stats::StatsFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile};
@@ -37,7 +38,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 8] {
+fn schemas() -> [(&'static str, Schema); 9] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -47,5 +48,6 @@ fn schemas() -> [(&'static str, Schema); 8] {
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
         ("result", schema_for!(ResultFile)),
+        ("stats", schema_for!(StatsFile)),
     ]
 }

@@ -5,7 +5,7 @@
 //!
 //! Between: [`recipe`] is checked whole, [`bitterli`] reads each source, [`instances`] numbers, [`atlas`] unwraps, [`bake`]
 //! fills textures, [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth,
-//! [`verify`] doubts it all.
+//! [`verify`] doubts it all, [`stats`] counts it.
 
 pub mod atlas;
 pub mod bake;
@@ -19,6 +19,7 @@ pub mod parts;
 pub mod recipe;
 pub mod render;
 pub mod sample;
+pub mod stats;
 pub mod verify;
 pub mod views;
 

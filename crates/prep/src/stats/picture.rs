@@ -1,0 +1,269 @@
+//! The counts as an SVG picture: a bar a category, grouped by super-category, and how many scenes have how many
+//! objects.
+//!
+//! Places and texts are settled here; the template `picture.j2` turns them into markup and escapes every name. The same
+//! counts give the same bytes.
+
+use minijinja::value::Serde;
+use minijinja::{Environment, UndefinedBehavior};
+use serde::Serialize;
+
+use super::{CategoryCount, Spread, StatsFile, SuperCategoryCount, shown};
+
+const TEMPLATE: &str = include_str!("picture.j2");
+
+/// Most rows that are drawn; only a made-up dataset has more.
+const MOST_ROWS: usize = 200;
+/// Most columns of the histogram.
+const MOST_COLUMNS: usize = 10;
+/// Longest name that fits in a line, in characters.
+const LONGEST: usize = 50;
+
+// Lengths in the picture's units: pixels where it is shown at its own size.
+const WIDTH: f64 = 480.0;
+const MARGIN: f64 = 20.0;
+const INNER: f64 = WIDTH - 2.0 * MARGIN;
+/// From a line to the heading of the next group.
+const GROUP: f64 = 40.0;
+/// From a heading to a bar's line, and from that to the next.
+const BAR: f64 = 30.0;
+const COLUMNS_HEIGHT: f64 = 90.0;
+
+/// All that the template needs; lengths are texts, so that their digits are settled.
+#[derive(Serialize)]
+struct Drawing {
+    width: String,
+    height: String,
+    left: String,
+    right: String,
+    inner: String,
+    title: String,
+    subtitle: String,
+    rows: Vec<Row>,
+    columns: Vec<Column>,
+    /// Where the histogram stands; none where there is none.
+    axis_y: Option<String>,
+}
+
+/// A line of text; for a category with a bar beneath it.
+#[derive(Serialize)]
+struct Row {
+    class: &'static str,
+    y: String,
+    name: String,
+    value: String,
+    bar: Option<Bar>,
+}
+
+#[derive(Serialize)]
+struct Bar {
+    y: String,
+    length: String,
+}
+
+/// Scenes that have as many objects as the label says.
+#[derive(Serialize)]
+struct Column {
+    x: String,
+    y: String,
+    width: String,
+    height: String,
+    middle: String,
+    label_y: String,
+    label: String,
+    value_y: String,
+    value: String,
+}
+
+/// The picture as SVG. It draws its own ground, in light or dark as its reader prefers.
+pub fn picture(stats: &StatsFile) -> String {
+    let drawing = drawing(stats);
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    // The name's ending turns escaping on. The template is our own and its words are all in `Drawing`.
+    environment
+        .render_named_str("picture.xml", TEMPLATE, Serde(&drawing))
+        .expect("the template only uses what a drawing has")
+}
+
+fn drawing(stats: &StatsFile) -> Drawing {
+    let mut y = 58.0;
+    let mut rows = category_rows(stats, &mut y);
+    y += GROUP + 4.0;
+    rows.push(text_row("group", y, "Objects a scene", mean_text(stats)));
+    y += 20.0;
+    rows.push(text_row("quiet", y, &histogram_subtitle(stats), String::new()));
+    let known = stats.per_scene.iter().filter(|scene| scene.knows_its_objects());
+    let objects: Vec<usize> = known.map(|scene| scene.counts.objects).collect();
+    let axis_y = (!objects.is_empty()).then_some(y + 32.0 + COLUMNS_HEIGHT);
+    let [name, version] = [&stats.dataset.name, &stats.dataset.version].map(|word| shown(word, LONGEST / 2));
+    Drawing {
+        width: number(WIDTH),
+        height: number(axis_y.map_or(y, |axis_y| axis_y + 18.0) + MARGIN),
+        left: number(MARGIN),
+        right: number(WIDTH - MARGIN),
+        inner: number(INNER),
+        title: format!("{name} {version}"),
+        subtitle: subtitle(stats),
+        rows,
+        columns: axis_y.map_or_else(Vec::new, |axis_y| columns(&objects, axis_y)),
+        axis_y: axis_y.map(number),
+    }
+}
+
+fn subtitle(stats: &StatsFile) -> String {
+    let objects = several(stats.total.objects, "object", "objects");
+    let categories = several(stats.total.different_categories(), "category", "categories");
+    format!("{objects} of {categories} in {}", several(stats.scenes, "scene", "scenes"))
+}
+
+fn mean_text(stats: &StatsFile) -> String {
+    stats.objects_per_scene.map_or_else(|| "unknown".to_owned(), |spread| format!("mean {:.1}", spread.mean))
+}
+
+fn histogram_subtitle(stats: &StatsFile) -> String {
+    let Some(Spread { scenes, .. }) = stats.objects_per_scene else {
+        return "no scene says what its objects are".to_owned();
+    };
+    let known = several(scenes, "scene", "scenes");
+    match stats.scenes - scenes {
+        0 => format!("{known} by number of objects"),
+        1 => format!("{known} by number of objects; 1 more does not say"),
+        more => format!("{known} by number of objects; {more} more do not say"),
+    }
+}
+
+fn several(count: usize, one: &str, more: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { more })
+}
+
+/// A heading for each super-category, and beneath it its categories; rows that are too many are only counted. `y` is
+/// moved to the last row.
+fn category_rows(stats: &StatsFile, y: &mut f64) -> Vec<Row> {
+    let total = &stats.total;
+    let most = total.categories.iter().map(|found| found.objects).max().unwrap_or(1);
+    let mut rows = Vec::new();
+    for group in &total.super_categories {
+        if rows.len() >= MOST_ROWS {
+            break;
+        }
+        *y += GROUP;
+        rows.push(text_row("group", *y, &shown(&group.super_category, LONGEST), group_value(group)));
+        let of_group = total.categories.iter().filter(|found| found.super_category == group.super_category);
+        for category in of_group.take(MOST_ROWS - rows.len()) {
+            *y += BAR;
+            rows.push(bar_row(*y, category, most));
+        }
+    }
+    let left_out = total.super_categories.len() + total.categories.len() - rows.len();
+    if left_out > 0 {
+        *y += BAR;
+        rows.push(text_row("quiet", *y, &format!("and {left_out} rows more"), String::new()));
+    }
+    rows
+}
+
+fn group_value(group: &SuperCategoryCount) -> String {
+    match group.share {
+        Some(share) if group.objects > 0 => format!("{} · {:.1} %", group.objects, 100.0 * share),
+        _ => group.objects.to_string(),
+    }
+}
+
+fn text_row(class: &'static str, y: f64, name: &str, value: String) -> Row {
+    Row { class, y: number(y), name: name.to_owned(), value, bar: None }
+}
+
+fn bar_row(y: f64, category: &CategoryCount, most: usize) -> Row {
+    let name = category.category.as_deref().map_or_else(|| "(no category)".to_owned(), |name| shown(name, LONGEST));
+    let length = INNER * category.objects as f64 / most as f64;
+    let bar = Some(Bar { y: number(y + 5.0), length: number(length.max(1.0)) });
+    Row { bar, ..text_row("name", y, &name, category.objects.to_string()) }
+}
+
+/// The histogram, standing on `axis_y`.
+fn columns(objects: &[usize], axis_y: f64) -> Vec<Column> {
+    let bins = bins(objects);
+    let most = bins.iter().map(|bin| bin.scenes).max().unwrap_or(1).max(1);
+    let pitch = INNER / MOST_COLUMNS as f64;
+    // Few columns stand in the middle, as wide as many.
+    let start = MARGIN + (INNER - pitch * bins.len() as f64) / 2.0;
+    let column = |(at, bin): (usize, &Bin)| {
+        let x = start + pitch * at as f64;
+        let height = COLUMNS_HEIGHT * bin.scenes as f64 / most as f64;
+        Column {
+            x: number(x + 2.0),
+            y: number(axis_y - height),
+            width: number(pitch - 4.0),
+            height: number(height),
+            middle: number(x + pitch / 2.0),
+            label_y: number(axis_y + 16.0),
+            label: bin.label(),
+            value_y: number(axis_y - height - 5.0),
+            value: bin.scenes.to_string(),
+        }
+    };
+    bins.iter().enumerate().map(column).collect()
+}
+
+/// Scenes with `first` to `last` objects.
+#[derive(Debug, PartialEq, Eq)]
+struct Bin {
+    first: usize,
+    last: usize,
+    scenes: usize,
+}
+
+impl Bin {
+    fn label(&self) -> String {
+        if self.first == self.last { self.first.to_string() } else { format!("{}–{}", self.first, self.last) }
+    }
+}
+
+/// Bins from the least to the largest value, each 1, 2, 5, 10, 20, ... wide: the narrowest that need no more columns
+/// than there is room for.
+fn bins(values: &[usize]) -> Vec<Bin> {
+    let (Some(min), Some(max)) = (values.iter().min(), values.iter().max()) else { return Vec::new() };
+    let widths = (0..u32::MAX).flat_map(|power| [1, 2, 5].map(|digit| digit * 10_usize.saturating_pow(power)));
+    let fits = |width: &usize| max / width - min / width < MOST_COLUMNS;
+    let width = widths.into_iter().find(fits).expect("a width above the largest value needs one column");
+    (min / width..=max / width)
+        .map(|at| Bin {
+            first: at * width,
+            last: at * width + (width - 1),
+            scenes: values.iter().filter(|value| **value / width == at).count(),
+        })
+        .collect()
+}
+
+/// A length with at most one digit after the point.
+fn number(value: f64) -> String {
+    let text = format!("{value:.1}");
+    text.strip_suffix(".0").map_or_else(|| text.clone(), str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_hold_every_value_once() {
+        for largest in [0, 1, 9, 10, 19, 20, 137, 99_999] {
+            let values: Vec<usize> = (0..50).map(|k| largest * k / 49).collect();
+            let bins = bins(&values);
+            assert!((1..=MOST_COLUMNS).contains(&bins.len()), "{bins:?}");
+            assert_eq!(bins.iter().map(|bin| bin.scenes).sum::<usize>(), values.len());
+            assert!(bins.windows(2).all(|pair| pair[0].last + 1 == pair[1].first), "{bins:?}");
+        }
+        assert_eq!(bins(&[]), []);
+    }
+
+    /// 3 to 21 objects, as in ATISS' rooms: bins of two.
+    #[test]
+    fn bins_are_as_narrow_as_they_may() {
+        let bins = bins(&[3, 7, 8, 21]);
+        let [first, last] = [&bins[0], &bins[bins.len() - 1]].map(|bin| (bin.first, bin.last, bin.scenes));
+        assert_eq!((bins.len(), first, last), (10, (2, 3, 1), (20, 21, 1)));
+        assert_eq!(bins[0].label(), "2–3");
+    }
+}
