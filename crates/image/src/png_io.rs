@@ -19,6 +19,18 @@ pub fn write_rgb_bytes(path: &Path, picture: &Picture<[u8; 3]>) -> Result<(), Im
     write(path, picture.width(), picture.height(), png::ColorType::Rgb, png::BitDepth::Eight, data)
 }
 
+/// Writes 8-bit RGB with opacity from bytes.
+pub fn write_rgba_bytes(path: &Path, picture: &Picture<[u8; 4]>) -> Result<(), ImageError> {
+    let data = picture.pixels().as_flattened();
+    write(path, picture.width(), picture.height(), png::ColorType::Rgba, png::BitDepth::Eight, data)
+}
+
+/// Writes 8-bit grey with opacity from bytes.
+pub fn write_grey_alpha_bytes(path: &Path, picture: &Picture<[u8; 2]>) -> Result<(), ImageError> {
+    let data = picture.pixels().as_flattened();
+    write(path, picture.width(), picture.height(), png::ColorType::GrayscaleAlpha, png::BitDepth::Eight, data)
+}
+
 /// Writes 16-bit RGB from words.
 pub fn write_rgb_words(path: &Path, picture: &Picture<[u16; 3]>) -> Result<(), ImageError> {
     let data: Vec<u8> = picture.pixels().as_flattened().iter().flat_map(|word| word.to_be_bytes()).collect();
@@ -170,6 +182,11 @@ mod tests {
         let colors = Picture::from_fn(7, 5, |x, y| [x as u8, y as u8, 200]);
         write_rgb_bytes(&path, &colors).unwrap();
         assert_eq!(read_rgb_bytes(&path).unwrap(), colors);
+        write_rgba_bytes(&path, &colors.map(|[r, g, b]| [r, g, b, 9])).unwrap();
+        assert_eq!(read_rgb_bytes(&path).unwrap(), colors);
+        assert_eq!(decode(&path).unwrap().data[..4], [0, 0, 200, 9]);
+        write_grey_alpha_bytes(&path, &colors.map(|[r, _, _]| [r, 9])).unwrap();
+        assert_eq!(read_rgb_bytes(&path).unwrap(), colors.map(|[r, _, _]| [r; 3]));
     }
 
     #[test]
