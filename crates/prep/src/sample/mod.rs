@@ -1,12 +1,14 @@
-//! A small room that the program makes itself, under CC0: what one can try everything on without a download.
+//! A small room and a house that the program makes itself, under CC0: what one can try everything on without a download.
 //!
-//! In: a folder. Out: in it `recipe.toml` and `room/`, a Mitsuba scene as Bitterli's are: `scene.xml`, OBJ files,
-//! textures, `LICENSE.txt`. The bytes are the same on every machine.
+//! In: a folder. Out: in it `recipe.toml`; `room/`, a Mitsuba scene as Bitterli's are: `scene.xml`, OBJ files, textures,
+//! `LICENSE.txt`; and `house/`, three rooms in the layout of 3D-FRONT and 3D-FUTURE, with their faults. The bytes are the
+//! same on every machine.
 //!
 //! Between: `solid` builds meshes, `furniture` makes things of them, `pattern` paints the textures, `room` says what
-//! stands where and writes it as XML.
+//! stands where and writes it as XML. `house` uses the first three.
 
 mod furniture;
+pub(crate) mod house;
 mod pattern;
 mod room;
 mod solid;
@@ -30,6 +32,13 @@ const RECIPE: &str =
 
 /// Writes the sample into the folder `out`, which is made if it is not there; files of the same name are replaced.
 pub fn write(out: &Path) -> Result<(), PrepError> {
+    write_room(out)?;
+    house::write(out)?;
+    // The recipe comes last: where it is, the sample is whole.
+    write_text(&out.join("recipe.toml"), RECIPE)
+}
+
+fn write_room(out: &Path) -> Result<(), PrepError> {
     let room = out.join("room");
     for folder in ["models", "textures"] {
         let path = room.join(folder);
@@ -42,9 +51,7 @@ pub fn write(out: &Path) -> Result<(), PrepError> {
         write_text(&room.join("models").join(format!("{}.obj", item.name)), &item.solid.to_obj())?;
     }
     write_text(&room.join("LICENSE.txt"), LICENSE)?;
-    write_text(&room.join("scene.xml"), &room::xml())?;
-    // The recipe comes last: where it is, the sample is whole.
-    write_text(&out.join("recipe.toml"), RECIPE)
+    write_text(&room.join("scene.xml"), &room::xml())
 }
 
 fn write_text(path: &Path, text: &str) -> Result<(), PrepError> {
@@ -64,7 +71,7 @@ mod tests {
 
     fn sample() -> BitterliScene {
         let folder = tempfile::tempdir().unwrap();
-        write(folder.path()).unwrap();
+        write_room(folder.path()).unwrap();
         bitterli::read(&folder.path().join("room/scene.xml"), &Limits::default()).unwrap()
     }
 
@@ -120,9 +127,9 @@ mod tests {
     fn every_run_writes_the_same_bytes() {
         let files = || {
             let folder = tempfile::tempdir().unwrap();
-            write(folder.path()).unwrap();
+            write_room(folder.path()).unwrap();
             let mut files = BTreeMap::new();
-            for part in ["", "room", "room/models", "room/textures"] {
+            for part in ["room", "room/models", "room/textures"] {
                 for entry in std::fs::read_dir(folder.path().join(part)).unwrap() {
                     let path = entry.unwrap().path();
                     if path.is_file() {

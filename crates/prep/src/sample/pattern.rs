@@ -15,10 +15,11 @@ pub(super) fn all() -> Vec<(&'static str, Picture<[u8; 3]>)> {
     ]
 }
 
-type Color = [f64; 3];
+/// sRGB values of 0 to 1.
+pub(super) type Color = [f64; 3];
 
 /// `color_at` gives sRGB values of 0 to 1 at texel centres.
-fn paint(width: usize, height: usize, color_at: fn(f64, f64) -> Color) -> Picture<[u8; 3]> {
+pub(super) fn paint(width: usize, height: usize, color_at: impl Fn(f64, f64) -> Color) -> Picture<[u8; 3]> {
     Picture::from_fn(width, height, |x, y| {
         let color = color_at((x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64);
         color.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
@@ -36,12 +37,12 @@ fn hash(x: i64, y: i64, seed: u32) -> u32 {
 }
 
 /// 0 to 1.
-fn random(x: i64, y: i64, seed: u32) -> f64 {
+pub(super) fn random(x: i64, y: i64, seed: u32) -> f64 {
     f64::from(hash(x, y, seed)) / f64::from(u32::MAX)
 }
 
 /// Smooth noise of 0 to 1 that repeats after `nx` and `ny` cells, which span the picture.
-fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
+pub(super) fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
     let (x, y) = (u * nx as f64, v * ny as f64);
     let (i, j) = (x.floor() as i64, y.floor() as i64);
     let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
@@ -54,22 +55,22 @@ fn mix1(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-fn mix(a: Color, b: Color, t: f64) -> Color {
+pub(super) fn mix(a: Color, b: Color, t: f64) -> Color {
     std::array::from_fn(|c| mix1(a[c], b[c], t.clamp(0.0, 1.0)))
 }
 
 /// 0 to 1 and back as `t` goes from 0 to 1.
-fn triangle(t: f64) -> f64 {
+pub(super) fn triangle(t: f64) -> f64 {
     1.0 - (2.0 * (t - t.floor()) - 1.0).abs()
 }
 
 /// 0 below `from`, 1 above `to`.
-fn ramp(from: f64, to: f64, value: f64) -> f64 {
+pub(super) fn ramp(from: f64, to: f64, value: f64) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
 /// Eight rows of oak planks along u, each of two lengths, with dark joints.
-fn planks(u: f64, v: f64) -> Color {
+pub(super) fn planks(u: f64, v: f64) -> Color {
     const ROWS: i64 = 8;
     let row = (v * ROWS as f64).floor() as i64;
     let shifted = u + random(row, 0, 1);
@@ -87,7 +88,7 @@ fn planks(u: f64, v: f64) -> Color {
 }
 
 /// Dark walnut with long grain along u.
-fn wood(u: f64, v: f64) -> Color {
+pub(super) fn wood(u: f64, v: f64) -> Color {
     let bend = noise(u, v, 3, 4, 7) + 0.4 * noise(u, v, 6, 12, 8);
     let rings = triangle(v * 7.0 + bend * 1.6);
     let fibres = noise(u, v, 12, 128, 9);
@@ -118,7 +119,7 @@ fn wallpaper(u: f64, v: f64) -> Color {
 }
 
 /// A plain weave of two blues.
-fn fabric(u: f64, v: f64) -> Color {
+pub(super) fn fabric(u: f64, v: f64) -> Color {
     const THREADS: f64 = 32.0;
     let (i, j) = ((u * THREADS).floor() as i64, (v * THREADS).floor() as i64);
     let (x, y) = (u * THREADS - i as f64, v * THREADS - j as f64);

@@ -8,11 +8,11 @@ use glam::{DVec2, DVec3};
 /// A mesh under construction; every face brings its own vertices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solid {
-    positions: Vec<DVec3>,
-    normals: Vec<DVec3>,
-    uvs: Vec<DVec2>,
+    pub(super) positions: Vec<DVec3>,
+    pub(super) normals: Vec<DVec3>,
+    pub(super) uvs: Vec<DVec2>,
     /// Counter-clockwise from outside, three or four corners.
-    faces: Vec<Vec<usize>>,
+    pub(super) faces: Vec<Vec<usize>>,
 }
 
 /// A corner of a face.
@@ -137,7 +137,7 @@ impl Solid {
 }
 
 /// Normal, right and up of a box's six sides, right times up being the normal.
-fn sides() -> [(DVec3, DVec3, DVec3); 6] {
+pub(super) fn sides() -> [(DVec3, DVec3, DVec3); 6] {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     [(x, -z, y), (-x, z, y), (y, x, -z), (-y, x, z), (z, x, y), (-z, -x, y)]
 }
