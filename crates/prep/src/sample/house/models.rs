@@ -86,35 +86,34 @@ fn sound() -> Vec<Model> {
     let cushion = letters(&["SIT", "^ UP"], [0.86, 0.74, 0.46], 0.35 / 0.3);
     let blanket = letters(&["SLEEP", "WELL ^"], [0.62, 0.70, 0.66], 1.2 / 0.8);
     let print = letters(&["MATEVAL", "^ TOP"], [0.93, 0.91, 0.84], 0.8 / 0.55);
-    let info = |sup, category, style, theme, material| [sup, category, style, theme, material];
     vec![
         model(
             "l_sofa",
-            info("Sofa", "L-shaped Sofa", "Modern", "Smooth Net", "Rough Cloth"),
+            ["Sofa", "L-shaped Sofa", "Modern", "Smooth Net", "Rough Cloth"],
             &[BLUE, BLACK, OCHRE, cushion],
             shapes::l_sofa(),
         ),
         model(
             "coffee_table",
-            info("Table", "Coffee Table", "Modern", "Lines", "Solid Wood"),
+            ["Table", "Coffee Table", "Modern", "Lines", "Solid Wood"],
             &[OAK],
             shapes::coffee_table(),
         ),
         model(
             "tv_stand",
-            info(CABINET, "TV Stand", "Nordic", "Smooth Net", "Composite Board"),
+            [CABINET, "TV Stand", "Nordic", "Smooth Net", "Composite Board"],
             &[WALNUT, BLACK, WHITE_WOOD],
             shapes::tv_stand(),
         ),
         model(
             "dining_table",
-            info("Table", "Dining Table", "Nordic", "Smooth Net", "Solid Wood"),
+            ["Table", "Dining Table", "Nordic", "Smooth Net", "Solid Wood"],
             &[WALNUT],
             shapes::dining_table(),
         ),
         model(
             "dining_chair",
-            info("Chair", "Dining Chair", "Nordic", "Smooth Net", "Wood"),
+            ["Chair", "Dining Chair", "Nordic", "Smooth Net", "Wood"],
             &[WALNUT, GREEN],
             shapes::dining_chair(),
         ),
@@ -123,7 +122,7 @@ fn sound() -> Vec<Model> {
             side: 128,
             ..model(
                 "pendant_lamp",
-                info("Lighting", "Pendant Lamp", "Industrial", "Smooth Net", "Metal"),
+                ["Lighting", "Pendant Lamp", "Industrial", "Smooth Net", "Metal"],
                 &[BRASS, BLACK, GLASS],
                 shapes::pendant_lamp(),
             )
@@ -132,33 +131,33 @@ fn sound() -> Vec<Model> {
             side: 128,
             ..model(
                 "floor_lamp",
-                info("Lighting", "Floor Lamp", "Modern", "", "Cloth"),
+                ["Lighting", "Floor Lamp", "Modern", "", "Cloth"],
                 &[SHADE, BRASS],
                 shapes::floor_lamp(),
             )
         },
-        Model { side: 512, ..model("picture", info("Others", "", "", "", ""), &[print, BLACK], shapes::picture()) },
+        Model { side: 512, ..model("picture", ["Others", "", "", "", ""], &[print, BLACK], shapes::picture()) },
         model(
             "bed",
-            info("Bed", "King-size Bed", "Modern", "Smooth Net", "Cloth"),
+            ["Bed", "King-size Bed", "Modern", "Smooth Net", "Cloth"],
             &[OAK, GREEN, LINEN, blanket],
             shapes::bed(),
         ),
         model(
             "nightstand",
-            info(CABINET, "Nightstand", "Modern", "Wooden Vertical Texture", "Wood"),
+            [CABINET, "Nightstand", "Modern", "Wooden Vertical Texture", "Wood"],
             &[OAK, WHITE_WOOD, BRASS],
             shapes::nightstand(),
         ),
         model(
             "wardrobe",
-            info(CABINET, "Wardrobe", "Minimalist", "Smooth Net", "Composite Board"),
+            [CABINET, "Wardrobe", "Minimalist", "Smooth Net", "Composite Board"],
             &[OAK, WHITE_WOOD, BLACK],
             shapes::wardrobe(),
         ),
         model(
             "bed_end_stool",
-            info("Pier/Stool", "Footstool / Sofastool / Bed End Stool / Stool", "Modern", "Smooth Net", "Cloth"),
+            ["Pier/Stool", "Footstool / Sofastool / Bed End Stool / Stool", "Modern", "Smooth Net", "Cloth"],
             &[OCHRE, OAK],
             shapes::bed_end_stool(),
         ),
@@ -167,7 +166,7 @@ fn sound() -> Vec<Model> {
             side: 128,
             ..model(
                 "ceiling_lamp",
-                info("Lighting", "Ceiling Lamp", "Modern", "", "Glass"),
+                ["Lighting", "Ceiling Lamp", "Modern", "", "Glass"],
                 &[BRASS, GLASS],
                 shapes::ceiling_lamp(),
             )
@@ -179,11 +178,10 @@ fn faulty() -> Vec<Model> {
     const CABINET: &str = "Cabinet/Shelf/Desk";
     let drawer = letters(&["TOP ^ DRAWER"], [0.90, 0.86, 0.74], 0.6 / 0.14);
     let with = |quirk, model: Model| Model { quirk: Some(quirk), ..model };
-    let plain = |name, info, swatches: &[Swatch], parts| model(name, info, swatches, parts);
     vec![
         with(
             Quirk::ClearTexture,
-            plain(
+            model(
                 "bookcase",
                 [CABINET, "Bookcase / jewelry Armoire", "Modern", "Lines", "Wood"],
                 &[WALNUT, Plain([0.62, 0.24, 0.20]), Plain([0.20, 0.34, 0.44])],
@@ -192,7 +190,7 @@ fn faulty() -> Vec<Model> {
         ),
         with(
             Quirk::TruncatedTexture,
-            plain(
+            model(
                 "chest",
                 [CABINET, "Drawer Chest / Corner cabinet", "Korean", "Lines", "Wood"],
                 &[OAK, WHITE_WOOD, drawer],
@@ -201,11 +199,11 @@ fn faulty() -> Vec<Model> {
         ),
         with(
             Quirk::Shadow,
-            plain("shelf", [CABINET, "Shelf", "Modern", "", "Wood"], &[WALNUT, Plain([0.05; 3])], shapes::shelf()),
+            model("shelf", [CABINET, "Shelf", "Modern", "", "Wood"], &[WALNUT, Plain([0.05; 3])], shapes::shelf()),
         ),
         with(
             Quirk::MisleadingMtl,
-            plain(
+            model(
                 "armchair",
                 ["Sofa", "armchair", "Vintage/Retro", "Smooth Net", "Leather"],
                 &[Fabric([0.52, 0.22, 0.18]), BLACK],
@@ -214,7 +212,7 @@ fn faulty() -> Vec<Model> {
         ),
         with(
             Quirk::OtherDialect,
-            plain(
+            model(
                 "side_table",
                 ["Table", "Round End Table", "Modern", "Granite Texture", "Marble"],
                 &[WHITE_WOOD, BLACK],
@@ -223,7 +221,7 @@ fn faulty() -> Vec<Model> {
         ),
         with(
             Quirk::GreyTexture,
-            plain(
+            model(
                 "lounge_chair",
                 ["Chair", "Lounge Chair / Cafe Chair / Office Chair", "Modern", "Smooth Net", "Suede"],
                 &[Fabric([0.62; 3]), Plain([0.3; 3])],
@@ -232,14 +230,14 @@ fn faulty() -> Vec<Model> {
         ),
         with(
             Quirk::Centimetres,
-            plain(
+            model(
                 "stool",
                 ["Pier/Stool", "Footstool / Sofastool / Bed End Stool / Stool", "Modern", "", "Cloth"],
                 &[GREEN, OAK],
                 shapes::stool(),
             ),
         ),
-        with(Quirk::NoTexture, plain("crate", [""; 5], &[OAK], shapes::crate_box())),
+        with(Quirk::NoTexture, model("crate", [""; 5], &[OAK], shapes::crate_box())),
     ]
 }
 

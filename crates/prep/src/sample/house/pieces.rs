@@ -7,7 +7,7 @@ use super::layout;
 /// A turn about y as the data writes it: x, y, z, w.
 pub(super) type Turn = [f64; 4];
 
-/// Where fronts look; those without a name in the data look along +z, south.
+/// Where fronts look: a model's own looks along +z, which is south.
 const SOUTH: Turn = [0.0, 0.0, 0.0, 1.0];
 const EAST: Turn = [0.0, FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2];
 const NORTH: Turn = [0.0, 1.0, 0.0, 0.0];
@@ -32,7 +32,7 @@ pub(super) struct Record {
     /// The model's name, or that of one that is not in the library.
     pub(super) model: &'static str,
     pub(super) shown: Shown,
-    /// Half a title: the data has "sofa/l-shaped sofa".
+    /// As in "sofa/l-shaped sofa"; may be empty.
     pub(super) title: &'static str,
 }
 
