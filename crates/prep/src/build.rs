@@ -67,7 +67,7 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         progress(&format!("scene {}", entry.id), at, recipe.scenes.len());
         let mark = options.out.join(BUILD).join(format!("{}.json", entry.id));
         let folder = SceneFolder::of(&options.out, &entry.id);
-        let finished = if resumes { finished_scene(&folder, &mark, &source.join(&entry.bitterli)) } else { None };
+        let finished = if resumes { finished_scene(&folder, &mark, &source_root(entry, &source)) } else { None };
         let licence = match finished {
             Some(licence) => {
                 report.resumed.push(entry.id.clone());
@@ -89,22 +89,56 @@ fn source_folder(options: &BuildOptions) -> PathBuf {
     options.source.clone().unwrap_or_else(beside)
 }
 
-/// Whatever can fail early must: every scene's file is there before the first one is made.
+/// The folder that the paths of a scene's files are relative to.
+fn source_root(entry: &RecipeScene, source: &Path) -> PathBuf {
+    match &entry.bitterli {
+        Some(xml) => source.join(xml).parent().map(Path::to_owned).unwrap_or_default(),
+        None => source.to_owned(),
+    }
+}
+
+/// Whatever can fail early must: every scene's sources are there, and are what the recipe pins, before the first is made.
 fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
-    let faults: Vec<String> = recipe
-        .scenes
-        .iter()
-        .filter(|scene| !source.join(&scene.bitterli).is_file())
-        .map(|scene| {
-            let path = source.join(&scene.bitterli);
-            format!(
-                "scene '{}': there is no file '{}'; mend `bitterli`, or name the folder with --source",
-                scene.id,
-                path.display()
-            )
-        })
-        .collect();
+    let mut faults: Vec<String> = recipe.scenes.iter().flat_map(|scene| missing_sources(scene, source)).collect();
+    if faults.is_empty() {
+        faults = recipe.scenes.iter().flat_map(|scene| changed_inputs(scene, &source_root(scene, source))).collect();
+    }
     if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
+}
+
+fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<String> {
+    let mut wanted: Vec<(&str, &Path, bool)> = Vec::new();
+    if let Some(xml) = &scene.bitterli {
+        wanted.push(("bitterli", xml, false));
+    }
+    if let Some(room) = &scene.front3d {
+        wanted.push(("house", &room.house, false));
+        wanted.push(("models", &room.models, true));
+        wanted.extend(room.textures.as_deref().map(|path| ("textures", path, true)));
+        wanted.extend(room.cameras.as_deref().map(|path| ("cameras", path, false)));
+    }
+    let fault = |(key, path, is_folder): (&str, &Path, bool)| {
+        let path = source.join(path);
+        let there = if is_folder { path.is_dir() } else { path.is_file() };
+        let kind = if is_folder { "folder" } else { "file" };
+        let hint = format!("mend `{key}`, or name the folder with --source");
+        (!there).then(|| format!("scene '{}': there is no {kind} '{}'; {hint}", scene.id, path.display()))
+    };
+    wanted.into_iter().filter_map(fault).collect()
+}
+
+/// What of `inputs` is missing or another file than it says.
+fn changed_inputs(scene: &RecipeScene, root: &Path) -> Vec<String> {
+    let fault = |(path, pinned): (&String, &String)| {
+        let found = match manifest::sha256_of_file(&root.join(path)) {
+            Ok(found) if found == *pinned => return None,
+            Ok(found) => format!("is {found}"),
+            Err(error) => format!("cannot be read ({error})"),
+        };
+        let hint = "get the file that the release was made of";
+        Some(format!("scene '{}': input '{path}' {found}, expected {pinned}; {hint}", scene.id))
+    };
+    scene.inputs.iter().filter_map(fault).collect()
 }
 
 fn empty_dataset(recipe: &Recipe, tool: &str) -> DatasetFile {
@@ -159,10 +193,9 @@ fn holds_only(folder: &Path, names: &[&str]) -> bool {
 struct SceneMark(Option<Licence>);
 
 /// A scene that an earlier run made of the same files as are there now.
-fn finished_scene(folder: &SceneFolder, mark: &Path, source: &Path) -> Option<SceneMark> {
+fn finished_scene(folder: &SceneFolder, mark: &Path, root: &Path) -> Option<SceneMark> {
     let mark = json::read(mark).ok()?;
     let scene: SceneFile = json::read(&folder.scene_file()).ok()?;
-    let root = source.parent().unwrap_or(Path::new(""));
     let is_same = |file: &SourceFile| manifest::sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
     scene.source.files.iter().all(is_same).then_some(mark)
 }

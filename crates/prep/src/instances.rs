@@ -8,6 +8,7 @@ use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{InstanceId, InstanceIndex, PartId};
 
 use crate::parts::connected_parts;
+use crate::source::InstanceOrigin;
 
 /// One instance: instance k is surface k of the reference scene.
 #[derive(Clone, Debug)]
@@ -16,6 +17,10 @@ pub struct InstanceEntry {
     pub id: InstanceId,
     /// Its value in `instance.png`.
     pub index: InstanceIndex,
+    /// What it is, where the source says so.
+    pub category: Option<String>,
+    /// The broader category, where the source says so.
+    pub super_category: Option<String>,
     /// The part of each of its triangles, as a place in `parts`.
     pub part_of_triangle: Vec<usize>,
     /// Its parts.
@@ -36,17 +41,18 @@ pub struct PartEntry {
 #[error("more than 65535 instances or parts; split the scene")]
 pub struct TooMany;
 
-/// Numbers instances and parts in the order of the surfaces, from 1 on.
-pub fn list(scene: &ReferenceScene) -> Result<Vec<InstanceEntry>, TooMany> {
+/// Numbers instances and parts in the order of the surfaces, from 1 on; `origins` holds one a surface.
+pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<InstanceEntry>, TooMany> {
     let mut taken = BTreeSet::new();
     let mut next_part = 1_usize;
     scene
         .surfaces
         .iter()
+        .zip(origins)
         .enumerate()
-        .map(|(at, surface)| {
+        .map(|(at, (surface, origin))| {
             let id = unique_id(surface, &mut taken);
-            let part_of_triangle = connected_parts(&surface.mesh);
+            let part_of_triangle = origin.part_of_triangle.clone().unwrap_or_else(|| connected_parts(&surface.mesh));
             let count = part_of_triangle.iter().max().map_or(0, |last| last + 1);
             let parts = (0..count)
                 .map(|part| {
@@ -56,7 +62,14 @@ pub fn list(scene: &ReferenceScene) -> Result<Vec<InstanceEntry>, TooMany> {
                 })
                 .collect::<Result<Vec<_>, TooMany>>()?;
             next_part += count;
-            Ok(InstanceEntry { id, index: InstanceIndex(number(at + 1)?), part_of_triangle, parts })
+            Ok(InstanceEntry {
+                id,
+                index: InstanceIndex(number(at + 1)?),
+                category: origin.category.clone(),
+                super_category: origin.super_category.clone(),
+                part_of_triangle,
+                parts,
+            })
         })
         .collect()
 }
@@ -98,7 +111,8 @@ mod tests {
 
     #[test]
     fn ids_are_unique_and_numbers_run_on() {
-        let list = list(&scene(&["Mesh 1", "mesh-1", "mesh-1-2", "椅子", ""])).unwrap();
+        let scene = scene(&["Mesh 1", "mesh-1", "mesh-1-2", "椅子", ""]);
+        let list = list(&scene, &vec![InstanceOrigin::default(); 5]).unwrap();
         let ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
         assert_eq!(ids, ["mesh-1", "mesh-1-2", "mesh-1-2-2", "object", "object-2"]);
         assert_eq!(list[2].index.0.get(), 3);

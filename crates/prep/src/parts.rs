@@ -1,4 +1,4 @@
-//! Parts: the connected components of an instance's mesh.
+//! Parts: the connected components of an instance's mesh, or of each of its groups.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,23 @@ pub const MAX_PARTS: usize = 64;
 ///
 /// Triangles belong together when they share a vertex position to the last bit.
 pub fn connected_parts(mesh: &TriangleMesh) -> Vec<usize> {
-    let roots = component_of_triangles(mesh);
+    labelled_parts(mesh, &vec![0; mesh.triangles.len()])
+}
+
+/// As [`connected_parts`], but only triangles of one label belong together; `labels` holds one a triangle.
+pub fn labelled_parts(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
+    by_area(mesh, &component_of_triangles(mesh, labels))
+}
+
+/// Each label a part, whether it hangs together or not; parts are numbered by area, largest first.
+pub fn parts_of_labels(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
+    let mut first_triangle: HashMap<usize, usize> = HashMap::new();
+    let first = labels.iter().enumerate().map(|(triangle, label)| *first_triangle.entry(*label).or_insert(triangle));
+    by_area(mesh, &first.collect::<Vec<_>>())
+}
+
+/// Numbers groups of triangles, which are named by their first triangle.
+fn by_area(mesh: &TriangleMesh, roots: &[usize]) -> Vec<usize> {
     let mut areas: HashMap<usize, f64> = HashMap::new();
     for (triangle, root) in roots.iter().enumerate() {
         *areas.entry(*root).or_default() += area(mesh, triangle);
@@ -25,29 +41,34 @@ pub fn connected_parts(mesh: &TriangleMesh) -> Vec<usize> {
 }
 
 /// For each triangle the first triangle of its component.
-fn component_of_triangles(mesh: &TriangleMesh) -> Vec<usize> {
-    let mut first_vertex: HashMap<[u32; 3], u32> = HashMap::new();
-    let welded: Vec<u32> = mesh
-        .positions
+fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
+    let mut places: HashMap<(usize, [u32; 3]), u32> = HashMap::new();
+    let corners: Vec<[u32; 3]> = mesh
+        .triangles
         .iter()
-        .enumerate()
-        // Adding zero turns -0 into +0: they are one place.
-        .map(|(index, p)| *first_vertex.entry(p.to_array().map(|v| (v + 0.0).to_bits())).or_insert(index as u32))
+        .zip(labels)
+        .map(|(triangle, label)| {
+            triangle.map(|vertex| {
+                // Adding zero turns -0 into +0: they are one place.
+                let bits = mesh.positions[vertex as usize].to_array().map(|v| (v + 0.0).to_bits());
+                let next = places.len() as u32;
+                *places.entry((*label, bits)).or_insert(next)
+            })
+        })
         .collect();
-    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|vertex| find(&mut parent, welded[vertex as usize]));
+    let mut parent: Vec<u32> = (0..places.len() as u32).collect();
+    for triangle in &corners {
+        let [a, b, c] = triangle.map(|place| find(&mut parent, place));
         let least = a.min(b).min(c);
         for root in [a, b, c] {
             parent[root as usize] = least;
         }
     }
     let mut first_triangle: HashMap<u32, usize> = HashMap::new();
-    (0..mesh.triangles.len())
-        .map(|index| {
-            let root = find(&mut parent, welded[mesh.triangles[index][0] as usize]);
-            *first_triangle.entry(root).or_insert(index)
-        })
+    corners
+        .iter()
+        .enumerate()
+        .map(|(index, triangle)| *first_triangle.entry(find(&mut parent, triangle[0])).or_insert(index))
         .collect()
 }
 
@@ -95,6 +116,15 @@ mod tests {
         mesh.positions.extend([Vec3::ZERO, Vec3::new(-0.0, 1.0, 0.0), Vec3::X * 100.0]);
         mesh.triangles.push([6, 7, 8]);
         assert_eq!(connected_parts(&mesh), [0, 0, 0]);
+    }
+
+    #[test]
+    fn labels_part_what_hangs_together() {
+        let mut mesh = islands(2);
+        mesh.triangles.push([0, 1, 2]);
+        assert_eq!(connected_parts(&mesh), [0, 1, 0]);
+        assert_eq!(labelled_parts(&mesh, &[0, 0, 1]), [1, 0, 2]);
+        assert_eq!(parts_of_labels(&mesh, &[0, 0, 1]), [0, 0, 1]);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! Paths are relative to the recipe's folder, or to the folder that `--source` names.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_scene::{SceneId, ViewId};
@@ -51,12 +52,18 @@ pub struct Offset {
 pub struct RecipeScene {
     /// Its id.
     pub id: SceneId,
-    /// Its Mitsuba XML.
-    pub bitterli: PathBuf,
-    /// The scene that it is a variant of, for rankings; its folder's name where absent.
+    /// Its Mitsuba XML; this or `front3d`.
+    pub bitterli: Option<PathBuf>,
+    /// A room of a 3D-FRONT house; this or `bitterli`.
+    pub front3d: Option<Front3dRoom>,
+    /// The scene that it is a variant of, for rankings; its folder's name, or its house's uid, where absent.
     pub house: Option<String>,
-    /// Overrides the source's own camera.
-    pub camera: Option<GivenCamera>,
+    /// The input camera; a Mitsuba scene has its own where absent.
+    pub camera: Option<RecipeCamera>,
+    /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`: the scene is
+    /// made of these very bytes or not at all. Not checked where empty.
+    #[serde(default)]
+    pub inputs: BTreeMap<String, String>,
     /// Overrides the recipe's.
     pub resolution: Option<[u32; 2]>,
     /// Overrides the recipe's.
@@ -66,9 +73,44 @@ pub struct RecipeScene {
     pub exposure: f64,
 }
 
-/// A camera by hand.
+/// A room of a 3D-FRONT house, and where everything for it is.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct Front3dRoom {
+    /// The house's JSON.
+    pub house: PathBuf,
+    /// The room's instanceid, as in `LivingDiningRoom-1912`.
+    pub room: String,
+    /// The folder of 3D-FUTURE's models.
+    pub models: PathBuf,
+    /// The folder of the layout's textures; without it the architecture has its colours only.
+    pub textures: Option<PathBuf>,
+    /// A file of designers' cameras beside the house.
+    pub cameras: Option<PathBuf>,
+    /// Mirror the layout as BlenderProc does.
+    #[serde(default)]
+    pub blenderproc_compat: bool,
+}
+
+/// The input camera, as a recipe says it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "CameraWords")]
+pub enum RecipeCamera {
+    /// By hand.
+    Given(GivenCamera),
+    /// Found by drawing cameras in the room until one sees enough; the same seed finds the same one.
+    Seed {
+        /// Of the draw.
+        seed: u64,
+        /// Vertical field of view in degrees.
+        fov_y_deg: f64,
+    },
+    /// A designer's, by its number; its field of view is kept.
+    Designer(usize),
+}
+
+/// A camera by hand.
+#[derive(Clone, Debug, PartialEq)]
 pub struct GivenCamera {
     /// Metres.
     pub position: [f64; 3],
@@ -76,6 +118,54 @@ pub struct GivenCamera {
     pub target: [f64; 3],
     /// Vertical field of view in degrees.
     pub fov_y_deg: f64,
+}
+
+/// A camera's keys as they stand in the file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraWords {
+    position: Option<[f64; 3]>,
+    target: Option<[f64; 3]>,
+    fov_y_deg: Option<f64>,
+    seed: Option<u64>,
+    designer: Option<usize>,
+}
+
+/// Vertical field of view of cameras that are drawn, in degrees, where the recipe names none.
+pub const DRAWN_FOV_Y_DEG: f64 = 45.0;
+
+impl TryFrom<CameraWords> for RecipeCamera {
+    type Error = String;
+
+    fn try_from(words: CameraWords) -> Result<Self, String> {
+        match words {
+            CameraWords {
+                position: Some(position),
+                target: Some(target),
+                fov_y_deg: Some(fov_y_deg),
+                seed: None,
+                designer: None,
+            } => Ok(Self::Given(GivenCamera { position, target, fov_y_deg })),
+            CameraWords { position: None, target: None, fov_y_deg, seed: Some(seed), designer: None } => {
+                Ok(Self::Seed { seed, fov_y_deg: fov_y_deg.unwrap_or(DRAWN_FOV_Y_DEG) })
+            }
+            CameraWords { position: None, target: None, fov_y_deg: None, seed: None, designer: Some(number) } => {
+                Ok(Self::Designer(number))
+            }
+            _ => Err("camera: expected { position, target, fov_y_deg }, { seed } (with or without fov_y_deg), or \
+                      { designer }"
+                .to_owned()),
+        }
+    }
+}
+
+/// Where a scene comes from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RecipeSource<'a> {
+    /// A Mitsuba XML.
+    Bitterli(&'a Path),
+    /// A room of a 3D-FRONT house.
+    Front3d(&'a Front3dRoom),
 }
 
 fn default_version() -> String {
@@ -120,7 +210,7 @@ impl Recipe {
     fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if self.scenes.is_empty() {
-            faults.push("names no scene; add a [[scene]] with `id` and `bitterli`".to_owned());
+            faults.push("names no scene; add a [[scene]] with `id` and `bitterli` or `front3d`".to_owned());
         }
         if self.samples == 0 || self.samples > 1 << 16 {
             faults.push(format!("samples = {}: expected 1 to 65536", self.samples));
@@ -148,16 +238,38 @@ impl Recipe {
 }
 
 impl RecipeScene {
+    /// Where it comes from; in words what is wrong where the recipe names no source or two.
+    pub fn source(&self) -> Result<RecipeSource<'_>, String> {
+        match (&self.bitterli, &self.front3d) {
+            (Some(xml), None) => Ok(RecipeSource::Bitterli(xml)),
+            (None, Some(room)) => Ok(RecipeSource::Front3d(room)),
+            _ => Err(format!("scene '{}': expected one of `bitterli` and `front3d`", self.id)),
+        }
+    }
+
     fn check(&self, faults: &mut Vec<String>) {
+        match (self.source(), &self.camera) {
+            (Err(fault), _) => faults.push(fault),
+            (Ok(RecipeSource::Front3d(_)), None) => {
+                faults.push(format!("scene '{}': a room needs a camera, as in `camera = {{ seed = 1 }}`", self.id));
+            }
+            (Ok(RecipeSource::Bitterli(_)), Some(RecipeCamera::Seed { .. } | RecipeCamera::Designer(_))) => {
+                faults.push(format!("scene '{}': `seed` and `designer` are for `front3d`", self.id));
+            }
+            (Ok(_), _) => {}
+        }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             faults.push(format!("scene '{}': exposure = {}: expected a number above 0", self.id, self.exposure));
         }
-        if let Some(camera) = &self.camera {
-            let finite = camera.position.iter().chain(&camera.target).all(|v| v.is_finite());
-            let field = camera.fov_y_deg > 0.0 && camera.fov_y_deg < 179.0;
-            if !finite || !field {
-                faults.push(format!("scene '{}': camera: expected finite points and 0 < fov_y_deg < 179", self.id));
+        let (finite, field) = match &self.camera {
+            Some(RecipeCamera::Given(camera)) => {
+                (camera.position.iter().chain(&camera.target).all(|v| v.is_finite()), camera.fov_y_deg)
             }
+            Some(RecipeCamera::Seed { fov_y_deg, .. }) => (true, *fov_y_deg),
+            Some(RecipeCamera::Designer(_)) | None => (true, 60.0),
+        };
+        if !finite || !(field > 0.0 && field < 179.0) {
+            faults.push(format!("scene '{}': camera: expected finite points and 0 < fov_y_deg < 179", self.id));
         }
     }
 }

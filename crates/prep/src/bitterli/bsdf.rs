@@ -4,9 +4,9 @@ use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput};
 use mateval_scene::reference::MaterialIndex;
 
 use super::document::Element;
-use super::log::shortened;
 use super::parameters::Parameters;
 use super::reader::Reader;
+use crate::source::log::shortened;
 
 /// More wrappers than this are a loop of references.
 const MOST_WRAPPERS: usize = 16;

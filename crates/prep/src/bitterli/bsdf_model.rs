@@ -3,11 +3,11 @@
 use mateval_scene::material::{ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput};
 
 use super::document::Element;
-use super::log::shortened;
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::texture::Bounds;
 use super::{ior, value};
+use crate::source::log::shortened;
 
 /// Mitsuba's own lower bound of alpha.
 const LEAST_ALPHA: f32 = 1e-4;

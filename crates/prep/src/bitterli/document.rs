@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::error::BitterliError;
 use super::limits::Limits;
-use super::log::{Log, shortened};
+use crate::source::log::{Log, shortened};
 
 /// One XML element.
 #[derive(Debug)]

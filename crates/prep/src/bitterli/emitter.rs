@@ -5,11 +5,11 @@ use mateval_image::Wrap;
 use mateval_scene::reference::{Emission, LightGroup, SurfaceIndex};
 
 use super::document::Element;
-use super::log::shortened;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::source::SourceFolder;
 use super::texture::{Bounds, mean_color};
+use crate::source::folder::SourceFolder;
+use crate::source::log::shortened;
 
 impl<'a> Reader<'a> {
     /// The emitter of a shape: it glows on its front side.

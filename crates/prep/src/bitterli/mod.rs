@@ -5,8 +5,7 @@
 //!
 //! Between: `document` makes a tree of the XML (depth and size checked, variables put in, names in snake_case),
 //! `parameters` takes what a plugin knows and reports the rest, and each kind of plugin has its file: `sensor`, `shape`
-//! (with `obj`, `primitives`, `surface_mesh`), `bsdf` (with `bsdf_model`, `ior`), `texture`, `emitter` (with `sun_sky`,
-//! `sun`). Where the documentation of Mitsuba leaves room, Mitsuba 3.9.1 was asked; the tests cite its answers.
+//! (with `primitives`), `bsdf` (with `bsdf_model`, `ior`), `texture`, `emitter` (with `sun_sky`, `sun`). Where the documentation of Mitsuba leaves room, Mitsuba 3.9.1 was asked; the tests cite its answers.
 
 mod bsdf;
 mod bsdf_model;
@@ -15,17 +14,13 @@ mod emitter;
 mod error;
 mod ior;
 mod limits;
-mod log;
-mod obj;
 mod parameters;
-mod primitives;
+pub(crate) mod primitives;
 mod reader;
 mod sensor;
 mod shape;
-mod source;
 mod sun;
 mod sun_sky;
-mod surface_mesh;
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
@@ -40,21 +35,13 @@ use std::path::{Path, PathBuf};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
+use crate::source::LicenceText;
+use crate::source::folder::SourceFolder;
+use crate::source::log::{Log, shortened};
 use document::Document;
 pub use error::BitterliError;
 pub use limits::Limits;
-use log::{Log, shortened};
 use reader::{Reader, Totals};
-use source::SourceFolder;
-
-/// A licence that must travel with the scene.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LicenceText {
-    /// The file's name in the scene's folder.
-    pub file: String,
-    /// What it says.
-    pub text: String,
-}
 
 /// A scene of Bitterli's resources.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 use glam::DMat4;
 
 use super::document::{Element, Ids};
-use super::log::{Log, shortened};
 use super::{transform, value};
+use crate::source::log::{Log, shortened};
 
 /// A plugin's children, references followed.
 pub(super) struct Parameters<'a> {

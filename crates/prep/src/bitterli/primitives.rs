@@ -43,7 +43,7 @@ impl Builder {
 }
 
 /// [-1, 1]^2 at z = 0, front +z; Mitsuba's uv (0, 0) lies at (-1, -1).
-pub(super) fn rectangle() -> TriangleMesh {
+pub(crate) fn rectangle() -> TriangleMesh {
     let mut build = Builder::default();
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     let ids = corners
@@ -53,7 +53,7 @@ pub(super) fn rectangle() -> TriangleMesh {
 }
 
 /// The box [-1, 1]^3, each face with its own uv.
-pub(super) fn cube() -> TriangleMesh {
+pub(crate) fn cube() -> TriangleMesh {
     let mut build = Builder::default();
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
         for normal in [axis, -axis] {

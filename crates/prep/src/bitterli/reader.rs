@@ -8,10 +8,10 @@ use mateval_scene::reference::{LightGroup, MaterialIndex, ReferenceScene};
 
 use super::document::{Element, Ids};
 use super::limits::Limits;
-use super::log::Log;
 use super::parameters::Parameters;
-use super::source::{FileFault, SourceFolder};
 use super::texture::TextureKey;
+use crate::source::folder::{FileFault, SourceFolder};
+use crate::source::log::Log;
 
 /// A scene while it is read.
 pub(super) struct Reader<'a> {

@@ -4,10 +4,10 @@ use glam::{DMat3, DMat4, DVec3};
 use mateval_scene::{Camera, Intrinsics};
 
 use super::document::Element;
-use super::log::{Log, shortened};
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::value;
+use crate::source::log::{Log, shortened};
 
 /// Columns of a camera's rotation may miss right angles and unit length by this much without being reported; the scenes
 /// at hand are written with six digits.

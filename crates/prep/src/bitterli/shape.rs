@@ -5,13 +5,13 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
 
 use super::document::Element;
-use super::log::shortened;
-use super::obj::{self, ObjLimits};
 use super::parameters::Parameters;
 use super::primitives;
 use super::reader::Reader;
-use super::source::{FileFault, SourceFolder};
-use super::surface_mesh::{Repairs, smooth_normals, to_world};
+use crate::source::folder::{FileFault, SourceFolder};
+use crate::source::log::shortened;
+use crate::source::obj::{self, ObjLimits};
+use crate::source::surface_mesh::{Repairs, smooth_normals, to_world};
 
 const LEFT_OUT: &str = "left the shape out";
 

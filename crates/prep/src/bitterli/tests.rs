@@ -1,5 +1,6 @@
 //! Whole scenes, built here, with and without faults.
 
+use crate::source::obj;
 use std::path::Path;
 
 use mateval_image::Texels;

@@ -6,11 +6,11 @@ use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform
 use mateval_scene::reference::SourceTexture;
 
 use super::document::Element;
-use super::log::shortened;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::source::{FileFault, SourceFolder};
 use super::value;
+use crate::source::folder::{FileFault, SourceFolder};
+use crate::source::log::shortened;
 
 /// What stands for a texture that cannot be read: linear mid-grey. (Mitsuba would refuse the scene.)
 const MISSING: [f32; 3] = [0.5; 3];

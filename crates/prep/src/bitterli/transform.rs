@@ -3,8 +3,8 @@
 use glam::{DMat3, DMat4, DVec3};
 
 use super::document::Element;
-use super::log::Log;
 use super::value::{number, numbers, vector};
+use crate::source::log::Log;
 
 /// The product of a transform's elements. A faulty element is a finding and counts as the identity.
 pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
@@ -13,7 +13,8 @@ pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
         match step(element) {
             Ok(matrix) => product = matrix * product,
             Err(what) => {
-                let message = format!("line {}: <{}>: {what}", element.line, super::log::shortened(&element.tag));
+                let message =
+                    format!("line {}: <{}>: {what}", element.line, crate::source::log::shortened(&element.tag));
                 log.warn("bad_transform", place, message, "left this step out");
             }
         }

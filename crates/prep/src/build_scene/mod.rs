@@ -2,23 +2,23 @@
 
 mod geometry;
 mod materials;
+mod source;
 
 use std::path::Path;
 
-use glam::DVec3;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::png_io;
-use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::Camera;
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, Part, SceneFile, SceneSource, SourceFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Finding, ViewId, json, reference_io};
 use mateval_tracer::World;
 
-use crate::bitterli::{self, BitterliScene};
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
-use crate::recipe::{GivenCamera, RESOLUTION, Recipe, RecipeScene};
+use crate::recipe::{Recipe, RecipeScene};
+use crate::source::{LicenceText, SourceScene};
 use crate::views::{GeometryPictures, TruthPictures, ViewScene};
 use materials::InstanceAtlas;
 use mateval_scene::Progress;
@@ -39,15 +39,14 @@ pub fn build(
     source: &Path,
     folder: &SceneFolder,
     progress: Progress<'_>,
-) -> Result<Option<bitterli::LicenceText>, PrepError> {
+) -> Result<Option<LicenceText>, PrepError> {
     progress("read the source", 0, 1);
-    let read = bitterli::read(&source.join(&entry.bitterli), &bitterli::Limits::default())?;
-    let files: Vec<SourceFile> = read
-        .source_files
-        .iter()
-        .map(|(path, sha256)| SourceFile { path: path.clone(), sha256: sha256.clone() })
-        .collect();
+    let read = source::read(recipe, entry, source)?;
+    check_inputs(entry, &read.files)?;
+    let files: Vec<SourceFile> =
+        read.files.iter().map(|(path, sha256)| SourceFile { path: path.clone(), sha256: sha256.clone() }).collect();
     let licence = read.licence.clone();
+    let (kind, house) = (read.kind.to_owned(), entry.house.clone().unwrap_or_else(|| read.house.clone()));
     let mut plan = plan(recipe, entry, read)?;
     make_folders(folder, &plan)?;
 
@@ -63,18 +62,45 @@ pub fn build(
     }
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
-    write_scene_file(plan, entry, files, &atlases, folder)?;
+    write_scene_file(plan, entry, SceneSource { kind, house, files }, &atlases, folder)?;
     Ok(licence)
 }
 
-fn plan(recipe: &Recipe, entry: &RecipeScene, read: BitterliScene) -> Result<Plan, PrepError> {
+/// Every file read must be what the recipe pins, if it pins any.
+fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), PrepError> {
+    if entry.inputs.is_empty() {
+        return Ok(());
+    }
+    let differs = |(path, sha256): &(String, String)| match entry.inputs.get(path) {
+        Some(pinned) if pinned == sha256 => None,
+        Some(pinned) => Some(format!("'{path}' is {sha256}, `inputs` says {pinned}")),
+        None => Some(format!("'{path}' was read, and `inputs` does not list it")),
+    };
+    let mut faults: Vec<String> = files.iter().filter_map(differs).collect();
+    let read = |path: &String| files.iter().any(|file| file.0 == *path);
+    let unread = entry.inputs.keys().filter(|path| !read(path));
+    faults.extend(unread.map(|path| format!("'{path}' is in `inputs`, and nothing reads it")));
+    if faults.is_empty() {
+        return Ok(());
+    }
+    let what = format!("it is not made of what the recipe pins: {}", faults.join("; "));
+    Err(PrepError::Scene { scene: entry.id.to_string(), what })
+}
+
+fn plan(recipe: &Recipe, entry: &RecipeScene, read: SourceScene) -> Result<Plan, PrepError> {
     let fault = |what: String| PrepError::Scene { scene: entry.id.to_string(), what };
     if read.scene.surfaces.is_empty() {
         let what = format!("not one surface could be read of it:{}", Finding::list(&read.findings));
         return Err(fault(what));
     }
-    let instances = instances::list(&read.scene).map_err(|error| fault(error.to_string()))?;
-    let camera = input_camera(recipe, entry, &read.camera).map_err(fault)?;
+    let instances = instances::list(&read.scene, &read.origins).map_err(|error| fault(error.to_string()))?;
+    let views = views_of(recipe, read.camera);
+    let scene = std::sync::Arc::new(read.scene);
+    Ok(Plan { scene, instances, views, findings: read.findings, file: read.file })
+}
+
+/// The input view and its turns.
+fn views_of(recipe: &Recipe, camera: Camera) -> Vec<View> {
     let input = View { id: ViewId::new(INPUT).expect("our own id is an id"), x_deg: 0.0, y_deg: 0.0, camera };
     let turned = recipe.views.iter().map(|offset| View {
         id: offset.id.clone(),
@@ -82,35 +108,7 @@ fn plan(recipe: &Recipe, entry: &RecipeScene, read: BitterliScene) -> Result<Pla
         y_deg: offset.y_deg,
         camera: camera.turned(offset.x_deg, offset.y_deg),
     });
-    let views = std::iter::once(input).chain(turned).collect();
-    let file = entry.bitterli.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Plan { scene: std::sync::Arc::new(read.scene), instances, views, findings: read.findings, file })
-}
-
-/// The source's camera or the recipe's, at the recipe's resolution: the horizontal field of view is kept.
-fn input_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, String> {
-    let old = source.intrinsics;
-    let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or([old.width, old.height]);
-    if ![width, height].iter().all(|side| RESOLUTION.contains(side)) {
-        return Err(format!(
-            "the source's film is {width}x{height}; name a resolution of 16 to 8192 a side in the recipe"
-        ));
-    }
-    if let Some(GivenCamera { position, target, fov_y_deg }) = entry.camera {
-        let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
-        let camera = Camera::look_at(DVec3::from_array(position), DVec3::from_array(target), DVec3::Y, intrinsics);
-        return camera.ok_or_else(|| "camera: position and target must differ, and not only in height".to_owned());
-    }
-    let scale = f64::from(width) / f64::from(old.width);
-    let intrinsics = Intrinsics {
-        width,
-        height,
-        fx: old.fx * scale,
-        fy: old.fy * scale,
-        cx: old.cx * scale,
-        cy: (old.cy - f64::from(old.height) / 2.0) * scale + f64::from(height) / 2.0,
-    };
-    Ok(Camera { intrinsics, ..*source })
+    std::iter::once(input).chain(turned).collect()
 }
 
 fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
@@ -186,7 +184,7 @@ fn write_view(
 fn write_scene_file(
     plan: Plan,
     entry: &RecipeScene,
-    files: Vec<SourceFile>,
+    source: SceneSource,
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
 ) -> Result<(), PrepError> {
@@ -196,8 +194,8 @@ fn write_scene_file(
             id: instance.id.clone(),
             index: instance.index,
             name: surface.name.clone(),
-            category: None,
-            super_category: None,
+            category: instance.category.clone(),
+            super_category: instance.super_category.clone(),
             triangles: surface.mesh.triangles.len(),
             atlas: atlas.unwrapped.as_ref().map(|unwrapped| Atlas {
                 size: unwrapped.size,
@@ -220,16 +218,12 @@ fn write_scene_file(
             })
         })
         .collect();
-    let house = entry.house.clone().unwrap_or_else(|| {
-        let folder = entry.bitterli.parent().and_then(Path::file_name);
-        folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned())
-    });
     let mut findings = plan.findings;
     findings.sort();
     let file = SceneFile {
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
-        source: SceneSource { kind: "bitterli".to_owned(), house, files },
+        source,
         exposure: entry.exposure,
         views: plan.views,
         instances,

@@ -8,20 +8,20 @@ const FARTHEST: f32 = 1e9;
 
 /// What was mended in a mesh, as counts.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(super) struct Repairs {
+pub(crate) struct Repairs {
     /// Triangles left out: a corner was not finite or absurdly far away.
-    pub(super) not_finite: usize,
+    pub(crate) not_finite: usize,
     /// Triangles of no area; they stay.
-    pub(super) degenerate: usize,
+    pub(crate) degenerate: usize,
     /// Normals made anew: they were zero or not finite.
-    pub(super) normals: usize,
+    pub(crate) normals: usize,
     /// Texture coordinates set to 0: they were not finite.
-    pub(super) uvs: usize,
+    pub(crate) uvs: usize,
 }
 
 /// The mesh in world space. The front stays the front under a mirror: the winding turns with the determinant's sign,
 /// and normals go by the inverse transpose.
-pub(super) fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) -> (TriangleMesh, Repairs) {
+pub(crate) fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) -> (TriangleMesh, Repairs) {
     let mut repairs = Repairs::default();
     let linear = DMat3::from_mat4(world_from_object);
     let mirrored = linear.determinant() < 0.0;
@@ -100,7 +100,7 @@ fn mend_uvs(mesh: &mut TriangleMesh) -> usize {
 
 /// Normals of a smooth surface: those of the faces around a vertex, weighted by their angle there (Thürmer and Wüthrich,
 /// "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba makes them for an OBJ without normals.
-pub(super) fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
+pub(crate) fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {
         let corners = mesh.corners(index).map(|p| p.as_dvec3());
@@ -118,8 +118,8 @@ pub(super) fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
 mod tests {
     use glam::Vec2;
 
-    use super::super::primitives::{cube, rectangle};
     use super::*;
+    use crate::bitterli::primitives::{cube, rectangle};
 
     fn front(mesh: &TriangleMesh) -> Vec3 {
         let [a, b, c] = mesh.corners(0);

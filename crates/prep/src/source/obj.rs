@@ -8,29 +8,31 @@ use super::log::shortened;
 
 /// What is read of a file at most.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ObjLimits {
+pub(crate) struct ObjLimits {
     /// Triangles after polygons are split.
-    pub(super) triangles: usize,
+    pub(crate) triangles: usize,
     /// Corners of faces, so at least as many as vertices can come of it.
-    pub(super) corners: usize,
+    pub(crate) corners: usize,
 }
 
 /// Why an OBJ was refused: the line, from 1 (0 where none is to blame), and what is wrong.
 #[derive(Debug, PartialEq)]
-pub(super) struct ObjFault {
-    pub(super) line: usize,
-    pub(super) what: String,
+pub(crate) struct ObjFault {
+    pub(crate) line: usize,
+    pub(crate) what: String,
     /// Whether it is sound but too large.
-    pub(super) limit: bool,
+    pub(crate) limit: bool,
 }
 
 /// A mesh in the file's own space, and what had to be left out of it.
 #[derive(Debug)]
-pub(super) struct ObjMesh {
-    pub(super) mesh: TriangleMesh,
+pub(crate) struct ObjMesh {
+    pub(crate) mesh: TriangleMesh,
+    /// Its objects and groups in their order, and how many triangles each has.
+    pub(crate) groups: Vec<(String, usize)>,
     /// Some faces have texture coordinates (normals) and some have none: then nobody keeps them.
-    pub(super) mixed_uvs: bool,
-    pub(super) mixed_normals: bool,
+    pub(crate) mixed_uvs: bool,
+    pub(crate) mixed_normals: bool,
 }
 
 /// What a file's faces refer to.
@@ -46,14 +48,14 @@ struct Census {
 }
 
 /// Reads an OBJ: positions, texture coordinates, normals and faces of all its groups as one mesh; polygons as fans.
-pub(super) fn read(bytes: &[u8], limits: ObjLimits) -> Result<ObjMesh, ObjFault> {
+pub(crate) fn read(bytes: &[u8], limits: ObjLimits) -> Result<ObjMesh, ObjFault> {
     let text = std::str::from_utf8(bytes).map_or_else(|_| String::from_utf8_lossy(bytes), std::borrow::Cow::Borrowed);
     let census = check(&text, limits)?;
     let mixed = |some: usize| some != 0 && some != census.corners;
     let (mixed_uvs, mixed_normals) = (mixed(census.corners_with_uv), mixed(census.corners_with_normal));
-    let mesh =
+    let (mesh, groups) =
         if mixed_uvs || mixed_normals { load(&without_mixed(&text, mixed_uvs, mixed_normals))? } else { load(&text)? };
-    Ok(ObjMesh { mesh, mixed_uvs, mixed_normals })
+    Ok(ObjMesh { mesh, groups, mixed_uvs, mixed_normals })
 }
 
 fn check(text: &str, limits: ObjLimits) -> Result<Census, ObjFault> {
@@ -141,7 +143,7 @@ fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
     out
 }
 
-fn load(text: &str) -> Result<TriangleMesh, ObjFault> {
+fn load(text: &str) -> Result<(TriangleMesh, Vec<(String, usize)>), ObjFault> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     // Material libraries are never opened: Mitsuba does not use them, and their names come from a stranger.
     let no_materials = |_: &std::path::Path| Ok(Default::default());
@@ -151,13 +153,15 @@ fn load(text: &str) -> Result<TriangleMesh, ObjFault> {
         limit: false,
     })?;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), normals: Some(Vec::new()), ..Default::default() };
+    let mut groups = Vec::new();
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
         append(&mut mesh, &model.mesh);
+        groups.push((model.name.clone(), model.mesh.indices.len() / 3));
     }
     let count = mesh.positions.len();
     mesh.uvs = mesh.uvs.filter(|uvs| uvs.len() == count);
     mesh.normals = mesh.normals.filter(|normals| normals.len() == count);
-    Ok(mesh)
+    Ok((mesh, groups))
 }
 
 fn append(mesh: &mut TriangleMesh, group: &tobj::Mesh) {
@@ -185,8 +189,9 @@ mod tests {
 
     #[test]
     fn polygons_groups_and_negative_indices() {
-        let mesh =
-            read_text("g a\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl x\ng b\nf  -4/-4/-1 -3/-3/-1 -2/-2/-1\n").unwrap().mesh;
+        let read = read_text("g a\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl x\ng b\nf  -4/-4/-1 -3/-3/-1 -2/-2/-1\n").unwrap();
+        assert_eq!(read.groups, [("a".to_owned(), 2), ("b".to_owned(), 1)]);
+        let mesh = read.mesh;
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (3, 7));
         assert_eq!(mesh.uvs.as_ref().map(Vec::len), Some(7));
         assert_eq!(mesh.corners(2), mesh.corners(0));

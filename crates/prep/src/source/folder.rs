@@ -8,16 +8,16 @@ use sha2::{Digest as _, Sha256};
 
 /// Why a file that the XML names was not read.
 #[derive(Debug)]
-pub(super) struct FileFault {
+pub(crate) struct FileFault {
     /// The finding's code.
-    pub(super) code: &'static str,
+    pub(crate) code: &'static str,
     /// What was expected and what was found.
-    pub(super) message: String,
+    pub(crate) message: String,
 }
 
 /// The folder of the XML. Nothing outside of it is read.
 #[derive(Debug)]
-pub(super) struct SourceFolder {
+pub(crate) struct SourceFolder {
     root: PathBuf,
     file_bytes: u64,
     hashes: BTreeMap<String, String>,
@@ -25,20 +25,20 @@ pub(super) struct SourceFolder {
 
 impl SourceFolder {
     /// `root` is the folder of the XML; no file of more than `file_bytes` is read.
-    pub(super) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
+    pub(crate) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
         Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new() })
     }
 
     /// A file name of the XML with forward slashes and without `.` and `..`; refused where it leads out.
-    pub(super) fn relative(name: &str) -> Result<String, FileFault> {
+    pub(crate) fn relative(name: &str) -> Result<String, FileFault> {
         let forward = name.trim().replace('\\', "/");
         let escapes = || FileFault {
             code: "path_escapes",
-            message: format!("'{}' leads out of the scene's folder", super::log::shortened(name)),
+            message: format!("'{}' leads out of the scene's folder", crate::source::log::shortened(name)),
         };
         if forward.is_empty() || forward.contains('\0') || forward.len() > 1024 {
-            let message = format!("expected a file name, found '{}'", super::log::shortened(name));
+            let message = format!("expected a file name, found '{}'", crate::source::log::shortened(name));
             return Err(FileFault { code: "bad_value", message });
         }
         let drive = forward.as_bytes().get(1) == Some(&b':');
@@ -57,11 +57,11 @@ impl SourceFolder {
     }
 
     /// The bytes of the file `relative`.
-    pub(super) fn read(&mut self, relative: &str) -> Result<Vec<u8>, FileFault> {
+    pub(crate) fn read(&mut self, relative: &str) -> Result<Vec<u8>, FileFault> {
         let path = self.path(relative)?;
         let unreadable = |error: std::io::Error| FileFault {
             code: "unreadable_file",
-            message: format!("'{}' cannot be read: {error}", super::log::shortened(relative)),
+            message: format!("'{}' cannot be read: {error}", crate::source::log::shortened(relative)),
         };
         let file = std::fs::File::open(&path).map_err(unreadable)?;
         let mut bytes = Vec::new();
@@ -74,8 +74,8 @@ impl SourceFolder {
     }
 
     /// Where the file `relative` is: an ordinary file inside the folder and within the limit.
-    pub(super) fn path(&self, relative: &str) -> Result<PathBuf, FileFault> {
-        let short = super::log::shortened(relative);
+    pub(crate) fn path(&self, relative: &str) -> Result<PathBuf, FileFault> {
+        let short = crate::source::log::shortened(relative);
         let path = match self.root.join(relative).canonicalize() {
             Ok(path) => path,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -98,17 +98,17 @@ impl SourceFolder {
     }
 
     fn too_large(&self, relative: &str) -> FileFault {
-        let message = format!("'{}' has more than {} bytes", super::log::shortened(relative), self.file_bytes);
+        let message = format!("'{}' has more than {} bytes", crate::source::log::shortened(relative), self.file_bytes);
         FileFault { code: "limit", message }
     }
 
     /// The hash of a file that was read.
-    pub(super) fn hash(&self, relative: &str) -> Option<String> {
+    pub(crate) fn hash(&self, relative: &str) -> Option<String> {
         self.hashes.get(relative).cloned()
     }
 
     /// Every file that was read and its SHA-256, sorted by name.
-    pub(super) fn into_hashes(self) -> Vec<(String, String)> {
+    pub(crate) fn into_hashes(self) -> Vec<(String, String)> {
         self.hashes.into_iter().collect()
     }
 }

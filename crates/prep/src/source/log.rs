@@ -6,7 +6,7 @@ use mateval_scene::{Finding, Severity};
 
 /// What was found so far, each finding once.
 #[derive(Debug)]
-pub(super) struct Log {
+pub(crate) struct Log {
     file: String,
     limit: usize,
     findings: BTreeSet<Finding>,
@@ -15,29 +15,29 @@ pub(super) struct Log {
 
 impl Log {
     /// Findings are about `file` unless said otherwise; beyond `limit` they are only counted.
-    pub(super) fn new(file: String, limit: usize) -> Self {
+    pub(crate) fn new(file: String, limit: usize) -> Self {
         Self { file, limit, findings: BTreeSet::new(), dropped: 0 }
     }
 
     /// The file that findings are about unless said otherwise.
-    pub(super) fn file(&self) -> &str {
+    pub(crate) fn file(&self) -> &str {
         &self.file
     }
 
     /// Something was left out or replaced.
-    pub(super) fn warn(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
+    pub(crate) fn warn(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
         let file = self.file.clone();
         self.push(Severity::Warning, code, &file, place, message, action);
     }
 
     /// Something was read differently from how it is written, without loss.
-    pub(super) fn note(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
+    pub(crate) fn note(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
         let file = self.file.clone();
         self.push(Severity::Note, code, &file, place, message, action);
     }
 
     /// A finding about another file.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         severity: Severity,
         code: &str,
@@ -61,7 +61,7 @@ impl Log {
     }
 
     /// All of them, sorted.
-    pub(super) fn into_findings(mut self) -> Vec<Finding> {
+    pub(crate) fn into_findings(mut self) -> Vec<Finding> {
         if self.dropped > 0 {
             let (file, message) = (self.file.clone(), format!("{} more findings than are listed", self.dropped));
             self.limit = usize::MAX;
@@ -72,7 +72,7 @@ impl Log {
 }
 
 /// At most 80 characters of a stranger's text, without control characters.
-pub(super) fn shortened(text: &str) -> String {
+pub(crate) fn shortened(text: &str) -> String {
     let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
     if text.chars().nth(80).is_some() { format!("{short}...") } else { short }
 }

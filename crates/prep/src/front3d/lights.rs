@@ -1,0 +1,63 @@
+//! BlenderProc's lights: ceilings and lamps glow, but the camera sees their ordinary surface; a grey world around.
+
+use mateval_scene::reference::{Emission, LightGroup, SurfaceIndex};
+
+use super::furnish::{FurnishedHouse, Role};
+
+/// Radiance of ceilings, times their colour.
+const CEILING: f32 = 0.8;
+/// Radiance of lamps, times their texture.
+const LAMP: f32 = 7.0;
+/// Radiance of everything outside.
+const WORLD: f32 = 0.05;
+
+/// What a surface is among the lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Glow {
+    No,
+    /// All of one colour in a room are one group.
+    Ceiling([f32; 3]),
+    Lamp,
+}
+
+fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
+    let placed = &house.placed[surface];
+    match &placed.role {
+        Role::Architecture { kind } if kind.to_lowercase().contains("ceiling") => {
+            Glow::Ceiling(placed.color.map(|v| v * CEILING))
+        }
+        Role::Architecture { .. } => Glow::No,
+        Role::Furniture { name, .. } => {
+            let is_lighting = placed.origin.super_category.as_deref() == Some("Lighting");
+            if is_lighting || name.contains("lamp") { Glow::Lamp } else { Glow::No }
+        }
+    }
+}
+
+/// The lights of the surfaces that `kept` lists, numbered as they stand there. Blender's emission is on both sides.
+pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], names: &[String]) -> Vec<LightGroup> {
+    let mut groups: Vec<LightGroup> = Vec::new();
+    let mut ceilings: Vec<(usize, [f32; 3], usize)> = Vec::new();
+    for (at, surface) in kept.iter().enumerate() {
+        let room = house.placed[*surface].room;
+        let radiance = match glow(house, *surface) {
+            Glow::No => continue,
+            Glow::Lamp => [LAMP; 3],
+            Glow::Ceiling(radiance) if radiance == [0.0; 3] => continue,
+            Glow::Ceiling(radiance) => {
+                let known = ceilings.iter().find(|known| (known.0, known.1) == (room, radiance)).map(|known| known.2);
+                if let Some(Emission::Area { surfaces, .. }) = known.map(|group| &mut groups[group].emission) {
+                    surfaces.push(SurfaceIndex(at));
+                    continue;
+                }
+                ceilings.push((room, radiance, groups.len()));
+                radiance
+            }
+        };
+        let emission = Emission::Area { surfaces: vec![SurfaceIndex(at)], radiance, two_sided: true };
+        groups.push(LightGroup { name: names[at].clone(), emission, camera_visible: false });
+    }
+    let emission = Emission::Constant { radiance: [WORLD; 3] };
+    groups.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
+    groups
+}

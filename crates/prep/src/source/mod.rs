@@ -1,0 +1,52 @@
+//! What readers of all kinds of source share: findings, files of strangers, OBJ, and the scene that comes of it.
+
+pub(crate) mod folder;
+pub(crate) mod log;
+pub(crate) mod obj;
+pub(crate) mod surface_mesh;
+
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::{Camera, Finding};
+
+/// A licence that must travel with the scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LicenceText {
+    /// The file's name in the scene's folder.
+    pub file: String,
+    /// What it says.
+    pub text: String,
+}
+
+/// What a source says of an instance beside its mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct InstanceOrigin {
+    /// What it is, as in `Dining Chair`.
+    pub category: Option<String>,
+    /// The broader category, as in `Chair`.
+    pub super_category: Option<String>,
+    /// The part of each triangle, 0, 1, ...; none: connected components are its parts.
+    pub part_of_triangle: Option<Vec<usize>>,
+}
+
+/// A scene from any source, ready to be numbered, unwrapped and looked at.
+#[derive(Clone, Debug)]
+pub struct SourceScene {
+    /// `bitterli` or `front3d`.
+    pub kind: &'static str,
+    /// What scenes that are not independent of each other have in common.
+    pub house: String,
+    /// The file that findings are about unless they say otherwise.
+    pub file: String,
+    /// World space; surface k becomes instance k.
+    pub scene: ReferenceScene,
+    /// One a surface.
+    pub origins: Vec<InstanceOrigin>,
+    /// The input view's.
+    pub camera: Camera,
+    /// What was wrong; sorted.
+    pub findings: Vec<Finding>,
+    /// The licence that came with it.
+    pub licence: Option<LicenceText>,
+    /// Every file read and its SHA-256 in hex; sorted.
+    pub files: Vec<(String, String)>,
+}
