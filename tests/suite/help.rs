@@ -67,11 +67,12 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 12] = [
+    let subcommands: [&[&str]; 13] = [
         &["demo"],
         &["sample"],
         &["prep"],
         &["prep", "build"],
+        &["prep", "survey"],
         &["prep", "render"],
         &["prep", "verify"],
         &["prep", "stats"],

@@ -1,5 +1,7 @@
 //! `mateval prep`.
 
+mod survey;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
@@ -20,6 +22,8 @@ use crate::outcome::{Outcome, print, say, say_findings};
 pub enum Command {
     /// Converts what a recipe lists into a dataset; goes on where it was killed.
     Build(BuildArgs),
+    /// Looks through 3D-FRONT houses for rooms that could be scenes: a page to pick from, and a recipe.
+    Survey(survey::SurveyArgs),
     /// Renders the dataset's RGB pictures.
     Render(RenderArgs),
     /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
@@ -130,6 +134,7 @@ pub struct MitsubaArgs {
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Build(args) => build(args),
+        Command::Survey(args) => survey::run(args),
         Command::Render(args) => render(args),
         Command::Verify(args) => verify(args),
         Command::Stats(args) => count(args),

@@ -6,6 +6,7 @@ use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
 use mateval_prep::render::RenderFile;
 use mateval_prep::stats::StatsFile;
+use mateval_prep::survey::SurveyFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile};
@@ -38,7 +39,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 9] {
+fn schemas() -> [(&'static str, Schema); 10] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -49,5 +50,6 @@ fn schemas() -> [(&'static str, Schema); 9] {
         ("submission", schema_for!(SubmissionFile)),
         ("result", schema_for!(ResultFile)),
         ("stats", schema_for!(StatsFile)),
+        ("survey", schema_for!(SurveyFile)),
     ]
 }

@@ -23,6 +23,14 @@ pub enum PrepError {
         /// All that is wrong with it.
         faults: Vec<String>,
     },
+    /// Rules or lists that cannot be read.
+    #[error("'{}': {what}", path.display())]
+    Rules {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// The output is in the way.
     #[error("'{}' {what}", path.display())]
     Output {

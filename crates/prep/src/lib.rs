@@ -22,6 +22,7 @@ pub mod render;
 pub mod sample;
 pub mod source;
 pub mod stats;
+pub mod survey;
 pub mod verify;
 pub mod views;
 

@@ -180,7 +180,8 @@ fn default_exposure() -> f64 {
     1.0
 }
 
-fn default_views() -> Vec<Offset> {
+/// The paper's four turns by five degrees.
+pub(crate) fn default_views() -> Vec<Offset> {
     [("up_left", 5.0, 5.0), ("up_right", 5.0, -5.0), ("down_left", -5.0, 5.0), ("down_right", -5.0, -5.0)]
         .map(|(id, x_deg, y_deg)| Offset { id: ViewId::new(id).expect("our own ids are ids"), x_deg, y_deg })
         .to_vec()

@@ -111,6 +111,14 @@ impl<'a> RoomSampler<'a> {
         Ok(Self { house, world, room, floor: [low, high] })
     }
 
+    /// Whether a place is above the room's floor's box, below six metres.
+    pub fn holds(&self, place: DVec3) -> bool {
+        let [low, high] = self.floor.map(|corner| corner.as_dvec3());
+        (low.x..=high.x).contains(&place.x)
+            && (low.z..=high.z).contains(&place.z)
+            && (0.0..6.0).contains(&(place.y - high.y))
+    }
+
     /// Draws until a camera keeps to the rules.
     pub fn sample(
         &self,
@@ -235,7 +243,8 @@ fn nearest(seen: &[(usize, f64)]) -> f64 {
 /// Rays of a side.
 const GRID: usize = 10;
 
-fn grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> {
+/// The places of ten by ten rays over the picture, corners included.
+pub(crate) fn grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> + use<> {
     let size = DVec2::new(f64::from(intrinsics.width), f64::from(intrinsics.height));
     let share = |k: usize| k as f64 / (GRID - 1) as f64;
     // A hair within the frame: its border belongs to the pixel beyond.

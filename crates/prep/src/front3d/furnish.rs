@@ -130,12 +130,14 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, Fr
         furniture_materials: BTreeMap::new(),
         texels: 0,
         triangles: 0,
+        untextured: 0,
         scene: ReferenceScene::default(),
         placed: Vec::new(),
     };
     furnisher.read_model_info();
     let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.room(&house, room)).collect();
     furnisher.note_private_pieces(&house);
+    furnisher.note_missing_textures();
     let cameras = cameras::all(&house, files, limits, &mut furnisher.log)?;
     let Furnisher { models, textures, log, scene, placed, .. } = furnisher;
     let libraries = [Some(models), textures].into_iter().flatten();
@@ -209,6 +211,8 @@ struct Furnisher {
     furniture_materials: BTreeMap<String, MaterialIndex>,
     texels: usize,
     triangles: usize,
+    /// Materials with a texture, where no folder of textures was given.
+    untextured: usize,
     scene: ReferenceScene,
     placed: Vec<Placed>,
 }
@@ -375,11 +379,7 @@ impl Furnisher {
             self.log.warn("bad_jid", &place, message, "took the colour");
             return None;
         }
-        if self.textures.is_none() {
-            let message = format!("the texture '{jid}', but no folder of textures was given");
-            self.log.warn("missing_texture", &place, message, "took the colour");
-            return None;
-        }
+        self.untextured += usize::from(self.textures.is_none());
         self.texture(jid, false)
     }
 
@@ -433,6 +433,13 @@ impl Furnisher {
             bump: None,
         });
         MaterialIndex(self.scene.materials.len() - 1)
+    }
+
+    fn note_missing_textures(&mut self) {
+        if self.untextured > 0 {
+            let message = format!("{} materials have a texture, and no folder of textures was given", self.untextured);
+            self.log.warn("no_textures", "/material", message, "took their colours");
+        }
     }
 
     /// Windows, doors and cabinets whose models are not public are no fault of anybody: one finding for all.

@@ -239,11 +239,16 @@ fn counts(scenes: &[SceneFile]) -> Counts {
         instances_with_atlas: instances().filter(|instance| instance.atlas.is_some()).count(),
         super_categories: super_categories(&objects),
         categories: categories(&objects),
-        findings: tally(findings.map(|finding| (finding.severity, finding.code.as_str())))
-            .into_iter()
-            .map(|((severity, code), count)| FindingCount { severity, code: code.to_owned(), count })
-            .collect(),
+        findings: finding_counts(findings),
     }
+}
+
+/// Findings by severity and code.
+pub(crate) fn finding_counts<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<FindingCount> {
+    tally(findings.map(|finding| (finding.severity, finding.code.as_str())))
+        .into_iter()
+        .map(|((severity, code), count)| FindingCount { severity, code: code.to_owned(), count })
+        .collect()
 }
 
 /// Where a super-category stands: the eight first.

@@ -1,0 +1,285 @@
+//! The rooms of one house: what they are like, and cameras in them with what these see.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use glam::{DVec2, Vec2};
+use mateval_image::Picture;
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_scene::TriangleMesh;
+use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::ids::id_text_from;
+use mateval_tracer::World;
+use mateval_tracer::aov::hit_through;
+use rayon::prelude::*;
+
+use super::intersect::intersecting_pairs;
+use super::rules::{Rejection, RoomFacts};
+use super::{CandidateCamera, SurveyOptions, SurveyedRoom};
+use crate::error::PrepError;
+use crate::front3d::camera_sampler::{RoomSampler, SamplerRules, score};
+use crate::front3d::{FurnishedHouse, Role};
+use crate::recipe::Offset;
+
+/// Width of thumbnails.
+const THUMBNAIL: u32 = 320;
+
+/// A house looked through.
+pub(super) struct HouseSurvey {
+    pub(super) rooms: Vec<SurveyedRoom>,
+    /// Files, relative to the survey's folder.
+    pub(super) pictures: Vec<(String, Picture<[u8; 3]>)>,
+}
+
+/// Looks through all rooms.
+pub(super) fn look_through(options: &SurveyOptions, house: &FurnishedHouse) -> Result<HouseSurvey, PrepError> {
+    let world = World::new(Arc::new(house.scene.clone()))?;
+    let look = Look { options, house, world: &world, views: crate::recipe::default_views() };
+    let rooms = (0..house.house.rooms.len()).map(|room| look.room(room)).collect::<Result<Vec<_>, PrepError>>()?;
+    let mut survey = HouseSurvey { rooms: Vec::new(), pictures: Vec::new() };
+    for (room, pictures) in rooms {
+        survey.rooms.push(room);
+        survey.pictures.extend(pictures);
+    }
+    Ok(survey)
+}
+
+struct Look<'a> {
+    options: &'a SurveyOptions,
+    house: &'a FurnishedHouse,
+    world: &'a World,
+    views: Vec<Offset>,
+}
+
+/// A camera and where it is from.
+struct Posed {
+    origin: String,
+    camera: Camera,
+    fov_y_deg: f64,
+}
+
+type NamedPicture = (String, Picture<[u8; 3]>);
+
+impl Look<'_> {
+    fn room(&self, room: usize) -> Result<(SurveyedRoom, Vec<NamedPicture>), PrepError> {
+        let facts = self.facts(room)?;
+        let source = &self.house.house.rooms[room];
+        let mut rejections = self.options.rules.check(&facts);
+        rejections.extend(self.listed(room));
+        let (mut cameras, mut pictures) = (Vec::new(), Vec::new());
+        if rejections.is_empty() {
+            let (found, refused) = self.cameras(room);
+            if found.is_empty() {
+                rejections.push(Rejection::new("no_camera", refused.join("; ")));
+            }
+            for (camera, picture) in found {
+                pictures.push((camera.thumbnail.clone(), picture));
+                cameras.push(camera);
+            }
+        }
+        let surveyed = SurveyedRoom {
+            room: source.id.clone(),
+            room_type: facts.kind,
+            objects: facts.objects,
+            super_categories: facts.super_categories,
+            size_m: facts.size_m,
+            intersecting: facts.intersecting,
+            missing: facts.missing,
+            rejections,
+            cameras,
+        };
+        Ok((surveyed, pictures))
+    }
+
+    fn facts(&self, room: usize) -> Result<RoomFacts, PrepError> {
+        let house = self.house;
+        let furniture: Vec<usize> = (0..house.placed.len()).filter(|&k| self.is_furniture_of(k, room)).collect();
+        let meshes: Vec<&TriangleMesh> = furniture.iter().map(|&k| &house.scene.surfaces[k].mesh).collect();
+        let name = |place: usize| house.scene.surfaces[furniture[place]].name.clone();
+        let pairs = intersecting_pairs(&meshes)?;
+        let complete = |k: &&usize| matches!(house.placed[**k].role, Role::Furniture { complete: true, .. });
+        let kinds: BTreeSet<&str> =
+            furniture.iter().filter_map(|&k| house.placed[k].origin.super_category.as_deref()).collect();
+        Ok(RoomFacts {
+            kind: house.house.rooms[room].kind.clone(),
+            objects: furniture.len(),
+            super_categories: kinds.len(),
+            size_m: self.size_m(room),
+            intersecting: pairs.into_iter().map(|[a, b]| [name(a), name(b)]).collect(),
+            missing: house.wanted_pieces[room] - furniture.iter().filter(complete).count(),
+        })
+    }
+
+    fn is_furniture_of(&self, surface: usize, room: usize) -> bool {
+        let placed = &self.house.placed[surface];
+        placed.room == room && matches!(placed.role, Role::Furniture { .. })
+    }
+
+    fn size_m(&self, room: usize) -> [f64; 2] {
+        let is_floor = |k: &usize| {
+            let placed = &self.house.placed[*k];
+            placed.room == room && matches!(&placed.role, Role::Architecture { kind } if kind == "Floor")
+        };
+        let floors = (0..self.house.placed.len()).filter(is_floor);
+        let positions: Vec<glam::Vec3> =
+            floors.flat_map(|k| self.house.scene.surfaces[k].mesh.positions.iter().copied()).collect();
+        let low = positions.iter().copied().reduce(glam::Vec3::min).unwrap_or_default();
+        let high = positions.iter().copied().reduce(glam::Vec3::max).unwrap_or_default();
+        [f64::from(high.x - low.x), f64::from(high.z - low.z)]
+    }
+
+    /// The room, its house, and its models may each be listed.
+    fn listed(&self, room: usize) -> Vec<Rejection> {
+        let lists = &self.options.lists;
+        let jids: BTreeSet<&str> = (0..self.house.placed.len())
+            .filter(|&k| self.house.placed[k].room == room)
+            .filter_map(|k| match &self.house.placed[k].role {
+                Role::Furniture { jid, .. } => Some(jid.as_str()),
+                Role::Architecture { .. } => None,
+            })
+            .collect();
+        let ids = [self.house.house.rooms[room].id.as_str(), self.house.house.uid.as_str()];
+        ids.into_iter().chain(jids).filter_map(|id| lists.reason(id)).collect()
+    }
+
+    /// Drawn cameras and the designers' in this room that keep to the rules, the best score first; and why others do not.
+    fn cameras(&self, room: usize) -> (Vec<(CandidateCamera, Picture<[u8; 3]>)>, Vec<String>) {
+        let (posed, mut refused) = self.posed(room);
+        let mut found = Vec::new();
+        for Posed { origin, camera, fov_y_deg } in posed {
+            match self.candidate(room, &origin, camera, fov_y_deg) {
+                Ok(candidate) => found.push(candidate),
+                Err(why) => refused.push(format!("{origin}: {why}")),
+            }
+        }
+        found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score).then(a.0.scene.cmp(&b.0.scene)));
+        (found, refused)
+    }
+
+    /// Every camera that may be tried in a room; and why no more are drawn.
+    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<String>) {
+        let [width, height] = self.options.resolution;
+        let sampler = match RoomSampler::new(self.house, self.world, room) {
+            Ok(sampler) => sampler,
+            Err(why) => return (Vec::new(), vec![why]),
+        };
+        let (mut posed, mut refused) = (Vec::new(), Vec::new());
+        let turns: Vec<[f64; 2]> = self.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
+        let fov_y_deg = self.options.fov_y_deg;
+        let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
+        for number in 0..self.options.cameras_per_room {
+            let seed = self.options.seed + u64::from(number);
+            match sampler.sample(intrinsics, &turns, &SamplerRules::default(), seed) {
+                Ok(drawn) => posed.push(Posed { origin: format!("seed {seed}"), camera: drawn.camera, fov_y_deg }),
+                Err(why) => {
+                    // Another seed would take as long and hardly do better.
+                    refused.push(format!("seed {seed}: {why}"));
+                    break;
+                }
+            }
+        }
+        let own = self.house.cameras.iter().filter(|camera| sampler.holds(camera.position));
+        posed.extend(own.filter_map(|camera| {
+            let intrinsics = Intrinsics::from_fov_y(width, height, camera.fov_y_deg.to_radians());
+            let posed = Camera::look_at(camera.position, camera.target, glam::DVec3::Y, intrinsics)?;
+            Some(Posed { origin: format!("designer {}", camera.number), camera: posed, fov_y_deg: camera.fov_y_deg })
+        }));
+        (posed, refused)
+    }
+
+    /// What a camera sees; in words which rule it breaks.
+    fn candidate(
+        &self,
+        room: usize,
+        origin: &str,
+        camera: Camera,
+        fov_y_deg: f64,
+    ) -> Result<(CandidateCamera, Picture<[u8; 3]>), String> {
+        let small = thumbnail_camera(&camera);
+        let seen = self.seen(&small);
+        let pieces: BTreeSet<usize> =
+            seen.iter().flatten().map(|hit| hit.0).filter(|&k| self.is_furniture_of(k, room)).collect();
+        let turned = self.views.iter().map(|view| self.seen(&small.turned(view.x_deg, view.y_deg)));
+        let misses = |seen: &[Option<Seen>]| seen.iter().filter(|hit| hit.is_none()).count();
+        let all = misses(&seen) + turned.map(|seen| misses(&seen)).sum::<usize>();
+        let outside = all as f64 / (seen.len() * (1 + self.views.len())) as f64;
+        let rules = &self.options.rules;
+        if outside > rules.max_outside {
+            return Err(format!("{:.0} % of the pixels see the outside", 100.0 * outside));
+        }
+        if pieces.len() < rules.min_seen_objects {
+            return Err(format!("it sees {} pieces of furniture", pieces.len()));
+        }
+        let surfaces: Vec<usize> =
+            grid_of(&small).iter().filter_map(|place| Some(self.look_at(&small, *place)?.0)).collect();
+        let position = camera.position();
+        let forward = camera.rotation() * -glam::DVec3::Z;
+        let scene = self.scene_id(room, origin);
+        let candidate = CandidateCamera {
+            thumbnail: format!("thumbnails/{scene}.png"),
+            scene,
+            origin: origin.to_owned(),
+            position: position.to_array(),
+            target: (position + forward).to_array(),
+            fov_y_deg,
+            score: score(self.house, &surfaces),
+            nearest_m: seen.iter().flatten().map(|hit| hit.1).fold(f64::INFINITY, f64::min),
+            outside,
+            seen_objects: pieces.len(),
+        };
+        let (width, height) = (small.intrinsics.width as usize, small.intrinsics.height as usize);
+        let picture = Picture::from_fn(width, height, |x, y| seen[y * width + x].map_or(OUTSIDE, |hit| hit.2));
+        Ok((candidate, picture))
+    }
+
+    /// Room, house and camera, so that ids stay the same whatever else is picked.
+    fn scene_id(&self, room: usize, origin: &str) -> String {
+        let house: String = self.house.house.uid.chars().take(8).collect();
+        let room: String = self.house.house.rooms[room].id.chars().take(28).collect();
+        id_text_from(&format!("{room}-{house}-{}", origin.replace(' ', "")), "room")
+    }
+
+    fn seen(&self, camera: &Camera) -> Vec<Option<Seen>> {
+        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+        let place = |k: usize| DVec2::new((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
+        (0..width * height).into_par_iter().map(|k| self.look_at(camera, place(k))).collect()
+    }
+
+    fn look_at(&self, camera: &Camera, place: DVec2) -> Option<Seen> {
+        let hit = hit_through(self.world, camera, place)?;
+        let surface = &self.house.scene.surfaces[hit.surface.0];
+        let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
+        let material = &self.house.scene.materials[surface.material.0];
+        let color = material.appearance(self.world.textures(), uv).map_or([0.5; 3], |seen| seen.base_color);
+        let distance = camera.camera_direction(place).length() * hit.depth;
+        // As if lit by a lamp on the camera: shapes show, and no path is traced.
+        let facing = hit.normal.as_dvec3().dot(camera.direction(place)).abs() as f32;
+        let shade = 0.25 + 0.75 * facing;
+        Some((hit.surface.0, distance, color.map(|v| byte_from_unit(srgb_from_linear(v * shade)))))
+    }
+}
+
+/// Surface, distance in metres, colour as sRGB bytes.
+type Seen = (usize, f64, [u8; 3]);
+
+/// The colour of what is outside: none that a room has.
+const OUTSIDE: [u8; 3] = [255, 0, 255];
+
+fn thumbnail_camera(camera: &Camera) -> Camera {
+    let old = camera.intrinsics;
+    let scale = f64::from(THUMBNAIL) / f64::from(old.width);
+    let height = (f64::from(old.height) * scale).round().max(1.0);
+    let intrinsics = Intrinsics {
+        width: THUMBNAIL,
+        height: height as u32,
+        fx: old.fx * scale,
+        fy: old.fy * scale,
+        cx: old.cx * scale,
+        cy: (old.cy - f64::from(old.height) / 2.0) * scale + height / 2.0,
+    };
+    Camera { intrinsics, ..*camera }
+}
+
+fn grid_of(camera: &Camera) -> Vec<DVec2> {
+    crate::front3d::camera_sampler::grid(&camera.intrinsics).collect()
+}

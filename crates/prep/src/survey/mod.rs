@@ -1,0 +1,264 @@
+//! Looks through houses for rooms that could be scenes: a page to pick from, a recipe, and why the others were rejected.
+//!
+//! In: houses, models, textures, rules, lists. Out: [`SurveyFile`] with every room, and beside it thumbnails, an HTML
+//! page and a recipe that pins the SHA-256 of everything it is made of. Rooms and cameras depend on houses and seed alone.
+//!
+//! Between: [`rules`] say what a room must be like, [`intersect`] finds furniture in furniture, `candidates` finds cameras
+//! and looks through them, `recipe_text` and `page` write.
+
+mod candidates;
+pub mod intersect;
+mod page;
+mod recipe_text;
+pub mod rules;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mateval_image::png_io::write_rgb_bytes;
+use mateval_image::store::write_whole;
+use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::{Progress, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::PrepError;
+use crate::front3d::{self, HouseFiles};
+use crate::stats::{FindingCount, finding_counts};
+use candidates::HouseSurvey;
+use rules::{Rejection, RejectionLists, SelectionRules};
+
+/// The word for this version of the file.
+pub const SURVEY_FORMAT: &str = "mateval-survey/1";
+
+/// Its place in the output's folder.
+pub const SURVEY: &str = "survey.json";
+
+/// What to look through, and how.
+#[derive(Clone, Debug)]
+pub struct SurveyOptions {
+    /// Folder that all paths are relative to, as in a recipe.
+    pub source: PathBuf,
+    /// Houses, or folders of houses.
+    pub houses: Vec<PathBuf>,
+    /// 3D-FUTURE's folder.
+    pub models: PathBuf,
+    /// The layout's textures.
+    pub textures: Option<PathBuf>,
+    /// Designers' cameras beside the houses.
+    pub cameras: Option<PathBuf>,
+    /// What a room must be like.
+    pub rules: SelectionRules,
+    /// What is known to be bad.
+    pub lists: RejectionLists,
+    /// Of the cameras.
+    pub seed: u64,
+    /// Cameras drawn a room.
+    pub cameras_per_room: u32,
+    /// Pictures of the scenes.
+    pub resolution: [u32; 2],
+    /// Of drawn cameras, degrees.
+    pub fov_y_deg: f64,
+    /// The output's folder.
+    pub out: PathBuf,
+    /// Replace a survey that is there.
+    pub force: bool,
+}
+
+/// `survey.json`: every room that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyFile {
+    /// Always `mateval-survey/1`.
+    pub format: String,
+    /// What made it, as in `mateval 0.1.0`.
+    pub tool: String,
+    /// Of the cameras.
+    pub seed: u64,
+    /// Houses in the order of their files.
+    pub houses: Vec<SurveyedHouse>,
+}
+
+/// A house.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyedHouse {
+    /// Its file, relative to the source's folder.
+    pub file: String,
+    /// Its uid; null where it could not be read.
+    pub uid: Option<String>,
+    /// Why it could not be read; null where it could.
+    pub error: Option<String>,
+    /// What was wrong with it, by severity and code.
+    pub findings: Vec<FindingCount>,
+    /// Its rooms, in the file's order.
+    pub rooms: Vec<SurveyedRoom>,
+}
+
+/// A room.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyedRoom {
+    /// Its instanceid.
+    pub room: String,
+    /// Its type.
+    pub room_type: String,
+    /// Pieces of furniture placed.
+    pub objects: usize,
+    /// Different super-categories of them.
+    pub super_categories: usize,
+    /// Sides of its floor's box, metres; zeros without a floor.
+    pub size_m: [f64; 2],
+    /// Pairs of pieces that stand in each other.
+    pub intersecting: Vec<[String; 2]>,
+    /// Valid pieces without their model or texture.
+    pub missing: usize,
+    /// Why it is not offered as a scene; empty where it is.
+    pub rejections: Vec<Rejection>,
+    /// Cameras to choose from, the best score first.
+    pub cameras: Vec<CandidateCamera>,
+}
+
+/// A camera to choose.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CandidateCamera {
+    /// The scene's id in the recipe.
+    pub scene: String,
+    /// `seed 3`, or `designer 5`.
+    pub origin: String,
+    /// Metres.
+    pub position: [f64; 3],
+    /// A point in the middle of the picture, metres.
+    pub target: [f64; 3],
+    /// Vertical field of view, degrees.
+    pub fov_y_deg: f64,
+    /// BlenderProc's coverage score of the input view.
+    pub score: f64,
+    /// Metres to the nearest thing in the input view.
+    pub nearest_m: f64,
+    /// Share of the five views' pixels that see the outside.
+    pub outside: f64,
+    /// Pieces of furniture that the input view sees.
+    pub seen_objects: usize,
+    /// Its picture, relative to this file.
+    pub thumbnail: String,
+}
+
+/// Looks through all houses and writes survey, page, thumbnails and recipe. A house that cannot be read is told in the
+/// survey and does not stop it.
+pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<SurveyFile, PrepError> {
+    let houses = house_files(options)?;
+    if options.out.exists() && !options.force {
+        let what = "is already there; choose another --out, or add --force to replace it".to_owned();
+        return Err(PrepError::Output { path: options.out.clone(), what });
+    }
+    let is_survey = options.out.join(SURVEY).is_file();
+    if options.out.exists() && !is_survey {
+        let what = "is there and is no survey: it is not replaced; choose another --out".to_owned();
+        return Err(PrepError::Output { path: options.out.clone(), what });
+    }
+    let work = WorkFolder::start(&options.out)?;
+    let thumbnails = work.path().join("thumbnails");
+    std::fs::create_dir_all(&thumbnails).map_err(PrepError::io("make", &thumbnails))?;
+    let mut file =
+        SurveyFile { format: SURVEY_FORMAT.to_owned(), tool: tool.to_owned(), seed: options.seed, houses: Vec::new() };
+    let mut texts = RecipeTexts { head: recipe_text::head(options), ..Default::default() };
+    for (at, house) in houses.iter().enumerate() {
+        progress(&format!("house {}", house.display()), at, houses.len());
+        file.houses.push(survey_house(options, house, work.path(), &mut texts)?);
+    }
+    json::write(&work.path().join(SURVEY), &file)?;
+    write_whole(&work.path().join("recipe.toml"), texts.of_best(&file).as_bytes())?;
+    write_whole(&work.path().join("index.html"), page::page(&file, &texts).as_bytes())?;
+    work.finish()?;
+    Ok(file)
+}
+
+/// Pieces of recipes, for whatever is picked.
+#[derive(Debug, Default, Serialize)]
+struct RecipeTexts {
+    head: String,
+    /// By scene.
+    scenes: BTreeMap<String, String>,
+    /// By the house's file.
+    inputs: BTreeMap<String, String>,
+}
+
+impl RecipeTexts {
+    /// The best camera of every room that is offered.
+    fn of_best(&self, survey: &SurveyFile) -> String {
+        let mut text = self.head.clone();
+        for house in &survey.houses {
+            for camera in house.rooms.iter().filter_map(|room| room.cameras.first()) {
+                text.push_str(&self.scenes[&camera.scene]);
+                text.push_str(&self.inputs[&house.file]);
+            }
+        }
+        text
+    }
+}
+
+fn survey_house(
+    options: &SurveyOptions,
+    house: &Path,
+    out: &Path,
+    texts: &mut RecipeTexts,
+) -> Result<SurveyedHouse, PrepError> {
+    let files = HouseFiles {
+        root: options.source.clone(),
+        house: house.to_owned(),
+        models: options.models.clone(),
+        textures: options.textures.clone(),
+        cameras: options.cameras.clone(),
+        blenderproc_compat: false,
+    };
+    let shown = house.to_string_lossy().replace('\\', "/");
+    let furnished = match front3d::furnish(&files, &front3d::Limits::default()) {
+        Ok(furnished) => furnished,
+        Err(error) => {
+            let error = Some(error.to_string());
+            return Ok(SurveyedHouse { file: shown, uid: None, error, findings: Vec::new(), rooms: Vec::new() });
+        }
+    };
+    let HouseSurvey { rooms, pictures } = candidates::look_through(options, &furnished)?;
+    for (name, picture) in pictures {
+        write_rgb_bytes(&out.join(name), &picture)?;
+    }
+    for room in &rooms {
+        for camera in &room.cameras {
+            let text = recipe_text::scene(options, &shown, &room.room, camera);
+            texts.scenes.insert(camera.scene.clone(), text);
+        }
+    }
+    texts.inputs.insert(shown.clone(), recipe_text::inputs(&furnished.files));
+    Ok(SurveyedHouse {
+        file: shown,
+        uid: Some(furnished.house.uid.clone()),
+        error: None,
+        findings: finding_counts(furnished.findings.iter()),
+        rooms,
+    })
+}
+
+/// The files, and all JSON files of the folders, sorted; relative to the source's folder.
+fn house_files(options: &SurveyOptions) -> Result<Vec<PathBuf>, PrepError> {
+    let mut files = Vec::new();
+    for path in &options.houses {
+        let at = options.source.join(path);
+        if !at.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let entries = std::fs::read_dir(&at).map_err(PrepError::io("list", &at))?;
+        let names = entries.flatten().map(|entry| path.join(entry.file_name()));
+        let mut names: Vec<PathBuf> = names.filter(|name| name.extension().is_some_and(|e| e == "json")).collect();
+        names.sort();
+        files.extend(names);
+    }
+    if files.is_empty() {
+        let what = "holds no house: expected JSON files of 3D-FRONT".to_owned();
+        return Err(PrepError::Output { path: options.source.clone(), what });
+    }
+    Ok(files)
+}

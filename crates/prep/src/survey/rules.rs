@@ -1,0 +1,200 @@
+//! Which rooms become scenes: limits in a TOML file, and lists of what is known to be bad.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::error::PrepError;
+
+/// What a room must be like. Every key may be left out of the file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SelectionRules {
+    /// Room types, as in `LivingDiningRoom`; any where empty.
+    pub room_types: Vec<String>,
+    /// Least pieces of furniture placed.
+    pub min_objects: usize,
+    /// Most of them.
+    pub max_objects: usize,
+    /// Least different super-categories.
+    pub min_super_categories: usize,
+    /// Longest sides of the floor's box, metres.
+    pub max_size_m: [f64; 2],
+    /// Most pairs of pieces that stand in each other.
+    pub max_intersecting: usize,
+    /// Most valid pieces without their model or their texture.
+    pub max_missing: usize,
+    /// Largest share of the five views' pixels that see the outside.
+    pub max_outside: f64,
+    /// Least pieces that the input view sees.
+    pub min_seen_objects: usize,
+}
+
+impl Default for SelectionRules {
+    /// Sizes are ATISS' for living rooms.
+    fn default() -> Self {
+        Self {
+            room_types: Vec::new(),
+            min_objects: 3,
+            max_objects: 60,
+            min_super_categories: 2,
+            max_size_m: [12.0, 12.0],
+            max_intersecting: 0,
+            max_missing: 0,
+            max_outside: 0.2,
+            min_seen_objects: 2,
+        }
+    }
+}
+
+/// A rule that a room breaks.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rejection {
+    /// The rule's key, `listed`, or `no_camera`.
+    pub rule: String,
+    /// What was expected and what was found.
+    pub reason: String,
+}
+
+impl Rejection {
+    pub(super) fn new(rule: &str, reason: impl Into<String>) -> Self {
+        Self { rule: rule.to_owned(), reason: reason.into() }
+    }
+}
+
+/// What is known of a room before cameras are tried.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct RoomFacts {
+    pub(super) kind: String,
+    pub(super) objects: usize,
+    pub(super) super_categories: usize,
+    pub(super) size_m: [f64; 2],
+    pub(super) intersecting: Vec<[String; 2]>,
+    pub(super) missing: usize,
+}
+
+impl SelectionRules {
+    /// Reads them from a TOML file.
+    pub fn read(path: &Path) -> Result<Self, PrepError> {
+        let text = std::fs::read_to_string(path).map_err(PrepError::io("read", path))?;
+        let faults = |what: String| PrepError::Rules { path: path.to_owned(), what };
+        toml::from_str(&text).map_err(|error| faults(error.to_string().trim_end().to_owned()))
+    }
+
+    /// Every rule that the room breaks.
+    pub(super) fn check(&self, room: &RoomFacts) -> Vec<Rejection> {
+        let mut broken = Vec::new();
+        let mut check = |holds: bool, rule: &str, reason: String| {
+            if !holds {
+                broken.push(Rejection::new(rule, reason));
+            }
+        };
+        let known_type = self.room_types.is_empty() || self.room_types.contains(&room.kind);
+        check(known_type, "room_types", format!("it is a {}", room.kind));
+        let least = format!("{} pieces of furniture, expected at least {}", room.objects, self.min_objects);
+        check(room.objects >= self.min_objects, "min_objects", least);
+        let most = format!("{} pieces of furniture, expected at most {}", room.objects, self.max_objects);
+        check(room.objects <= self.max_objects, "max_objects", most);
+        let kinds = room.super_categories;
+        let reason = format!("{kinds} super-categories, expected at least {}", self.min_super_categories);
+        check(kinds >= self.min_super_categories, "min_super_categories", reason);
+        let fits = room.size_m.iter().zip(&self.max_size_m).all(|(size, most)| size <= most);
+        let [width, depth] = room.size_m;
+        check(
+            fits,
+            "max_size_m",
+            format!("its floor is {width:.2} by {depth:.2} m, expected at most {:?}", self.max_size_m),
+        );
+        let pairs: Vec<String> = room.intersecting.iter().map(|[a, b]| format!("'{a}' in '{b}'")).collect();
+        let reason = format!("furniture stands in other furniture: {}", pairs.join(", "));
+        check(pairs.len() <= self.max_intersecting, "max_intersecting", reason);
+        let reason =
+            format!("{} pieces without their model or texture, expected at most {}", room.missing, self.max_missing);
+        check(room.missing <= self.max_missing, "max_missing", reason);
+        broken
+    }
+}
+
+/// Ids of rooms, houses or models that are not to be used, each with its reason.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RejectionLists {
+    reasons: BTreeMap<String, String>,
+}
+
+/// Most rows of all lists together.
+const MAX_ROWS: usize = 1_000_000;
+
+impl RejectionLists {
+    /// Adds a CSV file of rows `id,reason`; the reason may be missing, lines that begin with `#` are remarks.
+    pub fn add(&mut self, path: &Path) -> Result<(), PrepError> {
+        let fault = |what: String| PrepError::Rules { path: path.to_owned(), what };
+        let file = std::fs::File::open(path).map_err(PrepError::io("read", path))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut reader =
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(file);
+        for row in reader.records() {
+            let row = row.map_err(|error| fault(error.to_string()))?;
+            let Some(id) = row.get(0).map(str::trim).filter(|id| !id.is_empty()) else { continue };
+            let reason = row.get(1).map(str::trim).filter(|reason| !reason.is_empty()).unwrap_or("no reason given");
+            if self.reasons.len() >= MAX_ROWS {
+                return Err(fault(format!("more than {MAX_ROWS} rows in all")));
+            }
+            self.reasons.entry(id.to_owned()).or_insert_with(|| format!("'{id}' is in {name}: {reason}"));
+        }
+        Ok(())
+    }
+
+    /// Why something is not to be used.
+    pub(super) fn reason(&self, id: &str) -> Option<Rejection> {
+        self.reasons.get(id).map(|reason| Rejection::new("listed", reason.clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good() -> RoomFacts {
+        RoomFacts { kind: "Bedroom".into(), objects: 5, super_categories: 3, size_m: [4.0, 3.0], ..Default::default() }
+    }
+
+    #[test]
+    fn each_rule_is_told_by_its_name() {
+        let rules = SelectionRules { room_types: vec!["Bedroom".into()], ..Default::default() };
+        assert_eq!(rules.check(&good()), []);
+        let broken = |room: RoomFacts| rules.check(&room).into_iter().map(|r| r.rule).collect::<Vec<_>>().join(" ");
+        assert_eq!(broken(RoomFacts { kind: "Kitchen".into(), ..good() }), "room_types");
+        assert_eq!(broken(RoomFacts { objects: 2, ..good() }), "min_objects");
+        assert_eq!(broken(RoomFacts { objects: 61, ..good() }), "max_objects");
+        assert_eq!(broken(RoomFacts { super_categories: 1, ..good() }), "min_super_categories");
+        assert_eq!(broken(RoomFacts { size_m: [4.0, 12.5], ..good() }), "max_size_m");
+        assert_eq!(broken(RoomFacts { intersecting: vec![["a".into(), "b".into()]], ..good() }), "max_intersecting");
+        assert_eq!(broken(RoomFacts { missing: 1, ..good() }), "max_missing");
+        assert_eq!(broken(RoomFacts { missing: 1, objects: 0, ..good() }), "min_objects max_missing");
+    }
+
+    #[test]
+    fn lists_are_rows_of_id_and_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bad.csv");
+        std::fs::write(&path, "# rooms\nRoom-1,\"chairs, in tables\"\nRoom-2\n\n").unwrap();
+        let mut lists = RejectionLists::default();
+        lists.add(&path).unwrap();
+        assert_eq!(lists.reason("Room-1").unwrap().reason, "'Room-1' is in bad.csv: chairs, in tables");
+        assert_eq!(lists.reason("Room-2").unwrap().reason, "'Room-2' is in bad.csv: no reason given");
+        assert_eq!(lists.reason("# rooms"), None);
+        assert!(lists.add(&folder.path().join("none.csv")).is_err());
+    }
+
+    #[test]
+    fn rules_are_toml_and_unknown_words_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rules.toml");
+        std::fs::write(&path, "min_objects = 7\n").unwrap();
+        assert_eq!(SelectionRules::read(&path).unwrap(), SelectionRules { min_objects: 7, ..Default::default() });
+        std::fs::write(&path, "min_object = 7\n").unwrap();
+        assert!(SelectionRules::read(&path).unwrap_err().to_string().contains("min_object"));
+    }
+}
