@@ -70,8 +70,9 @@ fn picture_job(shot: &Shot, folder: &Path) -> Value {
     let mut world = [0.0; 3];
     for light in &scene.lights {
         match &light.emission {
-            Emission::Area { surfaces, radiance, two_sided } => {
+            Emission::Area { surfaces, radiance, map, two_sided } => {
                 assert!(two_sided, "Blender's lamps glow on both sides");
+                assert!(map.is_none(), "no scene here has a lamp with a map");
                 for surface in surfaces {
                     materials[surface.0]["radiance"] = json!(radiance);
                     materials[surface.0]["camera_visible"] = json!(light.camera_visible);

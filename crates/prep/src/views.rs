@@ -220,7 +220,8 @@ const OCCLUSION_SLACK: f64 = 1e-3;
 fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
     let mut glow = vec![Glow::default(); reference.surfaces.len()];
     for group in reference.lights.iter().filter(|group| group.camera_visible) {
-        if let Emission::Area { surfaces, radiance, two_sided } = &group.emission
+        // Wherever a map is black: such a surface is a lamp all over.
+        if let Emission::Area { surfaces, radiance, two_sided, map: _ } = &group.emission
             && radiance.iter().any(|v| *v > 0.0)
         {
             for SurfaceIndex(surface) in surfaces {
@@ -230,4 +231,36 @@ fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
         }
     }
     glow
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::TriangleMesh;
+    use mateval_scene::material::TextureIndex;
+    use mateval_scene::reference::{EmissionMap, LightGroup, MaterialIndex, Surface};
+
+    use super::*;
+
+    /// A lamp with a map glows on the sides that one without glows on; one of no radiance, or hidden, on none.
+    #[test]
+    fn a_map_changes_no_glow() {
+        let glow = |radiance: f32, mapped: bool, two_sided: bool, camera_visible: bool| {
+            let map = mapped.then(|| EmissionMap { texture: TextureIndex(0), uv: Default::default() });
+            let emission = Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [radiance; 3], map, two_sided };
+            let mesh = TriangleMesh::default();
+            let scene = ReferenceScene {
+                surfaces: vec![Surface { name: String::new(), mesh, material: MaterialIndex(0) }],
+                lights: vec![LightGroup { name: String::new(), emission, camera_visible }],
+                ..Default::default()
+            };
+            let glow = glow_of_surfaces(&scene)[0];
+            (glow.front, glow.back)
+        };
+        for mapped in [false, true] {
+            assert_eq!(glow(1.0, mapped, false, true), (true, false));
+            assert_eq!(glow(1.0, mapped, true, true), (true, true));
+            assert_eq!(glow(0.0, mapped, true, true), (false, false));
+            assert_eq!(glow(1.0, mapped, true, false), (false, false));
+        }
+    }
 }

@@ -2,11 +2,12 @@
 //!
 //! This is what truth is made from: the tracer renders it, `prep` bakes it.
 
+use glam::Vec2;
 use mateval_image::Texture;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::material::{Material, TextureIndex};
+use crate::material::{Material, TextureIndex, UvTransform};
 use crate::mesh::TriangleMesh;
 
 /// A place in [`ReferenceScene::materials`].
@@ -46,6 +47,25 @@ pub struct SourceTexture {
     pub texture: Texture,
 }
 
+/// A texture that says how a glowing surface's radiance differs from place to place, as a lamp's shade does.
+///
+/// It is looked up at the surface's own uv, zero where that has none, and multiplies the radiance channel by channel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EmissionMap {
+    /// Which; no texel below 0.
+    pub texture: TextureIndex,
+    /// Where in it.
+    pub uv: UvTransform,
+}
+
+impl EmissionMap {
+    /// What the radiance is multiplied by at the surface's `uv`, linear.
+    pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 3] {
+        textures[self.texture.0].sample(self.uv.apply(uv).to_array())
+    }
+}
+
 /// What emits light.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
@@ -56,6 +76,9 @@ pub enum Emission {
         surfaces: Vec<SurfaceIndex>,
         /// Linear Rec. 709 radiance, W/(m^2 sr) in the scene's own unit.
         radiance: [f32; 3],
+        /// Multiplies it, place by place; absent: it is the same all over.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        map: Option<EmissionMap>,
         /// Whether the back glows too; Mitsuba's does not, Blender's does.
         two_sided: bool,
     },

@@ -239,7 +239,10 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
     }
     for (at, group) in lights.groups.iter().enumerate() {
         let sound = match &group.emission {
-            Emission::Area { surfaces, .. } => surfaces.iter().all(|surface| surface.0 < nodes),
+            Emission::Area { surfaces, map, .. } => {
+                surfaces.iter().all(|surface| surface.0 < nodes)
+                    && map.is_none_or(|map| map.texture.0 < file.textures.len())
+            }
             Emission::Environment { texture, .. } => texture.0 < file.textures.len(),
             Emission::Constant { .. } => true,
         };
@@ -255,9 +258,9 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::material::{ColorInput, MaterialModel, ScalarInput, TextureIndex};
+    use crate::material::{ColorInput, MaterialModel, ScalarInput, TextureIndex, UvTransform};
     use crate::mesh::TriangleMesh;
-    use crate::reference::SurfaceIndex;
+    use crate::reference::{EmissionMap, SurfaceIndex};
 
     fn scene() -> ReferenceScene {
         let mesh = TriangleMesh {
@@ -297,6 +300,7 @@ mod tests {
                 emission: Emission::Area {
                     surfaces: vec![SurfaceIndex(0)],
                     radiance: [1.0, 2.0, 3.0],
+                    map: None,
                     two_sided: false,
                 },
                 camera_visible: true,
@@ -312,6 +316,63 @@ mod tests {
         assert_eq!(read(&folder).unwrap(), scene());
     }
 
+    /// A light without a map is written as it was before there were maps; one with a map comes back.
+    #[test]
+    fn maps_of_lights() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = SceneFolder::at(folder.path().to_owned());
+        write(&folder, &scene()).unwrap();
+        let text = std::fs::read_to_string(folder.lights()).unwrap();
+        let emission = r#""emission":{"type":"area","surfaces":[0],"radiance":[1.0,2.0,3.0],"two_sided":false}"#;
+        assert!(text.split_whitespace().collect::<String>().contains(emission), "{text}");
+
+        let mapped = |texture: usize| {
+            let mut scene = scene();
+            let Emission::Area { map, .. } = &mut scene.lights[0].emission else { unreachable!() };
+            let uv = UvTransform([[2.0, 0.0, 0.5], [0.0, -1.0, 1.0]]);
+            *map = Some(EmissionMap { texture: TextureIndex(texture), uv });
+            scene
+        };
+        // Its surface has no uv, which is no fault: see FORMAT.md.
+        write(&folder, &mapped(5)).unwrap();
+        assert_eq!(read(&folder).unwrap(), mapped(5));
+        for absent in [6, usize::MAX] {
+            write(&folder, &mapped(absent)).unwrap();
+            let text = read(&folder).unwrap_err().to_string();
+            assert!(text.contains("/groups/0"), "{text}");
+        }
+    }
+
+    /// What a stranger may write where a map should be is an error that names the file.
+    #[test]
+    fn hostile_maps() {
+        let folder = tempfile::tempdir().unwrap();
+        let folder = SceneFolder::at(folder.path().to_owned());
+        write(&folder, &scene()).unwrap();
+        let text = std::fs::read_to_string(folder.lights()).unwrap();
+        let read_with = |map: &str| {
+            let text = text.replace("\"radiance\"", &format!("\"map\": {map}, \"radiance\""));
+            std::fs::write(folder.lights(), text).unwrap();
+            read(&folder).map_err(|error| error.to_string())
+        };
+        let uv = "[[1, 0, 0], [0, 1, 0]]";
+        assert!(read_with(&format!("{{\"texture\": 0, \"uv\": {uv}}}")).is_ok());
+        assert_eq!(read_with("null").unwrap(), scene());
+        for map in [
+            "7".to_owned(),
+            "{}".to_owned(),
+            format!("{{\"texture\": -1, \"uv\": {uv}}}"),
+            format!("{{\"texture\": 1e30, \"uv\": {uv}}}"),
+            format!("{{\"texture\": 18446744073709551615, \"uv\": {uv}}}"),
+            format!("{{\"texture\": 0, \"uv\": {uv}, \"more\": 1}}"),
+            "{\"texture\": 0, \"uv\": [[1, 0], [0, 1]]}".to_owned(),
+            "{\"texture\": 0, \"uv\": [[1e999, 0, 0], [0, 1, 0]]}".to_owned(),
+        ] {
+            let error = read_with(&map).unwrap_err();
+            assert!(error.contains("lights.json"), "{map}: {error}");
+        }
+    }
+
     #[test]
     fn all_dangling_places_are_named_at_once() {
         let folder = tempfile::tempdir().unwrap();
@@ -321,7 +382,7 @@ mod tests {
         bad.materials[0].opacity =
             Some(ScalarInput::Texture { texture: TextureIndex(9), channel: 0, uv: Default::default() });
         bad.lights[0].emission =
-            Emission::Area { surfaces: vec![SurfaceIndex(3)], radiance: [1.0; 3], two_sided: false };
+            Emission::Area { surfaces: vec![SurfaceIndex(3)], radiance: [1.0; 3], map: None, two_sided: false };
         write(&folder, &bad).unwrap();
         let text = read(&folder).unwrap_err().to_string();
         for place in ["/surfaces/0/material", "/materials/0", "/groups/0"] {

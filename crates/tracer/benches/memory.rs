@@ -132,6 +132,7 @@ fn room(triangles: u32, lights: u32) -> ReferenceScene {
         emission: Emission::Area {
             surfaces: vec![SurfaceIndex(light as usize + 1)],
             radiance: [3.0; 3],
+            map: None,
             two_sided: true,
         },
         camera_visible: true,

@@ -11,6 +11,8 @@ mod closed_forms;
 mod estimators;
 #[path = "suite/light_basis.rs"]
 mod light_basis;
+#[path = "suite/mapped_lamps.rs"]
+mod mapped_lamps;
 #[path = "suite/same_bytes.rs"]
 mod same_bytes;
 #[path = "suite/scenes.rs"]

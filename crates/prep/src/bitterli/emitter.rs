@@ -18,7 +18,7 @@ impl<'a> Reader<'a> {
         if element.kind() == "area" {
             from.ignore(&["sampling_weight"]);
             let radiance = self.radiance(&mut from, "radiance", [1.0; 3]);
-            let emission = Emission::Area { surfaces: vec![surface], radiance, two_sided: false };
+            let emission = Emission::Area { surfaces: vec![surface], radiance, map: None, two_sided: false };
             self.add_light(LightGroup { name: owner.to_owned(), emission, camera_visible: true });
         } else {
             let message = format!("line {}: the emitter '{}' on a shape", element.line, shortened(element.kind()));

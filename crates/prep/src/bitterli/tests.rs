@@ -112,7 +112,8 @@ fn what_the_scene_says_is_there() {
     assert!(wood.two_sided && wood.name == "Wood" && wood.opacity == Some(ScalarInput::Constant(0.5)));
     let MaterialModel::Conductor { ior, .. } = scene.materials[1].model else { panic!("expected a conductor") };
     assert_eq!(ior, ConductorIor::EtaK { eta: [1.0, 2.0, 3.0], k: [4.0, 2.0, 1.0] });
-    let emission = Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [16.032; 3], two_sided: false };
+    let emission =
+        Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [16.032; 3], map: None, two_sided: false };
     assert_eq!(scene.lights[0].emission, emission);
     let Emission::Environment { scale, world_from_environment, .. } = scene.lights[1].emission else {
         panic!("expected an environment")
@@ -181,7 +182,7 @@ fn a_shape_without_bsdf_is_grey_and_a_lamp_black() {
     }
     assert_eq!(
         scene.lights[0].emission,
-        Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [1.0; 3], two_sided: false }
+        Emission::Area { surfaces: vec![SurfaceIndex(1)], radiance: [1.0; 3], map: None, two_sided: false }
     );
 }
 

@@ -3,29 +3,32 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use glam::Vec2;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture, Texture};
-use mateval_scene::reference::{Emission, LightGroup, ReferenceScene, SurfaceIndex};
+use mateval_scene::TriangleMesh;
+use mateval_scene::reference::{Emission, LightGroup, ReferenceScene, Surface, SurfaceIndex};
 
 use super::element::Element;
 use super::remarks::Remarks;
+use super::texture;
+use super::unfolded::is_unfolded;
 
 /// What a surface glows with.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Glow {
-    radiance: [f32; 3],
+    /// The emitter of the shape; it glows on the shape's front.
+    pub(super) element: Element,
     pub(super) two_sided: bool,
 }
 
-impl Glow {
-    /// The emitter of a shape; it glows on the shape's front.
-    pub(super) fn element(&self) -> Element {
-        Element::plugin("emitter", "area").rgb("radiance", self.radiance)
-    }
-}
-
-/// Which surfaces glow, and with what.
-pub(super) fn glows(scene: &ReferenceScene, remarks: &mut Remarks) -> BTreeMap<SurfaceIndex, Glow> {
+/// Which surfaces glow, and with what; maps go to files below `folder`.
+pub(super) fn glows(
+    folder: &Path,
+    scene: &ReferenceScene,
+    textures: &[Texture],
+    remarks: &mut Remarks,
+) -> Result<BTreeMap<SurfaceIndex, Glow>, ImageError> {
     let mut glows = BTreeMap::new();
     for (index, group) in scene.lights.iter().enumerate() {
         let place = place(index, group);
@@ -33,17 +36,49 @@ pub(super) fn glows(scene: &ReferenceScene, remarks: &mut Remarks) -> BTreeMap<S
             let message = "Mitsuba cannot hide one light from the camera alone";
             remarks.warn("camera_invisible", &place, message, "wrote it visible");
         }
-        let Emission::Area { surfaces, radiance, two_sided } = &group.emission else { continue };
+        let Emission::Area { surfaces, radiance, map, two_sided } = &group.emission else { continue };
+        let bitmap = match map.filter(|map| differs(&textures[map.texture.0], radiance)) {
+            Some(map) => Some(texture::radiance(folder, index, &textures[map.texture.0], &map.uv, *radiance)?),
+            None => None,
+        };
+        // Without uv the map is looked up at one place.
+        let constant = map.map_or(*radiance, |map| product(radiance, &map.at(textures, Vec2::ZERO)));
         for surface in surfaces {
-            glows.insert(*surface, Glow { radiance: *radiance, two_sided: *two_sided });
-            let material = &scene.materials[scene.surfaces[surface.0].material.0];
-            if material.opacity.is_some() {
+            let Surface { mesh, material, .. } = &scene.surfaces[surface.0];
+            let area = Element::plugin("emitter", "area");
+            let element = match &bitmap {
+                Some(bitmap) if mesh.uvs.is_some() => {
+                    remark_folds(mesh, &place, remarks);
+                    area.child(bitmap.clone())
+                }
+                _ => area.rgb("radiance", constant),
+            };
+            glows.insert(*surface, Glow { element, two_sided: *two_sided });
+            if scene.materials[material.0].opacity.is_some() {
                 let message = "a masked surface glows; in Mitsuba it glows where it is masked out too";
                 remarks.warn("masked_light", &place, message, "wrote it as it is");
             }
         }
     }
-    glows
+    Ok(glows)
+}
+
+fn remark_folds(mesh: &TriangleMesh, place: &str, remarks: &mut Remarks) {
+    if !is_unfolded(mesh) {
+        let message = "uv of a textured light overlap or leave 0..1; Mitsuba finds its places by their uv";
+        remarks.warn("folded_light", place, message, "wrote it as it is; Mitsuba's picture of it is wrong");
+    }
+}
+
+/// Whether the light is not the same all over, nor black, which Mitsuba could not sample.
+fn differs(texture: &Texture, radiance: &[f32; 3]) -> bool {
+    let (width, height) = (texture.width(), texture.height());
+    let mut texels = (0..width * height).map(|k| texture.texel(k % width, k / width));
+    width * height > 1 && texels.any(|texel| product(radiance, &texel).iter().any(|v| *v > 0.0))
+}
+
+fn product(a: &[f32; 3], b: &[f32; 3]) -> [f32; 3] {
+    std::array::from_fn(|c| a[c] * b[c])
 }
 
 /// The light from far outside: Mitsuba takes one.

@@ -4,8 +4,8 @@
 //! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings: a warning for all that Mitsuba cannot say, which
 //! stands in the scene as the nearest that it can.
 //!
-//! Between: `sensor` turns the camera, `ply` writes meshes, `bsdf` materials (with `texture`), `emitter` lights,
-//! `element` the XML. Names of the source are remarks in the XML and nothing else, so they cannot lead anywhere.
+//! Between: `sensor` turns the camera, `ply` writes meshes, `bsdf` materials (with `texture`), `emitter` lights
+//! (with `texture` and `unfolded`), `element` the XML. Names of the source are remarks in the XML and nothing else, so they cannot lead anywhere.
 
 mod bsdf;
 mod element;
@@ -16,6 +16,7 @@ mod sensor;
 #[cfg(test)]
 mod tests;
 mod texture;
+mod unfolded;
 
 use std::path::{Path, PathBuf};
 
@@ -122,7 +123,7 @@ fn write_scene(
     for material in write_materials(scene, folder, &textures, remarks)? {
         document = document.child(material);
     }
-    let glows = emitter::glows(scene, remarks);
+    let glows = emitter::glows(folder, scene, &textures, remarks)?;
     for (index, surface) in scene.surfaces.iter().enumerate() {
         let glow = glows.get(&mateval_scene::reference::SurfaceIndex(index));
         for shape in write_surface(folder, index, surface, glow, remarks)? {
@@ -196,7 +197,7 @@ fn write_surface(
             .boolean("face_normals", !normals)
             .boolean("flip_tex_coords", false)
             .child(Element::new("ref").attribute("id", material_id(surface.material.0)));
-        shapes.push(glow.map_or(shape.clone(), |glow| shape.child(glow.element())));
+        shapes.push(glow.map_or(shape.clone(), |glow| shape.child(glow.element.clone())));
     }
     Ok(shapes)
 }

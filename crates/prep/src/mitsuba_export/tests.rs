@@ -1,11 +1,11 @@
 //! Whole exports: what is written, what is remarked, and that names lead nowhere.
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_image::{Texels, Wrap};
+use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
 use mateval_scene::material::{
-    ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex,
+    ColorInput, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
+use mateval_scene::reference::{Emission, EmissionMap, LightGroup, MaterialIndex, SourceTexture, SurfaceIndex};
 use mateval_scene::{Intrinsics, Severity, TriangleMesh};
 
 use super::*;
@@ -71,7 +71,7 @@ fn light(emission: Emission) -> LightGroup {
 }
 
 fn area(two_sided: bool) -> LightGroup {
-    light(Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [2.0; 3], two_sided })
+    light(Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [2.0; 3], map: None, two_sided })
 }
 
 fn textured() -> ScalarInput {
@@ -111,7 +111,12 @@ fn what_mitsuba_cannot_say_is_a_warning() {
     let hidden = || LightGroup { camera_visible: false, ..area(false) };
     let oren_nayar = MaterialModel::Diffuse { reflectance: GREY, alpha: Some(ScalarInput::Constant(0.3)) };
     let bright = MaterialModel::Diffuse { reflectance: ColorInput::Constant([1.5; 3]), alpha: None };
-    let cases: [(ReferenceScene, &[&str]); 12] = [
+    let folded = || {
+        let mut scene = mapped_lamp();
+        scene.surfaces[0].mesh.uvs = Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::X]);
+        scene
+    };
+    let cases: [(ReferenceScene, &[&str]); 14] = [
         (scene(vec![diffuse()]), &[]),
         (scene(vec![material(oren_nayar)]), &["oren_nayar"]),
         (scene(vec![material(bright)]), &["color_range"]),
@@ -124,6 +129,8 @@ fn what_mitsuba_cannot_say_is_a_warning() {
         (changed(&|scene| scene.lights = vec![sky(), sky()]), &["second_environment"]),
         (changed(&|scene| scene.materials = vec![masked()]), &[]),
         (changed(&|scene| (scene.materials, scene.lights) = (vec![masked()], vec![area(false)])), &["masked_light"]),
+        (mapped_lamp(), &[]),
+        (folded(), &["folded_light"]),
     ];
     for (scene, expected) in cases {
         assert_eq!(warnings(&scene), expected, "{scene:?}");
@@ -143,6 +150,57 @@ fn shapes_and_files() {
     assert!(text.contains("<string name=\"wrap_mode\" value=\"mirror\"/>"));
     assert!(text.contains("<integer name=\"max_depth\" value=\"18\"/>"));
     assert_eq!(exported(&ReferenceScene::default()).0, []);
+}
+
+/// The scene of one lamp of radiance (2, 3, 4) times the texture.
+fn mapped_lamp() -> ReferenceScene {
+    let mut scene = scene(vec![diffuse()]);
+    let uv = UvTransform([[2.0, 0.0, 0.0], [0.0, 1.0, 0.25]]);
+    let map = Some(EmissionMap { texture: TextureIndex(0), uv });
+    let surfaces = vec![SurfaceIndex(0)];
+    scene.lights = vec![light(Emission::Area { surfaces, radiance: [2.0, 3.0, 4.0], map, two_sided: false })];
+    scene
+}
+
+/// A textured light is a bitmap of its radiance, in floats; a constant where nothing differs.
+#[test]
+fn textured_lights() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    export(&mapped_lamp(), &camera(), &RenderSettings::default(), &out).unwrap();
+    let text = std::fs::read_to_string(out.join("scene.xml")).unwrap();
+    let emitter = &text[text.find("<emitter").unwrap()..text.find("</emitter>").unwrap()];
+    for part in [
+        "<texture type=\"bitmap\" name=\"radiance\">",
+        "textures/light_0.exr",
+        "<boolean name=\"raw\" value=\"true\"/>",
+        "value=\"mirror\"",
+        "value=\"2 0 0 0 0 -1 0 0.75 0 0 1 0 0 0 0 1\"",
+    ] {
+        assert!(emitter.contains(part), "{part}: {emitter}");
+    }
+    let picture = exr_io::read_linear(&out.join("textures/light_0.exr")).unwrap();
+    let expected = [0.0, 0.2, 0.4, 1.0].map(|share| LinearRgb([2.0 * share, 3.0 * share, 4.0 * share]));
+    for (found, expected) in picture.pixels().iter().zip(expected) {
+        assert!((0..3).all(|c| (found.0[c] - expected.0[c]).abs() < 1e-6), "{found:?} {expected:?}");
+    }
+
+    let constant = |change: &dyn Fn(&mut ReferenceScene)| {
+        let mut scene = mapped_lamp();
+        change(&mut scene);
+        assert_eq!(warnings(&scene), [""; 0]);
+        exported(&scene).1
+    };
+    let set = |scene: &mut ReferenceScene, texels: Vec<u8>, side: usize| {
+        scene.textures[0].texture = Texture::new(side, side, Texels::Grey8(texels), Wrap::Repeat).unwrap();
+    };
+    let half = constant(&|scene| set(scene, vec![51], 1));
+    assert!(half.contains("<rgb name=\"radiance\" value=\"0.4 0.6 0.8\"/>"), "{half}");
+    let black = constant(&|scene| set(scene, vec![0; 4], 2));
+    assert!(black.contains("<rgb name=\"radiance\" value=\"0 0 0\"/>"), "{black}");
+    // Looked up at uv (0, 0), that is at (0, 0.25): the lower left texel.
+    let without_uv = constant(&|scene| scene.surfaces[0].mesh.uvs = None);
+    assert!(without_uv.contains("<rgb name=\"radiance\" value=\"0.8 1.2 1.6\"/>"), "{without_uv}");
 }
 
 /// Names that would leave a folder, an attribute or a comment, or paint a terminal.

@@ -74,19 +74,43 @@ impl<'a> TextureFiles<'a> {
                 file
             }
         };
-        let wrap = match self.textures[index].wrap() {
-            Wrap::Repeat => "repeat",
-            Wrap::Clamp => "clamp",
-            Wrap::Mirror => "mirror",
-        };
-        Ok(Element::plugin("texture", "bitmap")
-            .named(name)
-            .string("filename", file)
-            .boolean("raw", channel.is_some())
-            .string("filter_type", "bilinear")
-            .string("wrap_mode", wrap)
-            .matrix("to_uv", rows_downwards(uv)))
+        Ok(bitmap(name, file, channel.is_some(), self.textures[index].wrap(), uv))
     }
+}
+
+/// The texture times `radiance`, as the parameter of that name of the lights of group `group`; written below `folder`.
+/// Floats that are taken as they are: Mitsuba scales no texture, and takes those of a light for reflectances unless `raw`.
+pub(super) fn radiance(
+    folder: &Path,
+    group: usize,
+    texture: &Texture,
+    uv: &UvTransform,
+    radiance: [f32; 3],
+) -> Result<Element, ImageError> {
+    let (width, height) = (texture.width(), texture.height());
+    let file = format!("textures/light_{group}.exr");
+    // Mitsuba wants two columns and two rows at least; a single one twice is looked up as the same.
+    let picture = Picture::from_fn(width.max(2), height.max(2), |x, y| {
+        let texel = texture.texel(x % width, y % height);
+        LinearRgb(std::array::from_fn(|c| radiance[c] * texel[c]))
+    });
+    exr_io::write_linear(&folder.join(&file), &picture, Precision::Float)?;
+    Ok(bitmap("radiance", file, true, texture.wrap(), uv))
+}
+
+fn bitmap(name: &'static str, file: String, raw: bool, wrap: Wrap, uv: &UvTransform) -> Element {
+    let wrap = match wrap {
+        Wrap::Repeat => "repeat",
+        Wrap::Clamp => "clamp",
+        Wrap::Mirror => "mirror",
+    };
+    Element::plugin("texture", "bitmap")
+        .named(name)
+        .string("filename", file)
+        .boolean("raw", raw)
+        .string("filter_type", "bilinear")
+        .string("wrap_mode", wrap)
+        .matrix("to_uv", rows_downwards(uv))
 }
 
 /// Mitsuba's v grows downwards in the picture, ours upwards; the mesh's uv are ours: v' = 1 - (ours).

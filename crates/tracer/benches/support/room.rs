@@ -79,7 +79,7 @@ pub fn lit(meshes: Vec<TriangleMesh>, size: u32) -> (ReferenceScene, Camera) {
         scene.surfaces.push(Surface { name: String::new(), mesh, material });
     }
     let surfaces = vec![SurfaceIndex(scene.surfaces.len() - 1)];
-    let emission = Emission::Area { surfaces, radiance: [8.0; 3], two_sided: false };
+    let emission = Emission::Area { surfaces, radiance: [8.0; 3], map: None, two_sided: false };
     scene.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
     (scene, camera(size))
 }

@@ -5,17 +5,28 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
 
 use super::distribution::Distribution;
+use super::radiance_map::RadianceMap;
 use crate::accel::TriangleIndex;
 use crate::surface_hit::SurfaceHit;
 use crate::triangle_record::TriangleRecord;
 use crate::warp;
 
+/// What surfaces glow with.
+#[derive(Clone, Debug)]
+pub(crate) struct Glow {
+    /// Linear Rec. 709.
+    pub(crate) radiance: Vec3,
+    /// Multiplies it.
+    pub(crate) map: Option<RadianceMap>,
+    /// Whether backs glow too.
+    pub(crate) two_sided: bool,
+}
+
 /// One or more surfaces of one light group, sampled together.
 #[derive(Debug)]
 pub(crate) struct AreaEmitter {
     pub(crate) light: LightIndex,
-    pub(crate) radiance: Vec3,
-    pub(crate) two_sided: bool,
+    glow: Glow,
     surfaces: Vec<SurfaceIndex>,
     /// For each of `surfaces` the number of triangles before it.
     starts: Vec<usize>,
@@ -108,8 +119,7 @@ impl AreaEmitter {
     pub(crate) fn new(
         scene: &ReferenceScene,
         light: LightIndex,
-        radiance: [f32; 3],
-        two_sided: bool,
+        glow: Glow,
         surfaces: Vec<SurfaceIndex>,
         scene_size: f32,
     ) -> Self {
@@ -125,11 +135,10 @@ impl AreaEmitter {
             .collect();
         let (centre, radius2) = bounding_sphere(&meshes);
         let triangles = Distribution::new(areas);
-        let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !two_sided));
+        let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !glow.two_sided));
         Self {
             light,
-            radiance: Vec3::from_array(radiance),
-            two_sided,
+            glow,
             triangles,
             records,
             surfaces,
@@ -159,7 +168,16 @@ impl AreaEmitter {
 
     /// Whether the side of `hit` towards `direction` glows.
     pub(crate) fn glows(&self, hit: &SurfaceHit, direction: Vec3) -> bool {
-        self.two_sided || hit.is_front(direction)
+        self.glow.two_sided || hit.is_front(direction)
+    }
+
+    /// What it sends from `place`, on a side that glows. How it is sampled does not follow from this: see the module.
+    #[inline]
+    pub(crate) fn radiance(&self, place: &SurfaceHit) -> Vec3 {
+        match &self.glow.map {
+            None => self.glow.radiance,
+            Some(map) => self.glow.radiance * map.at(place.uv),
+        }
     }
 }
 

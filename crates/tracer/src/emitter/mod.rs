@@ -7,6 +7,7 @@
 mod area;
 mod distribution;
 mod environment;
+mod radiance_map;
 
 use glam::Vec3;
 use mateval_image::Texture;
@@ -14,8 +15,9 @@ use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceInde
 
 use crate::error::TracerError;
 use crate::surface_hit::SurfaceHit;
-use area::{AreaEmitter, Outlines, TOGETHER};
+use area::{AreaEmitter, Glow, Outlines, TOGETHER};
 use environment::EnvironmentMap;
+use radiance_map::RadianceMap;
 
 /// All light groups of a scene.
 #[derive(Debug)]
@@ -108,8 +110,10 @@ impl Emitters {
         separate: bool,
     ) -> Result<(), String> {
         match emission {
-            Emission::Area { surfaces, radiance, two_sided } => {
+            Emission::Area { surfaces, radiance, map, two_sided } => {
                 check_radiance(radiance)?;
+                let map = map.as_ref().map(|map| RadianceMap::new(map, textures)).transpose()?;
+                let glow = Glow { radiance: Vec3::from_array(*radiance), map, two_sided: *two_sided };
                 let parts: Vec<&[SurfaceIndex]> =
                     if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
                 for part in parts {
@@ -119,14 +123,7 @@ impl Emitters {
                         part.iter().for_each(|surface| self.area_of[surface.0] = None);
                         continue;
                     }
-                    self.areas.push(AreaEmitter::new(
-                        scene,
-                        light,
-                        *radiance,
-                        *two_sided,
-                        part.to_vec(),
-                        self.scene_size,
-                    ));
+                    self.areas.push(AreaEmitter::new(scene, light, glow.clone(), part.to_vec(), self.scene_size));
                 }
             }
             Emission::Environment { texture, scale, world_from_environment } => {
@@ -197,7 +194,7 @@ impl Emitters {
         if !area.glows(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;
         }
-        let radiance = area.radiance * opacity(&place).clamp(0.0, 1.0);
+        let radiance = area.radiance(&place) * opacity(&place).clamp(0.0, 1.0);
         Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place) })
     }
 
@@ -230,7 +227,7 @@ impl Emitters {
         let distance2 = towards.length_squared();
         let cos = place.geometric_normal.dot(towards).abs() / distance2.sqrt();
         let density = probability * distance2 / (cos * area.area());
-        Some(Emitted { light: area.light, radiance: area.radiance, density })
+        Some(Emitted { light: area.light, radiance: area.radiance(place), density })
     }
 
     /// What arrives from far outside along a ray to `direction` that met nothing, one entry a group.
@@ -343,7 +340,7 @@ mod tests {
         };
         for k in 0..surfaces {
             let surfaces = vec![SurfaceIndex(k)];
-            light(Emission::Area { surfaces, radiance: [1.0; 3], two_sided: k % 2 == 0 });
+            light(Emission::Area { surfaces, radiance: [1.0; 3], map: None, two_sided: k % 2 == 0 });
         }
         if distant {
             light(Emission::Constant { radiance: [1.0; 3] });

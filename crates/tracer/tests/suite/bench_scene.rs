@@ -90,7 +90,7 @@ fn add_part(scene: &mut ReferenceScene, folder: &Path, part: &Value, mesh: Trian
     let radiance = rgb(&part["emission"]);
     if radiance.iter().any(|&v| v > 0.0) {
         let surfaces = vec![SurfaceIndex(scene.surfaces.len())];
-        let emission = Emission::Area { surfaces, radiance, two_sided: false };
+        let emission = Emission::Area { surfaces, radiance, map: None, two_sided: false };
         scene.lights.push(LightGroup { name: name.clone(), emission, camera_visible: true });
     }
     scene.surfaces.push(Surface { name, mesh, material });

@@ -82,7 +82,7 @@ pub fn view() -> Camera {
 }
 
 /// Whole and quarters within 4.5 standard errors.
-fn worst(a: &Renders, b: &Renders) -> f64 {
+pub fn worst(a: &Renders, b: &Renders) -> f64 {
     let quarter = |k: usize| (16 * (k % 2)..16 * (k % 2) + 16, 16 * (k / 2)..16 * (k / 2) + 16);
     let regions = (0..4).map(quarter).chain([(0..32, 0..32)]);
     regions.map(|(x, y)| a.region(x.clone(), y.clone()).z_against(&b.region(x, y)).abs()).fold(0.0, f64::max)
@@ -264,7 +264,7 @@ fn bad_scenes_are_refused() {
     refused(
         |s| {
             let surfaces = vec![SurfaceIndex(99)];
-            s.lights[0].emission = Emission::Area { surfaces, radiance: [1.0; 3], two_sided: false };
+            s.lights[0].emission = Emission::Area { surfaces, radiance: [1.0; 3], map: None, two_sided: false };
         },
         "light 0",
     );
@@ -289,7 +289,8 @@ fn lamps_without_triangles_are_dark() {
     let last = with.surfaces.len() - 1;
     with.surfaces[last].mesh = TriangleMesh::default();
     let mut light = with.lights[0].clone();
-    light.emission = Emission::Area { surfaces: vec![SurfaceIndex(last)], radiance: [1.0; 3], two_sided: false };
+    light.emission =
+        Emission::Area { surfaces: vec![SurfaceIndex(last)], radiance: [1.0; 3], map: None, two_sided: false };
     with.lights.push(light);
     let settings = RenderSettings { samples: 2, ..Default::default() };
     let picture =

@@ -3,8 +3,11 @@
 use std::sync::Arc;
 
 use glam::{DVec3, Vec2, Vec3};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
+use mateval_image::Texture;
+use mateval_scene::material::{ColorInput, Material, MaterialModel, TextureIndex, UvTransform};
+use mateval_scene::reference::{
+    Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
+};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use mateval_tracer::World;
 
@@ -77,7 +80,27 @@ impl Builder {
     /// Makes the surface that was added last glow on its front.
     pub fn glowing(self, radiance: [f32; 3]) -> Self {
         let last = SurfaceIndex(self.0.surfaces.len() - 1);
-        self.light(Emission::Area { surfaces: vec![last], radiance, two_sided: false })
+        self.light(Emission::Area { surfaces: vec![last], radiance, map: None, two_sided: false })
+    }
+
+    /// Multiplies the radiance of the light that was added last by `texture`, looked up by `uv`.
+    pub fn mapped(mut self, texture: Texture, uv: UvTransform) -> Self {
+        let index = TextureIndex(self.0.textures.len());
+        self.0.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
+        let Some(Emission::Area { map, .. }) = self.0.lights.last_mut().map(|group| &mut group.emission) else {
+            unreachable!("no surface has been made to glow")
+        };
+        *map = Some(EmissionMap { texture: index, uv });
+        self
+    }
+
+    /// Makes the light that was added last glow on both sides.
+    pub fn on_both_sides(mut self) -> Self {
+        let Some(Emission::Area { two_sided, .. }) = self.0.lights.last_mut().map(|group| &mut group.emission) else {
+            unreachable!("no surface has been made to glow")
+        };
+        *two_sided = true;
+        self
     }
 
     /// Adds light.
