@@ -2,14 +2,14 @@
 
 use glam::{DMat3, DMat4};
 use mateval_image::Wrap;
-use mateval_scene::reference::{Emission, LightGroup, SurfaceIndex};
+use mateval_scene::material::{ColorInput, TextureIndex};
+use mateval_scene::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
 
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::texture::{Bounds, mean_color};
 use crate::source::folder::SourceFolder;
-use crate::source::log::shortened;
+use super::texture::{Bounds, all_texels, mean_color};
 
 impl<'a> Reader<'a> {
     /// The emitter of a shape: it glows on its front side.
@@ -17,8 +17,8 @@ impl<'a> Reader<'a> {
         let mut from = self.parameters(element, format!("emitter of '{}'", shortened(owner)));
         if element.kind() == "area" {
             from.ignore(&["sampling_weight"]);
-            let radiance = self.radiance(&mut from, "radiance", [1.0; 3]);
-            let emission = Emission::Area { surfaces: vec![surface], radiance, map: None, two_sided: false };
+            let (radiance, map) = self.area_radiance(&mut from);
+            let emission = Emission::Area { surfaces: vec![surface], radiance, map, two_sided: false };
             self.add_light(LightGroup { name: owner.to_owned(), emission, camera_visible: true });
         } else {
             let message = format!("line {}: the emitter '{}' on a shape", element.line, shortened(element.kind()));
@@ -59,6 +59,34 @@ impl<'a> Reader<'a> {
         from.finish(&mut self.log);
     }
 
+    /// What a shape glows with: a constant, or 1 times a bitmap.
+    fn area_radiance(&mut self, from: &mut Parameters<'a>) -> ([f32; 3], Option<EmissionMap>) {
+        let Some(element) = from.take(&["radiance"]) else { return ([1.0; 3], None) };
+        if element.tag != "texture" {
+            return (self.constant(element, &from.place, Bounds::NotNegative).unwrap_or([1.0; 3]), None);
+        }
+        match self.color_bitmap(element, &from.place) {
+            ColorInput::Constant(rgb) => (rgb, None),
+            ColorInput::Texture { texture, uv } if self.is_light(texture) => {
+                ([1.0; 3], Some(EmissionMap { texture, uv }))
+            }
+            ColorInput::Texture { texture, .. } => {
+                let message = format!("line {}: a texture with values below 0 as radiance", element.line);
+                self.log.warn("out_of_range", &from.place, message, "used its mean colour, 0 where that is below");
+                (self.mean_of(texture).map(|v| v.max(0.0)), None)
+            }
+        }
+    }
+
+    fn is_light(&self, texture: TextureIndex) -> bool {
+        all_texels(&self.scene.textures[texture.0].texture, |texel| texel.iter().all(|v| *v >= 0.0))
+    }
+
+    fn mean_of(&self, texture: TextureIndex) -> [f32; 3] {
+        mean_color(&self.scene.textures[texture.0].texture).map(|v| v as f32)
+    }
+
+    /// What comes from everywhere outside: a constant.
     fn radiance(&mut self, from: &mut Parameters<'a>, name: &str, default: [f32; 3]) -> [f32; 3] {
         let Some(element) = from.take(&[name]) else { return default };
         if element.tag != "texture" {
@@ -66,14 +94,10 @@ impl<'a> Reader<'a> {
         }
         let message = format!("line {}: a texture as radiance", element.line);
         self.log.warn("unsupported", &from.place, message, "used its mean colour");
-        let mean = self.texture_mean(element, &from.place);
-        mean.unwrap_or(default)
-    }
-
-    /// The mean colour of a bitmap; none where it cannot be read.
-    fn texture_mean(&mut self, element: &'a Element, place: &str) -> Option<[f32; 3]> {
-        let index = self.color_texture(element, place)?;
-        Some(mean_color(&self.scene.textures[index.0].texture).map(|v| v as f32))
+        match self.color_bitmap(element, &from.place) {
+            ColorInput::Constant(rgb) => rgb,
+            ColorInput::Texture { texture, .. } => self.mean_of(texture).map(|v| v.max(0.0)),
+        }
     }
 
     fn environment_map(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<(&'static str, Emission)> {

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use mateval_image::Texels;
 use mateval_scene::Severity;
-use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput};
-use mateval_scene::reference::{Emission, SurfaceIndex};
+use mateval_scene::material::{ColorInput, ConductorIor, MaterialModel, ScalarInput, TextureIndex, UvTransform};
+use mateval_scene::reference::{Emission, EmissionMap, SurfaceIndex};
 use proptest::prelude::*;
 
 use super::*;
@@ -286,6 +286,28 @@ fn textures_are_decoded_shared_and_turned_upright() {
     let mesh = &scene.surfaces[0].mesh;
     let lower_left = mesh.uvs.as_ref().unwrap()[0] + glam::Vec2::new(0.25, -0.25);
     assert_eq!(scene.textures[0].texture.sample(lower_left.to_array()), [1.0, 0.0, 0.0]);
+}
+
+/// A shape's textured radiance is 1 times the texture, looked up as a material's would be; a world's is its mean.
+#[test]
+fn a_texture_as_radiance() {
+    let texture = "<texture name='radiance' type='bitmap'><string name='filename' value='a b.png'/>\
+                   <float name='uscale' value='2'/></texture>";
+    let BitterliScene { scene, findings, .. } =
+        read_inner(&format!("<shape type='rectangle'><emitter type='area'>{texture}</emitter></shape>"));
+    assert_eq!(findings, []);
+    let uv = UvTransform([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    let map = Some(EmissionMap { texture: TextureIndex(0), uv });
+    let emission = Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [1.0; 3], map, two_sided: false };
+    assert_eq!(scene.lights[0].emission, emission);
+    let world = read_inner(&format!("<emitter type='constant'>{texture}</emitter>"));
+    assert_eq!(codes(&world), ["unsupported"]);
+    assert!(matches!(world.scene.lights[0].emission, Emission::Constant { .. }));
+    let absent = texture.replace("a b.png", "none.png");
+    let absent = read_inner(&format!("<shape type='rectangle'><emitter type='area'>{absent}</emitter></shape>"));
+    assert_eq!(codes(&absent), ["missing_file"]);
+    let emission = Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [0.5; 3], map: None, two_sided: false };
+    assert_eq!(absent.scene.lights[0].emission, emission);
 }
 
 #[test]

@@ -54,21 +54,20 @@ impl<'a> Reader<'a> {
             let constant = self.constant(element, &from.place, Bounds::Share);
             return ColorInput::Constant(constant.unwrap_or([default; 3]));
         }
-        let Some(bitmap) = self.bitmap(element, &from.place) else { return ColorInput::Constant(MISSING) };
+        self.color_bitmap(element, &from.place)
+    }
+
+    /// The bitmap `element` as a colour; mid-grey, after a finding, where it cannot be read.
+    pub(super) fn color_bitmap(&mut self, element: &'a Element, place: &str) -> ColorInput {
+        let Some(bitmap) = self.bitmap(element, place) else { return ColorInput::Constant(MISSING) };
         if bitmap.channel.is_some() {
             let message = format!("line {}: one channel of a bitmap as a colour", element.line);
-            self.log.warn("unsupported", &from.place, message, "used all its channels");
+            self.log.warn("unsupported", place, message, "used all its channels");
         }
         match self.texture(&bitmap, Aspect::Color) {
             Some(texture) => ColorInput::Texture { texture, uv: bitmap.uv },
             None => ColorInput::Constant(MISSING),
         }
-    }
-
-    /// The bitmap `element` as colours; none, after a finding, where it cannot be read.
-    pub(super) fn color_texture(&mut self, element: &'a Element, place: &str) -> Option<TextureIndex> {
-        let bitmap = self.bitmap(element, place)?;
-        self.texture(&bitmap, Aspect::Color)
     }
 
     /// The number `name` from 0 to 1, or `default` where it is absent. A colour counts by its luminance, as in Mitsuba.
@@ -310,7 +309,7 @@ pub(super) fn luminance(rgb: [f32; 3]) -> f32 {
     0.212671 * rgb[0] + 0.715160 * rgb[1] + 0.072169 * rgb[2]
 }
 
-fn all_texels(texture: &Texture, holds: impl Fn([f32; 3]) -> bool) -> bool {
+pub(super) fn all_texels(texture: &Texture, holds: impl Fn([f32; 3]) -> bool) -> bool {
     (0..texture.height()).all(|y| (0..texture.width()).all(|x| holds(texture.texel(x, y))))
 }
 
