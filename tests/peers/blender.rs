@@ -6,7 +6,8 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_image::{Texels, Texture, Wrap};
+use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, UvTransform};
 use mateval_scene::reference::{Emission, ReferenceScene};
 use mateval_tracer::{RenderSettings, World};
 
@@ -68,6 +69,8 @@ enum Twin {
     Brighter,
     /// Lamps that the camera sees.
     Seen,
+    /// Maps of lamps left to right.
+    Turned,
 }
 
 impl Twin {
@@ -82,13 +85,16 @@ impl Twin {
             match self {
                 Self::Mitsuba => *flavour = PrincipledFlavour::Mitsuba,
                 Self::Rougher => *roughness += 0.05,
-                Self::Brighter | Self::Seen => (),
+                Self::Brighter | Self::Seen | Self::Turned => (),
             }
         }
         for light in &mut scene.lights {
             match (self, &mut light.emission) {
                 (Self::Brighter, Emission::Area { radiance, .. }) => *radiance = radiance.map(|r| 1.01 * r),
                 (Self::Seen, _) => light.camera_visible = true,
+                (Self::Turned, Emission::Area { map: Some(map), .. }) => {
+                    map.uv.0 = map.uv.0.map(|[along_u, along_v, shift]| [-along_u, along_v, along_u + shift]);
+                }
                 _ => (),
             }
         }
@@ -222,4 +228,25 @@ fn lamp_hidden_from_the_camera() {
     shot.camera = camera([0.1, 0.1, 0.95], [0.0, 0.1, -0.4], SIZE as u32, 75.0);
     let theirs = blender_job::render(std::slice::from_ref(&shot));
     assert_agrees(&shot, &theirs[0], Bounds { tiles: 0.01, whole: 0.002 }, &[Twin::Seen]);
+}
+
+/// A lamp of many colours, of both kinds: as BlenderProc's, whose radiance is a factor times a texture, and seen.
+#[test]
+fn lamps_with_a_map() {
+    let shots = [true, false].map(|hidden| {
+        let mut shot = principled_room(0.5, 0.0, 512);
+        shot.name = format!("room whose lamp has a map, {}", if hidden { "hidden from the camera" } else { "seen" });
+        let texels = (0..20).map(|k| [12 * k, 255 - 12 * k, 40 + 53 * k % 199].map(|v| v as u8)).collect();
+        let texture = Texture::new(5, 4, Texels::Srgb8(texels), Wrap::Repeat).unwrap();
+        let uv = UvTransform([[0.9, 0.2, -0.3], [-0.4, 1.3, 0.6]]);
+        let mut scene = Builder::from(shot.scene).mapped(texture, uv).scene();
+        let group = &mut scene.lights[0];
+        let Emission::Area { radiance, .. } = &mut group.emission else { unreachable!("the room has one lamp") };
+        (*radiance, group.camera_visible) = ([7.0; 3], !hidden);
+        shot.camera = camera([0.1, 0.1, 0.95], [0.0, 0.1, -0.4], SIZE as u32, 75.0);
+        Shot { scene, ..shot }
+    });
+    for (shot, theirs) in shots.iter().zip(blender_job::render(&shots)) {
+        assert_agrees(shot, &theirs, Bounds { tiles: 0.01, whole: 0.002 }, &[Twin::Turned, Twin::Brighter]);
+    }
 }

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use glam::Vec3;
-use mateval_image::{LinearRgb, Picture};
+use mateval_image::{LinearRgb, Picture, Wrap};
 use mateval_scene::material::{ColorInput, MaterialModel, ScalarInput};
-use mateval_scene::reference::{Emission, ReferenceScene};
+use mateval_scene::reference::{Emission, EmissionMap, ReferenceScene};
 use mateval_scene::{Camera, TriangleMesh};
 use serde_json::{Value, json};
 
@@ -67,13 +67,19 @@ fn picture_job(shot: &Shot, folder: &Path) -> Value {
     let surfaces = || scene.surfaces.iter().enumerate();
     let mut materials: Vec<Value> =
         surfaces().map(|(_, surface)| material_job(&scene.materials[surface.material.0].model)).collect();
-    let mut world = [0.0; 3];
+    let (mut world, mut maps) = ([0.0; 3], vec![None; scene.surfaces.len()]);
     for light in &scene.lights {
         match &light.emission {
             Emission::Area { surfaces, radiance, map, two_sided } => {
                 assert!(two_sided, "Blender's lamps glow on both sides");
-                assert!(map.is_none(), "no scene here has a lamp with a map");
                 for surface in surfaces {
+                    maps[surface.0] = *map;
+                    materials[surface.0]["map"] = json!(map.map(|map| map_job(
+                        scene,
+                        &map,
+                        radiance,
+                        &folder.join(format!("{}.texels", surface.0))
+                    )));
                     materials[surface.0]["radiance"] = json!(radiance);
                     materials[surface.0]["camera_visible"] = json!(light.camera_visible);
                 }
@@ -84,7 +90,7 @@ fn picture_job(shot: &Shot, folder: &Path) -> Value {
     }
     json!({
         "materials": materials,
-        "surfaces": surfaces().map(|(k, surface)| surface_job(&surface.mesh, k, folder)).collect::<Vec<_>>(),
+        "surfaces": surfaces().map(|(k, surface)| surface_job(&surface.mesh, k, maps[k], folder)).collect::<Vec<_>>(),
         "world": world,
         "camera": {
             "world_from_camera": shot.camera.world_from_camera,
@@ -119,18 +125,41 @@ fn material_job(model: &MaterialModel) -> Value {
     }
 }
 
-fn surface_job(mesh: &TriangleMesh, index: usize, folder: &Path) -> Value {
+/// The radiance that a map gives, as a picture whose rows run from the bottom, in `path`.
+fn map_job(scene: &ReferenceScene, map: &EmissionMap, radiance: &[f32; 3], path: &Path) -> Value {
+    let texture = &scene.textures[map.texture.0].texture;
+    let (width, height) = (texture.width(), texture.height());
+    let texels = (0..width * height).flat_map(|k| {
+        let [r, g, b] = texture.texel(k % width, height - 1 - k / width);
+        [r * radiance[0], g * radiance[1], b * radiance[2], 1.0]
+    });
+    std::fs::write(path, texels.flat_map(f32::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+    let extension = match texture.wrap() {
+        Wrap::Repeat => "REPEAT",
+        Wrap::Clamp => "EXTEND",
+        Wrap::Mirror => "MIRROR",
+    };
+    json!({ "texels": path, "width": width, "height": height, "extension": extension })
+}
+
+/// uv are those of the map, if there is one: nothing else is looked up.
+fn surface_job(mesh: &TriangleMesh, index: usize, map: Option<EmissionMap>, folder: &Path) -> Value {
     let write = |name: &str, bytes: Vec<u8>| -> PathBuf {
         let path = folder.join(format!("{index}.{name}"));
         std::fs::write(&path, bytes).unwrap();
         path
     };
     let floats = |vectors: &[Vec3]| vectors.iter().flat_map(|v| v.to_array()).flat_map(f32::to_le_bytes).collect();
+    let uvs = |map: EmissionMap| {
+        let uvs = mesh.uvs.as_ref().expect("a lamp with a map has uv");
+        write("uvs", uvs.iter().flat_map(|uv| map.uv.apply(*uv).to_array()).flat_map(f32::to_le_bytes).collect())
+    };
     let triangles = mesh.triangles.iter().flatten().flat_map(|corner| corner.to_le_bytes()).collect();
     json!({
         "material": index,
         "positions": write("positions", floats(&mesh.positions)),
         "normals": mesh.normals.as_ref().map(|normals| write("normals", floats(normals))),
+        "uvs": map.map(uvs),
         "triangles": write("triangles", triangles),
     })
 }

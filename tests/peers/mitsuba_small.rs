@@ -251,7 +251,8 @@ fn lit(name: &str, textures: Vec<Texture>, lights: impl FnOnce(Builder) -> Build
     builder = builder.surface(sheet, Material { two_sided: false, ..grey(0.7) });
     let mut scene = lights(builder).scene();
     let source = |texture| SourceTexture { name: String::new(), sha256: None, texture };
-    scene.textures = textures.into_iter().map(source).collect();
+    // A lamp's map is there already; an environment's would have to be the first, and no case has both.
+    scene.textures.extend(textures.into_iter().map(source));
     case(name, scene)
 }
 
@@ -290,6 +291,7 @@ fn lights() {
         *both = two_sided;
         Builder::from(scene)
     };
+    let mapped = |builder: Builder, scale: f32| builder.mapped(texture(Wrap::Mirror), shifted(scale));
     let upright = || quad(Vec3::new(-1.5, -0.4, 0.4), Vec3::new(0.3, 0.0, -0.8), Vec3::Y * 0.7);
     let constant = || Emission::Constant { radiance: [0.5, 0.6, 0.8] };
     let globe = || sphere(Vec3::new(0.6, 0.9, 0.6), 0.2, 12);
@@ -299,6 +301,8 @@ fn lights() {
         lit("area, both sides of a sheet", vec![], |builder| glow(builder, upright(), 5.0, true)),
         lit("area, as a point", vec![], |builder| glow(builder, panel(1.5, 0.02), 9000.0, false)),
         lit("area, a globe", vec![], |builder| glow(builder, globe(), 20.0, false)),
+        lit("area, textured", vec![], |builder| mapped(glow(builder, panel(1.5, 1.0), 5.0, false), 1.0)),
+        lit("area, textured, both sides", vec![], |builder| mapped(glow(builder, upright(), 5.0, true), -1.5)),
         lit("constant", vec![], |builder| builder.light(constant())),
         lit("environment", vec![sky()], |builder| builder.light(environment(0.8))),
         lit("all together", vec![sky()], |builder| {
@@ -351,8 +355,17 @@ fn slightly_wrong_lights_are_told() {
     let world = |radiance: f32| {
         lit("constant", vec![], |builder| builder.light(Emission::Constant { radiance: [radiance; 3] })).scene
     };
+    let mapped = |radiance: f32| {
+        let glowing = |builder: Builder| builder.surface(panel(), grey(0.3)).glowing([radiance; 3]);
+        lit("mapped lamp", vec![], |builder| glowing(builder).mapped(texture(Wrap::Repeat), shifted(1.0))).scene
+    };
     let map = |scale: f32| lit("map", vec![sky()], |builder| builder.light(environment(scale))).scene;
-    let pairs = [("lamp", lamp(5.0), lamp(5.05)), ("world", world(0.5), world(0.505)), ("map", map(0.8), map(0.808))];
+    let pairs = [
+        ("lamp", lamp(5.0), lamp(5.05)),
+        ("mapped lamp", mapped(8.0), mapped(8.08)),
+        ("world", world(0.5), world(0.505)),
+        ("map", map(0.8), map(0.808)),
+    ];
     let rendered = all_agree(pairs.iter().map(|(name, right, _)| case(name, right.clone())).collect());
     for (case, (name, _, wrong)) in rendered.iter().zip(pairs) {
         assert!(case.tells(&format!("{name} 1 % more"), |scene| *scene = wrong), "{name}");

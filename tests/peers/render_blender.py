@@ -22,6 +22,8 @@ from mathutils import Matrix
 
 Job = dict[str, Any]
 
+UV_LAYER = "uv"
+
 
 def main() -> None:
     """Carries out the job named on the command line."""
@@ -71,6 +73,11 @@ def add_mesh(*, surface: Job, made_of: bpy.types.Material) -> None:
     if surface["normals"]:
         mesh.shade_smooth()
         mesh.normals_split_custom_set_from_vertices(triples(numbers=read_floats(path=surface["normals"])))
+    if surface["uvs"]:
+        numbers = read_floats(path=surface["uvs"])
+        layer = mesh.uv_layers.new(name=UV_LAYER)
+        corners = [corner for face in faces for corner in face]
+        layer.uv.foreach_set("vector", [number for k in corners for number in numbers[2 * k : 2 * k + 2]])
     mesh.materials.append(made_of)
     thing = bpy.data.objects.new("object", mesh)
     # Blender moves shadow rays off curved surfaces by default, which is no part of the material.
@@ -92,10 +99,27 @@ def material(*, spec: Job) -> bpy.types.Material:
     if spec["radiance"] is not None:
         emission = tree.nodes.new("ShaderNodeEmission")
         emission.inputs["Color"].default_value = (*spec["radiance"], 1.0)
+        if spec["map"]:
+            tree.links.new(emission_map(tree=tree, spec=spec["map"]).outputs["Color"], emission.inputs["Color"])
         combine = glowing if spec["camera_visible"] else hidden_from_camera
         shader = combine(tree=tree, surface=shader, emission=emission)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
     return made
+
+
+def emission_map(*, tree: bpy.types.NodeTree, spec: Job) -> bpy.types.Node:
+    """A lamp's radiance, place by place."""
+    image = bpy.data.images.new("map", width=spec["width"], height=spec["height"], float_buffer=True, is_data=True)
+    image.pixels.foreach_set(read_floats(path=spec["texels"]))
+    image.update()
+    texture = tree.nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    texture.interpolation = "Linear"
+    texture.extension = spec["extension"]
+    uv = tree.nodes.new("ShaderNodeUVMap")
+    uv.uv_map = UV_LAYER
+    tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
+    return texture
 
 
 def glowing(*, tree: bpy.types.NodeTree, surface: bpy.types.Node, emission: bpy.types.Node) -> bpy.types.Node:
