@@ -269,7 +269,8 @@ impl RecipeScene {
             Some(RecipeCamera::Seed { fov_y_deg, .. }) => (true, *fov_y_deg),
             Some(RecipeCamera::Designer(_)) | None => (true, 60.0),
         };
-        if !finite || !(field > 0.0 && field < 179.0) {
+        let sound = finite && field > 0.0 && field < 179.0;
+        if !sound {
             faults.push(format!("scene '{}': camera: expected finite points and 0 < fov_y_deg < 179", self.id));
         }
     }

@@ -8,8 +8,9 @@ use mateval_scene::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use crate::source::folder::SourceFolder;
 use super::texture::{Bounds, all_texels, mean_color};
+use crate::source::folder::SourceFolder;
+use crate::source::log::shortened;
 
 impl<'a> Reader<'a> {
     /// The emitter of a shape: it glows on its front side.

@@ -82,7 +82,7 @@ fn uvs(uv: &[f64], mesh: &TriangleMesh, place: &str, log: &mut Log) -> Option<Ve
         let message = format!("{} texture coordinates for {count} vertices", pairs.len());
         log.warn("bad_uv", &place, message, "took (0, 0) for the others");
     }
-    let bad = pairs.iter().flatten().filter(|v| !(v.abs() <= FARTHEST)).count();
+    let bad = pairs.iter().flatten().filter(|v| v.is_nan() || v.abs() > FARTHEST).count();
     if bad > 0 {
         log.warn("bad_uv", &place, format!("{bad} of {} numbers are no numbers", uv.len()), "took 0 for them");
     }

@@ -1,6 +1,7 @@
 //! BlenderProc's lights: ceilings and lamps glow, but the camera sees their ordinary surface; a grey world around.
 
-use mateval_scene::reference::{Emission, LightGroup, SurfaceIndex};
+use mateval_scene::material::{ColorInput, MaterialModel};
+use mateval_scene::reference::{Emission, EmissionMap, LightGroup, ReferenceScene, SurfaceIndex};
 
 use super::furnish::{FurnishedHouse, Role};
 
@@ -34,30 +35,43 @@ fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
     }
 }
 
-/// The lights of the surfaces that `kept` lists, numbered as they stand there. Blender's emission is on both sides.
-pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], names: &[String]) -> Vec<LightGroup> {
+/// The lights of the surfaces that `kept` lists, numbered as they stand in `scene`. Blender's emission is on both sides.
+pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) -> Vec<LightGroup> {
     let mut groups: Vec<LightGroup> = Vec::new();
-    let mut ceilings: Vec<(usize, [f32; 3], usize)> = Vec::new();
+    let mut ceilings: Vec<((usize, [f32; 3]), usize)> = Vec::new();
     for (at, surface) in kept.iter().enumerate() {
-        let room = house.placed[*surface].room;
-        let radiance = match glow(house, *surface) {
-            Glow::No => continue,
-            Glow::Lamp => [LAMP; 3],
-            Glow::Ceiling(radiance) if radiance == [0.0; 3] => continue,
+        let (radiance, map) = match glow(house, *surface) {
+            Glow::No | Glow::Ceiling(BLACK) => continue,
+            Glow::Lamp => lamp(scene, at),
             Glow::Ceiling(radiance) => {
-                let known = ceilings.iter().find(|known| (known.0, known.1) == (room, radiance)).map(|known| known.2);
+                let key = (house.placed[*surface].room, radiance);
+                let known = ceilings.iter().find(|(known, _)| *known == key).map(|(_, group)| *group);
                 if let Some(Emission::Area { surfaces, .. }) = known.map(|group| &mut groups[group].emission) {
                     surfaces.push(SurfaceIndex(at));
                     continue;
                 }
-                ceilings.push((room, radiance, groups.len()));
-                radiance
+                ceilings.push((key, groups.len()));
+                (radiance, None)
             }
         };
-        let emission = Emission::Area { surfaces: vec![SurfaceIndex(at)], radiance, two_sided: true };
-        groups.push(LightGroup { name: names[at].clone(), emission, camera_visible: false });
+        let emission = Emission::Area { surfaces: vec![SurfaceIndex(at)], radiance, map, two_sided: true };
+        groups.push(LightGroup { name: scene.surfaces[at].name.clone(), emission, camera_visible: false });
     }
     let emission = Emission::Constant { radiance: [WORLD; 3] };
     groups.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
     groups
+}
+
+const BLACK: [f32; 3] = [0.0; 3];
+
+/// What a lamp sends out: its base colour is the map.
+fn lamp(scene: &ReferenceScene, surface: usize) -> ([f32; 3], Option<EmissionMap>) {
+    let material = &scene.materials[scene.surfaces[surface].material.0];
+    match material.model {
+        MaterialModel::Principled { base_color: ColorInput::Texture { texture, uv }, .. } => {
+            ([LAMP; 3], Some(EmissionMap { texture, uv }))
+        }
+        MaterialModel::Principled { base_color: ColorInput::Constant(color), .. } => (color.map(|v| LAMP * v), None),
+        _ => ([LAMP; 3], None),
+    }
 }

@@ -27,7 +27,7 @@ pub fn room_scene(house: &FurnishedHouse, room: usize, views: &[Camera]) -> Resu
     for (surface, name) in scene.surfaces.iter_mut().zip(&names) {
         surface.name.clone_from(name);
     }
-    scene.lights = lights::groups(house, &kept, &names);
+    scene.lights = lights::groups(house, &kept, &scene);
     Ok(SourceScene {
         kind: "front3d",
         house: house.house.uid.clone(),

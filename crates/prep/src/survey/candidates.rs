@@ -58,6 +58,10 @@ struct Posed {
     fov_y_deg: f64,
 }
 
+/// A camera that keeps to the rules, and its thumbnail.
+type Candidate = (CandidateCamera, Picture<[u8; 3]>);
+
+/// With its file.
 type NamedPicture = (String, Picture<[u8; 3]>);
 
 impl Look<'_> {
@@ -143,7 +147,7 @@ impl Look<'_> {
     }
 
     /// Drawn cameras and the designers' in this room that keep to the rules, the best score first; and why others do not.
-    fn cameras(&self, room: usize) -> (Vec<(CandidateCamera, Picture<[u8; 3]>)>, Vec<String>) {
+    fn cameras(&self, room: usize) -> (Vec<Candidate>, Vec<String>) {
         let (posed, mut refused) = self.posed(room);
         let mut found = Vec::new();
         for Posed { origin, camera, fov_y_deg } in posed {
@@ -188,13 +192,7 @@ impl Look<'_> {
     }
 
     /// What a camera sees; in words which rule it breaks.
-    fn candidate(
-        &self,
-        room: usize,
-        origin: &str,
-        camera: Camera,
-        fov_y_deg: f64,
-    ) -> Result<(CandidateCamera, Picture<[u8; 3]>), String> {
+    fn candidate(&self, room: usize, origin: &str, camera: Camera, fov_y_deg: f64) -> Result<Candidate, String> {
         let small = thumbnail_camera(&camera);
         let seen = self.seen(&small);
         let pieces: BTreeSet<usize> =
