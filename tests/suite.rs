@@ -13,6 +13,7 @@ mod suite {
     mod determinism;
     mod full_disk;
     mod help;
+    mod house;
     mod images;
     mod mitsuba_export;
     mod planted;

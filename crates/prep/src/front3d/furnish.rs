@@ -108,12 +108,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, Fr
     let path = files.root.join(&files.house);
     let file = shown_path(&files.house);
     let mut log = Log::new(file.clone(), limits.findings);
-    let (bytes, house_folder) = read_house_file(&path, limits)?;
-    let invalid = |what: String| Front3dError::Invalid { path: path.clone(), what };
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let tree = document::parse(&bytes, limits).map_err(invalid)?;
-    let house = house_reader::read(&tree, &stem, limits, &mut log).map_err(invalid)?;
-    drop(tree);
+    let (house, house_folder) = read_json(&path, limits, &mut log)?;
 
     let models = library(files, &files.models, limits)?;
     let textures = files.textures.as_ref().map(|path| library(files, path, limits)).transpose()?;
@@ -155,6 +150,22 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, Fr
         findings: log.into_findings(),
         files: hashes,
     })
+}
+
+/// What a house's JSON says, and its findings; nothing else is read.
+pub fn read_house(path: &Path, limits: &Limits) -> Result<(House, Vec<Finding>), Front3dError> {
+    let mut log = Log::new(shown_path(path), limits.findings);
+    let (house, _) = read_json(path, limits, &mut log)?;
+    Ok((house, log.into_findings()))
+}
+
+fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, SourceFolder), Front3dError> {
+    let (bytes, folder) = read_house_file(path, limits)?;
+    let invalid = |what: String| Front3dError::Invalid { path: path.to_owned(), what };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let tree = document::parse(&bytes, limits).map_err(invalid)?;
+    let house = house_reader::read(&tree, &stem, limits, log).map_err(invalid)?;
+    Ok((house, folder))
 }
 
 /// BlenderProc's world, in our axes: its swap of y and z instead of a rotation mirrors the third axis.

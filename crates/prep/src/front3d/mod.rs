@@ -23,7 +23,7 @@ mod model_info;
 pub mod room_scene;
 
 pub use error::Front3dError;
-pub use furnish::{FurnishedHouse, HouseFiles, Placed, Role, furnish};
+pub use furnish::{FurnishedHouse, HouseFiles, Placed, Role, furnish, read_house};
 pub use house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
 };

@@ -1,0 +1,134 @@
+//! The built-in 3D-FRONT house from survey to score: rooms offered and rejected, a recipe with hashes, a dataset, its
+//! ceiling and its floor.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::LazyLock;
+
+use serde_json::Value;
+
+use super::command::{Run, baseline, build, mateval, run, run_words, score, stats, verify};
+use super::sample::{json, kept_folder};
+
+/// The sample's source and what a survey of its house gives.
+struct Surveyed {
+    source: PathBuf,
+    survey: PathBuf,
+}
+
+static SURVEYED: LazyLock<Surveyed> = LazyLock::new(|| {
+    let folder = kept_folder("house");
+    let (source, survey) = (folder.join("source"), folder.join("survey"));
+    run_words([Path::new("sample"), &source]).ends_with(0);
+    run(&mut survey_of(&source, &survey)).ends_with(0);
+    Surveyed { source, survey }
+});
+
+fn survey_of(source: &Path, out: &Path) -> Command {
+    let mut command = mateval();
+    command.args(["prep", "survey", "house/3D-FRONT", "--models", "house/3D-FUTURE-model"]);
+    command.args(["--textures", "house/3D-FRONT-texture", "--cameras-per-room", "1", "--resolution", "96", "72"]);
+    command.arg("--source").arg(source).arg("--out").arg(out);
+    command
+}
+
+fn rooms() -> Vec<Value> {
+    json(&SURVEYED.survey.join("survey.json"))["houses"][0]["rooms"].as_array().unwrap().clone()
+}
+
+/// The recipe of the survey with small atlases.
+fn recipe(folder: &Path) -> PathBuf {
+    let text = std::fs::read_to_string(SURVEYED.survey.join("recipe.toml")).unwrap();
+    let path = folder.join("recipe.toml");
+    std::fs::write(&path, text.replacen("\n\n", "\natlas_size = 256\n\n", 1)).unwrap();
+    path
+}
+
+fn build_from(recipe: &Path, source: &Path, dataset: &Path) -> Run {
+    run(build(recipe, dataset).arg("--source").arg(source))
+}
+
+#[test]
+fn sound_rooms_are_offered_and_the_faulty_one_is_rejected_with_reasons() {
+    let offered: Vec<Value> =
+        rooms().iter().filter(|r| r["cameras"][0].is_object()).map(|r| r["room"].clone()).collect();
+    assert_eq!(offered, ["LivingDiningRoom-101", "MasterBedroom-102"]);
+    let store = rooms().into_iter().find(|room| room["room"] == "OtherRoom-103").unwrap();
+    let rejections = store["rejections"].as_array().unwrap().iter();
+    let rules: Vec<String> = rejections.map(|rejection| rejection["rule"].as_str().unwrap().to_owned()).collect();
+    assert_eq!(rules, ["max_intersecting", "max_missing"], "{store}");
+    assert_eq!(store["intersecting"].as_array().unwrap().len(), 1, "{store}");
+}
+
+#[test]
+fn the_page_shows_every_candidate_and_every_rejection() {
+    let page = std::fs::read_to_string(SURVEYED.survey.join("index.html")).unwrap();
+    for room in rooms() {
+        for camera in room["cameras"].as_array().unwrap() {
+            let thumbnail = camera["thumbnail"].as_str().unwrap();
+            assert!(SURVEYED.survey.join(thumbnail).is_file(), "{thumbnail}");
+            assert!(page.contains(camera["scene"].as_str().unwrap()));
+        }
+        for rejection in room["rejections"].as_array().unwrap() {
+            assert!(page.contains(rejection["rule"].as_str().unwrap()), "{rejection}");
+        }
+    }
+}
+
+#[test]
+fn a_list_rejects_with_its_reason_and_a_survey_is_repeated_to_the_byte() {
+    let folder = tempfile::tempdir().unwrap();
+    let (list, out) = (folder.path().join("bad.csv"), folder.path().join("survey"));
+    std::fs::write(&list, "MasterBedroom-102,the bed is made\n").unwrap();
+    run(survey_of(&SURVEYED.source, &out).arg("--list").arg(&list)).ends_with(0);
+    let listed = json(&out.join("survey.json"))["houses"][0]["rooms"][1].clone();
+    assert_eq!(listed["rejections"][0]["rule"], "listed");
+    assert!(listed["rejections"][0]["reason"].as_str().unwrap().contains("the bed is made"), "{listed}");
+    run(&mut survey_of(&SURVEYED.source, &out)).ends_with(2).says("--force");
+    run(survey_of(&SURVEYED.source, &out).arg("--force")).ends_with(0);
+    for file in ["survey.json", "recipe.toml", "index.html"] {
+        let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
+        assert!(read(&out) == read(&SURVEYED.survey), "{file} differs");
+    }
+}
+
+/// From the recipe to scores: sound, counted, its truth far better than grey.
+#[test]
+fn offered_rooms_become_a_dataset_that_can_be_scored() {
+    let folder = tempfile::tempdir().unwrap();
+    let dataset = folder.path().join("dataset");
+    build_from(&recipe(folder.path()), &SURVEYED.source, &dataset).ends_with(0);
+    run(&mut verify(&dataset)).ends_with(0);
+    let counted = run(stats(&dataset).args(["--format", "json"])).ends_with(0);
+    let counted: Value = serde_json::from_str(&counted.stdout).unwrap();
+    assert_eq!((&counted["houses"], &counted["scenes"]), (&1.into(), &2.into()));
+    assert!(counted["objects_per_scene"]["mean"].as_f64().unwrap() > 5.0, "{counted}");
+    let psnr = |name: &str| {
+        let [submission, result] = [name.to_owned(), format!("{name}.json")].map(|name| folder.path().join(name));
+        run(&mut baseline(name, &dataset, &submission)).ends_with(0);
+        run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder.path())).ends_with(0);
+        json(&result)["protocols"]["mateval-1"]["summary"]["albedo.input.psnr"].as_f64().unwrap()
+    };
+    let (truth, grey) = (psnr("gt"), psnr("grey"));
+    assert!(truth > 25.0 && grey < 15.0, "gt {truth} dB, grey {grey} dB");
+}
+
+#[test]
+fn a_recipe_refuses_files_that_are_not_those_it_pins() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, dataset) = (folder.path().join("source"), folder.path().join("dataset"));
+    super::sample::copy_folder(&SURVEYED.source, &source);
+    let recipe = recipe(folder.path());
+    let model = "house/3D-FUTURE-model/cc0f0000-5a3b-4e00-8000-000000000001/raw_model.obj";
+    let mut text = std::fs::read_to_string(source.join(model)).unwrap();
+    text.push_str("# one remark more\n");
+    std::fs::write(source.join(model), text).unwrap();
+    build_from(&recipe, &source, &dataset).ends_with(2).says(&format!("input '{model}' is "));
+    assert!(!dataset.join("dataset.json").exists());
+    // The twin: with the hashes taken out the same source builds.
+    let text = std::fs::read_to_string(&recipe).unwrap();
+    let without: Vec<&str> =
+        text.lines().filter(|l| !l.starts_with("[scene.inputs]") && !l.starts_with("\"house/")).collect();
+    std::fs::write(&recipe, without.join("\n")).unwrap();
+    build_from(&recipe, &source, &dataset).ends_with(0);
+}
