@@ -17,7 +17,7 @@ pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, String> {
 }
 
 /// Counts what a tree of the text would hold: two bytes of text can cost a hundred of memory.
-fn check_size(text: &[u8], limits: &Limits) -> Result<(), String> {
+pub(super) fn check_size(text: &[u8], limits: &Limits) -> Result<(), String> {
     let (mut values, mut containers, mut in_text, mut escaped) = (0_usize, 0_usize, false, false);
     for byte in text {
         if in_text {
@@ -34,7 +34,7 @@ fn check_size(text: &[u8], limits: &Limits) -> Result<(), String> {
     }
     if values > limits.json_values || containers > limits.json_containers {
         return Err(format!(
-            "expected at most {} values and {} lists and objects, found {values} and {containers}: no house is that large",
+            "expected at most {} values and {} lists and objects, found {values} and {containers}: no file of the data is that large",
             limits.json_values, limits.json_containers
         ));
     }
@@ -53,9 +53,12 @@ pub(super) fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// The text at `key`, unless it is empty or no text.
+/// Longer texts are none: names are copied to each thing that they name.
+const LONGEST_TEXT: usize = 4096;
+
+/// The text at `key`, unless it is empty, absurdly long or no text.
 pub(super) fn text<'a>(from: &'a Value, key: &str) -> Option<&'a str> {
-    from.get(key).and_then(Value::as_str).map(str::trim).filter(|text| !text.is_empty())
+    from.get(key).and_then(Value::as_str).map(str::trim).filter(|text| (1..=LONGEST_TEXT).contains(&text.len()))
 }
 
 /// The list at `key`; empty where there is none.
@@ -99,6 +102,8 @@ mod tests {
     fn lookups_forgive() {
         let value = serde_json::json!({"t": " x ", "e": "", "n": [1, 2.5], "bad": [1, null]});
         assert_eq!((text(&value, "t"), text(&value, "e"), text(&value, "n")), (Some("x"), None, None));
+        let long = serde_json::json!({"t": "x".repeat(LONGEST_TEXT), "u": "x".repeat(LONGEST_TEXT + 1)});
+        assert_eq!((text(&long, "t").map(str::len), text(&long, "u")), (Some(LONGEST_TEXT), None));
         assert_eq!(numbers::<2>(&value, "n"), Some([1.0, 2.5]));
         assert_eq!((numbers::<3>(&value, "n"), numbers::<2>(&value, "bad")), (None, None));
         assert!(list(&value, "none").is_empty());

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use glam::{DMat4, DVec3};
 use mateval_image::texture_io::{Encoding, read_texture};
@@ -22,7 +23,7 @@ use super::{cameras, document, house_reader};
 use crate::source::InstanceOrigin;
 use crate::source::folder::SourceFolder;
 use crate::source::log::{Log, shortened};
-use crate::source::surface_mesh::to_world;
+use crate::source::surface_mesh::{Repairs, to_world};
 
 /// What stands for a colour that cannot be read: linear mid-grey.
 const MISSING: [f32; 3] = [0.5; 3];
@@ -215,7 +216,7 @@ struct Furnisher {
     compat: bool,
     log: Log,
     /// None: it is not there or not sound, and that has been told.
-    known_models: BTreeMap<String, Option<Model>>,
+    known_models: BTreeMap<String, Option<Rc<Model>>>,
     known_textures: BTreeMap<String, Option<TextureIndex>>,
     /// By their place in the house.
     layout_materials: BTreeMap<Option<usize>, MaterialIndex>,
@@ -233,7 +234,7 @@ impl Furnisher {
         const FILE: &str = "model_info.json";
         let shown = self.models.shown(FILE);
         match self.models.folder.read(FILE) {
-            Ok(bytes) => self.info = ModelInfo::parse(&bytes, &shown, &mut self.log),
+            Ok(bytes) => self.info = ModelInfo::parse(&bytes, &shown, &self.limits, &mut self.log),
             Err(fault) => {
                 let action = "guessed categories from names";
                 self.log.push(Severity::Warning, fault.code, &shown, "", fault.message, action);
@@ -266,7 +267,10 @@ impl Furnisher {
                 continue;
             }
             let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * child.placement.matrix();
-            let (mesh, _) = to_world(source.mesh.clone(), matrix, false);
+            let (mesh, repairs) = to_world(source.mesh.clone(), matrix, false);
+            if self.is_too_far(&repairs, &child.place) {
+                continue;
+            }
             let key = (source.kind.as_str(), source.material);
             let at = groups.iter().position(|(other, _)| *other == key).unwrap_or_else(|| {
                 groups.push((key, Merged::default()));
@@ -294,6 +298,15 @@ impl Furnisher {
         fits
     }
 
+    /// Whether its room's and its own transform lead to no place at all; that is told.
+    fn is_too_far(&mut self, repairs: &Repairs, place: &str) -> bool {
+        if repairs.not_finite > 0 {
+            let message = format!("{} triangles lie absurdly far away", repairs.not_finite);
+            self.log.warn("bad_placement", place, message, "left it out");
+        }
+        repairs.not_finite > 0
+    }
+
     fn piece(&mut self, house: &House, room: usize, child: &Child, record: usize) {
         let record = &house.furniture[record];
         if child.placement.scale.abs().min_element() < SMALLEST_SCALE {
@@ -306,8 +319,12 @@ impl Furnisher {
         }
         let own = if self.compat { child.placement.mirrored_matrix() } else { child.placement.matrix() };
         let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * own;
-        let (mesh, _) = to_world(model.mesh, matrix, false);
-        if child.placement.scale.min_element() < 0.0 {
+        let (mesh, repairs) = to_world(model.mesh.clone(), matrix, false);
+        if self.is_too_far(&repairs, &child.place) {
+            return;
+        }
+        // Two negative signs are half a turn.
+        if child.placement.scale.element_product() < 0.0 {
             let message = format!("a scale of {}", child.placement.scale);
             let place = format!("{}/scale", child.place);
             self.log.note("mirrored_piece", &place, message, "mirrored it, its front sides outwards");
@@ -329,13 +346,13 @@ impl Furnisher {
             origin: InstanceOrigin {
                 category: kind.category,
                 super_category: Some(kind.super_category),
-                part_of_triangle: Some(model.part_of_triangle),
+                part_of_triangle: Some(model.part_of_triangle.clone()),
             },
             color: MISSING,
         });
     }
 
-    fn model(&mut self, jid: &str, place: &str) -> Option<Model> {
+    fn model(&mut self, jid: &str, place: &str) -> Option<Rc<Model>> {
         if !is_folder_name(jid) {
             let message = format!("'{}' is no folder's name", shortened(jid));
             self.log.warn("bad_jid", &format!("{place}/jid"), message, "left its pieces out");
@@ -344,7 +361,9 @@ impl Furnisher {
         if let Some(known) = self.known_models.get(jid) {
             return known.clone();
         }
-        let model = model::read(jid, &mut self.models, &self.limits, &mut self.log);
+        let left = self.limits.triangles.saturating_sub(self.triangles);
+        let limits = Limits { triangles: left, ..self.limits };
+        let model = model::read(jid, &mut self.models, &limits, &mut self.log).map(Rc::new);
         self.known_models.insert(jid.to_owned(), model.clone());
         model
     }

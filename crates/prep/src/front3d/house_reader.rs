@@ -172,6 +172,7 @@ fn rooms(
     let things = Things {
         furniture: furniture.iter().enumerate().map(|(k, record)| (record.uid.as_str(), k)).collect(),
         meshes: meshes.iter().enumerate().map(|(k, mesh)| (mesh.uid.as_str(), k)).collect(),
+        listed_meshes: list(tree, "mesh").iter().filter_map(|record| text(record, "uid")).collect(),
     };
     let mut rooms: Vec<Room> = Vec::new();
     let mut children = 0;
@@ -193,7 +194,8 @@ fn room_id(record: &Value, at: usize, rooms: &[Room], place: &str, log: &mut Log
     if rooms.iter().all(|room| room.id != id) {
         return id;
     }
-    let other = format!("{id}-{at}");
+    let free = |other: &String| rooms.iter().all(|room| room.id != *other);
+    let other = (at..).map(|number| format!("{id}-{number}")).find(free).expect("rooms are finitely many");
     let message = format!("the instanceid '{}' is there already", shortened(&id));
     log.note("duplicate_room", place, message, format!("named it '{}'", shortened(&other)));
     other
@@ -203,6 +205,8 @@ fn room_id(record: &Value, at: usize, rooms: &[Room], place: &str, log: &mut Log
 struct Things<'a> {
     furniture: BTreeMap<&'a str, usize>,
     meshes: BTreeMap<&'a str, usize>,
+    /// Those that were left out, too.
+    listed_meshes: BTreeSet<&'a str>,
 }
 
 fn room(
@@ -238,7 +242,8 @@ fn child_kind(child: &Value, place: &str, things: &Things<'_>, log: &mut Log) ->
     let mesh = || things.meshes.get(target).copied().map(ChildKind::Mesh);
     let is_mesh = text(child, "instanceid").is_some_and(|id| id.starts_with("mesh/"));
     let found = if is_mesh { mesh().or_else(furniture) } else { furniture().or_else(mesh) };
-    if found.is_none() {
+    // Why a mesh was left out has been told at the mesh.
+    if found.is_none() && !things.listed_meshes.contains(target) {
         let message = format!("there is no record '{}'", shortened(target));
         log.note("dangling_ref", &format!("{place}/ref"), message, "left it out");
     }

@@ -9,6 +9,8 @@ use super::furnish::{FurnishedHouse, Role};
 const CEILING: f32 = 0.8;
 /// Radiance of lamps, times their texture.
 const LAMP: f32 = 7.0;
+/// What the light from outside is called.
+pub(super) const WORLD_NAME: &str = "world";
 /// Radiance of everything outside.
 const WORLD: f32 = 0.05;
 
@@ -58,7 +60,7 @@ pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceSc
         groups.push(LightGroup { name: scene.surfaces[at].name.clone(), emission, camera_visible: false });
     }
     let emission = Emission::Constant { radiance: [WORLD; 3] };
-    groups.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
+    groups.push(LightGroup { name: WORLD_NAME.to_owned(), emission, camera_visible: true });
     groups
 }
 

@@ -28,3 +28,8 @@ pub use house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
 };
 pub use limits::Limits;
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_real;

@@ -60,7 +60,8 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         Ok(read) => read,
         Err(fault) => {
             let place = if fault.line > 0 { format!("line {}", fault.line) } else { String::new() };
-            warn("bad_model", &place, fault.what, "left its pieces out");
+            let code = if fault.limit { "limit" } else { "bad_model" };
+            warn(code, &place, fault.what, "left its pieces out");
             return None;
         }
     };
@@ -98,14 +99,8 @@ fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, V
     (mesh, kept)
 }
 
-/// Scales a model in centimetres, drops what is not finite or has no area, and finds its parts.
+/// Drops what is not finite or has no area, scales what is then still too large, and finds its parts.
 fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<Model> {
-    let size = size_of_used(&mesh);
-    let centimetres = size > LARGEST_M;
-    if centimetres {
-        let message = format!("it is {size:.1} m large");
-        log.push(Severity::Note, "centimetres", file, "", message, "took its numbers for centimetres");
-    }
     // One triangle a group number: `to_world` keeps the order, so what it drops is found again by counting.
     let sound: Vec<bool> = (0..mesh.triangles.len()).map(|t| has_area(mesh.corners(t))).collect();
     let dropped = sound.iter().filter(|sound| !**sound).count();
@@ -116,6 +111,12 @@ fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) 
     let pick = |all: &[[u32; 3]]| all.iter().zip(&sound).filter(|(_, s)| **s).map(|(t, _)| *t).collect();
     let groups: Vec<usize> = groups.iter().zip(&sound).filter(|(_, sound)| **sound).map(|(g, _)| *g).collect();
     let mesh = TriangleMesh { triangles: pick(&mesh.triangles), ..mesh };
+    let size = size_of_used(&mesh);
+    let centimetres = size > LARGEST_M;
+    if centimetres {
+        let message = format!("it is {size:.1} m large");
+        log.push(Severity::Note, "centimetres", file, "", message, "took its numbers for centimetres");
+    }
     let scale = if centimetres { 0.01 } else { 1.0 };
     let (mesh, repairs) = to_world(mesh, DMat4::from_scale(DVec3::splat(scale)), false);
     if repairs.normals > 0 || repairs.uvs > 0 {

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 use mateval_scene::Severity;
 use serde_json::Value;
 
-use super::document::{kind, text};
+use super::document::{check_size, kind, text};
 use super::house::FurnitureRecord;
+use super::limits::Limits;
 use crate::source::log::Log;
 use crate::stats::SUPER_CATEGORIES;
 
@@ -59,11 +60,15 @@ pub(super) struct Kind {
 
 impl ModelInfo {
     /// From the file's text; rows that say nothing are passed over, a file that is no list is a finding.
-    pub(super) fn parse(bytes: &[u8], file: &str, log: &mut Log) -> Self {
+    pub(super) fn parse(bytes: &[u8], file: &str, limits: &Limits, log: &mut Log) -> Self {
         let mut warn = |message: String| {
             let action = "guessed categories from names";
             log.push(Severity::Warning, "bad_model_info", file, "", message, action);
         };
+        if let Err(what) = check_size(bytes, limits) {
+            warn(what);
+            return Self::default();
+        }
         let tree: Value = match serde_json::from_slice(bytes) {
             Ok(tree) => tree,
             Err(error) => {
@@ -128,7 +133,7 @@ mod tests {
         let text = br#"[{"model_id": "a", "super-category": "Sofa", "category": "Three-Seat / Multi-seat Sofa"},
             {"model_id": "a", "super-category": "Bed"}, {"model_id": "b", "super-category": "chair", "category": null}, 7]"#;
         let mut log = Log::new("h".into(), 10);
-        let info = ModelInfo::parse(text, "model_info.json", &mut log);
+        let info = ModelInfo::parse(text, "model_info.json", &Limits::default(), &mut log);
         assert!(log.into_findings().is_empty());
         let kind = |jid, category, title| {
             let kind = info.kind(&record(jid, category, title));
@@ -144,9 +149,10 @@ mod tests {
 
     #[test]
     fn what_is_no_list_is_told() {
-        for bad in [&b"{"[..], b"{}", b"7"] {
+        let small = Limits { json_containers: 3, ..Limits::default() };
+        for bad in [&b"{"[..], b"{}", b"7", b"[[],[],[]]"] {
             let mut log = Log::new("h".into(), 10);
-            ModelInfo::parse(bad, "model_info.json", &mut log);
+            ModelInfo::parse(bad, "model_info.json", &small, &mut log);
             assert_eq!(log.into_findings()[0].code, "bad_model_info");
         }
     }

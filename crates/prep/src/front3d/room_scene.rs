@@ -15,6 +15,9 @@ use super::furnish::{FurnishedHouse, Role};
 use super::lights;
 use crate::source::SourceScene;
 
+/// Characters of a name that has a number behind it.
+const LONGEST_NAME: usize = 40;
+
 /// The scene of room number `room`, seen from `views`, the input view first.
 ///
 /// Of another room that any of them sees, the architecture is kept (its ceiling lights what is seen), and the furniture
@@ -65,8 +68,10 @@ fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usiz
     (0..house.placed.len()).filter(is_kept).collect()
 }
 
-/// Names of what is kept: what it is, with the room's id before it for other rooms, and a number behind the second.
+/// Names of what is kept: what it is, with the room's id before it for other rooms, and a number behind the second. No two
+/// are one as ids, and none is the world's.
 fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
+    let mut taken = BTreeSet::from([id_text_from(lights::WORLD_NAME, "")]);
     let mut count: BTreeMap<String, usize> = BTreeMap::new();
     let name = |surface: &usize| {
         let placed = &house.placed[*surface];
@@ -75,9 +80,16 @@ fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
             true => own.clone(),
             false => format!("{} {own}", house.house.rooms[placed.room].id),
         };
-        let number = count.entry(id_text_from(&name, "object")).or_insert(0);
-        *number += 1;
-        if *number == 1 { name } else { format!("{name} {number}") }
+        // An id is cut: what is behind a long name would not show in it.
+        let stem: String = name.chars().take(LONGEST_NAME).collect();
+        let count = count.entry(id_text_from(&name, "object")).or_insert(0);
+        loop {
+            *count += 1;
+            let name = if *count == 1 { name.clone() } else { format!("{stem} {count}") };
+            if taken.insert(id_text_from(&name, "object")) {
+                return name;
+            }
+        }
     };
     kept.iter().map(name).collect()
 }

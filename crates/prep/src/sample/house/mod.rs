@@ -42,7 +42,7 @@ For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
 /// Writes the house into the folder `out`; files of the same name are replaced.
-pub(super) fn write(out: &Path) -> Result<(), PrepError> {
+pub(crate) fn write(out: &Path) -> Result<(), PrepError> {
     let house = out.join("house");
     let (layouts, library) = (house.join("3D-FRONT"), house.join("3D-FUTURE-model"));
     for folder in [&layouts, &library] {
@@ -69,6 +69,12 @@ fn spoilt_house(models: &[models::Model], textures: &[textures::LayoutTexture]) 
     let mut house = house_json::house(models, textures);
     faults::plant(&mut house);
     house
+}
+
+/// The house's JSON without those faults that `faults` plants.
+#[cfg(test)]
+pub(crate) fn sound_house() -> serde_json::Value {
+    house_json::house(&models::all(), &textures::all())
 }
 
 #[cfg(test)]

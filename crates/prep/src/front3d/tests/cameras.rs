@@ -1,0 +1,191 @@
+//! Cameras that the sampler finds keep to the rules, by code that is not its own.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec2;
+use mateval_scene::Camera;
+use mateval_scene::camera::Intrinsics;
+use mateval_tracer::{Ray, World};
+
+use super::*;
+use crate::front3d::camera_sampler::{FoundCamera, RoomSampler, SamplerRules, sample, score};
+
+/// The recipe's own.
+const TURNS: [[f64; 2]; 4] = [[5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
+
+fn intrinsics() -> Intrinsics {
+    Intrinsics::from_fov_y(480, 270, 50_f64.to_radians())
+}
+
+fn world() -> World {
+    World::new(Arc::new(furnished().scene.clone())).unwrap()
+}
+
+/// A few cameras of a room; the seeds that find one.
+fn found(world: &World, room: usize, rules: &SamplerRules) -> Vec<FoundCamera> {
+    let sampler = RoomSampler::new(furnished(), world, room).unwrap();
+    (0..6).filter_map(|seed| sampler.sample(intrinsics(), &TURNS, rules, seed).ok()).collect()
+}
+
+/// The point of a triangle nearest to another: by thousands of tries that get closer, not by a formula.
+fn nearest_by_search([a, b, c]: [DVec3; 3], from: DVec3) -> f64 {
+    let at = |u: f64, v: f64| (a + (b - a) * u + (c - a) * v).distance(from);
+    let (mut best, mut step) = ([1.0_f64 / 3.0; 2], 0.5);
+    while step > 1e-5 {
+        let mut better = best;
+        for (du, dv) in [(1., 0.), (-1., 0.), (0., 1.), (0., -1.), (1., -1.), (-1., 1.), (1., 1.), (-1., -1.)] {
+            let u = (best[0] + du * step).clamp(0.0, 1.0);
+            let v = (best[1] + dv * step).clamp(0.0, 1.0 - u);
+            if at(u, v) < at(better[0], better[1]) {
+                better = [u, v];
+            }
+        }
+        if better == best {
+            step /= 2.0;
+        }
+        best = better;
+    }
+    at(best[0], best[1])
+}
+
+/// Metres to the nearest thing that the picture shows, by `side` x `side` rays.
+fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
+    let mut nearest = f64::INFINITY;
+    for k in 0..side * side {
+        let share = |v: u32, size: u32| (f64::from(v) + 0.5) / f64::from(side) * f64::from(size);
+        let place = DVec2::new(share(k % side, camera.intrinsics.width), share(k / side, camera.intrinsics.height));
+        let ray = Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3());
+        nearest = world.first_hit(&ray).map_or(nearest, |hit| nearest.min(f64::from(hit.distance)));
+    }
+    nearest
+}
+
+#[test]
+fn same_seed_same_camera() {
+    let rules = SamplerRules::default();
+    let of = |seed| sample(furnished(), LIVING, intrinsics(), &TURNS, &rules, seed);
+    let (one, again, other) = (of(1).unwrap(), of(1).unwrap(), of(2).unwrap());
+    assert_eq!(one, again);
+    assert_ne!(one.camera, other.camera);
+}
+
+/// Above its own floor, inside its room, level, as high and as steep as the rules say, and nothing within the clearance.
+#[test]
+fn cameras_stand_free_in_their_room() {
+    let (house, world) = (furnished(), world());
+    let rules = SamplerRules::default();
+    let mut seen = 0;
+    for room in [LIVING, 1] {
+        let floor =
+            house.placed.iter().position(|p| p.room == room && p.role == Role::Architecture { kind: "Floor".into() });
+        let [low, high] = bounds(&house.scene.surfaces[floor.unwrap()].mesh);
+        for found in found(&world, room, &rules) {
+            let at = found.camera.position();
+            assert!(at.x > f64::from(low.x) && at.x < f64::from(high.x), "{at}");
+            assert!(at.z > f64::from(low.z) && at.z < f64::from(high.z), "{at}");
+            assert!((1.4..=1.8).contains(&(at.y - f64::from(high.y))), "{at}");
+            let forward = -found.camera.rotation().z_axis;
+            let down = (-forward.y).asin().to_degrees();
+            assert!((13.34..=20.0).contains(&down), "{down}");
+            assert!(found.camera.rotation().x_axis.y.abs() < 1e-9);
+            let triangles = house.scene.surfaces.iter().flat_map(|surface| {
+                (0..surface.mesh.triangles.len()).map(|at| surface.mesh.corners(at).map(|p| p.as_dvec3()))
+            });
+            let radius = |t: &[DVec3; 3]| (t[1] - t[0]).length().max((t[2] - t[0]).length());
+            let near = triangles.filter(|t| t[0].distance(at) < radius(t) + 0.5);
+            let nearest = near.map(|t| nearest_by_search(t, at)).fold(f64::INFINITY, f64::min);
+            assert!(nearest >= rules.clearance_m - 1e-4, "{nearest}");
+            assert!(found.score > rules.min_score && found.nearest_m >= 1.0);
+            assert!((2.5..=3.5).contains(&found.mean_m), "{}", found.mean_m);
+            seen += 1;
+        }
+    }
+    assert!(seen >= 4, "{seen}");
+}
+
+/// All five views, by ten times as many rays a side: what is between the sampler's rays is not much nearer.
+#[test]
+fn nothing_near_is_seen() {
+    let world = world();
+    let rules = SamplerRules::default();
+    let mut worst = f64::INFINITY;
+    for room in [LIVING, 1] {
+        for found in found(&world, room, &rules) {
+            let views = TURNS.iter().map(|turn| found.camera.turned(turn[0], turn[1])).chain([found.camera]);
+            for view in views {
+                worst = worst.min(nearest_seen(&world, &view, 100));
+            }
+        }
+    }
+    assert!(worst >= rules.min_distance_m, "{worst}");
+}
+
+/// Twin: without the rule something near is seen.
+#[test]
+fn without_the_rule_near_things_are_seen() {
+    let world = world();
+    let rules = SamplerRules { min_distance_m: 0.0, ..SamplerRules::default() };
+    let all = found(&world, LIVING, &rules);
+    assert!(all.iter().any(|found| nearest_seen(&world, &found.camera, 100) < 1.0));
+}
+
+#[test]
+fn rooms_that_will_not_do_are_told() {
+    let mut house = furnished().clone();
+    let rules = SamplerRules { tries: 200, ..SamplerRules::default() };
+    // Too small, for what it is asked.
+    let far = SamplerRules { mean_distance_m: [50.0, 60.0], ..rules };
+    let told = sample(&house, LIVING, intrinsics(), &TURNS, &far, 1).unwrap_err();
+    assert!(
+        told.contains("none of 200") && told.contains("LivingDiningRoom-101") && told.contains("by hand"),
+        "{told}"
+    );
+    let near = SamplerRules { clearance_m: 3.0, ..rules };
+    let told = sample(&house, LIVING, intrinsics(), &TURNS, &near, 1).unwrap_err();
+    assert!(told.contains("within 3 m"), "{told}");
+    // Without a floor.
+    for placed in &mut house.placed {
+        if placed.room == LIVING && placed.role == (Role::Architecture { kind: "Floor".into() }) {
+            placed.role = Role::Architecture { kind: "Other".into() };
+        }
+    }
+    let told = sample(&house, LIVING, intrinsics(), &TURNS, &rules, 1).unwrap_err();
+    assert!(told.contains("LivingDiningRoom-101") && told.contains("no floor"), "{told}");
+}
+
+/// BlenderProc's sum, by hand: 50 rays at a sofa, 30 at walls, 20 at the floor:
+/// (500 + 30 + 20) / 100 * 3 / 3 * (0.5 * 0.7 * 0.8) = 1.54.
+#[test]
+fn scores_are_those_of_the_formula() {
+    let house = furnished();
+    let of_kind =
+        |kind: &str| house.placed.iter().position(|p| p.role == Role::Architecture { kind: kind.into() }).unwrap();
+    let of_name = |word: &str| {
+        let is_it = |p: &Placed| matches!(&p.role, Role::Furniture { name, .. } if name.contains(word));
+        house.placed.iter().position(is_it).unwrap()
+    };
+    let rays = |all: &[(usize, usize)]| -> Vec<usize> {
+        all.iter().flat_map(|(surface, count)| std::iter::repeat_n(*surface, *count)).collect()
+    };
+    let (sofa, wall, floor) = (of_name("sofa"), of_kind("WallInner"), of_kind("Floor"));
+    let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]));
+    assert!((found - 1.54).abs() < 1e-12, "{found}");
+    // One kind fills all: nothing is left of it.
+    assert_eq!(score(house, &rays(&[(wall, 100)])), 0.0);
+    // Two surfaces of one kind are one kind: 100 / 100 * 2 / 3 * 0.4 * 0.6.
+    let walls: Vec<usize> = (0..house.placed.len())
+        .filter(|at| house.placed[*at].role == Role::Architecture { kind: "WallInner".into() })
+        .collect();
+    assert!(walls.len() > 1);
+    let found = score(house, &rays(&[(walls[0], 30), (walls[1], 30), (floor, 40)]));
+    assert!((found - 0.16).abs() < 1e-12, "{found}");
+    let mut names: BTreeMap<&str, usize> = BTreeMap::new();
+    for placed in &house.placed {
+        if let Role::Furniture { name, .. } = &placed.role {
+            assert_eq!(*name, name.to_lowercase());
+            *names.entry(name).or_insert(0) += 1;
+        }
+    }
+    assert!(names.len() > 5, "{names:?}");
+}

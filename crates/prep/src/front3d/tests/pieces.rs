@@ -1,0 +1,261 @@
+//! Pieces, their models and materials.
+
+use mateval_scene::material::{ColorInput, Material, MaterialModel, UvTransform};
+
+use super::*;
+
+const GREY: ColorInput = ColorInput::Constant([0.5; 3]);
+
+fn color_of(material: &Material) -> &ColorInput {
+    let MaterialModel::Principled { base_color, .. } = &material.model else { panic!("{:?}", material.model) };
+    base_color
+}
+
+/// The colour of the layout's material with this number, if anything is made of it.
+fn layout_color(house: &FurnishedHouse, number: usize) -> Option<&ColorInput> {
+    let uid = format!("101000000003/{number:05}");
+    house.scene.materials.iter().find(|material| material.name == uid).map(color_of)
+}
+
+fn texture_name<'a>(house: &'a FurnishedHouse, color: &ColorInput) -> &'a str {
+    let ColorInput::Texture { texture, .. } = color else { panic!("{color:?}") };
+    &house.scene.textures[texture.0].name
+}
+
+/// 31 places: three whose models are not there, one of them valid; and one valid piece the size of a speck.
+#[test]
+fn all_valid_pieces_are_placed() {
+    let house = furnished();
+    assert_sound(house);
+    assert_eq!(house.wanted_pieces, [11, 6, 12]);
+    let placed =
+        |room| house.placed.iter().filter(|p| p.room == room && matches!(p.role, Role::Furniture { .. })).count();
+    assert_eq!([placed(0), placed(1), placed(2)], [11, 6, 10]);
+    assert_eq!(house.house.lights, 3);
+    assert_eq!(house.house.release, Release::R3);
+    assert_eq!(house.cameras.len(), 6);
+}
+
+/// /furniture/21 is a lounge chair; the record that repeats its uid would make a shelf of it.
+#[test]
+fn of_two_records_the_first_counts() {
+    let house = furnished();
+    let all: Vec<&str> = house.house.furniture.iter().map(|record| record.uid.as_str()).collect();
+    assert_eq!(all.len(), 30);
+    assert_eq!(house.house.furniture[21].jid, jid(19));
+    assert_eq!(pieces_of(house, LIBRARY, 19).len(), 1);
+    // The magenta one repeats the floor's uid.
+    assert_eq!(house.house.materials.len(), 13);
+    assert!(matches!(layout_color(house, 0), Some(ColorInput::Texture { .. })));
+}
+
+/// Sizes by the numbers in the files: the stool's are centimetres, the shelf has a shadow of six metres.
+#[test]
+fn models_have_their_size_in_metres() {
+    let house = furnished();
+    let only = |number| {
+        let all = pieces_of(house, LIBRARY, number);
+        assert_eq!(all.len(), 1, "{number}");
+        all[0]
+    };
+    let stool = size(&only(20).mesh);
+    assert!(stool.max_element() < 0.6 && stool.min_element() > 0.3, "{stool}");
+    let shelf = only(16);
+    assert!(size(&shelf.mesh).max_element() < 2.5, "{}", size(&shelf.mesh));
+    assert!(signed_volume(&shelf.mesh) > 0.0);
+}
+
+/// Quads are fanned: the side table, which is closed, still has the volume of its parts and looks outwards. Lamps' shades
+/// are open, and so have none.
+#[test]
+fn closed_models_look_outwards() {
+    let house = furnished();
+    let mut seen = 0;
+    for (placed, surface) in house.placed.iter().zip(&house.scene.surfaces) {
+        let Role::Furniture { jid, .. } = &placed.role else { continue };
+        if placed.origin.super_category.as_deref() == Some("Lighting") {
+            continue;
+        }
+        let volume = signed_volume(&surface.mesh);
+        assert!(volume > 1e-5, "{jid} {volume}");
+        let box_volume = f64::from(size(&surface.mesh).element_product());
+        assert!(volume < box_volume * 1.0001, "{jid} {volume} {box_volume}");
+        seen += 1;
+    }
+    assert_eq!(seen, 24);
+    let table = &pieces_of(house, LIBRARY, 18)[0].mesh;
+    assert!(table.uvs.is_some() && table.normals.is_some() && table.triangles.len() > 20);
+}
+
+/// The picture on the library's wall is scaled by -1 along x: the same box as its unmirrored twin, its letters backwards,
+/// its front still in front, its normals with its triangles.
+#[test]
+fn a_mirrored_piece_is_mirrored_and_looks_outwards() {
+    let disk = Disk::new();
+    let mut json = disk.json.clone();
+    json["scene"]["room"][2]["children"][33]["scale"] = json!([1, 1, 1]);
+    let straight = disk.furnish_json(&json).unwrap();
+    let [one, other] = [furnished(), &straight].map(|house| &pieces_of(house, LIBRARY, 8)[0].mesh);
+    assert!((size(one) - size(other)).length() < 1e-5);
+    assert!((signed_volume(one) - signed_volume(other)).abs() < 1e-5 && signed_volume(one) > 0.0);
+    for mesh in [one, other] {
+        let normals = mesh.normals.as_ref().unwrap();
+        for (at, triangle) in mesh.triangles.iter().enumerate() {
+            let [a, b, c] = mesh.corners(at);
+            assert!((b - a).cross(c - a).dot(normals[triangle[0] as usize]) > 0.0);
+        }
+    }
+    // The way of u along z turns round: it looks west, so that its own x is the room's z.
+    assert!(slope_of_u(one) * slope_of_u(other) < 0.0);
+}
+
+/// Whether u grows with z over the triangles whose uv are spread most.
+fn slope_of_u(mesh: &TriangleMesh) -> f32 {
+    let uvs = mesh.uvs.as_ref().unwrap();
+    let largest = |t: &&[u32; 3]| {
+        let [a, b, c] = t.map(|v| uvs[v as usize]);
+        ((b - a).perp_dot(c - a).abs() * 1e6) as i64
+    };
+    let [a, b, c] = mesh.triangles.iter().max_by_key(largest).unwrap().map(|v| v as usize);
+    let gradient = |p: usize, q: usize| (uvs[q].x - uvs[p].x) * (mesh.positions[q].z - mesh.positions[p].z);
+    gradient(a, b) + gradient(b, c) + gradient(a, c)
+}
+
+/// children/24 is the bookcase, 1.3 wide and 0.9 deep; it looks north, so that its width lies along x.
+#[test]
+fn uneven_scales_act_along_the_models_axes() {
+    let disk = Disk::new();
+    let mut json = disk.json.clone();
+    let child = json.pointer_mut("/scene/room/2/children/24").unwrap();
+    let record = child["ref"].clone();
+    child["scale"] = json!([1, 1, 1]);
+    let record = json["furniture"].as_array().unwrap().iter().find(|r| r["uid"] == record).unwrap();
+    let number: u32 = record["jid"].as_str().unwrap().rsplit('-').next().unwrap().parse().unwrap();
+    let even = disk.furnish_json(&json).unwrap();
+    let [uneven, even] = [furnished(), &even].map(|house| size(&pieces_of(house, LIBRARY, number)[0].mesh));
+    let ratio = uneven / even;
+    assert!((ratio - Vec3::new(1.3, 1.0, 0.9)).length() < 1e-4, "{ratio}");
+}
+
+/// children/27: a quaternion of length 1.58 turns but does not stretch.
+#[test]
+fn quaternions_are_made_unit() {
+    let house = furnished();
+    let child = house.house.rooms[LIBRARY].children.iter().find(|c| c.place.ends_with("/27")).unwrap();
+    let turn = child.placement.rotation;
+    assert!((turn.length() - 1.0).abs() < 1e-12);
+    assert!((turn.y / turn.w - 1.0 / 3.0).abs() < 1e-12);
+    let ChildKind::Furniture(record) = child.what else { panic!() };
+    let number: u32 = house.house.furniture[record].jid.rsplit('-').next().unwrap().parse().unwrap();
+    let mesh = &pieces_of(house, LIBRARY, number)[0].mesh;
+    assert!(size(mesh).y < 1.5, "{}", size(mesh));
+}
+
+/// A truncated or missing picture leaves a piece in mid-grey; black, glowing .mtl files say nothing.
+#[test]
+fn materials_of_models_are_their_pictures() {
+    let house = furnished();
+    let color = |number: u32| {
+        let name = jid(number);
+        color_of(house.scene.materials.iter().find(|material| material.name == name).unwrap())
+    };
+    for number in [15, 21] {
+        assert_eq!(*color(number), GREY, "{number}");
+    }
+    for number in (1..=14).chain(16..=20) {
+        let name = format!("house/3D-FUTURE-model/{}/texture.png", jid(number));
+        // Every other name is of the model's own file.
+        assert_eq!(texture_name(house, color(number)), name);
+        let texture = house.scene.textures.iter().find(|texture| texture.name == name).unwrap();
+        assert_eq!(texture.sha256.as_ref().map(String::len), Some(64));
+        assert!(house.files.contains(&(name, texture.sha256.clone().unwrap())));
+    }
+}
+
+/// The layout's: what `useColor`, `local`, "" and a missing folder come to; colours are decoded as sRGB.
+#[test]
+fn materials_of_the_layout_follow_the_rules() {
+    let house = furnished();
+    // 255, 244, 214 is 1, 0.9047, 0.6724 in linear light (IEC 61966-2-1, by hand); 8 is the light band's.
+    let Some(ColorInput::Constant(band)) = layout_color(house, 8) else { panic!() };
+    for (found, by_hand) in band.iter().zip([1.0, 0.904_66, 0.672_44]) {
+        assert!((found - by_hand).abs() < 2e-4, "{band:?}");
+    }
+    for plain in [5, 6, 7, 8, 10, 11, 12] {
+        assert!(matches!(layout_color(house, plain), Some(ColorInput::Constant(_))), "{plain}");
+    }
+    for textured in [0, 1, 2, 3, 4, 9] {
+        let color = layout_color(house, textured).unwrap();
+        assert!(texture_name(house, color).starts_with("house/3D-FRONT-texture/"), "{textured}");
+        let ColorInput::Texture { uv, .. } = color else { unreachable!() };
+        assert_ne!(*uv, UvTransform::default());
+        assert_eq!(*uv, house.house.materials[textured].uv);
+    }
+    // Of the mesh that names no material.
+    let none = house.scene.materials.iter().find(|material| material.name == "none").unwrap();
+    assert_eq!(*color_of(none), GREY);
+}
+
+/// Each rule alone. Trescope: colorMode before useColor, and only where there is a texture.
+#[test]
+fn each_material_rule_alone() {
+    let read = |change: Value| {
+        let mut json = small_house();
+        let own = json["material"][0].as_object_mut().unwrap();
+        own.insert("jid".into(), "t".into());
+        own.extend(change.as_object().unwrap().clone());
+        let (house, findings) = read_house(&json);
+        (house.unwrap().materials.remove(0), findings)
+    };
+    for (change, texture) in [
+        (json!({}), Some("t")),
+        (json!({"useColor": false}), Some("t")),
+        (json!({"useColor": true}), None),
+        (json!({"useColor": true, "colorMode": "texture"}), Some("t")),
+        (json!({"useColor": false, "colorMode": "color"}), None),
+        (json!({"jid": "local"}), None),
+        (json!({"jid": ""}), None),
+        (json!({"jid": null}), None),
+        (json!({"texture": {"value": ""}}), Some("t")),
+        (json!({"texture": ""}), Some("t")),
+    ] {
+        let (material, findings) = read(change.clone());
+        assert_eq!((material.texture.as_deref(), findings.len()), (texture, 0), "{change}");
+    }
+    let (material, _) = read(json!({"UVTransform": [2, 0, 0.25, 0, -3, 0.5, 0, 0, 1]}));
+    assert_eq!(material.uv, UvTransform([[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]));
+    let (material, _) = read(json!({"color": [10, 20, 30]}));
+    assert_eq!(material.color, [10.0, 20.0, 30.0]);
+    for (bad, code) in [
+        (json!({"UVTransform": [1, 2]}), "bad_uv_transform"),
+        (json!({"UVTransform": [1e9, 0, 0, 0, 1, 0, 0, 0, 1]}), "bad_uv_transform"),
+        (json!({"color": [1, 2]}), "bad_color"),
+        (json!({"color": [0, 0, 256]}), "bad_color"),
+        (json!({"color": "red"}), "bad_color"),
+    ] {
+        let (material, findings) = read(bad);
+        assert_eq!((findings.len(), findings[0].code.as_str()), (1, code));
+        assert_eq!((material.uv, material.color), (UvTransform::default(), [255.0; 3]));
+    }
+}
+
+/// The whole matrix acts, its translation too: a texel that lies a quarter further on is what is looked up.
+#[test]
+fn uv_transforms_move_too() {
+    let uv = UvTransform([[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]);
+    let place = uv.apply(glam::Vec2::new(0.5, 1.0));
+    assert!((place - glam::Vec2::new(1.25, -2.5)).length() < 1e-6, "{place}");
+}
+
+/// Without the folder of textures the architecture has its colours, and each texture has one finding.
+#[test]
+fn textures_may_be_missing_altogether() {
+    let disk = Disk::new();
+    let house = furnish(&HouseFiles { textures: None, ..disk.files() }, &Limits::default()).unwrap();
+    assert!(house.scene.textures.iter().all(|texture| texture.name.contains("3D-FUTURE-model")));
+    assert_eq!(
+        house.findings.iter().filter(|f| f.code == "missing_texture" && f.place.starts_with("/material")).count(),
+        7
+    );
+    assert_sound(&house);
+}
