@@ -9,11 +9,7 @@ use super::limits::Limits;
 pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, String> {
     check_size(text, limits)?;
     let tree: Value = serde_json::from_slice(text).map_err(|error| format!("not JSON: {error}"))?;
-    if tree.is_object() {
-        Ok(tree)
-    } else {
-        Err(format!("expected an object with furniture, mesh, material and scene, found {}", kind(&tree)))
-    }
+    if tree.is_object() { Ok(tree) } else { Err(format!("expected an object, found {}", kind(&tree))) }
 }
 
 /// Counts what a tree of the text would hold: two bytes of text can cost a hundred of memory.

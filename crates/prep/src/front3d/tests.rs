@@ -18,9 +18,9 @@ use mateval_scene::{Severity, TriangleMesh};
 use serde_json::{Value, json};
 
 use super::*;
-use crate::sample;
+use crate::sample::house::for_tests;
 
-/// The sample's house, below the folder that [`sample::house::write`] fills.
+/// The sample's house, below the folder that [`for_tests::write`] fills.
 const HOUSE: &str = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
 const LIVING: usize = 0;
 const LIBRARY: usize = 2;
@@ -33,8 +33,17 @@ struct Disk {
 
 impl Disk {
     fn new() -> Self {
+        Self::written(true)
+    }
+
+    /// Without pictures, which take the most time: every piece and wall is there, in plain colours.
+    fn bare() -> Self {
+        Self::written(false)
+    }
+
+    fn written(pictures: bool) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        sample::house::write(folder.path()).unwrap();
+        for_tests::write(folder.path(), pictures);
         let json = serde_json::from_slice(&std::fs::read(folder.path().join(HOUSE)).unwrap()).unwrap();
         Self { folder, json }
     }
@@ -70,6 +79,12 @@ impl Disk {
 fn furnished() -> &'static FurnishedHouse {
     static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
     HOUSE.get_or_init(|| Disk::new().furnish())
+}
+
+/// The same without pictures, for what is about shapes.
+fn bare() -> &'static FurnishedHouse {
+    static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
+    HOUSE.get_or_init(|| Disk::bare().furnish())
 }
 
 /// A model's id by the last digits.

@@ -19,12 +19,12 @@ fn intrinsics() -> Intrinsics {
 }
 
 fn world() -> World {
-    World::new(Arc::new(furnished().scene.clone())).unwrap()
+    World::new(Arc::new(bare().scene.clone())).unwrap()
 }
 
 /// A few cameras of a room; the seeds that find one.
 fn found(world: &World, room: usize, rules: &SamplerRules) -> Vec<FoundCamera> {
-    let sampler = RoomSampler::new(furnished(), world, room).unwrap();
+    let sampler = RoomSampler::new(bare(), world, room).unwrap();
     (0..6).filter_map(|seed| sampler.sample(intrinsics(), &TURNS, rules, seed).ok()).collect()
 }
 
@@ -64,7 +64,7 @@ fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
 #[test]
 fn same_seed_same_camera() {
     let rules = SamplerRules::default();
-    let of = |seed| sample(furnished(), LIVING, intrinsics(), &TURNS, &rules, seed);
+    let of = |seed| sample(bare(), LIVING, intrinsics(), &TURNS, &rules, seed);
     let (one, again, other) = (of(1).unwrap(), of(1).unwrap(), of(2).unwrap());
     assert_eq!(one, again);
     assert_ne!(one.camera, other.camera);
@@ -73,7 +73,7 @@ fn same_seed_same_camera() {
 /// Above its own floor, inside its room, level, as high and as steep as the rules say, and nothing within the clearance.
 #[test]
 fn cameras_stand_free_in_their_room() {
-    let (house, world) = (furnished(), world());
+    let (house, world) = (bare(), world());
     let rules = SamplerRules::default();
     let mut seen = 0;
     for room in [LIVING, 1] {
@@ -132,7 +132,7 @@ fn without_the_rule_near_things_are_seen() {
 
 #[test]
 fn rooms_that_will_not_do_are_told() {
-    let mut house = furnished().clone();
+    let mut house = bare().clone();
     let rules = SamplerRules { tries: 200, ..SamplerRules::default() };
     // Too small, for what it is asked.
     let far = SamplerRules { mean_distance_m: [50.0, 60.0], ..rules };
@@ -158,7 +158,7 @@ fn rooms_that_will_not_do_are_told() {
 /// (500 + 30 + 20) / 100 * 3 / 3 * (0.5 * 0.7 * 0.8) = 1.54.
 #[test]
 fn scores_are_those_of_the_formula() {
-    let house = furnished();
+    let house = bare();
     let of_kind =
         |kind: &str| house.placed.iter().position(|p| p.role == Role::Architecture { kind: kind.into() }).unwrap();
     let of_name = |word: &str| {

@@ -88,7 +88,7 @@ fn silent_faults_have_their_effect() {
     let house = furnished();
     let origin = |number: u32| {
         let of = |placed: &&Placed| matches!(&placed.role, Role::Furniture { jid: own, .. } if *own == jid(number));
-        let placed = house.placed.iter().filter(of).next_back().unwrap();
+        let placed = house.placed.iter().rfind(of).unwrap();
         let Role::Furniture { name, complete, .. } = &placed.role else { unreachable!() };
         let [category, super_category] = [&placed.origin.category, &placed.origin.super_category];
         let text = |text: &Option<String>| text.clone().unwrap_or_default();
@@ -120,7 +120,7 @@ fn a_sound_house_has_no_warning() {
     for number in [15, 21] {
         std::fs::copy(disk.model(1).join("texture.png"), disk.model(number).join("texture.png")).unwrap();
     }
-    let mut json = sample::house::sound_house();
+    let mut json = for_tests::sound_house();
     json["furniture"][27]["valid"] = false.into();
     let house = disk.furnish_json(&json).unwrap();
     assert_eq!(warnings(&house), [""; 0]);

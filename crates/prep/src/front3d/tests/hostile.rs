@@ -132,7 +132,7 @@ fn assert_house_is_sound(json: &Value) {
 
 fn sample_json() -> &'static Value {
     static JSON: OnceLock<Value> = OnceLock::new();
-    JSON.get_or_init(|| Disk::new().json)
+    JSON.get_or_init(for_tests::spoilt_house)
 }
 
 proptest! {
@@ -164,15 +164,10 @@ proptest! {
     }
 }
 
-/// Also furnished, and as something to trace rays in. Without pictures, which take most of the time.
+/// Also furnished, and as something to trace rays in.
 #[test]
 fn mutated_houses_are_furnished_or_refused() {
-    let disk = Disk::new();
-    for number in 1..=21 {
-        let _ = std::fs::remove_file(disk.model(number).join("texture.png"));
-    }
-    std::fs::remove_dir_all(disk.folder.path().join("house/3D-FRONT-texture")).unwrap();
-    std::fs::create_dir(disk.folder.path().join("house/3D-FRONT-texture")).unwrap();
+    let disk = Disk::bare();
     // Half of all changes in what rooms hold.
     let in_rooms = (prop::collection::vec(any::<usize>(), 3..6), any_mutation().prop_map(|(_, value)| value));
     let strategy = prop::collection::vec(prop_oneof![any_mutation(), in_rooms], 1..4);
@@ -204,7 +199,7 @@ fn mutated_houses_are_furnished_or_refused() {
 /// Transforms that each pass, and together lead nowhere.
 #[test]
 fn what_is_absurdly_far_is_left_out() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     let mut json = disk.json.clone();
     json["scene"]["scale"] = json!([99_999, 99_999, 99_999]);
     json["scene"]["room"][0]["scale"] = json!([99_999, 99_999, 99_999]);
@@ -289,7 +284,7 @@ fn limits_hold() {
         assert!(error.contains(told), "{error}");
     }
     // Enough for the architecture and for some of the models.
-    let architecture: usize = furnished().house.meshes.iter().map(|mesh| mesh.mesh.triangles.len()).sum();
+    let architecture: usize = bare().house.meshes.iter().map(|mesh| mesh.mesh.triangles.len()).sum();
     let tight = with(Limits { triangles: architecture + 3000, ..all }).unwrap();
     assert_sound(&tight);
     assert!(tight.scene.surfaces.iter().map(|s| s.mesh.triangles.len()).sum::<usize>() <= architecture + 3000);

@@ -143,7 +143,7 @@ fn parts_are_by_group_and_then_by_what_hangs_together() {
     let list = crate::instances::list(&house.scene, &origins).unwrap();
     assert_eq!(list[at].parts.len(), 3);
     // The whole sample: ids of instances and parts are there once.
-    let sample = furnished();
+    let sample = bare();
     let origins: Vec<_> = sample.placed.iter().map(|placed| placed.origin.clone()).collect();
     let list = crate::instances::list(&sample.scene, &origins).unwrap();
     let mut ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();

@@ -52,7 +52,7 @@ fn of_two_records_the_first_counts() {
 /// Sizes by the numbers in the files: the stool's are centimetres, the shelf has a shadow of six metres.
 #[test]
 fn models_have_their_size_in_metres() {
-    let house = furnished();
+    let house = bare();
     let only = |number| {
         let all = pieces_of(house, LIBRARY, number);
         assert_eq!(all.len(), 1, "{number}");
@@ -69,7 +69,7 @@ fn models_have_their_size_in_metres() {
 /// are open, and so have none.
 #[test]
 fn closed_models_look_outwards() {
-    let house = furnished();
+    let house = bare();
     let mut seen = 0;
     for (placed, surface) in house.placed.iter().zip(&house.scene.surfaces) {
         let Role::Furniture { jid, .. } = &placed.role else { continue };
@@ -91,11 +91,11 @@ fn closed_models_look_outwards() {
 /// its front still in front, its normals with its triangles.
 #[test]
 fn a_mirrored_piece_is_mirrored_and_looks_outwards() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     let mut json = disk.json.clone();
     json["scene"]["room"][2]["children"][33]["scale"] = json!([1, 1, 1]);
     let straight = disk.furnish_json(&json).unwrap();
-    let [one, other] = [furnished(), &straight].map(|house| &pieces_of(house, LIBRARY, 8)[0].mesh);
+    let [one, other] = [bare(), &straight].map(|house| &pieces_of(house, LIBRARY, 8)[0].mesh);
     assert!((size(one) - size(other)).length() < 1e-5);
     assert!((signed_volume(one) - signed_volume(other)).abs() < 1e-5 && signed_volume(one) > 0.0);
     for mesh in [one, other] {
@@ -124,7 +124,7 @@ fn slope_of_u(mesh: &TriangleMesh) -> f32 {
 /// children/24 is the bookcase, 1.3 wide and 0.9 deep; it looks north, so that its width lies along x.
 #[test]
 fn uneven_scales_act_along_the_models_axes() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     let mut json = disk.json.clone();
     let child = json.pointer_mut("/scene/room/2/children/24").unwrap();
     let record = child["ref"].clone();
@@ -132,7 +132,7 @@ fn uneven_scales_act_along_the_models_axes() {
     let record = json["furniture"].as_array().unwrap().iter().find(|r| r["uid"] == record).unwrap();
     let number: u32 = record["jid"].as_str().unwrap().rsplit('-').next().unwrap().parse().unwrap();
     let even = disk.furnish_json(&json).unwrap();
-    let [uneven, even] = [furnished(), &even].map(|house| size(&pieces_of(house, LIBRARY, number)[0].mesh));
+    let [uneven, even] = [bare(), &even].map(|house| size(&pieces_of(house, LIBRARY, number)[0].mesh));
     let ratio = uneven / even;
     assert!((ratio - Vec3::new(1.3, 1.0, 0.9)).length() < 1e-4, "{ratio}");
 }
@@ -140,7 +140,7 @@ fn uneven_scales_act_along_the_models_axes() {
 /// children/27: a quaternion of length 1.58 turns but does not stretch.
 #[test]
 fn quaternions_are_made_unit() {
-    let house = furnished();
+    let house = bare();
     let child = house.house.rooms[LIBRARY].children.iter().find(|c| c.place.ends_with("/27")).unwrap();
     let turn = child.placement.rotation;
     assert!((turn.length() - 1.0).abs() < 1e-12);

@@ -69,7 +69,7 @@ fn compat_is_blenderprocs_matrix() {
 /// under compat on the east of a room whose x stays as it was: wrong against the layout, as in BlenderProc's pictures.
 #[test]
 fn compat_mirrors_the_layout_and_not_the_sofa() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     let normal = disk.furnish();
     let compat = furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap();
     assert_sound(&compat);
@@ -116,10 +116,10 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
 /// The designers' cameras go with the layout, so that they see the same walls.
 #[test]
 fn compat_mirrors_cameras_too() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     let compat = furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap();
     assert_eq!(compat.cameras.len(), 6);
-    for (one, other) in furnished().cameras.iter().zip(&compat.cameras) {
+    for (one, other) in bare().cameras.iter().zip(&compat.cameras) {
         assert_eq!(
             (one.position.x, one.position.y, one.position.z),
             (other.position.x, other.position.y, -other.position.z)
@@ -131,7 +131,7 @@ fn compat_mirrors_cameras_too() {
 /// Two negative factors are half a turn, three and one a mirror.
 #[test]
 fn only_mirrors_are_told() {
-    let disk = Disk::new();
+    let disk = Disk::bare();
     for (scale, told) in [(json!([-1, 1, -1]), false), (json!([-1, -1, -1]), true), (json!([1, 1, -1]), true)] {
         let mut json = disk.json.clone();
         json["scene"]["room"][2]["children"][33]["scale"] = scale.clone();

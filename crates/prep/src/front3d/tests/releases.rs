@@ -80,7 +80,7 @@ fn summary(house: &House) -> (usize, usize, usize, Vec<Child>) {
 /// None of these keys matters for what there is and where; none of them is missed.
 #[test]
 fn optional_keys_may_be_missing() {
-    let whole = sample::house::sound_house();
+    let whole = for_tests::sound_house();
     let (house, findings) = read_house(&whole);
     assert!(findings.is_empty(), "{findings:?}");
     let expected = summary(&house.unwrap());
@@ -110,7 +110,7 @@ fn optional_keys_may_be_missing() {
 /// Twin: these do matter, and are missed where they are gone.
 #[test]
 fn keys_that_matter_are_missed() {
-    let whole = sample::house::sound_house();
+    let whole = for_tests::sound_house();
     let expected = summary(&read_house(&whole).0.unwrap());
     let keys = [("/furniture", "uid"), ("/mesh", "uid"), ("/mesh", "xyz"), ("/mesh", "faces"), ("/mesh", "material")];
     let more = [("/mesh", "uv"), ("/material", "uid")];
@@ -137,7 +137,7 @@ fn keys_that_matter_are_missed() {
 /// A replaced model's jid is in its record already.
 #[test]
 fn what_was_replaced_is_ignored() {
-    let mut json = sample::house::sound_house();
+    let mut json = for_tests::sound_house();
     let expected = summary(&read_house(&json).0.unwrap());
     let more = json!({"replace_jid": "x", "replace_bbox": {"xLen": 100, "yLen": 50, "zLen": 1}, "componentModifiers": [],
         "components": [], "uv_override": {}, "material": "m", "parentJid": "p"});

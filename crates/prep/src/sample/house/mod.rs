@@ -42,23 +42,27 @@ For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
 /// Writes the house into the folder `out`; files of the same name are replaced.
-pub(crate) fn write(out: &Path) -> Result<(), PrepError> {
-    let house = out.join("house");
-    let (layouts, library) = (house.join("3D-FRONT"), house.join("3D-FUTURE-model"));
-    for folder in [&layouts, &library] {
-        std::fs::create_dir_all(folder).map_err(PrepError::io("create", folder))?;
-    }
+pub(super) fn write(out: &Path) -> Result<(), PrepError> {
     let (models, textures) = (models::all(), textures::all());
     for texture in &textures {
-        let folder = house.join("3D-FRONT-texture").join(uids::texture(texture.number));
+        let folder = out.join("house/3D-FRONT-texture").join(uids::texture(texture.number));
         std::fs::create_dir_all(&folder).map_err(PrepError::io("create", &folder))?;
         write_rgb_bytes(&folder.join("texture.png"), &texture.file())?;
     }
-    for model in &models {
-        model_files::write(&library, model)?;
+    write_shapes(out, &models, &textures)?;
+    models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
+}
+
+/// Everything but the pictures, which take the most time.
+fn write_shapes(out: &Path, models: &[models::Model], textures: &[textures::LayoutTexture]) -> Result<(), PrepError> {
+    let house = out.join("house");
+    let (layouts, library) = (house.join("3D-FRONT"), house.join("3D-FUTURE-model"));
+    for folder in [&layouts, &library, &house.join("3D-FRONT-texture")] {
+        std::fs::create_dir_all(folder).map_err(PrepError::io("create", folder))?;
     }
-    write_text(&library.join("model_info.json"), &model_files::info(&models))?;
-    let json = house_json::text(spoilt_house(&models, &textures));
+    models.iter().try_for_each(|model| model_files::write_shape(&library, model))?;
+    write_text(&library.join("model_info.json"), &model_files::info(models))?;
+    let json = house_json::text(spoilt_house(models, textures));
     write_text(&layouts.join(format!("{}.json", uids::HOUSE)), &json)?;
     write_text(&house.join("FAULTS.txt"), &faults::text())?;
     write_text(&house.join("LICENSE.txt"), LICENSE)
@@ -71,10 +75,31 @@ fn spoilt_house(models: &[models::Model], textures: &[textures::LayoutTexture]) 
     house
 }
 
-/// The house's JSON without those faults that `faults` plants.
+/// For tests of the reader.
 #[cfg(test)]
-pub(crate) fn sound_house() -> serde_json::Value {
-    house_json::house(&models::all(), &textures::all())
+pub(crate) mod for_tests {
+    use std::path::Path;
+
+    use serde_json::Value;
+
+    use super::{house_json, models, textures};
+
+    /// The whole house into a folder, with its pictures or without.
+    pub(crate) fn write(out: &Path, pictures: bool) {
+        let written =
+            if pictures { super::write(out) } else { super::write_shapes(out, &models::all(), &textures::all()) };
+        written.unwrap();
+    }
+
+    /// The house's JSON without those faults that `faults` plants.
+    pub(crate) fn sound_house() -> Value {
+        house_json::house(&models::all(), &textures::all())
+    }
+
+    /// The house's JSON as it is on disk.
+    pub(crate) fn spoilt_house() -> Value {
+        super::spoilt_house(&models::all(), &textures::all())
+    }
 }
 
 #[cfg(test)]

@@ -18,13 +18,17 @@ use crate::sample::write_text;
 /// Decimals of numbers in the files: hundredths of millimetres.
 const DECIMALS: usize = 5;
 
-/// Writes a model's folder into `library`.
-pub(super) fn write(library: &Path, model: &Model) -> Result<(), PrepError> {
+/// Writes a model's folder into `library`, but for its picture.
+pub(super) fn write_shape(library: &Path, model: &Model) -> Result<(), PrepError> {
     let folder = library.join(model.jid());
     std::fs::create_dir_all(&folder).map_err(PrepError::io("create", &folder))?;
     write_text(&folder.join("raw_model.obj"), &obj(model))?;
-    write_text(&folder.join("model.mtl"), &mtl(model))?;
-    let path = folder.join("texture.png");
+    write_text(&folder.join("model.mtl"), &mtl(model))
+}
+
+/// Writes a model's picture into its folder in `library`.
+pub(super) fn write_picture(library: &Path, model: &Model) -> Result<(), PrepError> {
+    let path = library.join(model.jid()).join("texture.png");
     let picture = swatches::picture(&model.swatches, model.side);
     match model.quirk {
         Some(Quirk::NoTexture) => return Ok(()),
