@@ -133,17 +133,21 @@ fn lights_are_ceilings_lamps_and_the_world() {
         assert_eq!(light.camera_visible, light.name == "world");
         match &light.emission {
             Emission::Constant { radiance } => assert_eq!((light.name.as_str(), *radiance), ("world", [0.05; 3])),
-            Emission::Area { surfaces, radiance, two_sided } => {
+            Emission::Area { surfaces, radiance, map, two_sided } => {
                 assert!(two_sided);
                 let all: Vec<usize> = surfaces.iter().map(|surface| surface.0).collect();
                 if let [lamp] = all[..]
                     && lamps.contains(&lamp)
                 {
                     assert_eq!(*radiance, [7.0; 3]);
+                    let material = &scene.scene.materials[scene.scene.surfaces[lamp].material.0];
+                    let MaterialModel::Principled { base_color, .. } = material.model else { panic!("{material:?}") };
+                    let map = map.expect("a lamp of the sample has a texture");
+                    assert_eq!(base_color, ColorInput::Texture { texture: map.texture, uv: map.uv });
                     continue;
                 }
                 let color = house.placed[kept[all[0]]].color;
-                assert_eq!(*radiance, color.map(|v| 0.8 * v));
+                assert_eq!((*radiance, *map), (color.map(|v| 0.8 * v), None));
                 assert_eq!(ceilings[&(house.placed[kept[all[0]]].room, color.map(f32::to_bits))], all);
             }
             other => panic!("{other:?}"),
