@@ -64,15 +64,21 @@ pub struct FoundCamera {
     pub tries: u32,
 }
 
-/// Why draws were thrown away, most frequent reasons last.
-#[derive(Clone, Copy, Debug, Default)]
-struct Thrown {
-    off_floor: u32,
-    crowded: u32,
-    open: u32,
-    near: u32,
-    mean: u32,
-    dull: u32,
+/// Why a draw is thrown away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Refusal {
+    /// Not above the room's floor alone.
+    OffFloor,
+    /// Sees the outside.
+    Open,
+    /// Sees something too near.
+    Near,
+    /// The mean distance is out of range.
+    Mean,
+    /// The score is too low.
+    Dull,
+    /// Something is within the clearance, seen or not.
+    Crowded,
 }
 
 /// Draws cameras in room number `room` until one keeps to the rules. `turns` are the novel views', degrees about x and y.
@@ -127,36 +133,41 @@ impl<'a> RoomSampler<'a> {
         rules: &SamplerRules,
         seed: u64,
     ) -> Result<FoundCamera, String> {
-        let mut thrown = Thrown::default();
+        let mut refusals = Vec::new();
         for number in 0..rules.tries {
             // One pixel of a picture of the room: every draw follows from seed, room and number alone.
             let sampler = Sampler::new(seed, [self.room as u32, 0], number);
-            if let Some(found) = self.draw(&sampler, intrinsics, turns, rules, &mut thrown) {
-                return Ok(FoundCamera { tries: number + 1, ..found });
+            match self.draw(&sampler, intrinsics, rules).and_then(|camera| self.judge(camera, turns, rules)) {
+                Ok(found) => return Ok(FoundCamera { tries: number + 1, ..found }),
+                Err(refusal) => refusals.push(refusal),
             }
         }
-        let Thrown { off_floor, crowded, open, near, mean, dull } = thrown;
-        Err(format!(
-            "none of {} cameras will do in room '{}': {off_floor} not above its floor alone, {crowded} within {} m of \
-             something, {open} see the outside, {near} see something nearer than {} m, {mean} have a mean distance out of \
-             {:?} m, {dull} score no more than {}; give one by hand, or try another seed",
-            rules.tries,
-            self.house.house.rooms[self.room].id,
-            rules.clearance_m,
-            rules.min_distance_m,
-            rules.mean_distance_m,
-            rules.min_score
-        ))
+        Err(self.told(&refusals, rules))
     }
 
-    fn draw(
-        &self,
-        sampler: &Sampler,
-        intrinsics: Intrinsics,
-        turns: &[[f64; 2]],
-        rules: &SamplerRules,
-        thrown: &mut Thrown,
-    ) -> Option<FoundCamera> {
+    fn told(&self, refusals: &[Refusal], rules: &SamplerRules) -> String {
+        let count = |which: Refusal| refusals.iter().filter(|refusal| **refusal == which).count();
+        format!(
+            "none of {} cameras will do in room '{}': {} not above its floor alone, {} see the outside, {} see something \
+             nearer than {} m, {} have a mean distance out of {:?} m, {} score no more than {}, {} within {} m of something; \
+             give one by hand, or try another seed",
+            rules.tries,
+            self.house.house.rooms[self.room].id,
+            count(Refusal::OffFloor),
+            count(Refusal::Open),
+            count(Refusal::Near),
+            rules.min_distance_m,
+            count(Refusal::Mean),
+            rules.mean_distance_m,
+            count(Refusal::Dull),
+            rules.min_score,
+            count(Refusal::Crowded),
+            rules.clearance_m,
+        )
+    }
+
+    /// A camera above the room's floor.
+    fn draw(&self, sampler: &Sampler, intrinsics: Intrinsics, rules: &SamplerRules) -> Result<Camera, Refusal> {
         let [x, z, height, pitch] = sampler.set(0).map(f64::from);
         let [yaw, ..] = sampler.set(1).map(f64::from);
         let between = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
@@ -166,35 +177,31 @@ impl<'a> RoomSampler<'a> {
             high.y + between(rules.height_m, height),
             between([low.z, high.z], z),
         );
-        let position = self.on_own_floor(above, rules, height).or_else(|| (thrown.off_floor += 1, None).1)?;
-        if self.distance_to_anything(position, rules.clearance_m) < rules.clearance_m {
-            thrown.crowded += 1;
-            return None;
-        }
+        let position = self.on_own_floor(above, rules, height).ok_or(Refusal::OffFloor)?;
         let pitch = -between(rules.pitch_down_deg, pitch).to_radians();
         let rotation = DMat3::from_rotation_y(yaw * std::f64::consts::TAU) * DMat3::from_rotation_x(pitch);
-        let camera = Camera::from_rotation(rotation, position, intrinsics);
-        let seen = self.rays(&camera).or_else(|| (thrown.open += 1, None).1)?;
-        let mut nearest_m = nearest(&seen);
-        for turn in turns {
-            let seen = self.rays(&camera.turned(turn[0], turn[1])).or_else(|| (thrown.open += 1, None).1)?;
-            nearest_m = nearest_m.min(nearest(&seen));
-        }
-        if nearest_m < rules.min_distance_m {
-            thrown.near += 1;
-            return None;
-        }
+        Ok(Camera::from_rotation(rotation, position, intrinsics))
+    }
+
+    /// Whether a camera keeps to the rules; what costs least is asked first.
+    fn judge(&self, camera: Camera, turns: &[[f64; 2]], rules: &SamplerRules) -> Result<FoundCamera, Refusal> {
+        let holds = |holds: bool, refusal: Refusal| if holds { Ok(()) } else { Err(refusal) };
+        let seen = self.rays(&camera).ok_or(Refusal::Open)?;
+        holds(nearest(&seen) >= rules.min_distance_m, Refusal::Near)?;
         let mean_m = seen.iter().map(|(_, distance)| distance).sum::<f64>() / seen.len() as f64;
-        if !(rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m) {
-            thrown.mean += 1;
-            return None;
-        }
+        holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::Mean)?;
         let score = score(self.house, &seen.iter().map(|(surface, _)| *surface).collect::<Vec<_>>());
-        if score <= rules.min_score {
-            thrown.dull += 1;
-            return None;
+        holds(score > rules.min_score, Refusal::Dull)?;
+        let turned: Vec<Camera> = turns.iter().map(|turn| camera.turned(turn[0], turn[1])).collect();
+        for view in &turned {
+            self.rays(view).ok_or(Refusal::Open)?;
         }
-        Some(FoundCamera { camera, score, nearest_m, mean_m, tries: 0 })
+        let views = turned.iter().chain([&camera]);
+        let nearest_m = views.map(|view| self.nearest_between(view)).fold(nearest(&seen), f64::min);
+        holds(nearest_m >= rules.min_distance_m, Refusal::Near)?;
+        let clearance_m = self.distance_to_anything(camera.position(), rules.clearance_m);
+        holds(clearance_m >= rules.clearance_m, Refusal::Crowded)?;
+        Ok(FoundCamera { camera, score, nearest_m, mean_m, tries: 0 })
     }
 
     /// The place at the drawn height above the floor below; none where something else is below, or nothing above that
@@ -219,9 +226,19 @@ impl<'a> RoomSampler<'a> {
         f64::from(nearest)
     }
 
+    /// Metres to the nearest thing that many more rays meet: table edges and lamps fit between ten by ten. Only cameras that
+    /// keep to all other rules are worth it.
+    fn nearest_between(&self, view: &Camera) -> f64 {
+        let met = grid(&view.intrinsics, DENSE_GRID).filter_map(|place| {
+            let hit = hit_through(self.world, view, place)?;
+            Some(view.camera_direction(place).length() * hit.depth)
+        });
+        met.fold(f64::INFINITY, f64::min)
+    }
+
     /// What ten by ten rays meet, corners included, and how far away; none where one leaves the house.
     fn rays(&self, camera: &Camera) -> Option<Vec<(usize, f64)>> {
-        grid(&camera.intrinsics)
+        grid(&camera.intrinsics, GRID)
             .map(|place| {
                 let hit: PixelHit = hit_through(self.world, camera, place)?;
                 let distance = camera.camera_direction(place).length() * hit.depth;
@@ -242,14 +259,20 @@ fn nearest(seen: &[(usize, f64)]) -> f64 {
 
 /// Rays of a side.
 const GRID: usize = 10;
+/// Rays of a side, where nothing may be missed.
+const DENSE_GRID: usize = 60;
 
 /// The places of ten by ten rays over the picture, corners included.
-pub(crate) fn grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> + use<> {
+pub(crate) fn score_grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> + use<> {
+    grid(intrinsics, GRID)
+}
+
+fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + use<> {
     let size = DVec2::new(f64::from(intrinsics.width), f64::from(intrinsics.height));
-    let share = |k: usize| k as f64 / (GRID - 1) as f64;
+    let share = move |k: usize| k as f64 / (side - 1) as f64;
     // A hair within the frame: its border belongs to the pixel beyond.
     let within = move |place: DVec2| (size - DVec2::splat(1e-3)) * place;
-    (0..GRID * GRID).map(move |k| within(DVec2::new(share(k % GRID), share(k / GRID))))
+    (0..side * side).map(move |k| within(DVec2::new(share(k % side), share(k / side))))
 }
 
 /// BlenderProc's coverage score of the surfaces met by 100 rays: chairs, sofas, tables and beds count ten times, all else

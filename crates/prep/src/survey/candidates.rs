@@ -279,5 +279,5 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
 }
 
 fn grid_of(camera: &Camera) -> Vec<DVec2> {
-    crate::front3d::camera_sampler::grid(&camera.intrinsics).collect()
+    crate::front3d::camera_sampler::score_grid(&camera.intrinsics).collect()
 }

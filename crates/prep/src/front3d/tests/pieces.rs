@@ -247,15 +247,17 @@ fn uv_transforms_move_too() {
     assert!((place - glam::Vec2::new(1.25, -2.5)).length() < 1e-6, "{place}");
 }
 
-/// Without the folder of textures the architecture has its colours, and each texture has one finding.
+/// Without the folder of textures the architecture has its colours, and one finding says so.
 #[test]
 fn textures_may_be_missing_altogether() {
     let disk = Disk::new();
     let house = furnish(&HouseFiles { textures: None, ..disk.files() }, &Limits::default()).unwrap();
     assert!(house.scene.textures.iter().all(|texture| texture.name.contains("3D-FUTURE-model")));
-    assert_eq!(
-        house.findings.iter().filter(|f| f.code == "missing_texture" && f.place.starts_with("/material")).count(),
-        7
-    );
+    let told: Vec<&str> =
+        house.findings.iter().filter(|f| f.code == "no_textures").map(|f| f.message.as_str()).collect();
+    assert_eq!(told, ["7 materials have a texture, and no folder of textures was given"]);
     assert_sound(&house);
+    // The twin: with the folder there is no such finding.
+    let house = furnish(&disk.files(), &Limits::default()).unwrap();
+    assert!(house.findings.iter().all(|finding| finding.code != "no_textures"));
 }
