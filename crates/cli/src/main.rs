@@ -32,7 +32,7 @@ struct Cli {
 enum Command {
     /// Everything on the built-in sample: dataset, renders, baselines, scores.
     Demo(demo::Args),
-    /// Writes the built-in sample: a small CC0 room as a source scene, with a recipe.
+    /// Writes the built-in sample: a small CC0 room and a house as source scenes, with a recipe.
     Sample(sample::Args),
     /// Makes datasets.
     #[command(subcommand)]
