@@ -161,8 +161,10 @@ fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepEr
     let marks = out.join(BUILD);
     let key_file = marks.join("key.json");
     let is_dataset = out.join(DATASET).is_file();
-    let unfinished = !is_dataset && marks.is_dir();
-    if unfinished && !options.force && json::read::<BuildKey>(&key_file).is_ok_and(|found| found == *key) {
+    // Other tools have folders of that name: only one with our key is ours.
+    let found_key = json::read::<BuildKey>(&key_file).ok();
+    let unfinished = !is_dataset && found_key.is_some();
+    if unfinished && !options.force && found_key.as_ref() == Some(key) {
         return Ok(true);
     }
     // A build killed before it wrote its key has written nothing else.

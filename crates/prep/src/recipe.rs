@@ -30,7 +30,7 @@ pub struct Recipe {
     #[serde(default = "default_samples")]
     pub samples: u32,
     /// The scenes.
-    #[serde(rename = "scene")]
+    #[serde(default, rename = "scene")]
     pub scenes: Vec<RecipeScene>,
 }
 

@@ -35,7 +35,7 @@ pub struct SurveyArgs {
     #[arg(long = "list", value_name = "LIST.csv")]
     lists: Vec<PathBuf>,
     /// Of the cameras.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=u64::from(u32::MAX)))]
     seed: u64,
     /// Cameras drawn in each room.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(0..=1000))]

@@ -315,7 +315,7 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
 /// A camera with `pos`, `target` and a vertical `fov` in degrees.
 pub(super) fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);
-    let fov_y_deg = record.get("fov")?.as_f64().filter(|fov| (1.0..=179.0).contains(fov))?;
+    let fov_y_deg = record.get("fov")?.as_f64().filter(|fov| (1.0..179.0).contains(fov))?;
     let (position, target) = (DVec3::from_array(position), DVec3::from_array(target));
     (position.distance(target) > 1e-6).then_some(DesignerCamera { number, position, target, fov_y_deg })
 }

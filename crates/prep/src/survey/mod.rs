@@ -153,7 +153,7 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
         let what = "is already there; choose another --out, or add --force to replace it".to_owned();
         return Err(PrepError::Output { path: options.out.clone(), what });
     }
-    let is_survey = options.out.join(SURVEY).is_file();
+    let is_survey = json::read::<SurveyFile>(&options.out.join(SURVEY)).is_ok_and(|file| file.format == SURVEY_FORMAT);
     if options.out.exists() && !is_survey {
         let what = "is there and is no survey: it is not replaced; choose another --out".to_owned();
         return Err(PrepError::Output { path: options.out.clone(), what });
@@ -214,14 +214,16 @@ fn survey_house(
         blenderproc_compat: false,
     };
     let shown = house.to_string_lossy().replace('\\', "/");
-    let furnished = match front3d::furnish(&files, &front3d::Limits::default()) {
-        Ok(furnished) => furnished,
+    let looked = front3d::furnish(&files, &front3d::Limits::default())
+        .map_err(PrepError::from)
+        .and_then(|furnished| Ok((candidates::look_through(options, &furnished)?, furnished)));
+    let (HouseSurvey { rooms, pictures }, furnished) = match looked {
+        Ok(looked) => looked,
         Err(error) => {
             let error = Some(error.to_string());
             return Ok(SurveyedHouse { file: shown, uid: None, error, findings: Vec::new(), rooms: Vec::new() });
         }
     };
-    let HouseSurvey { rooms, pictures } = candidates::look_through(options, &furnished)?;
     for (name, picture) in pictures {
         write_rgb_bytes(&out.join(name), &picture)?;
     }
