@@ -132,3 +132,21 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     std::fs::write(&recipe, without.join("\n")).unwrap();
     build_from(&recipe, &source, &dataset).ends_with(0);
 }
+
+/// What every house needs is looked for first; a house named twice is surveyed once.
+#[test]
+fn a_survey_refuses_folders_that_are_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("survey");
+    let with = |words: &[&str]| {
+        let mut command = mateval();
+        command.args(["prep", "survey", "--source"]).arg(&SURVEYED.source).arg("--out").arg(&out);
+        run(command.args(["--cameras-per-room", "0"]).args(words))
+    };
+    with(&["house/3D-FRONT", "--models", "house/3D-FUTURE-modell"]).ends_with(2).says("3D-FUTURE-modell' is not there");
+    with(&["house/3D-FRUNT", "--models", "house/3D-FUTURE-model"]).ends_with(2).says("3D-FRUNT' is not there");
+    assert!(!out.exists());
+    let house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
+    with(&["house/3D-FRONT", house, "--models", "house/3D-FUTURE-model"]);
+    assert_eq!(json(&out.join("survey.json"))["houses"].as_array().unwrap().len(), 1);
+}

@@ -70,6 +70,8 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         let finished = if resumes { finished_scene(&folder, &mark, &source_root(entry, &source)) } else { None };
         let licence = match finished {
             Some(licence) => {
+                // Of a run killed between making a scene anew and removing the old one.
+                remove_aside(folder.path())?;
                 report.resumed.push(entry.id.clone());
                 licence
             }
@@ -210,6 +212,10 @@ fn make_scene(
     mark: &Path,
     progress: Progress<'_>,
 ) -> Result<SceneMark, PrepError> {
+    if mark.exists() {
+        // It is of what is about to be replaced.
+        std::fs::remove_file(mark).map_err(PrepError::io("remove", mark))?;
+    }
     let work = WorkFolder::start(folder.path())?;
     let licence = build_scene::build(recipe, entry, source, &SceneFolder::at(work.path().to_owned()), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });

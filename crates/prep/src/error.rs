@@ -49,10 +49,7 @@ pub enum PrepError {
     },
     /// The source could not be read at all.
     #[error(transparent)]
-    Bitterli(#[from] crate::bitterli::BitterliError),
-    /// The house could not be read at all.
-    #[error(transparent)]
-    Front3d(#[from] crate::front3d::Front3dError),
+    Source(#[from] crate::source::SourceError),
     /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

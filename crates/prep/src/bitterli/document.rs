@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::error::BitterliError;
 use super::limits::Limits;
+use crate::source::SourceError;
 use crate::source::log::{Log, shortened};
 
 /// One XML element.
@@ -60,8 +60,8 @@ pub(super) type Ids<'a> = BTreeMap<&'a str, &'a Element>;
 
 impl Document {
     /// Reads the XML `text` of `path`. Fails where it is not a sound `<scene>` or breaks a limit.
-    pub(super) fn parse(path: &Path, text: &str, limits: &Limits, log: &mut Log) -> Result<Self, BitterliError> {
-        let invalid = |what: String| BitterliError::Invalid { path: path.to_owned(), what };
+    pub(super) fn parse(path: &Path, text: &str, limits: &Limits, log: &mut Log) -> Result<Self, SourceError> {
+        let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
         check_depth(text, limits.xml_depth).map_err(invalid)?;
         let xml = roxmltree::Document::parse(text).map_err(|error| invalid(format!("not sound XML: {error}")))?;
         let mut builder = Builder::new(text, limits, log);
@@ -295,7 +295,7 @@ pub(super) fn snake_case(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_scene::Finding>) {
+    fn parse(text: &str) -> (Result<Document, SourceError>, Vec<mateval_scene::Finding>) {
         let mut log = Log::new("scene.xml".into(), 100);
         let document = Document::parse(Path::new("scene.xml"), text, &Limits::default(), &mut log);
         (document, log.into_findings())

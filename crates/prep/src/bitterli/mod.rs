@@ -11,7 +11,6 @@ mod bsdf;
 mod bsdf_model;
 mod document;
 mod emitter;
-mod error;
 mod ior;
 mod limits;
 mod parameters;
@@ -30,16 +29,15 @@ mod transform;
 mod value;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
-use crate::source::LicenceText;
 use crate::source::folder::SourceFolder;
 use crate::source::log::{Log, shortened};
+use crate::source::{LicenceText, SourceError};
 use document::Document;
-pub use error::BitterliError;
 pub use limits::Limits;
 use reader::{Reader, Totals};
 
@@ -63,8 +61,8 @@ pub struct BitterliScene {
 /// Reads the scene whose XML is at `xml_path`.
 ///
 /// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
-pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, BitterliError> {
-    let invalid = |what: String| BitterliError::Invalid { path: xml_path.to_owned(), what };
+pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceError> {
+    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
     let (mut source, name, text) = read_xml_file(xml_path, limits)?;
     let mut log = Log::new(name, limits.findings);
     let document = Document::parse(xml_path, &text, limits, &mut log)?;
@@ -100,18 +98,9 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, BitterliE
     })
 }
 
-fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), BitterliError> {
-    let io = |source| BitterliError::Io { path: xml_path.to_owned(), source };
-    let invalid = |what: String| BitterliError::Invalid { path: xml_path.to_owned(), what };
-    let size = std::fs::metadata(xml_path).map_err(io)?.len();
-    if size > limits.xml_bytes {
-        return Err(invalid(format!("expected at most {} bytes of XML, found {size}", limits.xml_bytes)));
-    }
-    let name = xml_path.file_name().map(|name| name.to_string_lossy().into_owned());
-    let name = name.ok_or_else(|| invalid("expected the path of a file".to_owned()))?;
-    let folder = xml_path.parent().map_or(PathBuf::new(), Path::to_owned);
-    let mut source = SourceFolder::new(&folder, limits.file_bytes).map_err(io)?;
-    let bytes = source.read(&name).map_err(|fault| invalid(fault.message))?;
+fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
+    let (source, name, bytes) = SourceFolder::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
+    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
     let text = String::from_utf8(bytes).map_err(|_| invalid("expected UTF-8, found other bytes".to_owned()))?;
     Ok((source, name, text))
 }

@@ -31,7 +31,7 @@ fn folder_with(xml: &str) -> tempfile::TempDir {
 }
 
 /// Reads a scene from a folder with `models/a b.obj` and `a b.png`.
-pub(super) fn read_xml(xml: &str) -> Result<BitterliScene, BitterliError> {
+pub(super) fn read_xml(xml: &str) -> Result<BitterliScene, SourceError> {
     read(&folder_with(xml).path().join("scene.xml"), &Limits::default())
 }
 

@@ -11,7 +11,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::TriangleMesh;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_tracer::aov::{PixelHit, hit_through};
-use mateval_tracer::{Ray, Sampler, World};
+use mateval_tracer::{Hit, Ray, Sampler, World};
 
 use super::furnish::{FurnishedHouse, Role};
 
@@ -117,12 +117,12 @@ impl<'a> RoomSampler<'a> {
         Ok(Self { house, world, room, floor: [low, high] })
     }
 
-    /// Whether a place is above the room's floor's box, below six metres.
-    pub fn holds(&self, place: DVec3) -> bool {
-        let [low, high] = self.floor.map(|corner| corner.as_dvec3());
-        (low.x..=high.x).contains(&place.x)
-            && (low.z..=high.z).contains(&place.z)
-            && (0.0..6.0).contains(&(place.y - high.y))
+    /// Whether the first floor straight below a place is the room's own; furniture may be in between.
+    pub fn stands_in_room(&self, place: DVec3) -> bool {
+        let is_any_floor = |hit: &Hit| is_architecture(self.house, hit.surface.0, "Floor");
+        let down = Ray::endless(place.as_vec3(), Vec3::NEG_Y);
+        let floor = self.world.accel().closest_where(&down, is_any_floor);
+        floor.is_some_and(|hit| is_floor(self.house, hit.surface.0, self.room))
     }
 
     /// Draws until a camera keeps to the rules.
@@ -190,7 +190,7 @@ impl<'a> RoomSampler<'a> {
         holds(nearest(&seen) >= rules.min_distance_m, Refusal::Near)?;
         let mean_m = seen.iter().map(|(_, distance)| distance).sum::<f64>() / seen.len() as f64;
         holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::Mean)?;
-        let score = score(self.house, &seen.iter().map(|(surface, _)| *surface).collect::<Vec<_>>());
+        let score = score(self.house, &seen.iter().map(|(surface, _)| Some(*surface)).collect::<Vec<_>>());
         holds(score > rules.min_score, Refusal::Dull)?;
         let turned: Vec<Camera> = turns.iter().map(|turn| camera.turned(turn[0], turn[1])).collect();
         for view in &turned {
@@ -250,7 +250,11 @@ impl<'a> RoomSampler<'a> {
 
 fn is_floor(house: &FurnishedHouse, surface: usize, room: usize) -> bool {
     let placed = &house.placed[surface];
-    placed.room == room && matches!(&placed.role, Role::Architecture { kind } if kind == "Floor")
+    placed.room == room && is_architecture(house, surface, "Floor")
+}
+
+fn is_architecture(house: &FurnishedHouse, surface: usize, wanted: &str) -> bool {
+    matches!(&house.placed[surface].role, Role::Architecture { kind } if kind == wanted)
 }
 
 fn nearest(seen: &[(usize, f64)]) -> f64 {
@@ -277,12 +281,12 @@ fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + u
 
 /// BlenderProc's coverage score of the surfaces met by 100 rays: chairs, sofas, tables and beds count ten times, all else
 /// once; the sum over 100, times a third of the number of different kinds, times the product over kinds of one minus the
-/// kind's share. Walls and floors are kinds too.
-pub fn score(house: &FurnishedHouse, seen: &[usize]) -> f64 {
+/// kind's share. Walls and floors are kinds too; a ray that meets nothing adds nothing.
+pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
     const SPECIAL: [&str; 4] = ["chair", "sofa", "table", "bed"];
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     let mut weighted = 0;
-    for surface in seen {
+    for surface in seen.iter().flatten() {
         let name = match &house.placed[*surface].role {
             Role::Architecture { kind } => kind.to_lowercase(),
             Role::Furniture { name, .. } => name.clone(),

@@ -3,11 +3,12 @@
 use serde_json::Value;
 
 use super::document;
-use super::error::Front3dError;
-use super::furnish::{HouseFiles, read_house_file, shown_path};
+use super::furnish::{HouseFiles, shown_path};
 use super::house::{DesignerCamera, House};
 use super::house_reader::designer_camera;
 use super::limits::Limits;
+use crate::source::SourceError;
+use crate::source::folder::SourceFolder;
 use crate::source::log::Log;
 
 /// All cameras of a house.
@@ -19,11 +20,11 @@ pub(super) struct Cameras {
 }
 
 /// Those of the file beside where there is one, else those of the JSON.
-pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut Log) -> Result<Cameras, Front3dError> {
+pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut Log) -> Result<Cameras, SourceError> {
     let Some(beside) = &files.cameras else { return Ok(Cameras { all: house.cameras.clone(), hash: None }) };
     let path = files.root.join(beside);
-    let (bytes, folder) = read_house_file(&path, limits)?;
-    let invalid = |what: String| Front3dError::Invalid { path: path.clone(), what };
+    let (folder, _, bytes) = SourceFolder::open(&path, limits.json_bytes, limits.json_bytes)?;
+    let invalid = |what: String| SourceError::Invalid { path: path.clone(), what };
     let tree = document::parse(&bytes, limits).map_err(invalid)?;
     let all = of_house(&tree, &house.uid);
     if all.is_empty() {

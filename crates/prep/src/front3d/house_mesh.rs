@@ -6,6 +6,7 @@ use serde_json::Value;
 
 use super::document::{kind, list};
 use crate::source::log::Log;
+use crate::source::surface_mesh::has_area;
 
 /// Beyond this many metres a coordinate is a fault, not a place.
 const FARTHEST: f64 = 1e5;
@@ -26,7 +27,8 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleM
         log.note("empty_mesh", place, "it has no triangle that covers anything", "left it out");
         return None;
     }
-    Some(without_unused(&mesh))
+    // Vertices that no triangle uses may be nowhere.
+    Some(mesh.picked(|_| true))
 }
 
 /// Impossible ones are not finite.
@@ -62,11 +64,7 @@ fn drop_impossible(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
 fn drop_without_area(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
-    mesh.triangles.retain(|triangle| {
-        let [a, b, c] = triangle.map(|vertex| positions[vertex as usize].as_dvec3());
-        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-        (b - a).cross(c - a).length() > 1e-9 * longest
-    });
+    mesh.triangles.retain(|triangle| has_area(triangle.map(|vertex| positions[vertex as usize])));
     let dropped = before - mesh.triangles.len();
     if dropped > 0 {
         let message = format!("{dropped} of {before} triangles have no area");
@@ -104,27 +102,6 @@ fn note_bad_normals(from: &Value, vertices: usize, place: &str, log: &mut Log) {
     if bad > 0 || floats.len() != 3 * vertices {
         let message = format!("{} numbers for {vertices} vertices, {bad} normals are not of unit length", floats.len());
         log.note("bad_normals", &place, message, "took the triangles' own normals");
-    }
-}
-
-/// The same triangles with the vertices that they use alone: the others may be nowhere.
-fn without_unused(mesh: &TriangleMesh) -> TriangleMesh {
-    let mut new_place = vec![u32::MAX; mesh.positions.len()];
-    let mut used: Vec<usize> = Vec::new();
-    let mut renumbered = |vertex: u32| {
-        let place = &mut new_place[vertex as usize];
-        if *place == u32::MAX {
-            *place = used.len() as u32;
-            used.push(vertex as usize);
-        }
-        *place
-    };
-    let triangles = mesh.triangles.iter().map(|triangle| triangle.map(&mut renumbered)).collect();
-    TriangleMesh {
-        positions: used.iter().map(|&vertex| mesh.positions[vertex]).collect(),
-        normals: None,
-        uvs: mesh.uvs.as_ref().map(|uvs| used.iter().map(|&vertex| uvs[vertex]).collect()),
-        triangles,
     }
 }
 

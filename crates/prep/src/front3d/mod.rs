@@ -5,14 +5,15 @@
 //! is missing or mended is a finding with its JSON pointer; an error is left for what is no house at all.
 //!
 //! Between: `document` makes a tree of the JSON (bounded), `house_reader` with `house_mesh` a [`House`] of it; `model`,
-//! `model_info` read 3D-FUTURE; [`furnish`] places everything; `cameras` are the designers', [`camera_sampler`] finds
+//! `model_info` read 3D-FUTURE; [`furnish`] places everything, by `furnisher` and `appearance`; `cameras` are the designers', [`camera_sampler`] finds
 //! others; `lights` lets ceilings and lamps glow; [`room_scene`] takes one room and what its views see of the others.
 
+mod appearance;
 pub mod camera_sampler;
 mod cameras;
 mod document;
-mod error;
 mod furnish;
+mod furnisher;
 mod house;
 mod house_mesh;
 mod house_reader;
@@ -22,7 +23,6 @@ mod model;
 mod model_info;
 pub mod room_scene;
 
-pub use error::Front3dError;
 pub use furnish::{FurnishedHouse, HouseFiles, Placed, Role, furnish, read_house};
 pub use house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,

@@ -8,7 +8,7 @@ use crate::parts::labelled_parts;
 use crate::source::folder::SourceFolder;
 use crate::source::log::{Log, shortened};
 use crate::source::obj::{self, ObjLimits, ObjMesh};
-use crate::source::surface_mesh::to_world;
+use crate::source::surface_mesh::{has_area, to_world};
 
 /// A larger model is in centimetres: no furniture is ten metres long.
 const LARGEST_M: f32 = 10.0;
@@ -135,13 +135,6 @@ fn size_of_used(mesh: &TriangleMesh) -> f32 {
     let low = corners().reduce(Vec3::min).unwrap_or_default();
     let high = corners().reduce(Vec3::max).unwrap_or_default();
     (high - low).max_element()
-}
-
-fn has_area(corners: [Vec3; 3]) -> bool {
-    let [a, b, c] = corners.map(|p| p.as_dvec3());
-    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-    // False for what is not finite.
-    longest < 1e12 && (b - a).cross(c - a).length() > 1e-9 * longest
 }
 
 impl Library {

@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::sample::house::for_tests;
+use crate::source::SourceError;
 
 /// The sample's house, below the folder that [`for_tests::write`] fills.
 const HOUSE: &str = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
@@ -69,7 +70,7 @@ impl Disk {
     }
 
     /// With another JSON.
-    fn furnish_json(&self, json: &Value) -> Result<FurnishedHouse, Front3dError> {
+    fn furnish_json(&self, json: &Value) -> Result<FurnishedHouse, SourceError> {
         std::fs::write(self.folder.path().join(HOUSE), json.to_string()).unwrap();
         furnish(&self.files(), &Limits::default())
     }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
+use super::SourceError;
+
 /// Why a file that the XML names was not read.
 #[derive(Debug)]
 pub(crate) struct FileFault {
@@ -28,6 +30,22 @@ impl SourceFolder {
     pub(crate) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
         Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new() })
+    }
+
+    /// The folder of the file at `path`, that file's name and its bytes; it may have at most `most_bytes`, others of the
+    /// folder `file_bytes`.
+    pub(crate) fn open(path: &Path, most_bytes: u64, file_bytes: u64) -> Result<(Self, String, Vec<u8>), SourceError> {
+        let io = |source| SourceError::Io { path: path.to_owned(), source };
+        let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
+        let size = std::fs::metadata(path).map_err(io)?.len();
+        if size > most_bytes {
+            return Err(invalid(format!("expected at most {most_bytes} bytes, found {size}")));
+        }
+        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+        let name = name.ok_or_else(|| invalid("expected the path of a file".to_owned()))?;
+        let mut folder = Self::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
+        let bytes = folder.read(&name).map_err(|fault| invalid(fault.message))?;
+        Ok((folder, name, bytes))
     }
 
     /// A file name of the XML with forward slashes and without `.` and `..`; refused where it leads out.

@@ -1,10 +1,12 @@
 //! What readers of all kinds of source share: findings, files of strangers, OBJ, and the scene that comes of it.
 
+mod error;
 pub(crate) mod folder;
 pub(crate) mod log;
 pub(crate) mod obj;
 pub(crate) mod surface_mesh;
 
+pub use error::SourceError;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 

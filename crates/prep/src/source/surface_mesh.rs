@@ -58,6 +58,13 @@ fn is_degenerate(corners: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).length() <= 1e-12 * longest
 }
 
+/// Whether a triangle covers anything worth keeping; false for what is not finite.
+pub(crate) fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    longest < 1e12 && (b - a).cross(c - a).length() > 1e-9 * longest
+}
+
 /// Leaves out triangles with impossible corners, and those corners; how many.
 fn drop_far_triangles(mesh: &mut TriangleMesh) -> usize {
     let sound: Vec<bool> = mesh.positions.iter().map(|p| p.is_finite() && p.abs().max_element() <= FARTHEST).collect();

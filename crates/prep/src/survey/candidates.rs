@@ -17,31 +17,51 @@ use super::intersect::intersecting_pairs;
 use super::rules::{Rejection, RoomFacts};
 use super::{CandidateCamera, SurveyOptions, SurveyedRoom};
 use crate::error::PrepError;
-use crate::front3d::camera_sampler::{RoomSampler, SamplerRules, score};
+use crate::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
 use crate::front3d::{FurnishedHouse, Role};
 use crate::recipe::Offset;
 
+/// sRGB bytes.
+type Thumbnail = Picture<[u8; 3]>;
+
 /// Width of thumbnails.
-const THUMBNAIL: u32 = 320;
+const THUMBNAIL_WIDTH: u32 = 320;
 
 /// A house looked through.
 pub(super) struct HouseSurvey {
     pub(super) rooms: Vec<SurveyedRoom>,
     /// Files, relative to the survey's folder.
-    pub(super) pictures: Vec<(String, Picture<[u8; 3]>)>,
+    pub(super) pictures: Vec<(String, Thumbnail)>,
 }
 
-/// Looks through all rooms.
-pub(super) fn look_through(options: &SurveyOptions, house: &FurnishedHouse) -> Result<HouseSurvey, PrepError> {
+/// Looks through all rooms. `taken` holds the ids of scenes so far.
+pub(super) fn look_through(
+    options: &SurveyOptions,
+    house: &FurnishedHouse,
+    taken: &mut BTreeSet<String>,
+) -> Result<HouseSurvey, PrepError> {
     let world = World::new(Arc::new(house.scene.clone()))?;
     let look = Look { options, house, world: &world, views: crate::recipe::default_views() };
-    let rooms = (0..house.house.rooms.len()).map(|room| look.room(room)).collect::<Result<Vec<_>, PrepError>>()?;
     let mut survey = HouseSurvey { rooms: Vec::new(), pictures: Vec::new() };
-    for (room, pictures) in rooms {
+    for room in 0..house.house.rooms.len() {
+        let (mut room, pictures) = look.room(room)?;
+        for (camera, picture) in room.cameras.iter_mut().zip(pictures) {
+            camera.scene = free_id(&camera.scene, taken);
+            camera.thumbnail = format!("thumbnails/{}.png", camera.scene);
+            survey.pictures.push((camera.thumbnail.clone(), picture));
+        }
         survey.rooms.push(room);
-        survey.pictures.extend(pictures);
     }
     Ok(survey)
+}
+
+/// The id, with a number behind it where it is taken: houses and rooms of other names may be cut to the same one.
+fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|number| format!("{id}-{number}"));
+    let free = std::iter::once(id.to_owned()).chain(numbered).find(|id| !taken.contains(id));
+    let free = free.expect("ids are finitely many");
+    taken.insert(free.clone());
+    free
 }
 
 struct Look<'a> {
@@ -59,13 +79,11 @@ struct Posed {
 }
 
 /// A camera that keeps to the rules, and its thumbnail.
-type Candidate = (CandidateCamera, Picture<[u8; 3]>);
-
-/// With its file.
-type NamedPicture = (String, Picture<[u8; 3]>);
+type Candidate = (CandidateCamera, Thumbnail);
 
 impl Look<'_> {
-    fn room(&self, room: usize) -> Result<(SurveyedRoom, Vec<NamedPicture>), PrepError> {
+    /// A room, and a picture for each of its cameras.
+    fn room(&self, room: usize) -> Result<(SurveyedRoom, Vec<Thumbnail>), PrepError> {
         let facts = self.facts(room)?;
         let source = &self.house.house.rooms[room];
         let mut rejections = self.options.rules.check(&facts);
@@ -77,7 +95,7 @@ impl Look<'_> {
                 rejections.push(Rejection::new("no_camera", refused.join("; ")));
             }
             for (camera, picture) in found {
-                pictures.push((camera.thumbnail.clone(), picture));
+                pictures.push(picture);
                 cameras.push(camera);
             }
         }
@@ -182,7 +200,7 @@ impl Look<'_> {
                 }
             }
         }
-        let own = self.house.cameras.iter().filter(|camera| sampler.holds(camera.position));
+        let own = self.house.cameras.iter().filter(|camera| sampler.stands_in_room(camera.position));
         posed.extend(own.filter_map(|camera| {
             let intrinsics = Intrinsics::from_fov_y(width, height, camera.fov_y_deg.to_radians());
             let posed = Camera::look_at(camera.position, camera.target, glam::DVec3::Y, intrinsics)?;
@@ -202,19 +220,19 @@ impl Look<'_> {
         let all = misses(&seen) + turned.map(|seen| misses(&seen)).sum::<usize>();
         let outside = all as f64 / (seen.len() * (1 + self.views.len())) as f64;
         let rules = &self.options.rules;
-        if outside > rules.max_outside {
+        if all == seen.len() * (1 + self.views.len()) || outside > rules.max_outside {
             return Err(format!("{:.0} % of the pixels see the outside", 100.0 * outside));
         }
         if pieces.len() < rules.min_seen_objects {
             return Err(format!("it sees {} pieces of furniture", pieces.len()));
         }
-        let surfaces: Vec<usize> =
-            grid_of(&small).iter().filter_map(|place| Some(self.look_at(&small, *place)?.0)).collect();
+        let surfaces: Vec<Option<usize>> =
+            score_grid(&small.intrinsics).map(|place| Some(self.look_at(&small, place)?.0)).collect();
         let position = camera.position();
         let forward = camera.rotation() * -glam::DVec3::Z;
         let scene = self.scene_id(room, origin);
         let candidate = CandidateCamera {
-            thumbnail: format!("thumbnails/{scene}.png"),
+            thumbnail: String::new(),
             scene,
             origin: origin.to_owned(),
             position: position.to_array(),
@@ -265,10 +283,10 @@ const OUTSIDE: [u8; 3] = [255, 0, 255];
 
 fn thumbnail_camera(camera: &Camera) -> Camera {
     let old = camera.intrinsics;
-    let scale = f64::from(THUMBNAIL) / f64::from(old.width);
+    let scale = f64::from(THUMBNAIL_WIDTH) / f64::from(old.width);
     let height = (f64::from(old.height) * scale).round().max(1.0);
     let intrinsics = Intrinsics {
-        width: THUMBNAIL,
+        width: THUMBNAIL_WIDTH,
         height: height as u32,
         fx: old.fx * scale,
         fy: old.fy * scale,
@@ -278,6 +296,14 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
     Camera { intrinsics, ..*camera }
 }
 
-fn grid_of(camera: &Camera) -> Vec<DVec2> {
-    crate::front3d::camera_sampler::score_grid(&camera.intrinsics).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_given_once() {
+        let mut taken = BTreeSet::new();
+        let ids = ["a", "a", "b", "a", "a-2"].map(|id| free_id(id, &mut taken));
+        assert_eq!(ids, ["a", "a-2", "b", "a-3", "a-2-2"]);
+    }
 }

@@ -1,14 +1,17 @@
 //! Furniture that stands in other furniture: our own test, on the meshes and not on their boxes.
 //!
 //! Two pieces intersect where an edge of one goes through a face of the other and reaches further than a tolerance to both
-//! sides of it: so a lamp that sinks a millimetre into its table, or two shelves side by side, do not.
+//! sides of it, or where a corner of one lies within the other, further than the tolerance from its surface (the edges of
+//! fine meshes are short). So a lamp that sinks a millimetre into its table, or two shelves side by side, do not.
+
+use std::cell::Cell;
 
 use glam::Vec3;
 use mateval_scene::TriangleMesh;
 use mateval_tracer::{Accel, Ray, TracerError};
 use rayon::prelude::*;
 
-/// How far an edge must reach to both sides of a face, in metres.
+/// How far a piece must reach into another, in metres.
 pub const TOLERANCE_M: f32 = 0.02;
 
 /// A piece made ready.
@@ -23,12 +26,15 @@ pub fn intersecting_pairs(meshes: &[&TriangleMesh]) -> Result<Vec<[usize; 2]>, T
         .par_iter()
         .map(|mesh| Ok(Piece { mesh, accel: Accel::build(&[mesh])? }))
         .collect::<Result<_, TracerError>>()?;
-    let pairs: Vec<[usize; 2]> = (0..pieces.len()).flat_map(|a| (a + 1..meshes.len()).map(move |b| [a, b])).collect();
-    let intersect = |[a, b]: &[usize; 2]| {
-        let (a, b) = (&pieces[*a], &pieces[*b]);
-        boxes_overlap(a, b) && (goes_through(a, b) || goes_through(b, a))
+    let with_later = |a: usize| {
+        let (one, pieces) = (&pieces[a], &pieces);
+        (a + 1..pieces.len()).filter(move |b| intersect(one, &pieces[*b])).map(move |b| [a, b])
     };
-    Ok(pairs.into_par_iter().filter(intersect).collect())
+    Ok((0..pieces.len()).into_par_iter().flat_map_iter(with_later).collect())
+}
+
+fn intersect(a: &Piece<'_>, b: &Piece<'_>) -> bool {
+    boxes_overlap(a, b) && (reaches_into(a, b) || reaches_into(b, a))
 }
 
 fn boxes_overlap(a: &Piece<'_>, b: &Piece<'_>) -> bool {
@@ -36,17 +42,18 @@ fn boxes_overlap(a: &Piece<'_>, b: &Piece<'_>) -> bool {
     (low_a + TOLERANCE_M).cmplt(high_b).all() && (low_b + TOLERANCE_M).cmplt(high_a).all()
 }
 
-/// Whether an edge of `one` goes through a face of `other`.
-fn goes_through(one: &Piece<'_>, other: &Piece<'_>) -> bool {
+/// Whether an edge of `one` goes through a face of `other`, or a corner of it lies within.
+fn reaches_into(one: &Piece<'_>, other: &Piece<'_>) -> bool {
     let [low, high] = other.accel.bounds();
     let near = |from: Vec3, to: Vec3| from.min(to).cmple(high).all() && from.max(to).cmpge(low).all();
-    (0..one.mesh.triangles.len()).any(|triangle| {
+    let through = (0..one.mesh.triangles.len()).any(|triangle| {
         let [a, b, c] = one.mesh.corners(triangle);
         // Both ways: the first face met may be one that is only touched.
         [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]
             .into_iter()
             .any(|(from, to)| near(from, to) && edge_goes_through(from, to, other))
-    })
+    });
+    through || one.mesh.positions.iter().any(|corner| near(*corner, *corner) && lies_within(*corner, other))
 }
 
 fn edge_goes_through(from: Vec3, to: Vec3, other: &Piece<'_>) -> bool {
@@ -55,6 +62,23 @@ fn edge_goes_through(from: Vec3, to: Vec3, other: &Piece<'_>) -> bool {
     let [a, b, c] = other.mesh.corners(hit.triangle.0);
     let normal = (b - a).cross(c - a).normalize_or_zero();
     (from - a).dot(normal).abs().min((to - a).dot(normal).abs()) > TOLERANCE_M
+}
+
+/// Whether a place is enclosed, with nothing within the tolerance: rays on three axes, aslant so that they follow no edge,
+/// each meet an odd number of faces both ways. What is open encloses nothing.
+fn lies_within(place: Vec3, other: &Piece<'_>) -> bool {
+    const AXES: [Vec3; 3] = [Vec3::new(0.93, 0.29, 0.21), Vec3::new(-0.27, 0.91, 0.31), Vec3::new(0.19, -0.33, 0.92)];
+    AXES.into_iter().flat_map(|axis| [axis, -axis]).all(|direction| {
+        let (count, nearest) = (Cell::new(0_u32), Cell::new(f32::INFINITY));
+        let ray = Ray::endless(place, direction.normalize());
+        // None is taken, so every one is met.
+        other.accel.closest_where(&ray, |hit| {
+            count.set(count.get() + 1);
+            nearest.set(nearest.get().min(hit.distance));
+            false
+        });
+        count.get() % 2 == 1 && nearest.get() > TOLERANCE_M
+    })
 }
 
 #[cfg(test)]
@@ -106,5 +130,46 @@ mod tests {
         let (a, b, c) = (pole(false, 0.0), pole(true, 0.2), pole(true, 0.0));
         assert_eq!(intersecting_pairs(&[&a, &b]).unwrap(), Vec::<[usize; 2]>::new());
         assert_eq!(intersecting_pairs(&[&a, &c]).unwrap(), [[0, 1]]);
+    }
+
+    /// A ball of triangles with edges of about two centimetres.
+    fn ball(middle: Vec3, radius: f32) -> TriangleMesh {
+        const SIDES: u32 = 96;
+        let mut mesh = TriangleMesh::default();
+        for ring in 0..=SIDES / 2 {
+            for side in 0..SIDES {
+                let (up, around) = (f64::from(ring) / f64::from(SIDES / 2), f64::from(side) / f64::from(SIDES));
+                let ((sin, cos), (s, c)) =
+                    (libm::sincos(up * std::f64::consts::PI), libm::sincos(around * std::f64::consts::TAU));
+                let out = glam::DVec3::new(sin * c, cos, sin * s).as_vec3();
+                mesh.positions.push(middle + out * radius);
+                if ring > 0 {
+                    let [here, next] = [side, (side + 1) % SIDES].map(|side| ring * SIDES + side);
+                    mesh.triangles.extend([[here, next, here - SIDES], [next, next - SIDES, here - SIDES]]);
+                }
+            }
+        }
+        mesh
+    }
+
+    /// No edge of theirs reaches far enough on its own.
+    #[test]
+    fn fine_meshes_are_told_by_their_corners() {
+        let pairs = |apart: f32| intersecting_pairs(&[&ball(Vec3::ZERO, 0.3), &ball(Vec3::X * apart, 0.3)]).unwrap();
+        assert_eq!(pairs(0.3), [[0, 1]]);
+        assert_eq!(pairs(0.5), [[0, 1]]);
+        // One centimetre each into the other, and apart.
+        assert!(pairs(0.59).is_empty());
+        assert!(pairs(0.7).is_empty());
+    }
+
+    /// A cup in an open box is not within the box's boards.
+    #[test]
+    fn what_is_open_encloses_nothing() {
+        let mut bowl = ball(Vec3::ZERO, 0.3);
+        bowl.triangles.retain(|triangle| triangle.iter().all(|vertex| bowl.positions[*vertex as usize].y < 0.1));
+        assert!(intersecting_pairs(&[&bowl, &ball(Vec3::ZERO, 0.05)]).unwrap().is_empty());
+        // The twin: in the closed ball it is.
+        assert_eq!(intersecting_pairs(&[&ball(Vec3::ZERO, 0.3), &ball(Vec3::ZERO, 0.05)]).unwrap(), [[0, 1]]);
     }
 }

@@ -12,7 +12,7 @@ mod page;
 mod recipe_text;
 pub mod rules;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use mateval_image::png_io::write_rgb_bytes;
@@ -148,6 +148,7 @@ pub struct CandidateCamera {
 /// Looks through all houses and writes survey, page, thumbnails and recipe. A house that cannot be read is told in the
 /// survey and does not stop it.
 pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<SurveyFile, PrepError> {
+    check_folders(options)?;
     let houses = house_files(options)?;
     if options.out.exists() && !options.force {
         let what = "is already there; choose another --out, or add --force to replace it".to_owned();
@@ -179,6 +180,9 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
 #[derive(Debug, Default, Serialize)]
 struct RecipeTexts {
     head: String,
+    /// Ids of scenes.
+    #[serde(skip)]
+    taken: BTreeSet<String>,
     /// By scene.
     scenes: BTreeMap<String, String>,
     /// By the house's file.
@@ -216,7 +220,7 @@ fn survey_house(
     let shown = house.to_string_lossy().replace('\\', "/");
     let looked = front3d::furnish(&files, &front3d::Limits::default())
         .map_err(PrepError::from)
-        .and_then(|furnished| Ok((candidates::look_through(options, &furnished)?, furnished)));
+        .and_then(|furnished| Ok((candidates::look_through(options, &furnished, &mut texts.taken)?, furnished)));
     let (HouseSurvey { rooms, pictures }, furnished) = match looked {
         Ok(looked) => looked,
         Err(error) => {
@@ -243,7 +247,19 @@ fn survey_house(
     })
 }
 
-/// The files, and all JSON files of the folders, sorted; relative to the source's folder.
+/// What all houses need must be there: else each of them would have the same fault.
+fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
+    let folders = [Some(&options.models), options.textures.as_ref()].into_iter().flatten();
+    let missing_folder = folders.map(|path| options.source.join(path)).find(|path| !path.is_dir());
+    let files = options.cameras.iter().chain(&options.houses).map(|path| options.source.join(path));
+    let missing = missing_folder.or_else(|| files.into_iter().find(|path| !path.exists()));
+    match missing {
+        Some(path) => Err(PrepError::Output { path, what: "is not there; mend the path, or name --source".to_owned() }),
+        None => Ok(()),
+    }
+}
+
+/// The files, and all JSON files of the folders, each once, sorted by folder; relative to the source's folder.
 fn house_files(options: &SurveyOptions) -> Result<Vec<PathBuf>, PrepError> {
     let mut files = Vec::new();
     for path in &options.houses {
@@ -258,6 +274,8 @@ fn house_files(options: &SurveyOptions) -> Result<Vec<PathBuf>, PrepError> {
         names.sort();
         files.extend(names);
     }
+    let mut seen = BTreeSet::new();
+    files.retain(|file| seen.insert(options.source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
     if files.is_empty() {
         let what = "holds no house: expected JSON files of 3D-FRONT".to_owned();
         return Err(PrepError::Output { path: options.source.clone(), what });

@@ -38,7 +38,29 @@ pub(super) fn inputs(files: &[(String, String)]) -> String {
     })
 }
 
-/// As TOML's basic string.
+/// As a TOML basic string on one line, which is a key as well as a value.
 fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+    let mut quoted = String::from('"');
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if c.is_control() => quoted.push_str(&format!("\\u{:04X}", c as u32)),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_file_name_is_a_key_and_comes_back() {
+        for name in ["a/b.json", "Bob's \"flat\".json", "a\\b\n\u{7f}", "客厅"] {
+            let table: toml::Table = toml::from_str(&format!("{} = 1", quoted(name))).unwrap();
+            assert_eq!(table.keys().collect::<Vec<_>>(), [name]);
+        }
+    }
 }

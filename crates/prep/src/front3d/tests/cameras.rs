@@ -165,12 +165,16 @@ fn scores_are_those_of_the_formula() {
         let is_it = |p: &Placed| matches!(&p.role, Role::Furniture { name, .. } if name.contains(word));
         house.placed.iter().position(is_it).unwrap()
     };
-    let rays = |all: &[(usize, usize)]| -> Vec<usize> {
-        all.iter().flat_map(|(surface, count)| std::iter::repeat_n(*surface, *count)).collect()
+    let rays = |all: &[(usize, usize)]| -> Vec<Option<usize>> {
+        all.iter().flat_map(|(surface, count)| std::iter::repeat_n(Some(*surface), *count)).collect()
     };
     let (sofa, wall, floor) = (of_name("sofa"), of_kind("WallInner"), of_kind("Floor"));
     let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]));
     assert!((found - 1.54).abs() < 1e-12, "{found}");
+    // Rays that meet nothing thin it out: (200 + 0) / 100 * 1 / 3 * 0.8.
+    let mut open = rays(&[(sofa, 20)]);
+    open.resize(100, None);
+    assert!((score(house, &open) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
     // One kind fills all: nothing is left of it.
     assert_eq!(score(house, &rays(&[(wall, 100)])), 0.0);
     // Two surfaces of one kind are one kind: 100 / 100 * 2 / 3 * 0.4 * 0.6.

@@ -1,10 +1,10 @@
-//! The one error of this module: why a scene could not be read at all. All lesser faults are findings.
+//! The one error of all readers: why a source could not be read at all. All lesser faults are findings.
 
 use std::path::PathBuf;
 
-/// Why a Mitsuba scene could not be read.
+/// Why nothing could be made of a source.
 #[derive(Debug, thiserror::Error)]
-pub enum BitterliError {
+pub enum SourceError {
     /// The file system refused.
     #[error("cannot read '{}': {source}", path.display())]
     Io {
@@ -13,7 +13,7 @@ pub enum BitterliError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// Not XML, not a scene, without a usable camera, or beyond a limit.
+    /// It is not what it should be (no XML, no scene, no house, without a usable camera), or beyond a limit.
     #[error("'{}': {what}", path.display())]
     Invalid {
         /// The file.
