@@ -16,6 +16,7 @@ mod suite {
     mod house;
     mod images;
     mod mitsuba_export;
+    mod part_labels;
     mod planted;
     mod readme;
     mod real_scenes;

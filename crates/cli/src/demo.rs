@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
+use mateval_scene::open::Dataset;
+
 use crate::outcome::{Outcome, print, say};
 use crate::{eval, prep};
 
@@ -28,7 +30,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         bail!("'{}' is already there; choose another --out, or add --force to replace what a demo left", out.display());
     }
     let [source, dataset, results] = ["source", "dataset", "results"].map(|name| out.join(name));
-    say("1/5 sample: a room that the program makes itself");
+    say("1/5 sample: a house and a room that the program makes itself");
     mateval_prep::sample::write(&source).context("cannot write the sample")?;
     say("2/5 prep build: geometry, atlases, pictures of five views");
     prep::build(&prep::BuildArgs {
@@ -46,38 +48,40 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         force: args.force,
     })?;
     say("4/5 baselines: gt and grey");
-    let submissions = make_baselines(&dataset, out, args.force)?;
+    let opened = Dataset::open(&dataset)?;
+    let submissions = make_baselines(&opened, out, args.force)?;
     say("5/5 eval score");
     let files = eval::score_submissions(&eval::ScoreArgs {
         submissions,
-        dataset: dataset.clone(),
-        out: results.clone(),
+        dataset,
+        out: results,
         scenes: Vec::new(),
         protocols: vec!["mateval-1".to_owned()],
         force: args.force,
     })?;
-    print_closing(out, &files)?;
+    print_closing(&opened, out, &files)?;
     Ok(Outcome::Good)
 }
 
-fn make_baselines(dataset: &Path, out: &Path, force: bool) -> anyhow::Result<Vec<PathBuf>> {
-    let dataset = mateval_scene::open::Dataset::open(dataset)?;
+fn make_baselines(dataset: &Dataset, out: &Path, force: bool) -> anyhow::Result<Vec<PathBuf>> {
     let [gt, grey] = ["gt", "grey"].map(|name| out.join("submissions").join(name));
     let folder = out.join("submissions");
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make '{}'", folder.display()))?;
-    mateval_baselines::truth::write(&dataset, &gt, force)?;
-    mateval_baselines::grey::write(&dataset, &grey, force)?;
+    mateval_baselines::truth::write(dataset, &gt, force)?;
+    mateval_baselines::grey::write(dataset, &grey, force)?;
     Ok(vec![gt, grey])
 }
 
-fn print_closing(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
+fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
     let results = files.iter().map(|path| mateval_scene::json::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
     print(&mateval_eval::tables::tables(&results, "mateval-1", mateval_eval::tables::TableFormat::Markdown)?)?;
-    let scene = out.join("dataset/scenes/room");
-    print(&format!("input picture:  {}\n", scene.join("views/input/rgb.png").display()))?;
-    print(&format!("all pictures:   {}\n", scene.join("views").display()))?;
-    print(&format!("truth:          {}\n", scene.join("ground_truth").display()))?;
+    for id in &dataset.file.scenes {
+        let scene = dataset.folder(id);
+        print(&format!("input picture:  {}\n", scene.path().join("views/input/rgb.png").display()))?;
+        print(&format!("all pictures:   {}\n", scene.path().join("views").display()))?;
+        print(&format!("truth:          {}\n", scene.truth().display()))?;
+    }
     print(&format!("results:        {}\n", out.join("results").display()))?;
     Ok(())
 }

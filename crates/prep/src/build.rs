@@ -67,7 +67,7 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         progress(&format!("scene {}", entry.id), at, recipe.scenes.len());
         let mark = options.out.join(BUILD).join(format!("{}.json", entry.id));
         let folder = SceneFolder::of(&options.out, &entry.id);
-        let finished = if resumes { finished_scene(&folder, &mark, &source_root(entry, &source)) } else { None };
+        let finished = if resumes { finished_scene(&folder, &mark, &entry.root(&source)) } else { None };
         let licence = match finished {
             Some(licence) => {
                 // Of a run killed between making a scene anew and removing the old one.
@@ -91,19 +91,11 @@ fn source_folder(options: &BuildOptions) -> PathBuf {
     options.source.clone().unwrap_or_else(beside)
 }
 
-/// The folder that the paths of a scene's files are relative to.
-fn source_root(entry: &RecipeScene, source: &Path) -> PathBuf {
-    match &entry.bitterli {
-        Some(xml) => source.join(xml).parent().map(Path::to_owned).unwrap_or_default(),
-        None => source.to_owned(),
-    }
-}
-
 /// Whatever can fail early must: every scene's sources are there, and are what the recipe pins, before the first is made.
 fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
     let mut faults: Vec<String> = recipe.scenes.iter().flat_map(|scene| missing_sources(scene, source)).collect();
     if faults.is_empty() {
-        faults = recipe.scenes.iter().flat_map(|scene| changed_inputs(scene, &source_root(scene, source))).collect();
+        faults = recipe.scenes.iter().flat_map(|scene| changed_inputs(scene, &scene.root(source))).collect();
     }
     if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
 }
@@ -119,8 +111,10 @@ fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<String> {
         wanted.extend(room.textures.as_deref().map(|path| ("textures", path, true)));
         wanted.extend(room.cameras.as_deref().map(|path| ("cameras", path, false)));
     }
-    let fault = |(key, path, is_folder): (&str, &Path, bool)| {
-        let path = source.join(path);
+    let mut wanted: Vec<_> = wanted.into_iter().map(|(key, path, folder)| (key, source.join(path), folder)).collect();
+    let labels = scene.part_labels.values().map(|path| ("part_labels", scene.root(source).join(path), true));
+    wanted.extend(labels);
+    let fault = |(key, path, is_folder): (&str, PathBuf, bool)| {
         let there = if is_folder { path.is_dir() } else { path.is_file() };
         let kind = if is_folder { "folder" } else { "file" };
         let hint = format!("mend `{key}`, or name the folder with --source");

@@ -1,12 +1,13 @@
-//! Instances and parts of a scene: ids, numbers, and which triangle is of which part.
+//! Instances of a scene: ids and numbers.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU16;
 
-use mateval_scene::ids::{PartIndex, id_text_from};
+use mateval_scene::ids::id_text_from;
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::{InstanceId, InstanceIndex, PartId};
+use mateval_scene::{InstanceId, InstanceIndex};
 
+use crate::part_split::PartSplit;
 use crate::parts::connected_parts;
 use crate::source::InstanceOrigin;
 
@@ -21,19 +22,6 @@ pub struct InstanceEntry {
     pub category: Option<String>,
     /// The broader category, where the source says so.
     pub super_category: Option<String>,
-    /// The part of each of its triangles, as a place in `parts`.
-    pub part_of_triangle: Vec<usize>,
-    /// Its parts.
-    pub parts: Vec<PartEntry>,
-}
-
-/// One part.
-#[derive(Clone, Debug)]
-pub struct PartEntry {
-    /// Its id, unique in the scene.
-    pub id: PartId,
-    /// Its value in `part.png`.
-    pub index: PartIndex,
 }
 
 /// Too many instances or parts for 16 bits.
@@ -41,10 +29,9 @@ pub struct PartEntry {
 #[error("more than 65535 instances or parts; split the scene")]
 pub struct TooMany;
 
-/// Numbers instances and parts in the order of the surfaces, from 1 on; `origins` holds one a surface.
+/// Numbers instances in the order of the surfaces, from 1 on; `origins` holds one a surface.
 pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<InstanceEntry>, TooMany> {
     let mut taken = BTreeSet::new();
-    let mut next_part = 1_usize;
     scene
         .surfaces
         .iter()
@@ -52,29 +39,29 @@ pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<In
         .enumerate()
         .map(|(at, (surface, origin))| {
             let id = unique_id(surface, &mut taken);
-            let part_of_triangle = origin.part_of_triangle.clone().unwrap_or_else(|| connected_parts(&surface.mesh));
-            let count = part_of_triangle.iter().max().map_or(0, |last| last + 1);
-            let parts = (0..count)
-                .map(|part| {
-                    let text = format!("{id}-p{part}");
-                    let id = PartId::new(text).expect("an id of 58 characters at most and a suffix is an id");
-                    Ok(PartEntry { id, index: PartIndex(number(next_part + part)?) })
-                })
-                .collect::<Result<Vec<_>, TooMany>>()?;
-            next_part += count;
             Ok(InstanceEntry {
                 id,
                 index: InstanceIndex(number(at + 1)?),
                 category: origin.category.clone(),
                 super_category: origin.super_category.clone(),
-                part_of_triangle,
-                parts,
             })
         })
         .collect()
 }
 
-fn number(value: usize) -> Result<NonZeroU16, TooMany> {
+/// The source's own parts of the instances that [`list`] numbered.
+pub fn own_parts(
+    scene: &ReferenceScene,
+    origins: &[InstanceOrigin],
+    instances: &[InstanceEntry],
+) -> Result<PartSplit, TooMany> {
+    let of_triangle = |(surface, origin): (&Surface, &InstanceOrigin)| {
+        origin.part_of_triangle.clone().unwrap_or_else(|| connected_parts(&surface.mesh))
+    };
+    PartSplit::new(None, instances, scene.surfaces.iter().zip(origins).map(of_triangle).collect())
+}
+
+pub(crate) fn number(value: usize) -> Result<NonZeroU16, TooMany> {
     u16::try_from(value).ok().and_then(NonZeroU16::new).ok_or(TooMany)
 }
 
@@ -112,12 +99,14 @@ mod tests {
     #[test]
     fn ids_are_unique_and_numbers_run_on() {
         let scene = scene(&["Mesh 1", "mesh-1", "mesh-1-2", "椅子", ""]);
-        let list = list(&scene, &vec![InstanceOrigin::default(); 5]).unwrap();
+        let origins = vec![InstanceOrigin::default(); 5];
+        let list = list(&scene, &origins).unwrap();
+        let split = own_parts(&scene, &origins, &list).unwrap();
         let ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
         assert_eq!(ids, ["mesh-1", "mesh-1-2", "mesh-1-2-2", "object", "object-2"]);
         assert_eq!(list[2].index.0.get(), 3);
-        assert_eq!(list[1].part_of_triangle, [1, 0]);
-        let parts: Vec<u16> = list.iter().flat_map(|e| e.parts.iter().map(|p| p.index.0.get())).collect();
+        assert_eq!(split.instances[1].of_triangle, [1, 0]);
+        let parts: Vec<u16> = split.instances.iter().flat_map(|e| e.parts.iter().map(|p| p.index.0.get())).collect();
         assert_eq!(parts, (1..=10).collect::<Vec<u16>>());
     }
 }

@@ -1,9 +1,9 @@
 //! From source scenes to a dataset.
 //!
-//! In: a recipe and the folders that it names (Mitsuba scenes of Bitterli's resources). Out: a dataset folder as
+//! In: a recipe and the folders that it names (rooms of 3D-FRONT, Mitsuba scenes of Bitterli's resources). Out: a dataset folder as
 //! `dataset_spec/FORMAT.md` tells, or findings about one.
 //!
-//! Between: [`recipe`] is checked whole, [`bitterli`] reads each source, [`instances`] numbers, [`atlas`] unwraps, [`bake`]
+//! Between: [`recipe`] is checked whole, [`front3d`] or [`bitterli`] reads each source, [`instances`] numbers, [`atlas`] unwraps, [`bake`]
 //! fills textures, [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth,
 //! [`verify`] doubts it all, [`stats`] counts it.
 
@@ -16,6 +16,8 @@ pub mod error;
 pub mod front3d;
 pub mod instances;
 pub mod mitsuba_export;
+pub(crate) mod part_labels;
+pub mod part_split;
 pub mod parts;
 pub mod recipe;
 pub mod render;

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_scene::{SceneId, ViewId};
+use mateval_scene::{PartSetId, SceneId, ViewId};
 use serde::Deserialize;
 
 use crate::error::PrepError;
@@ -60,6 +60,9 @@ pub struct RecipeScene {
     pub house: Option<String>,
     /// The input camera; a Mitsuba scene has its own where absent.
     pub camera: Option<RecipeCamera>,
+    /// Folders with `<instance>.npy`, a label for each triangle: other ways to split the instances into parts, by name.
+    #[serde(default)]
+    pub part_labels: BTreeMap<PartSetId, PathBuf>,
     /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`: the scene is
     /// made of these very bytes or not at all. Not checked where empty.
     #[serde(default)]
@@ -245,6 +248,14 @@ impl RecipeScene {
             (Some(xml), None) => Ok(RecipeSource::Bitterli(xml)),
             (None, Some(room)) => Ok(RecipeSource::Front3d(room)),
             _ => Err(format!("scene '{}': expected one of `bitterli` and `front3d`", self.id)),
+        }
+    }
+
+    /// The folder that the paths of the scene's files are relative to: the XML's, or `source`, where the recipe's paths are.
+    pub fn root(&self, source: &Path) -> PathBuf {
+        match &self.bitterli {
+            Some(xml) => source.join(xml).parent().map(Path::to_owned).unwrap_or_default(),
+            None => source.to_owned(),
         }
     }
 

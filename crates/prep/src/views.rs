@@ -21,8 +21,6 @@ pub struct ViewScene<'a> {
     textures: Vec<Texture>,
     /// The value in `instance.png` of every surface.
     instances: &'a [u16],
-    /// The value in `part.png` of every triangle of every surface.
-    parts: &'a [Vec<u16>],
     /// Whether a surface is scored at all.
     scored: &'a [bool],
     glow: Vec<Glow>,
@@ -44,12 +42,28 @@ pub struct GeometryPictures {
     pub normal: Picture<Normal>,
     /// Instance index at pixel centres; 0 where there is nothing.
     pub instance: Picture<u16>,
-    /// Part index at pixel centres; 0 where there is nothing.
-    pub part: Picture<u16>,
+    /// The triangle at pixel centres; none where there is nothing.
+    pub triangle: Picture<Option<SeenTriangle>>,
     /// Pixels whose centre and every sub-pixel show a surface that is scored.
     pub valid: Mask,
     /// Valid pixels whose centre the input view did not see.
     pub unobserved: Mask,
+}
+
+/// A triangle of the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SeenTriangle {
+    /// Its surface.
+    pub surface: SurfaceIndex,
+    /// Its place among the surface's triangles.
+    pub triangle: usize,
+}
+
+impl SeenTriangle {
+    /// Its entry in a table of one value a triangle of every surface; 0 where there is no triangle.
+    pub fn value_in(triangle: Option<Self>, values: &[Vec<u16>]) -> u16 {
+        triangle.map_or(0, |seen| values[seen.surface.0][seen.triangle])
+    }
 }
 
 /// What a view should look like without light, from the source materials: means over the sub-pixels.
@@ -76,8 +90,8 @@ pub struct ViewPixel {
     pub normal: [f32; 3],
     /// See [`GeometryPictures::instance`].
     pub instance: u16,
-    /// See [`GeometryPictures::part`].
-    pub part: u16,
+    /// See [`GeometryPictures::triangle`].
+    pub triangle: Option<SeenTriangle>,
     /// See [`GeometryPictures::valid`].
     pub valid: bool,
     /// See [`GeometryPictures::unobserved`].
@@ -102,16 +116,10 @@ pub struct PixelTruth {
 }
 
 impl<'a> ViewScene<'a> {
-    /// `instances` and `scored` hold an entry a surface, `parts` one a triangle of each surface.
-    pub fn new(
-        reference: &'a ReferenceScene,
-        world: &'a World,
-        instances: &'a [u16],
-        parts: &'a [Vec<u16>],
-        scored: &'a [bool],
-    ) -> Self {
+    /// `instances` and `scored` hold an entry a surface.
+    pub fn new(reference: &'a ReferenceScene, world: &'a World, instances: &'a [u16], scored: &'a [bool]) -> Self {
         let textures = reference.texture_list();
-        Self { reference, world, textures, instances, parts, scored, glow: glow_of_surfaces(reference) }
+        Self { reference, world, textures, instances, scored, glow: glow_of_surfaces(reference) }
     }
 
     /// The pictures of the view of `camera`; what `input` did not see is unobserved (nothing, for the input view itself).
@@ -126,7 +134,7 @@ impl<'a> ViewScene<'a> {
             depth: all.map(|p| p.depth),
             normal: all.map(|p| Normal(p.normal)),
             instance: all.map(|p| p.instance),
-            part: all.map(|p| p.part),
+            triangle: all.map(|p| p.triangle),
             valid: all.map(|p| p.valid),
             unobserved: all.map(|p| p.unobserved),
         };
@@ -155,7 +163,7 @@ impl<'a> ViewScene<'a> {
             depth: hit.as_ref().map_or(0.0, |hit| hit.depth as f32),
             normal: hit.as_ref().map_or([0.0; 3], |hit| hit.normal.to_array()),
             instance: surface.map_or(0, |surface| self.instances[surface]),
-            part: hit.as_ref().map_or(0, |hit| self.parts[hit.surface.0][hit.triangle]),
+            triangle: hit.as_ref().map(|hit| SeenTriangle { surface: hit.surface, triangle: hit.triangle }),
             valid,
             unobserved,
             truth,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::Camera;
 use crate::findings::Finding;
-use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, RendererId, SceneId, ViewId};
+use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
 
 /// The word for this version of the format.
 pub const FORMAT: &str = "mateval/1";
@@ -82,6 +82,8 @@ pub struct SceneFile {
     pub instances: Vec<Instance>,
     /// In the order of their index.
     pub parts: Vec<Part>,
+    /// Other ways to split the instances into parts, from labels made elsewhere.
+    pub part_sets: Vec<PartSet>,
     /// What was wrong with the source and what was done instead, sorted.
     pub findings: Vec<Finding>,
 }
@@ -163,17 +165,33 @@ pub struct Atlas {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// Its node in `parts.glb`.
+    /// Its node in its set's `parts.glb`.
     pub id: PartId,
-    /// Its value in `part.png`.
+    /// Its value in its set's `part.png`.
     pub index: PartIndex,
     /// The instance that it is of.
     pub instance: InstanceId,
-    /// Triangles in `parts.glb`.
+    /// Triangles in its set's `parts.glb`.
     pub triangles: usize,
 }
 
+/// A way to split all instances into parts other than the source's own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PartSet {
+    /// Its name, in `parts_<id>.glb` and `part_<id>.png`.
+    pub id: PartSetId,
+    /// In the order of their index.
+    pub parts: Vec<Part>,
+}
+
 impl SceneFile {
+    /// Every way to split the instances into parts: the source's own, which has no id, then those of `part_sets`.
+    pub fn all_part_sets(&self) -> impl Iterator<Item = (Option<&PartSetId>, &[Part])> {
+        let others = self.part_sets.iter().map(|set| (Some(&set.id), set.parts.as_slice()));
+        std::iter::once((None, self.parts.as_slice())).chain(others)
+    }
+
     /// The view of this id.
     pub fn view(&self, id: &str) -> Option<&View> {
         self.views.iter().find(|view| view.id.as_str() == id)

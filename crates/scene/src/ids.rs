@@ -97,8 +97,12 @@ id_type!(
     InstanceId
 );
 id_type!(
-    /// A part's id, unique in its scene: its glTF node name.
+    /// A part's id, unique in its set: its glTF node name.
     PartId
+);
+id_type!(
+    /// The id of a set of parts that comes from outside, as in `partfield`.
+    PartSetId
 );
 id_type!(
     /// A view's id, as in `input` or `up_left`.

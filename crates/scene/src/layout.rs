@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::ids::{InstanceId, RendererId, SceneId, ViewId};
+use crate::ids::{InstanceId, PartSetId, RendererId, SceneId, ViewId};
 
 /// `dataset.json`.
 pub const DATASET: &str = "dataset.json";
@@ -12,6 +12,17 @@ pub const TARGETS: &str = "targets.json";
 pub const MANIFEST: &str = "MANIFEST.sha256";
 /// The input view's id.
 pub const INPUT: &str = "input";
+
+/// The meshes of a set of parts, in its scene's folder: `geometry/parts.glb` for the source's own, `geometry/parts_<set>.glb`
+/// for another.
+pub fn parts_file(set: Option<&PartSetId>) -> String {
+    set.map_or("geometry/parts.glb".to_owned(), |set| format!("geometry/parts_{set}.glb"))
+}
+
+/// The picture of a set of parts, in its view's folder: `part.png` for the source's own, `part_<set>.png` for another.
+pub fn part_picture(set: Option<&PartSetId>) -> String {
+    set.map_or("part.png".to_owned(), |set| format!("part_{set}.png"))
+}
 
 /// The paths of one scene.
 #[derive(Clone, Debug)]
@@ -43,9 +54,9 @@ impl SceneFolder {
         self.0.join("geometry/instances.glb")
     }
 
-    /// `geometry/parts.glb`.
-    pub fn parts(&self) -> PathBuf {
-        self.0.join("geometry/parts.glb")
+    /// See [`parts_file`].
+    pub fn parts(&self, set: Option<&PartSetId>) -> PathBuf {
+        self.0.join(parts_file(set))
     }
 
     /// `views/<view>`: what methods may see.

@@ -27,6 +27,6 @@ pub mod work_folder;
 pub use camera::{Camera, Intrinsics};
 pub use error::SceneError;
 pub use findings::{Finding, Severity};
-pub use ids::{InstanceId, InstanceIndex, PartId, RendererId, SceneId, ViewId};
+pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;
 pub use progress::Progress;

@@ -7,7 +7,7 @@ use mateval_scene::{SceneError, TriangleMesh};
 use super::Plan;
 use super::materials::InstanceAtlas;
 
-/// Writes `instances.glb` and `parts.glb`.
+/// Writes `instances.glb` and, for each set of parts, its `parts.glb`.
 pub(super) fn write(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), SceneError> {
     let meshes: Vec<TriangleMesh> = plan
         .scene
@@ -19,14 +19,10 @@ pub(super) fn write(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]
             None => TriangleMesh { uvs: None, ..surface.mesh.clone() },
         })
         .collect();
-    let mut parts = Vec::new();
-    for (instance, mesh) in plan.instances.iter().zip(&meshes) {
-        for (at, part) in instance.parts.iter().enumerate() {
-            let mesh = mesh.picked(|triangle| instance.part_of_triangle[triangle] == at);
-            parts.push(GlbNode { name: part.id.to_string(), mesh });
-        }
+    for split in &plan.part_splits {
+        let parts = split.meshes(&meshes).into_iter().map(|(id, mesh)| GlbNode { name: id.to_string(), mesh });
+        glb::write(&folder.parts(split.id.as_ref()), &parts.collect::<Vec<_>>())?;
     }
-    glb::write(&folder.parts(), &parts)?;
     let instances: Vec<GlbNode> = plan
         .instances
         .iter()

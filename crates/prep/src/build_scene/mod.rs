@@ -9,17 +9,20 @@ use std::path::Path;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::png_io;
 use mateval_scene::Camera;
-use mateval_scene::dataset::{Atlas, FORMAT, Instance, Part, SceneFile, SceneSource, SourceFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::dataset::{Atlas, FORMAT, Instance, PartSet, SceneFile, SceneSource, SourceFile, View};
+use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Finding, ViewId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
+use crate::part_labels;
+use crate::part_split::PartSplit;
 use crate::recipe::{Recipe, RecipeScene};
+use crate::source::folder::SourceFolder;
 use crate::source::{LicenceText, SourceScene};
-use crate::views::{GeometryPictures, TruthPictures, ViewScene};
+use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
 use materials::InstanceAtlas;
 use mateval_scene::Progress;
 
@@ -27,9 +30,13 @@ use mateval_scene::Progress;
 struct Plan {
     scene: std::sync::Arc<ReferenceScene>,
     instances: Vec<InstanceEntry>,
+    /// The source's own parts first.
+    part_splits: Vec<PartSplit>,
     views: Vec<View>,
     findings: Vec<Finding>,
     file: String,
+    /// Every file read and its SHA-256; sorted.
+    files: Vec<(String, String)>,
 }
 
 /// Makes the scene in `folder`, from its source below `source`. Gives the licence that came with it.
@@ -42,12 +49,10 @@ pub fn build(
 ) -> Result<Option<LicenceText>, PrepError> {
     progress("read the source", 0, 1);
     let read = source::read(recipe, entry, source)?;
-    check_inputs(entry, &read.files)?;
-    let files: Vec<SourceFile> =
-        read.files.iter().map(|(path, sha256)| SourceFile { path: path.clone(), sha256: sha256.clone() }).collect();
     let licence = read.licence.clone();
     let (kind, house) = (read.kind.to_owned(), entry.house.clone().unwrap_or_else(|| read.house.clone()));
-    let mut plan = plan(recipe, entry, read)?;
+    let mut plan = plan(recipe, entry, source, read)?;
+    check_inputs(entry, &plan.files)?;
     make_folders(folder, &plan)?;
 
     let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
@@ -62,7 +67,7 @@ pub fn build(
     }
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
-    write_scene_file(plan, entry, SceneSource { kind, house, files }, &atlases, folder)?;
+    write_scene_file(plan, entry, [kind, house], &atlases, folder)?;
     Ok(licence)
 }
 
@@ -87,16 +92,45 @@ fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), P
     Err(PrepError::Scene { scene: entry.id.to_string(), what })
 }
 
-fn plan(recipe: &Recipe, entry: &RecipeScene, read: SourceScene) -> Result<Plan, PrepError> {
+fn plan(recipe: &Recipe, entry: &RecipeScene, source: &Path, mut read: SourceScene) -> Result<Plan, PrepError> {
     let fault = |what: String| PrepError::Scene { scene: entry.id.to_string(), what };
     if read.scene.surfaces.is_empty() {
         let what = format!("not one surface could be read of it:{}", Finding::list(&read.findings));
         return Err(fault(what));
     }
     let instances = instances::list(&read.scene, &read.origins).map_err(|error| fault(error.to_string()))?;
+    let own = instances::own_parts(&read.scene, &read.origins, &instances).map_err(|error| fault(error.to_string()))?;
+    let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
     let views = views_of(recipe, read.camera);
     let scene = std::sync::Arc::new(read.scene);
-    Ok(Plan { scene, instances, views, findings: read.findings, file: read.file })
+    Ok(Plan { scene, instances, part_splits, views, findings: read.findings, file: read.file, files: read.files })
+}
+
+/// The source's own parts, then those of the recipe's labels.
+fn part_splits(
+    entry: &RecipeScene,
+    source: &Path,
+    instances: &[InstanceEntry],
+    own: PartSplit,
+    read: &mut SourceScene,
+) -> Result<Vec<PartSplit>, PrepError> {
+    let root = entry.root(source);
+    let mut folder = SourceFolder::new(&root, part_labels::MAX_FILE_BYTES).map_err(PrepError::io("open", &root))?;
+    let (mut splits, mut faults) = (Vec::new(), Vec::new());
+    for (id, labels) in &entry.part_labels {
+        let own = (instances, &own);
+        match part_labels::read(id, labels, &mut folder, &read.scene, own, &mut read.findings) {
+            Ok(split) => splits.push(split),
+            Err(of_set) => faults.extend(of_set),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(PrepError::Scene { scene: entry.id.to_string(), what: faults.join("; ") });
+    }
+    read.files.extend(folder.into_hashes());
+    read.files.sort();
+    splits.insert(0, own);
+    Ok(splits)
 }
 
 /// The input view and its turns.
@@ -130,12 +164,9 @@ fn write_views(
 ) -> Result<Vec<Option<f64>>, PrepError> {
     let world = World::new(plan.scene.clone())?;
     let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
-    let parts: Vec<Vec<u16>> = plan
-        .instances
-        .iter()
-        .map(|entry| entry.part_of_triangle.iter().map(|part| entry.parts[*part].index.0.get()).collect())
-        .collect();
-    let scene = ViewScene::new(&plan.scene, &world, &instances, &parts, scored);
+    let parts: Vec<(String, Vec<Vec<u16>>)> =
+        plan.part_splits.iter().map(|split| (part_picture(split.id.as_ref()), split.values())).collect();
+    let scene = ViewScene::new(&plan.scene, &world, &instances, scored);
     let mut in_input = vec![None; plan.instances.len()];
     let mut elsewhere = vec![None; plan.instances.len()];
     for (at, view) in plan.views.iter().enumerate() {
@@ -143,6 +174,7 @@ fn write_views(
         let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
         write_view(folder, &view.id, &geometry, &truth)?;
+        write_parts(&folder.view(&view.id), &geometry, &parts)?;
     }
     progress("views", plan.views.len(), plan.views.len());
     Ok(in_input.into_iter().zip(elsewhere).map(|(first, other): (Option<f64>, _)| first.or(other)).collect())
@@ -167,7 +199,6 @@ fn write_view(
     exr_io::write_scalar(&shown.join("depth.exr"), &geometry.depth, Precision::Float)?;
     exr_io::write_normal(&shown.join("normal.exr"), &geometry.normal, Precision::Half)?;
     png_io::write_ids(&shown.join("instance.png"), &geometry.instance)?;
-    png_io::write_ids(&shown.join("part.png"), &geometry.part)?;
     png_io::write_mask(&shown.join("valid.png"), &geometry.valid)?;
     if view.as_str() != INPUT {
         png_io::write_mask(&shown.join("unobserved.png"), &geometry.unobserved)?;
@@ -181,10 +212,19 @@ fn write_view(
     Ok(())
 }
 
+/// Writes the picture of each set of parts: its file, and its value for every triangle.
+fn write_parts(shown: &Path, geometry: &GeometryPictures, parts: &[(String, Vec<Vec<u16>>)]) -> Result<(), PrepError> {
+    for (file, values) in parts {
+        let picture = geometry.triangle.map(|seen| SeenTriangle::value_in(seen, values));
+        png_io::write_ids(&shown.join(file), &picture)?;
+    }
+    Ok(())
+}
+
 fn write_scene_file(
     plan: Plan,
     entry: &RecipeScene,
-    source: SceneSource,
+    [kind, house]: [String; 2],
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
 ) -> Result<(), PrepError> {
@@ -206,28 +246,26 @@ fn write_scene_file(
             }),
         })
         .collect();
-    let parts = plan
-        .instances
-        .iter()
-        .flat_map(|instance| {
-            instance.parts.iter().enumerate().map(move |(at, part)| Part {
-                id: part.id.clone(),
-                index: part.index,
-                instance: instance.id.clone(),
-                triangles: instance.part_of_triangle.iter().filter(|of| **of == at).count(),
-            })
-        })
-        .collect();
+    let mut parts = Vec::new();
+    let mut part_sets = Vec::new();
+    for split in &plan.part_splits {
+        match &split.id {
+            None => parts = split.listed(&plan.instances),
+            Some(id) => part_sets.push(PartSet { id: id.clone(), parts: split.listed(&plan.instances) }),
+        }
+    }
+    let files = plan.files.into_iter().map(|(path, sha256)| SourceFile { path, sha256 }).collect();
     let mut findings = plan.findings;
     findings.sort();
     let file = SceneFile {
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
-        source,
+        source: SceneSource { kind, house, files },
         exposure: entry.exposure,
         views: plan.views,
         instances,
         parts,
+        part_sets,
         findings,
     };
     Ok(json::write(&folder.scene_file(), &file)?)

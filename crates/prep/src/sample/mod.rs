@@ -27,8 +27,24 @@ attribution.\n\n\
 For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
-const RECIPE: &str =
-    "name = \"sample\"\nresolution = [320, 240]\n\n[[scene]]\nid = \"room\"\nbitterli = \"room/scene.xml\"\n";
+/// One scene of each source.
+const RECIPE: &str = r#"name = "sample"
+resolution = [320, 240]
+
+[[scene]]
+id = "living"
+camera = { designer = 0 }
+
+[scene.front3d]
+house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json"
+room = "LivingDiningRoom-101"
+models = "house/3D-FUTURE-model"
+textures = "house/3D-FRONT-texture"
+
+[[scene]]
+id = "room"
+bitterli = "room/scene.xml"
+"#;
 
 /// Writes the sample into the folder `out`, which is made if it is not there; files of the same name are replaced.
 pub fn write(out: &Path) -> Result<(), PrepError> {

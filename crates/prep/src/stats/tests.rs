@@ -33,6 +33,7 @@ fn scene(id: &str, kind: &str, house: &str, things: &[Thing<'_>]) -> SceneFile {
         views: Vec::new(),
         instances: things.iter().enumerate().map(|(at, thing)| instance(at, *thing)).collect(),
         parts: Vec::new(),
+        part_sets: Vec::new(),
         findings: Vec::new(),
     }
 }

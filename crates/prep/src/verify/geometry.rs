@@ -4,7 +4,7 @@ use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::glb::{self, GlbNode};
-use mateval_scene::layout::SceneFolder;
+use mateval_scene::layout::{SceneFolder, parts_file};
 use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::submission::Map;
@@ -12,30 +12,42 @@ use mateval_scene::submission::Map;
 use super::Faults;
 
 const INSTANCES: &str = "geometry/instances.glb";
-const PARTS: &str = "geometry/parts.glb";
 
 /// The meshes of a scene: one an instance, one a part.
 pub(super) struct Meshes {
     pub(super) instances: Vec<GlbNode>,
-    /// For every instance the place in `parts` of each of its triangles.
-    pub(super) part_of_triangle: Vec<Vec<usize>>,
+    /// For every set of parts and every instance the place in the set of each of its triangles.
+    pub(super) part_sets: Vec<Vec<Vec<usize>>>,
 }
 
 /// None where the meshes do not fit `scene.json`, so that nothing can be held against them.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) -> Option<Meshes> {
     let instances = faults.read(INSTANCES, glb::read(&folder.instances()))?;
-    let parts = faults.read(PARTS, glb::read(&folder.parts()))?;
     let known = scene.instances.iter().map(|instance| (instance.id.as_str(), instance.triangles));
-    let fits = same_nodes(INSTANCES, &instances, known, faults);
-    let known = scene.parts.iter().map(|part| (part.id.as_str(), part.triangles));
-    if !(same_nodes(PARTS, &parts, known, faults) && fits) {
+    let mut fits = same_nodes(INSTANCES, &instances, known, faults);
+    let mut nodes_of_sets = Vec::new();
+    for (set, parts) in scene.all_part_sets() {
+        let file = parts_file(set);
+        let nodes = faults.read(&file, glb::read(&folder.parts(set)))?;
+        let known = parts.iter().map(|part| (part.id.as_str(), part.triangles));
+        fits &= same_nodes(&file, &nodes, known, faults);
+        nodes_of_sets.push(nodes);
+    }
+    if !fits {
         return None;
     }
     for (instance, node) in scene.instances.iter().zip(&instances) {
         check_uv(instance.atlas.is_some(), node, faults);
     }
-    let part_of_triangle = parts_of_triangles(scene, &instances, &parts, faults)?;
-    Some(Meshes { instances, part_of_triangle })
+    let mut part_sets = Vec::new();
+    for ((set, parts), nodes) in scene.all_part_sets().zip(&nodes_of_sets) {
+        let owned = scene.instances.iter().map(|instance| {
+            let is_own = |part: &usize| parts[*part].instance == instance.id;
+            (0..parts.len()).filter(is_own).collect::<Vec<_>>()
+        });
+        part_sets.push(parts_of_triangles(&instances, owned, nodes, &parts_file(set), faults)?);
+    }
+    Some(Meshes { instances, part_sets })
 }
 
 /// The nodes have the ids and numbers of triangles that `scene.json` tells, in its order.
@@ -72,17 +84,18 @@ fn check_uv(has_atlas: bool, node: &GlbNode, faults: &mut Faults) {
     }
 }
 
-/// The parts of an instance hold its triangles in their order: each triangle is the next one of exactly one part.
+/// The parts of an instance hold its triangles in their order: each triangle is the next one of exactly one part. `owned`
+/// tells each instance's places in `parts`.
 fn parts_of_triangles(
-    scene: &SceneFile,
     instances: &[GlbNode],
+    owned: impl Iterator<Item = Vec<usize>>,
     parts: &[GlbNode],
+    file: &str,
     faults: &mut Faults,
 ) -> Option<Vec<Vec<usize>>> {
     let mut used = vec![0_usize; parts.len()];
     let mut all = Vec::new();
-    for (instance, node) in scene.instances.iter().zip(instances) {
-        let own: Vec<usize> = (0..parts.len()).filter(|part| scene.parts[*part].instance == instance.id).collect();
+    for (node, own) in instances.iter().zip(owned) {
         let mut of_triangles = Vec::with_capacity(node.mesh.triangles.len());
         for triangle in 0..node.mesh.triangles.len() {
             let corners = node.mesh.corners(triangle);
@@ -90,8 +103,8 @@ fn parts_of_triangles(
                 used[*part] < parts[*part].mesh.triangles.len() && parts[*part].mesh.corners(used[*part]) == corners
             });
             let Some(part) = found else {
-                let message = format!("triangle {triangle} of '{}' is in none of its parts", instance.id);
-                faults.add("bad_parts", PARTS, format!("node '{}'", instance.id), message);
+                let message = format!("triangle {triangle} of '{}' is in none of its parts", node.name);
+                faults.add("bad_parts", file, format!("node '{}'", node.name), message);
                 return None;
             };
             used[part] += 1;

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
 use super::Faults;
 use super::geometry::Meshes;
-use crate::views::{ViewPixel, ViewScene};
+use crate::views::{SeenTriangle, ViewPixel, ViewScene};
 
 /// Every so many-th column and row is traced again; prime, so that no pattern of the picture hides between.
 const STRIDE: usize = 7;
@@ -26,56 +26,70 @@ struct ViewPictures {
     depth: Picture<f32>,
     normal: Picture<Normal>,
     instance: Picture<u16>,
-    part: Picture<u16>,
+    /// One a set of parts.
+    parts: Vec<Picture<u16>>,
     valid: Mask,
     unobserved: Option<Mask>,
 }
 
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, meshes: &Meshes, world: &World, faults: &mut Faults) {
     let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
-    let part_index = |part: &usize| scene.parts[*part].index.0.get();
-    let parts: Vec<Vec<u16>> =
-        meshes.part_of_triangle.iter().map(|of_triangles| of_triangles.iter().map(part_index).collect()).collect();
+    let parts = part_sets(scene, meshes);
     let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
-    let made_anew = ViewScene::new(world.scene(), world, &instances, &parts, &scored);
+    let made_anew = ViewScene::new(world.scene(), world, &instances, &scored);
     for view in &scene.views {
-        let Some(pictures) = read(folder, view, faults) else { continue };
+        let Some(pictures) = read(folder, scene, view, faults) else { continue };
         let at = |file: &str| format!("views/{}/{file}", view.id);
         check_ids(scene, &pictures, &at, faults);
         check_masks(scene, &pictures, &at, faults);
         check_normals(&pictures, &at, faults);
         let truth = if folder.truth().is_dir() { check_truth(folder, view, &pictures, faults) } else { None };
-        check_against_meshes(&made_anew, [view, &scene.views[0]], &pictures, truth.as_ref(), &at, faults);
+        let expected = Expected { scene: &made_anew, parts: &parts };
+        check_against_meshes(&expected, [view, &scene.views[0]], &pictures, truth.as_ref(), &at, faults);
     }
 }
 
-fn read(folder: &SceneFolder, view: &View, faults: &mut Faults) -> Option<ViewPictures> {
+fn read(folder: &SceneFolder, scene: &SceneFile, view: &View, faults: &mut Faults) -> Option<ViewPictures> {
     let shown = folder.view(&view.id);
     let at = |file: &str| format!("views/{}/{file}", view.id);
     let is_input = view.id.as_str() == INPUT;
     let depth = faults.read(&at("depth.exr"), exr_io::read_scalar(&shown.join("depth.exr")));
     let normal = faults.read(&at("normal.exr"), exr_io::read_normal(&shown.join("normal.exr")));
     let instance = faults.read(&at("instance.png"), png_io::read_ids(&shown.join("instance.png")));
-    let part = faults.read(&at("part.png"), png_io::read_ids(&shown.join("part.png")));
+    let parts: Vec<_> = scene
+        .all_part_sets()
+        .map(|(set, _)| part_picture(set))
+        .map(|file| faults.read(&at(&file), png_io::read_ids(&shown.join(&file))))
+        .collect();
     let valid = faults.read(&at("valid.png"), png_io::read_mask(&shown.join("valid.png")));
     let unobserved = match is_input {
         true => None,
         false => Some(faults.read(&at("unobserved.png"), png_io::read_mask(&shown.join("unobserved.png")))?),
     };
-    let pictures =
-        ViewPictures { depth: depth?, normal: normal?, instance: instance?, part: part?, valid: valid?, unobserved };
-    has_size(&pictures, view, &at, faults).then_some(pictures)
+    let parts = parts.into_iter().collect::<Option<_>>()?;
+    let (instance, valid) = (instance?, valid?);
+    let pictures = ViewPictures { depth: depth?, normal: normal?, instance, parts, valid, unobserved };
+    has_size(&pictures, scene, view, &at, faults).then_some(pictures)
 }
 
-fn has_size(pictures: &ViewPictures, view: &View, at: &dyn Fn(&str) -> String, faults: &mut Faults) -> bool {
+fn has_size(
+    pictures: &ViewPictures,
+    scene: &SceneFile,
+    view: &View,
+    at: &dyn Fn(&str) -> String,
+    faults: &mut Faults,
+) -> bool {
     let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
     let mut sizes = vec![
         ("depth.exr", (pictures.depth.width(), pictures.depth.height())),
         ("normal.exr", (pictures.normal.width(), pictures.normal.height())),
         ("instance.png", (pictures.instance.width(), pictures.instance.height())),
-        ("part.png", (pictures.part.width(), pictures.part.height())),
         ("valid.png", (pictures.valid.width(), pictures.valid.height())),
     ];
+    let files: Vec<String> = scene.all_part_sets().map(|(set, _)| part_picture(set)).collect();
+    for (file, part) in files.iter().zip(&pictures.parts) {
+        sizes.push((file, (part.width(), part.height())));
+    }
     sizes.extend(pictures.unobserved.as_ref().map(|mask| ("unobserved.png", (mask.width(), mask.height()))));
     let before = faults.all.len();
     for (file, size) in sizes {
@@ -107,21 +121,23 @@ fn first_of(
 
 fn check_ids(scene: &SceneFile, pictures: &ViewPictures, at: &dyn Fn(&str) -> String, faults: &mut Faults) {
     let size = (pictures.depth.width(), pictures.depth.height());
-    let (instance, part, depth) = (pictures.instance.pixels(), pictures.part.pixels(), pictures.depth.pixels());
+    let (instance, depth) = (pictures.instance.pixels(), pictures.depth.pixels());
     let instances = scene.instances.len();
     first_of(faults, "bad_id", &at("instance.png"), size, &format!("an id must be 0 to {instances}"), |p| {
         usize::from(instance[p]) > instances
     });
-    let parts = scene.parts.len();
-    first_of(faults, "bad_id", &at("part.png"), size, &format!("an id must be 0 to {parts}"), |p| {
-        usize::from(part[p]) > parts
-    });
-    first_of(faults, "bad_id", &at("part.png"), size, "a part must be one of the pixel's instance", |p| {
-        let of_part = usize::from(part[p]).checked_sub(1).and_then(|place| scene.parts.get(place)).map(|p| &p.instance);
-        let of_pixel =
-            usize::from(instance[p]).checked_sub(1).and_then(|place| scene.instances.get(place)).map(|i| &i.id);
-        of_part != of_pixel
-    });
+    for ((set, parts), picture) in scene.all_part_sets().zip(&pictures.parts) {
+        let (file, part, count) = (at(&part_picture(set)), picture.pixels(), parts.len());
+        first_of(faults, "bad_id", &file, size, &format!("an id must be 0 to {count}"), |p| {
+            usize::from(part[p]) > count
+        });
+        first_of(faults, "bad_id", &file, size, "a part must be one of the pixel's instance", |p| {
+            let of_part = usize::from(part[p]).checked_sub(1).and_then(|place| parts.get(place)).map(|p| &p.instance);
+            let of_pixel =
+                usize::from(instance[p]).checked_sub(1).and_then(|place| scene.instances.get(place)).map(|i| &i.id);
+            of_part != of_pixel
+        });
+    }
     first_of(
         faults,
         "bad_depth",
@@ -161,7 +177,7 @@ fn check_normals(pictures: &ViewPictures, at: &dyn Fn(&str) -> String, faults: &
 
 /// A view made anew at a grid of pixels must be what the pictures hold.
 fn check_against_meshes(
-    scene: &ViewScene<'_>,
+    expected: &Expected<'_>,
     [view, input]: [&View; 2],
     pictures: &ViewPictures,
     truth: Option<&TruthAlbedo>,
@@ -173,24 +189,48 @@ fn check_against_meshes(
         .step_by(STRIDE)
         .flat_map(|y| (STRIDE / 2..width).step_by(STRIDE).map(move |x| (x, y)))
         .collect();
-    let strays: Vec<[bool; NAMES.len()]> = places
-        .par_iter()
-        .map(|(x, y)| strays(&scene.pixel(&view.camera, &input.camera, *x, *y), pictures, truth, *x, *y))
-        .collect();
-    for (which, (file, what)) in NAMES.into_iter().enumerate() {
-        let count = strays.iter().filter(|stray| stray[which]).count();
+    let pixel = |(x, y): &(usize, usize)| expected.scene.pixel(&view.camera, &input.camera, *x, *y);
+    let pixels: Vec<ViewPixel> = places.par_iter().map(pixel).collect();
+    let mut tell = |count: usize, file: String, what: &str| {
         if count as f64 > STRAYS * places.len() as f64 {
             let message = format!("{count} of {} {what} are not what the camera sees of the meshes", places.len());
-            let file = if which < GEOMETRY { at(file) } else { format!("ground_truth/{}", at(file)) };
             faults.add("not_reprojected", &file, "", message);
         }
+    };
+    let strays: Vec<[bool; NAMES.len()]> =
+        pixels.iter().zip(&places).map(|(pixel, (x, y))| strays(pixel, pictures, truth, *x, *y)).collect();
+    for (which, (file, what)) in NAMES.into_iter().enumerate() {
+        let file = if which < GEOMETRY { at(file) } else { format!("ground_truth/{}", at(file)) };
+        tell(strays.iter().filter(|stray| stray[which]).count(), file, what);
+    }
+    for ((file, values), picture) in expected.parts.iter().zip(&pictures.parts) {
+        let differs = |(pixel, (x, y)): &(&ViewPixel, &(usize, usize))| {
+            SeenTriangle::value_in(pixel.triangle, values) != picture.get(*x, *y)
+        };
+        tell(pixels.iter().zip(&places).filter(differs).count(), at(file), "part ids");
     }
 }
 
-/// The pictures that are made anew: those of geometry, then those of the ground truth.
-const NAMES: [(&str, &str); 7] = [
+/// What the pictures are held against.
+struct Expected<'a> {
+    scene: &'a ViewScene<'a>,
+    /// The file of each set of parts, and its value for every triangle of every instance.
+    parts: &'a [(String, Vec<Vec<u16>>)],
+}
+
+fn part_sets(scene: &SceneFile, meshes: &Meshes) -> Vec<(String, Vec<Vec<u16>>)> {
+    let mut sets = Vec::new();
+    for ((set, parts), of_triangles) in scene.all_part_sets().zip(&meshes.part_sets) {
+        let value = |part: &usize| parts[*part].index.0.get();
+        let values = of_triangles.iter().map(|instance| instance.iter().map(value).collect());
+        sets.push((part_picture(set), values.collect()));
+    }
+    sets
+}
+
+/// The pictures that are made anew, parts apart: those of geometry, then those of the ground truth.
+const NAMES: [(&str, &str); 6] = [
     ("instance.png", "instance ids"),
-    ("part.png", "part ids"),
     ("depth.exr", "depths"),
     ("normal.exr", "normals"),
     ("valid.png", "valid marks"),
@@ -198,7 +238,7 @@ const NAMES: [(&str, &str); 7] = [
     ("albedo.exr", "albedos"),
 ];
 /// How many of them are not of the ground truth.
-const GEOMETRY: usize = 6;
+const GEOMETRY: usize = 5;
 
 /// Which of the pictures differ from the pixel made anew. What depends on materials is held against them only where the
 /// ground truth is there.
@@ -216,7 +256,6 @@ fn strays(
     let unobserved = pictures.unobserved.as_ref().is_some_and(|mask| mask.get(x, y) != expected.unobserved);
     [
         expected.instance != pictures.instance.get(x, y),
-        expected.part != pictures.part.get(x, y),
         f64::from((expected.depth - depth).abs()) > DEPTH_SLACK * f64::from(expected.depth.max(depth)),
         far(expected.normal, normal, NORMAL_SLACK),
         materials && expected.valid != pictures.valid.get(x, y),

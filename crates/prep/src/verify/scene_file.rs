@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::DMat3;
-use mateval_scene::dataset::{FORMAT, SceneFile};
+use mateval_scene::dataset::{FORMAT, Part, SceneFile};
 use mateval_scene::layout::INPUT;
 
 use super::Faults;
@@ -61,24 +61,36 @@ fn check_numbers(scene: &SceneFile, faults: &mut Faults) {
             faults.add("duplicate_id", FILE, format!("/instances/{at}/id"), format!("'{}'", instance.id));
         }
     }
-    let mut part_ids = BTreeSet::new();
-    for (at, part) in scene.parts.iter().enumerate() {
+    check_parts(scene, &scene.parts, "/parts", faults);
+    let mut sets = BTreeSet::new();
+    for (at, set) in scene.part_sets.iter().enumerate() {
+        if !sets.insert(&set.id) {
+            faults.add("duplicate_id", FILE, format!("/part_sets/{at}/id"), format!("'{}'", set.id));
+        }
+        check_parts(scene, &set.parts, &format!("/part_sets/{at}/parts"), faults);
+    }
+}
+
+/// One set of parts, which is at `pointer`.
+fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Faults) {
+    let instances: BTreeSet<_> = scene.instances.iter().map(|instance| &instance.id).collect();
+    let mut ids = BTreeSet::new();
+    for (at, part) in parts.iter().enumerate() {
         if usize::from(part.index.0.get()) != at + 1 {
-            faults.add("bad_index", FILE, format!("/parts/{at}/index"), format!("expected {}", at + 1));
+            faults.add("bad_index", FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
         }
-        if !part_ids.insert(&part.id) {
-            faults.add("duplicate_id", FILE, format!("/parts/{at}/id"), format!("'{}'", part.id));
+        if !ids.insert(&part.id) {
+            faults.add("duplicate_id", FILE, format!("{pointer}/{at}/id"), format!("'{}'", part.id));
         }
-        if !ids.contains(&part.instance) {
+        if !instances.contains(&part.instance) {
             let message = format!("there is no instance '{}'", part.instance);
-            faults.add("dangling_reference", FILE, format!("/parts/{at}/instance"), message);
+            faults.add("dangling_reference", FILE, format!("{pointer}/{at}/instance"), message);
         }
     }
     for (at, instance) in scene.instances.iter().enumerate() {
-        let of_parts: usize =
-            scene.parts.iter().filter(|part| part.instance == instance.id).map(|part| part.triangles).sum();
+        let of_parts: usize = parts.iter().filter(|part| part.instance == instance.id).map(|part| part.triangles).sum();
         if of_parts != instance.triangles {
-            let message = format!("{} triangles, its parts have {of_parts}", instance.triangles);
+            let message = format!("{} triangles, its parts have {of_parts} in {pointer}", instance.triangles);
             faults.add("bad_parts", FILE, format!("/instances/{at}"), message);
         }
     }

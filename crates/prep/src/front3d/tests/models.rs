@@ -141,16 +141,18 @@ fn parts_are_by_group_and_then_by_what_hangs_together() {
     assert_eq!(house.placed[at].origin.part_of_triangle.as_deref(), Some(&[2, 2, 0, 0, 1, 1][..]));
     let origins: Vec<_> = house.placed.iter().map(|placed| placed.origin.clone()).collect();
     let list = crate::instances::list(&house.scene, &origins).unwrap();
-    assert_eq!(list[at].parts.len(), 3);
+    let split = crate::instances::own_parts(&house.scene, &origins, &list).unwrap();
+    assert_eq!(split.instances[at].parts.len(), 3);
     // The whole sample: ids of instances and parts are there once.
     let sample = bare();
     let origins: Vec<_> = sample.placed.iter().map(|placed| placed.origin.clone()).collect();
     let list = crate::instances::list(&sample.scene, &origins).unwrap();
+    let split = crate::instances::own_parts(&sample.scene, &origins, &list).unwrap();
     let mut ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
-    ids.extend(list.iter().flat_map(|entry| entry.parts.iter().map(|part| part.id.as_str())));
+    ids.extend(split.instances.iter().flat_map(|entry| entry.parts.iter().map(|part| part.id.as_str())));
     let count = ids.len();
     ids.sort_unstable();
     ids.dedup();
     assert_eq!(ids.len(), count);
-    assert!(list.iter().all(|entry| entry.parts.len() == 1 + entry.part_of_triangle.iter().max().unwrap()));
+    assert!(split.instances.iter().all(|entry| entry.parts.len() == 1 + entry.of_triangle.iter().max().unwrap()));
 }
