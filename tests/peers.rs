@@ -1,6 +1,6 @@
 //! The tracer against other renderers: the same scenes, made by the same code, rendered by both.
 //!
-//! `tools/test_peers.sh` installs the renderers, sets `MATEVAL_PEERS_PYTHON` to the Python that has them, and runs this.
+//! `tools/test_peers.sh` installs the renderers, sets `MATEVAL_PEERS_PYTHON` and `MATEVAL_PEERS_BLENDER` to the Pythons that have them, and runs this.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 #![allow(clippy::print_stderr, reason = "what was measured is told, and what is left out")]

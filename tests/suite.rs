@@ -9,6 +9,7 @@
 mod suite {
     mod arrows;
     mod bad_input;
+    mod blender;
     mod command;
     mod determinism;
     mod full_disk;

@@ -1,25 +1,12 @@
 #!/bin/sh
-# The tracer against Mitsuba 3 and Blender: installs both into target/peers (1.2 GB), then renders the same scenes with each.
+# The tracer against Mitsuba 3 and Blender: installs Mitsuba into target/peers, then renders the same scenes with each.
 # Arguments go to the test runner: tools/test_peers.sh mitsuba
 set -eu
 cd "$(dirname "$0")/.."
 tools/setup.sh
 
-# mitsuba: libatomic1, and LLVM 19 for its fast variant. bpy: the libraries of X and GL that it is linked to.
-packages="libatomic1 libllvm19 libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libgl1 python3-venv"
-missing=""
-for package in $packages; do
-    dpkg -s "$package" >/dev/null 2>&1 || missing="$missing $package"
-done
-if [ -n "$missing" ]; then
-    as_root=""
-    [ "$(id -u)" = 0 ] || as_root=sudo
-    echo "test_peers: installing$missing" >&2
-    $as_root apt-get update -qq
-    # The list of names holds no spaces of its own.
-    # shellcheck disable=SC2086
-    DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq --no-install-recommends $missing >/dev/null
-fi
+# mitsuba: libatomic1, and LLVM 19 for its fast variant. setup.sh has installed Blender.
+tools/apt_install.sh libatomic1 libllvm19 python3-venv
 
 venv=target/peers
 requirements=tests/peers/requirements.txt
@@ -30,4 +17,5 @@ if ! cmp -s "$requirements" "$venv/requirements.txt"; then
     cp "$requirements" "$venv/requirements.txt"
 fi
 
-MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --test peers -- --show-output "$@"
+cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
+MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --test peers -- --show-output "$@"

@@ -43,7 +43,7 @@ pub fn render(shots: &[Shot]) -> Vec<Tiles> {
     let pictures: Vec<Value> = shots.iter().enumerate().map(picture).collect();
     let path = folder.path().join("job.json");
     std::fs::write(&path, json!({ "result": result, "pictures": pictures }).to_string()).unwrap();
-    python::run("render_blender.py", &path);
+    python::run(python::Python::Blender, "render_blender.py", &path);
     let pictures = read_pictures(&result);
     assert_eq!(pictures.len(), shots.len() * SEEDS as usize);
     pictures.chunks(SEEDS as usize).map(Tiles::of).collect()

@@ -18,6 +18,11 @@ pub struct Args {
     /// Samples a pixel of each half of a rendered picture.
     #[arg(long, default_value_t = 16)]
     samples: u32,
+    /// What renders the truth.
+    #[arg(long, value_enum, default_value = "blender")]
+    renderer: prep::RendererWord,
+    #[command(flatten)]
+    blender: prep::blender::BlenderArgs,
     /// Replace what an earlier demo left there.
     #[arg(long)]
     force: bool,
@@ -42,7 +47,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     say("3/5 prep render: RGB truth");
     prep::render(&prep::RenderArgs {
         dataset: dataset.clone(),
-        renderer: prep::Renderer::Builtin,
+        renderer: args.renderer,
+        blender: args.blender.clone(),
         samples: Some(args.samples),
         scenes: Vec::new(),
         force: args.force,

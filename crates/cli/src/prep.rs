@@ -1,5 +1,6 @@
 //! `mateval prep`.
 
+pub mod blender;
 mod survey;
 
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use anyhow::{Context as _, bail};
 use mateval_image::store::write_whole;
 use mateval_prep::build::{BuildOptions, BuildReport};
 use mateval_prep::mitsuba_export::ExportOptions;
-use mateval_prep::render::RenderOptions;
+use mateval_prep::render::{RenderOptions, Renderer};
 use mateval_prep::stats;
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, Severity, ViewId, json};
@@ -57,7 +58,9 @@ pub struct RenderArgs {
     pub dataset: PathBuf,
     /// By what.
     #[arg(long, value_enum, default_value = "builtin")]
-    pub renderer: Renderer,
+    pub renderer: RendererWord,
+    #[command(flatten)]
+    pub blender: blender::BlenderArgs,
     /// Samples a pixel of each of the two halves; the recipe's if absent.
     #[arg(long)]
     pub samples: Option<u32>,
@@ -71,9 +74,11 @@ pub struct RenderArgs {
 
 /// What renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Renderer {
+pub enum RendererWord {
     /// Our own path tracer.
     Builtin,
+    /// Blender's Cycles, denoised, light group by light group.
+    Blender,
 }
 
 /// What `prep verify` is given.
@@ -170,8 +175,11 @@ fn tell(report: &BuildReport) {
 
 /// Renders a dataset's RGB pictures.
 pub fn render(args: &RenderArgs) -> anyhow::Result<Outcome> {
-    let Renderer::Builtin = args.renderer;
-    let options = RenderOptions { samples: args.samples, scenes: args.scenes.clone(), force: args.force };
+    let renderer = match args.renderer {
+        RendererWord::Builtin => Renderer::Builtin,
+        RendererWord::Blender => Renderer::Blender(args.blender.options()?),
+    };
+    let options = RenderOptions { renderer, samples: args.samples, scenes: args.scenes.clone(), force: args.force };
     let bars = Bars::new();
     let report = mateval_prep::render::render(&args.dataset, &options, &|step, done, all| bars.step(step, done, all))
         .context("cannot render the dataset")?;
@@ -179,7 +187,13 @@ pub fn render(args: &RenderArgs) -> anyhow::Result<Outcome> {
     for line in &report.remarks {
         say(line);
     }
+    for failure in &report.failures {
+        say(&failure.to_string());
+    }
     print(&format!("{}: {} views rendered, {} were there\n", args.dataset.display(), report.rendered, report.kept))?;
+    if !report.failures.is_empty() {
+        bail!("{} scenes could not be rendered; the others were", report.failures.len());
+    }
     Ok(Outcome::Good)
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Colours are channels `R`, `G`, `B` (linear Rec. 709), vectors `X`, `Y`, `Z`, scalars `V`.
 
+use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -64,6 +65,20 @@ pub fn read_scalar(path: &Path) -> Result<Picture<f32>, ImageError> {
     let values = channel(path, &layer, "V").or_else(|error| channel(path, &layer, "Y").map_err(|_| error))?;
     check_finite(path, width, values.iter().map(|v| v.is_finite()))?;
     Picture::new(width, height, values)
+}
+
+/// Reads every channel of the first layer, by its full name, as in `ViewLayer.Combined.R`. Numbers are as they stand: they
+/// may be NaN or infinite.
+pub fn read_channels(path: &Path) -> Result<BTreeMap<String, Picture<f32>>, ImageError> {
+    let layer = read_first_layer(path)?;
+    let (width, height) = (layer.size.width(), layer.size.height());
+    let names = layer.channel_data.list.iter().map(|channel| channel.name.to_string());
+    names
+        .map(|name| {
+            let values = channel(path, &layer, &name)?;
+            Ok((name, Picture::new(width, height, values)?))
+        })
+        .collect()
 }
 
 fn write_triples(

@@ -10,6 +10,7 @@
 pub mod atlas;
 pub mod bake;
 pub mod bitterli;
+pub mod blender;
 pub mod build;
 pub mod build_scene;
 pub mod error;

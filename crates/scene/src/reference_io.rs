@@ -87,6 +87,26 @@ pub enum WrapWord {
     Mirror,
 }
 
+impl From<Wrap> for WrapWord {
+    fn from(wrap: Wrap) -> Self {
+        match wrap {
+            Wrap::Repeat => Self::Repeat,
+            Wrap::Clamp => Self::Clamp,
+            Wrap::Mirror => Self::Mirror,
+        }
+    }
+}
+
+impl From<WrapWord> for Wrap {
+    fn from(word: WrapWord) -> Self {
+        match word {
+            WrapWord::Repeat => Self::Repeat,
+            WrapWord::Clamp => Self::Clamp,
+            WrapWord::Mirror => Self::Mirror,
+        }
+    }
+}
+
 /// `lights.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -175,22 +195,14 @@ fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<
             (exr, TexelKind::Grey)
         }
     };
-    let wrap = match texture.wrap() {
-        Wrap::Repeat => WrapWord::Repeat,
-        Wrap::Clamp => WrapWord::Clamp,
-        Wrap::Mirror => WrapWord::Mirror,
-    };
+    let wrap = texture.wrap().into();
     let file = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(TextureEntry { file, source: source.name.clone(), source_sha256: source.sha256.clone(), texels, wrap })
 }
 
 fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTexture, SceneError> {
     let path = reference.join("textures").join(&entry.file);
-    let wrap = match entry.wrap {
-        WrapWord::Repeat => Wrap::Repeat,
-        WrapWord::Clamp => Wrap::Clamp,
-        WrapWord::Mirror => Wrap::Mirror,
-    };
+    let wrap = entry.wrap.into();
     let texture = match entry.texels {
         TexelKind::Srgb8 | TexelKind::Srgb16 => read_texture(&path, Encoding::Srgb, wrap)?,
         TexelKind::Linear8 | TexelKind::Grey8 | TexelKind::Linear => read_texture(&path, Encoding::Linear, wrap)?,

@@ -70,6 +70,18 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, PrepE
     Ok(faults.all)
 }
 
+/// The value in `part.png` of every triangle of every instance, from the meshes. Fails where these are not those of
+/// `scene.json`.
+pub(crate) fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u16>>, PrepError> {
+    let mut faults = Faults { all: Vec::new(), prefix: String::new() };
+    let Some(meshes) = geometry::check(folder, scene, &mut faults) else {
+        let path = folder.path().to_owned();
+        return Err(mateval_scene::SceneError::Invalid { path, findings: faults.all }.into());
+    };
+    let value = |part: &usize| scene.parts[*part].index.0.get();
+    Ok(meshes.part_sets[0].iter().map(|of_triangles| of_triangles.iter().map(value).collect()).collect())
+}
+
 fn check_manifest(root: &Path, faults: &mut Faults) {
     if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
         faults.all.extend(found.into_iter().filter(|finding| !is_withheld(root, finding)));

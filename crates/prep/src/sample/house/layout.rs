@@ -225,7 +225,7 @@ fn window_bars() -> LayoutMesh {
     bars
 }
 
-/// Four boxes whose tops lie in the ceiling and which overlap in the corners, a sheet that lies in the ceiling too, and
+/// Four boxes whose tops lie in the ceiling, a sheet close below the ceiling, and
 /// the strips of light along the inner edges.
 fn hung_ceiling() -> Vec<LayoutMesh> {
     let (low, high, wide, bottom) = (ROOMS[0].low, ROOMS[0].high, 0.5, 2.55);
@@ -238,7 +238,7 @@ fn hung_ceiling() -> Vec<LayoutMesh> {
         frame = strip(frame, x, bottom, low.y, x + wide, HEIGHT, high.y);
     }
     for z in [low.y, high.y - wide] {
-        frame = strip(frame, low.x, bottom, z, high.x, HEIGHT, z + wide);
+        frame = strip(frame, low.x + wide, bottom, z, high.x - wide, HEIGHT, z + wide);
     }
     for x in [low.x + wide, high.x - wide - 0.02] {
         band = strip(band, x, 2.7, low.y + wide, x + 0.02, 2.72, high.y - wide);
@@ -246,7 +246,7 @@ fn hung_ceiling() -> Vec<LayoutMesh> {
     for z in [low.y + wide, high.y - wide - 0.02] {
         band = strip(band, low.x + wide, 2.7, z, high.x - wide, 2.72, z + 0.02);
     }
-    let sheet = LayoutMesh::new("CustomizedCeiling", "ceiling").facing_down(low + wide, high - wide, HEIGHT);
+    let sheet = LayoutMesh::new("CustomizedCeiling", "ceiling").facing_down(low + wide, high - wide, HEIGHT - 0.005);
     vec![frame, sheet, band]
 }
 

@@ -1,0 +1,359 @@
+"""Materials and lamps of a job as Cycles' shader graphs.
+
+The names of models and inputs are those of `reference.json` and `lights.json` (dataset_spec/FORMAT.md, section 8). What
+Cycles can only come near is said by `approximation`.
+"""
+
+
+from pathlib import Path
+
+import bpy
+from mateval.job import Job
+from mateval.metal import edge_tint, reflectance
+from mateval.nodes import Socket, Tree, backfacing, constant, is_camera_ray, linear_map, mix, new, number, put, scaled, times
+from mateval.nodes import math as operation
+from mateval.plastic import base_under_coat
+
+UV_LAYER = "uv"
+INSTANCE, PART, BASE_COLOR = "instance", "part", "base_color"
+"""Attributes of faces, and the passes that show them."""
+
+EXTENSIONS = {"repeat": "REPEAT", "clamp": "EXTEND", "mirror": "MIRROR"}
+DISTRIBUTIONS = {"ggx": "GGX", "beckmann": "BECKMANN"}
+BLACK = (0.0, 0.0, 0.0)
+WHITE = [1.0, 1.0, 1.0]
+IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+COVERED = 0.5
+"""From this opacity on a place counts as there, in ids and base colour."""
+
+
+class Textures:
+    """The job's textures, each loaded once. A texture that cannot be read is an error: Blender would show it pink."""
+
+    def __init__(self, *, job: Job, folder: Path) -> None:
+        self._images = [self._load(path=folder / texture["file"]) for texture in job["textures"]]
+        self._extensions = [EXTENSIONS[texture["wrap"]] for texture in job["textures"]]
+
+    @staticmethod
+    def _load(*, path: Path) -> bpy.types.Image:
+        image = bpy.data.images.load(str(path))
+        image.colorspace_settings.name = "Non-Color"
+        if min(image.size) < 1 or not image.has_data:
+            raise RuntimeError(f"Blender cannot read the texture '{path}'")
+        return image
+
+    def color(self, *, tree: Tree, lookup: Job) -> Socket:
+        """The texture at the surface's uv, linear."""
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = self._images[lookup["texture"]]
+        node.interpolation = "Linear"
+        node.extension = self._extensions[lookup["texture"]]
+        uv = tree.nodes.new("ShaderNodeUVMap")
+        uv.uv_map = UV_LAYER
+        place = uv.outputs["UV"]
+        if lookup["uv"] != IDENTITY:
+            place = new(tree=tree, kind="ShaderNodeVectorMath", Vector=place).outputs["Vector"]
+            place.node.inputs[1].default_value = (0.0, 0.0, 1.0)
+            place = linear_map(tree=tree, vector=place, rows=lookup["uv"])
+        tree.links.new(place, node.inputs["Vector"])
+        return node.outputs["Color"]
+
+    def image(self, *, index: int) -> bpy.types.Image:
+        """The picture itself."""
+        return self._images[index]
+
+
+def color_of(*, tree: Tree, textures: Textures, given: Job) -> Socket:
+    """A colour of a material: `{"constant": rgb}` or `{"texture": ...}`."""
+    if "constant" in given:
+        return constant(tree=tree, color=given["constant"])
+    return textures.color(tree=tree, lookup=given["texture"])
+
+
+def number_of(*, tree: Tree, textures: Textures, given: Job) -> Socket:
+    """A number of a material: `{"constant": value}` or one channel of a texture."""
+    if "constant" in given:
+        return number(tree=tree, value=given["constant"])
+    color = textures.color(tree=tree, lookup=given["texture"])
+    return new(tree=tree, kind="ShaderNodeSeparateColor", Color=color).outputs[given["texture"]["channel"]]
+
+
+def is_white(*, given: Job) -> bool:
+    """Whether a colour changes nothing."""
+    return given.get("constant") == WHITE
+
+
+def roughness_of(*, tree: Tree, textures: Textures, microfacets: Job | None) -> Socket:
+    """Blender's roughness is the square root of the distribution's alpha; a smooth surface has 0."""
+    if microfacets is None:
+        return number(tree=tree, value=0.0)
+    alpha = number_of(tree=tree, textures=textures, given=microfacets["alpha"])
+    return operation(tree=tree, operation="SQRT", values=[alpha])
+
+
+def distribution_of(*, microfacets: Job | None) -> str:
+    """Blender's name of the distribution."""
+    return DISTRIBUTIONS[microfacets["distribution"]] if microfacets else "GGX"
+
+
+def base_color(*, tree: Tree, textures: Textures, model: Job) -> Socket | None:
+    """What a method is to recover (FORMAT.md, "Materials as base_color, roughness, metallic"); none for glass."""
+    match model["type"]:
+        case "diffuse":
+            return color_of(tree=tree, textures=textures, given=model["reflectance"])
+        case "plastic":
+            return color_of(tree=tree, textures=textures, given=model["diffuse_reflectance"])
+        case "principled":
+            return color_of(tree=tree, textures=textures, given=model["base_color"])
+        case "conductor":
+            tint = color_of(tree=tree, textures=textures, given=model["specular_reflectance"])
+            return times(tree=tree, color=tint, factor=normal_reflectance(ior=model["ior"]))
+        case _:
+            return None
+
+
+def normal_reflectance(*, ior: Job | str) -> tuple[float, ...]:
+    """F0 of a conductor."""
+    if ior == "perfect_mirror":
+        return (1.0, 1.0, 1.0)
+    pairs = zip(ior["eta_k"]["eta"], ior["eta_k"]["k"], strict=True)
+    return tuple(reflectance(cosine=1.0, eta=eta, k=k) for eta, k in pairs)
+
+
+def reflecting(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """The shader of a model, without lamps, masks and bumps."""
+    makers = {
+        "diffuse": diffuse,
+        "plastic": plastic,
+        "principled": principled,
+        "conductor": conductor,
+        "dielectric": dielectric,
+        "thin_dielectric": thin_dielectric,
+    }
+    return makers[model["type"]](tree=tree, textures=textures, model=model)
+
+
+def diffuse(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """Lambert, or with a roughness Blender's Oren-Nayar."""
+    color = color_of(tree=tree, textures=textures, given=model["reflectance"])
+    roughness: Socket | float = 0.0
+    if model["alpha"] is not None:
+        roughness = number_of(tree=tree, textures=textures, given=model["alpha"])
+    return new(tree=tree, kind="ShaderNodeBsdfDiffuse", Color=color, Roughness=roughness).outputs[0]
+
+
+def principled(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """Principled with all else at its default."""
+    node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
+    put(tree=tree, socket=node.inputs["Base Color"],
+        value=color_of(tree=tree, textures=textures, given=model["base_color"]))
+    put(tree=tree, socket=node.inputs["Roughness"],
+        value=number_of(tree=tree, textures=textures, given=model["roughness"]))
+    put(tree=tree, socket=node.inputs["Metallic"],
+        value=number_of(tree=tree, textures=textures, given=model["metallic"]))
+    node.inputs["Specular IOR Level"].default_value = model["specular"]
+    node.inputs["IOR"].default_value = 1.5
+    return node.outputs[0]
+
+
+def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """Principled with the coat's index, and the base colour that light sees after its way through the coat."""
+    given = color_of(tree=tree, textures=textures, given=model["diffuse_reflectance"])
+    scale, inner = base_under_coat(eta=model["eta"], nonlinear=model["nonlinear"])
+    color = times(tree=tree, color=given, factor=(scale, scale, scale))
+    if inner > 0.0:
+        lost = times(tree=tree, color=given, factor=(-inner, -inner, -inner))
+        rest = tree.nodes.new("ShaderNodeVectorMath")
+        tree.links.new(lost, rest.inputs[0])
+        rest.inputs[1].default_value = (1.0, 1.0, 1.0)
+        divide = tree.nodes.new("ShaderNodeVectorMath")
+        divide.operation = "DIVIDE"
+        tree.links.new(color, divide.inputs[0])
+        tree.links.new(rest.outputs["Vector"], divide.inputs[1])
+        color = divide.outputs["Vector"]
+    node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
+    node.distribution = "GGX"
+    put(tree=tree, socket=node.inputs["Base Color"], value=color)
+    put(tree=tree, socket=node.inputs["Roughness"],
+        value=roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"]))
+    put(tree=tree, socket=node.inputs["Specular Tint"],
+        value=color_of(tree=tree, textures=textures, given=model["specular_reflectance"]))
+    node.inputs["IOR"].default_value = model["eta"]
+    return node.outputs[0]
+
+
+def conductor(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """A metal by its complex index; with a tint, by its colour at normal incidence and at the edge."""
+    roughness = roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"])
+    distribution = distribution_of(microfacets=model["microfacets"])
+    if model["ior"] == "perfect_mirror":
+        tint = color_of(tree=tree, textures=textures, given=model["specular_reflectance"])
+        node = new(tree=tree, kind="ShaderNodeBsdfAnisotropic", Color=tint, Roughness=roughness)
+        node.distribution = distribution
+        return node.outputs[0]
+    node = new(tree=tree, kind="ShaderNodeBsdfMetallic", Roughness=roughness)
+    node.distribution = distribution
+    eta, k = model["ior"]["eta_k"]["eta"], model["ior"]["eta_k"]["k"]
+    if is_white(given=model["specular_reflectance"]):
+        node.fresnel_type = "PHYSICAL_CONDUCTOR"
+        node.inputs["IOR"].default_value = tuple(eta)
+        node.inputs["Extinction"].default_value = tuple(k)
+        return node.outputs[0]
+    node.fresnel_type = "F82"
+    tints = tuple(edge_tint(eta=e, k=x) for e, x in zip(eta, k, strict=True))
+    put(tree=tree, socket=node.inputs["Base Color"], value=base_color(tree=tree, textures=textures, model=model))
+    node.inputs["Edge Tint"].default_value = (*tints, 1.0)
+    return node.outputs[0]
+
+
+def dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """Glass: one colour for what it reflects and what it lets through."""
+    color = color_of(tree=tree, textures=textures, given=model["specular_transmittance"])
+    roughness = roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"])
+    node = new(tree=tree, kind="ShaderNodeBsdfGlass", Color=color, Roughness=roughness)
+    node.distribution = distribution_of(microfacets=model["microfacets"])
+    node.inputs["IOR"].default_value = model["eta"]
+    return node.outputs[0]
+
+
+def thin_dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
+    """A pane: what both its boundaries reflect together is 2 F / (1 + F), the rest goes straight through."""
+    # Blender's Fresnel node inverts the index behind a surface; a pane looks alike from both sides.
+    eta = model["eta"]
+    behind = backfacing(tree=tree)
+    index = operation(tree=tree, operation="MULTIPLY_ADD", values=[behind, 1.0 / eta - eta, eta])
+    one = new(tree=tree, kind="ShaderNodeFresnel", IOR=index).outputs[0]
+    twice = operation(tree=tree, operation="MULTIPLY", values=[one, 2.0])
+    both = operation(tree=tree, operation="DIVIDE",
+                     values=[twice, operation(tree=tree, operation="ADD", values=[one, 1.0])])
+    through = color_of(tree=tree, textures=textures, given=model["specular_transmittance"])
+    back = color_of(tree=tree, textures=textures, given=model["specular_reflectance"])
+    clear = new(tree=tree, kind="ShaderNodeBsdfTransparent", Color=through).outputs[0]
+    mirror = new(tree=tree, kind="ShaderNodeBsdfAnisotropic", Color=back, Roughness=0.0).outputs[0]
+    return mix(tree=tree, factor=both, first=clear, second=mirror)
+
+
+def approximation(*, model: Job) -> str | None:
+    """What Cycles does not do as the model says; none where it does."""
+    match model["type"]:
+        case "principled" if model["flavour"] != "blender":
+            return "Mitsuba's principled is rendered as Blender's"
+        case "diffuse" if model["alpha"] is not None:
+            return "Oren-Nayar is Blender's own form of it"
+        case "plastic":
+            return "plastic is Principled with a base colour of the same mean brightness under the coat"
+        case "conductor" if model["ior"] != "perfect_mirror" and not is_white(given=model["specular_reflectance"]):
+            return "a tinted conductor is Blender's F82 metal"
+        case "dielectric" if model["specular_reflectance"] != model["specular_transmittance"]:
+            return "glass reflects with the colour that it lets through"
+        case _:
+            return None
+
+
+def surface_material(*, textures: Textures, material: Job, light: Job | None) -> bpy.types.Material:
+    """A material as light sees it; `light` is the group of lamps that its surface is of."""
+    made, tree, output = empty(name=material["name"])
+    two_sided_lamp = light is not None and light["emission"]["two_sided"]
+    made.cycles.emission_sampling = "FRONT_BACK" if two_sided_lamp else "FRONT" if light else "NONE"
+    made.cycles.use_bump_map_correction = False
+    model = material["model"]
+    shader = reflecting(tree=tree, textures=textures, model=model)
+    bend(tree=tree, textures=textures, bump=material["bump"])
+    if not material["two_sided"] and "dielectric" not in model["type"]:
+        black = new(tree=tree, kind="ShaderNodeBsdfDiffuse", Color=(*BLACK, 1.0)).outputs[0]
+        shader = mix(tree=tree, factor=backfacing(tree=tree), first=shader, second=black)
+    if light is not None:
+        shader = lamp(tree=tree, textures=textures, surface=shader, light=light)
+    covered = None
+    if material["opacity"] is not None:
+        opacity = number_of(tree=tree, textures=textures, given=material["opacity"])
+        shader = mix(tree=tree, factor=opacity, first=clear(tree=tree), second=shader)
+        covered = is_covered(tree=tree, opacity=opacity)
+    tree.links.new(shader, output.inputs["Surface"])
+    color = base_color(tree=tree, textures=textures, model=model)
+    if color is not None:
+        show_color(tree=tree, name=BASE_COLOR, color=color, covered=covered)
+    return made
+
+
+def geometry_material(*, textures: Textures, material: Job) -> bpy.types.Material:
+    """The same surface without light: what it hides, and which instance and part it is."""
+    made, tree, output = empty(name=f"geometry of {material['name']}")
+    made.cycles.emission_sampling = "NONE"
+    shader = new(tree=tree, kind="ShaderNodeBsdfDiffuse").outputs[0]
+    covered = None
+    if material["opacity"] is not None:
+        opacity = number_of(tree=tree, textures=textures, given=material["opacity"])
+        covered = is_covered(tree=tree, opacity=opacity)
+        shader = mix(tree=tree, factor=covered, first=clear(tree=tree), second=shader)
+    tree.links.new(shader, output.inputs["Surface"])
+    for name in (INSTANCE, PART):
+        attribute = tree.nodes.new("ShaderNodeAttribute")
+        attribute.attribute_name = name
+        show_number(tree=tree, name=name, value=attribute.outputs["Fac"], covered=covered)
+    return made
+
+
+def empty(*, name: str) -> tuple[bpy.types.Material, Tree, bpy.types.Node]:
+    """A material without a surface, its graph and its output."""
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.clear()
+    return made, tree, tree.nodes.new("ShaderNodeOutputMaterial")
+
+
+def clear(*, tree: Tree) -> Socket:
+    """Lets everything through."""
+    return new(tree=tree, kind="ShaderNodeBsdfTransparent").outputs[0]
+
+
+def is_covered(*, tree: Tree, opacity: Socket) -> Socket:
+    """1 where the surface counts as there."""
+    return operation(tree=tree, operation="LESS_THAN", values=[COVERED, operation(
+        tree=tree, operation="ADD", values=[opacity, 1e-6])])
+
+
+def bend(*, tree: Tree, textures: Textures, bump: Job | None) -> None:
+    """Gives every shader of the graph the normal of the height map: heights in metres times `scale`."""
+    if bump is None:
+        return
+    height = number_of(tree=tree, textures=textures, given=bump["height"])
+    node = new(tree=tree, kind="ShaderNodeBump", Strength=1.0, Distance=bump["scale"], Height=height)
+    for shader in tree.nodes:
+        if shader.bl_idname.startswith("ShaderNodeBsdf") and "Normal" in shader.inputs:
+            tree.links.new(node.outputs["Normal"], shader.inputs["Normal"])
+
+
+def lamp(*, tree: Tree, textures: Textures, surface: Socket, light: Job) -> Socket:
+    """A surface that glows; one hidden from the camera shows it the surface alone, and every other ray the light alone."""
+    emission = light["emission"]
+    radiance = constant(tree=tree, color=emission["radiance"])
+    if emission.get("map") is not None:
+        radiance = times(tree=tree, color=textures.color(tree=tree, lookup=emission["map"]), factor=radiance)
+    if not emission["two_sided"]:
+        front = operation(tree=tree, operation="SUBTRACT", values=[1.0, backfacing(tree=tree)])
+        radiance = scaled(tree=tree, color=radiance, factor=front)
+    glow = new(tree=tree, kind="ShaderNodeEmission", Color=radiance, Strength=1.0).outputs[0]
+    if not light["camera_visible"]:
+        return mix(tree=tree, factor=is_camera_ray(tree=tree), first=glow, second=surface)
+    add = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(glow, add.inputs[0])
+    tree.links.new(surface, add.inputs[1])
+    return add.outputs[0]
+
+
+def show_color(*, tree: Tree, name: str, color: Socket, covered: Socket | None) -> None:
+    """Writes the colour to the pass of this name."""
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    node.aov_name = name
+    value = color if covered is None else scaled(tree=tree, color=color, factor=covered)
+    tree.links.new(value, node.inputs["Color"])
+
+
+def show_number(*, tree: Tree, name: str, value: Socket, covered: Socket | None) -> None:
+    """Writes the number to the pass of this name."""
+    node = tree.nodes.new("ShaderNodeOutputAOV")
+    node.aov_name = name
+    shown = value if covered is None else operation(tree=tree, operation="MULTIPLY", values=[value, covered])
+    tree.links.new(shown, node.inputs["Value"])

@@ -1,0 +1,26 @@
+"""Fresnel's equations for metals. Needs no bpy."""
+
+import math
+
+EDGE_COSINE = 1.0 / 7.0
+"""Where Blender's edge tint is meant: at about 82 degrees, where Schlick's curve is furthest off (Kutz et al. 2021)."""
+
+
+def reflectance(*, cosine: float, eta: float, k: float) -> float:
+    """Share of unpolarised light that a conductor of the complex index eta + i k reflects at this cosine."""
+    sine2 = 1.0 - cosine * cosine
+    t = eta * eta - k * k - sine2
+    a2b2 = math.sqrt(t * t + 4.0 * eta * eta * k * k)
+    a = math.sqrt(max(0.0, 0.5 * (a2b2 + t)))
+    s = (a2b2 + cosine * cosine - 2.0 * a * cosine) / (a2b2 + cosine * cosine + 2.0 * a * cosine)
+    tail = (a2b2 * cosine * cosine + sine2 * sine2 - 2.0 * a * cosine * sine2) / (
+        a2b2 * cosine * cosine + sine2 * sine2 + 2.0 * a * cosine * sine2
+    )
+    return 0.5 * (s + s * tail)
+
+
+def edge_tint(*, eta: float, k: float) -> float:
+    """What Blender's F82 model multiplies Schlick's curve by at 82 degrees, for the same metal."""
+    normal = reflectance(cosine=1.0, eta=eta, k=k)
+    schlick = normal + (1.0 - normal) * (1.0 - EDGE_COSINE) ** 5
+    return min(1.0, reflectance(cosine=EDGE_COSINE, eta=eta, k=k) / schlick)

@@ -1,0 +1,112 @@
+"""Renders one job with Blender's Cycles.
+
+    python render.py JOB.json                  with the bpy module
+    blender -b -P render.py -- JOB.json        with a Blender
+
+Beside the job it writes, for each view, `<view>/geometry.exr`, `a.exr`, `b.exr` and `denoised.exr`, and `result.json`,
+which names the views that are whole. Lines on stdout that begin with `mateval:` tell how far it is. It ends with 0, or with
+1 and the reason in `result.json`.
+"""
+
+import os
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import bpy  # noqa: E402: the folder of this file must come first
+from mateval.cycles import light_passes, render_to, set_up  # noqa: E402
+from mateval.denoise import denoise_to  # noqa: E402
+from mateval.job import RESULT_FORMAT, Job, read_job, write_result  # noqa: E402
+from mateval.scene import BuiltScene  # noqa: E402
+
+VERSION = (4, 5)
+"""The Blender that the graphs of nodes are written for."""
+
+
+def main() -> None:
+    """Carries out the job that the last word of the command line names."""
+    path = Path(sys.argv[-1]).resolve()
+    threading.Thread(target=end_with, kwargs={"parent": os.getppid()}, daemon=True).start()
+    result: Job = {"format": RESULT_FORMAT, "blender": bpy.app.version_string, "approximations": [], "views": [],
+                   "error": None}
+    code = 1
+    try:
+        carry_out_or_tell(path=path, result=result)
+        code = 0 if result["error"] is None else 1
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        # bpy 4.5 may hang when it is taken down in the ordinary way, and where the disk is full even a word about it fails.
+        os._exit(code)
+
+
+def carry_out_or_tell(*, path: Path, result: Job) -> None:
+    """Carries the job out; whatever stops it is told in the result."""
+    try:
+        carry_out(path=path, result=result)
+    except BaseException as error:  # noqa: BLE001: whatever it is
+        result["error"] = f"{type(error).__name__}: {error}"
+        write_result(folder=path.parent, result=result)
+        traceback.print_exc()
+    else:
+        write_result(folder=path.parent, result=result)
+
+
+def end_with(*, parent: int) -> None:
+    """Ends this process when the one that started it is gone: nobody would read what it renders."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(2)
+
+
+def carry_out(*, path: Path, result: Job) -> None:
+    """Renders all views of the job and tells of each in the result."""
+    if bpy.app.version[:2] != VERSION:
+        raise RuntimeError(f"expected Blender {VERSION[0]}.{VERSION[1]}, found {bpy.app.version_string}")
+    job, folder = read_job(path=path), path.parent
+    tell("scene")
+    built = BuiltScene(job=job, folder=folder)
+    result["approximations"] = built.approximations
+    set_up(scene=built.scene, job=job)
+    built.show_geometry()
+    for view in job["views"]:
+        tell(f"view {view['id']} geometry")
+        (folder / view["id"]).mkdir(exist_ok=True)
+        built.look_from(camera=view["camera"])
+        render_to(scene=built.scene, path=folder / view["id"] / "geometry.exr", samples=1, seed=0)
+    built.show_light()
+    for view in job["views"]:
+        result["views"].append({"id": view["id"], "seconds": render_view(built=built, job=job, view=view, folder=folder)})
+        write_result(folder=folder, result=result)
+
+
+def render_view(*, built: BuiltScene, job: Job, view: Job, folder: Path) -> dict[str, float]:
+    """Both halves of a view and their denoised mean. Gives the seconds of each."""
+    place = folder / view["id"]
+    built.look_from(camera=view["camera"])
+    render_to(scene=built.scene, path=place / "centre.exr", samples=1, seed=0)
+    seconds = {}
+    halves = (place / "a.exr", place / "b.exr")
+    for half, seed in zip(halves, view["seeds"], strict=True):
+        tell(f"view {view['id']} half {half.stem}")
+        start = time.monotonic()
+        render_to(scene=built.scene, path=half, samples=job["samples_each_half"], seed=seed)
+        seconds[half.stem] = round(time.monotonic() - start, 3)
+    tell(f"view {view['id']} denoise")
+    start = time.monotonic()
+    denoise_to(scene=built.scene, halves=halves, passes=light_passes(job=job), path=place / "denoised.exr")
+    seconds["denoise"] = round(time.monotonic() - start, 3)
+    return seconds
+
+
+def tell(text: str) -> None:
+    """How far it is, a line at a time."""
+    print(f"mateval: {text}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

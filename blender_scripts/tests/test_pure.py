@@ -1,0 +1,150 @@
+"""The parts of `blender_scripts` that need no Blender."""
+
+import json
+import math
+import struct
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from mateval.camera import lens  # noqa: E402: the folder above must come first
+from mateval.environment import blender_from_world  # noqa: E402
+from mateval.job import JobError, light_of_world, lights_of_surfaces, read_job, read_numbers, write_result  # noqa: E402
+from mateval.metal import EDGE_COSINE, edge_tint, reflectance  # noqa: E402
+from mateval.plastic import base_under_coat, diffuse_reflectance, fresnel  # noqa: E402
+
+
+def area(*, surfaces: list[int]) -> dict:
+    """A group of lamps."""
+    return {"emission": {"type": "area", "surfaces": surfaces}}
+
+
+class JobFiles(unittest.TestCase):
+    """Jobs and the files beside them."""
+
+    def write(self, *, job: dict) -> Path:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        path = Path(folder.name) / "job.json"
+        path.write_text(json.dumps(job), encoding="utf-8")
+        return path
+
+    def test_every_missing_file_is_named(self) -> None:
+        surface = {"positions": "p", "triangles": "t", "normals": None, "uvs": None, "parts": "k"}
+        job = {"format": "mateval-blender-job/1", "textures": [{"file": "x.exr"}], "surfaces": [surface]}
+        path = self.write(job=job)
+        (path.parent / "t").touch()
+        with self.assertRaises(JobError) as caught:
+            read_job(path=path)
+        for name, told in (("'x.exr'", True), ("'p'", True), ("'k'", True), ("'t'", False)):
+            self.assertEqual(name in str(caught.exception), told, name)
+        for name in ("x.exr", "p", "k"):
+            (path.parent / name).touch()
+        self.assertEqual(read_job(path=path), job)
+
+    def test_another_format_is_refused(self) -> None:
+        with self.assertRaises(JobError):
+            read_job(path=self.write(job={"format": "mateval-blender-job/2"}))
+
+    def test_numbers_are_little_endian(self) -> None:
+        path = self.write(job={})
+        path.write_bytes(struct.pack("<2f", 1.5, -2.0))
+        self.assertEqual(list(read_numbers(path=path, code="f")), [1.5, -2.0])
+        path.write_bytes(bytes([1, 2]))
+        self.assertEqual(list(read_numbers(path=path, code="H")), [513])
+
+    def test_a_result_is_replaced_whole(self) -> None:
+        path = self.write(job={})
+        for views in ([], ["input"]):
+            write_result(folder=path.parent, result={"views": views})
+            self.assertEqual(json.loads((path.parent / "result.json").read_text()), {"views": views})
+        self.assertEqual(sorted(p.name for p in path.parent.iterdir()), ["job.json", "result.json"])
+
+    def test_a_surface_is_in_one_group(self) -> None:
+        outside = {"emission": {"type": "constant"}}
+        self.assertEqual(lights_of_surfaces(job={"lights": [outside, area(surfaces=[4, 2])]}), {4: 1, 2: 1})
+        with self.assertRaises(JobError):
+            lights_of_surfaces(job={"lights": [area(surfaces=[1]), area(surfaces=[1])]})
+        self.assertEqual(light_of_world(job={"lights": [area(surfaces=[1]), outside]}), 1)
+        self.assertIsNone(light_of_world(job={"lights": [area(surfaces=[1])]}))
+        with self.assertRaises(JobError):
+            light_of_world(job={"lights": [outside, outside]})
+
+
+class Lenses(unittest.TestCase):
+    """Intrinsics in pixels as Blender's lens."""
+
+    def test_a_centred_lens_has_no_shift(self) -> None:
+        found = lens(intrinsics={"width": 200, "height": 100, "fx": 100.0, "fy": 100.0, "cx": 100.0, "cy": 50.0})
+        self.assertAlmostEqual(found.angle_x, math.pi / 2)
+        self.assertEqual(found[1:], (0.0, 0.0, 1.0))
+
+    def test_a_principal_point_right_of_and_below_the_middle(self) -> None:
+        """The picture then reaches further left and further up: Blender shifts it so."""
+        found = lens(intrinsics={"width": 200, "height": 100, "fx": 100.0, "fy": 50.0, "cx": 110.0, "cy": 60.0})
+        self.assertAlmostEqual(found.shift_x, -0.05)
+        self.assertAlmostEqual(found.shift_y, 0.1)
+        self.assertEqual(found.pixel_aspect_y, 2.0)
+
+
+def ours(*, direction: tuple[float, ...]) -> tuple[float, float]:
+    """FORMAT.md, "Environment lookup": u to the right, v from the top."""
+    x, y, z = direction
+    return (math.atan2(x, -z) / (2.0 * math.pi) % 1.0, math.acos(y) / math.pi)
+
+
+def blenders(*, direction: tuple[float, ...]) -> tuple[float, float]:
+    """Cycles' `direction_to_equirectangular`, v turned to run from the top."""
+    x, y, z = direction
+    return (0.5 - math.atan2(y, x) / (2.0 * math.pi)) % 1.0, 0.5 - math.asin(z) / math.pi
+
+
+class Environments(unittest.TestCase):
+    """The one change of axes."""
+
+    def test_both_look_up_the_same_place(self) -> None:
+        # A quarter of a turn about y.
+        rotation = [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
+        rows = blender_from_world(world_from_environment=rotation)
+        for own in ((0.6, 0.64, 0.48), (-0.36, -0.48, 0.8), (0.8, 0.0, -0.6)):
+            world = tuple(sum(rotation[r][c] * own[c] for c in range(3)) for r in range(3))
+            there = tuple(sum(a * b for a, b in zip(row, world, strict=True)) for row in rows)
+            for expected, found in zip(ours(direction=own), blenders(direction=there), strict=True):
+                self.assertAlmostEqual(expected, found)
+            self.assertGreater(abs(ours(direction=own)[0] - blenders(direction=world)[0]), 1e-3)
+
+
+class Fresnel(unittest.TestCase):
+    """Reflectances against published values."""
+
+    def test_copper_at_normal_incidence(self) -> None:
+        for eta, k, expected in ((0.2004, 3.9129, 0.9522), (0.9240, 2.4528, 0.6197), (1.1022, 2.1421, 0.5106)):
+            self.assertAlmostEqual(reflectance(cosine=1.0, eta=eta, k=k), expected, places=3)
+
+    def test_everything_is_a_mirror_at_grazing_angles(self) -> None:
+        self.assertAlmostEqual(reflectance(cosine=1e-9, eta=0.2, k=3.9), 1.0, places=6)
+        self.assertAlmostEqual(fresnel(cosine=1e-9, eta=1.5), 1.0, places=6)
+
+    def test_the_edge_tint_gives_the_metal_back_at_its_angle(self) -> None:
+        f0 = reflectance(cosine=1.0, eta=1.1, k=2.1)
+        schlick = f0 + (1.0 - f0) * (1.0 - EDGE_COSINE) ** 5
+        self.assertAlmostEqual(edge_tint(eta=1.1, k=2.1) * schlick, reflectance(cosine=EDGE_COSINE, eta=1.1, k=2.1))
+
+    def test_a_coat_of_glass(self) -> None:
+        """Egan and Hilgeman: 0.0918 from outside and 0.5964 from inside, for an index of 1.5."""
+        self.assertAlmostEqual(diffuse_reflectance(eta=1.5), 0.0918, places=3)
+        self.assertAlmostEqual(diffuse_reflectance(eta=1 / 1.5), 0.5964, places=3)
+
+    def test_a_white_base_loses_nothing_inside(self) -> None:
+        for nonlinear in (False, True):
+            scale, inner = base_under_coat(eta=1.5, nonlinear=nonlinear)
+            self.assertAlmostEqual(scale / (1.0 - inner), 1.0, places=2)
+        scale, inner = base_under_coat(eta=1.5, nonlinear=True)
+        self.assertLess(0.5 * scale / (1.0 - 0.5 * inner), 0.3)
+
+
+if __name__ == "__main__":
+    unittest.main()

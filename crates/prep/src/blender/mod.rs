@@ -1,0 +1,111 @@
+//! Blender's Cycles as a renderer: a job goes out, pictures come back.
+//!
+//! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes what Blender needs into a folder,
+//! `scripts` puts `blender_scripts` beside it, `process` runs Blender and watches it, `view_files` reads what it made.
+
+pub mod job;
+mod process;
+mod scripts;
+mod view_files;
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::{SceneError, json};
+
+use crate::error::PrepError;
+pub use job::{BlenderJob, BlenderResult, JobPlan, JobView};
+pub use process::{BlenderLimits, BlenderProgram, Ended, tail};
+pub use view_files::{BlenderView, LightPictures};
+
+/// A job in its folder, ready to be run.
+#[derive(Debug)]
+pub struct Workplace {
+    folder: PathBuf,
+    script: PathBuf,
+    groups: usize,
+}
+
+/// What is heard of a running Blender.
+pub enum News<'a> {
+    /// A line that it printed.
+    Line(&'a str),
+    /// A view is whole.
+    View(&'a job::ResultView, &'a BlenderResult, Box<BlenderView>),
+}
+
+impl Workplace {
+    /// Writes the job into the folder, which is made if it is not there.
+    pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
+        std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
+        job::write(folder, plan)?;
+        let script = scripts::write(folder)?;
+        Ok(Self { folder: folder.to_owned(), script, groups: plan.reference.lights.len() })
+    }
+
+    /// What Blender prints.
+    pub fn log(&self) -> PathBuf {
+        self.folder.join("blender.log")
+    }
+
+    fn job(&self) -> PathBuf {
+        self.folder.join("job.json")
+    }
+
+    /// The command that carries the job out, for a person to repeat it.
+    pub fn command_text(&self, program: &BlenderProgram) -> String {
+        let command = program.command(&self.script, &self.job());
+        let words = std::iter::once(command.get_program()).chain(command.get_args());
+        words.map(|word| format!("'{}'", word.to_string_lossy())).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Runs Blender until it ends, and tells of each view as soon as that is whole.
+    pub fn run(
+        &self,
+        program: &BlenderProgram,
+        limits: &BlenderLimits,
+        hear: &mut dyn FnMut(News<'_>) -> Result<(), PrepError>,
+    ) -> Result<Ended, PrepError> {
+        let result = self.folder.join("result.json");
+        match std::fs::remove_file(&result) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(PrepError::io("remove", &result)(error));
+            }
+            _ => {}
+        }
+        let mut told = 0;
+        process::run(program.command(&self.script, &self.job()), &self.log(), limits, &mut |line| match line {
+            Some(line) => hear(News::Line(line)),
+            None => {
+                let Some(result) = self.result()? else { return Ok(()) };
+                for view in result.views.iter().skip(told) {
+                    let pictures = view_files::read(&self.folder.join(view.id.as_str()), self.groups)?;
+                    hear(News::View(view, &result, Box::new(pictures)))?;
+                    told += 1;
+                }
+                Ok(())
+            }
+        })
+    }
+
+    /// What the script has told so far.
+    pub fn result(&self) -> Result<Option<BlenderResult>, PrepError> {
+        let path = self.folder.join("result.json");
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let result: BlenderResult = json::read(&path)?;
+        if result.format != job::RESULT_FORMAT {
+            let what = format!("format '{}', expected '{}'", result.format, job::RESULT_FORMAT);
+            return Err(SceneError::Unsupported { path, what }.into());
+        }
+        Ok(Some(result))
+    }
+}
+
+/// The mean of two pictures of one size.
+pub(crate) fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    let pixels = a.pixels().iter().zip(b.pixels());
+    let pixels = pixels.map(|(a, b)| LinearRgb(std::array::from_fn(|c| (a.0[c] + b.0[c]) / 2.0))).collect();
+    Picture::new(a.width(), a.height(), pixels).expect("both halves are of one size")
+}

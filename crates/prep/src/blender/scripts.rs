@@ -1,0 +1,65 @@
+//! What Blender runs, as it was when this program was built.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::PrepError;
+
+macro_rules! script {
+    ($name:literal) => {
+        ($name, include_str!(concat!("../../../../blender_scripts/", $name)))
+    };
+}
+
+/// The files of `blender_scripts`; the first is the one to run.
+const SCRIPTS: [(&str, &str); 13] = [
+    script!("render.py"),
+    script!("mateval/__init__.py"),
+    script!("mateval/job.py"),
+    script!("mateval/camera.py"),
+    script!("mateval/environment.py"),
+    script!("mateval/metal.py"),
+    script!("mateval/plastic.py"),
+    script!("mateval/nodes.py"),
+    script!("mateval/materials.py"),
+    script!("mateval/world.py"),
+    script!("mateval/scene.py"),
+    script!("mateval/cycles.py"),
+    script!("mateval/denoise.py"),
+];
+
+/// The folder of all but the first.
+const PACKAGE: &str = "mateval";
+
+/// Writes them into `folder/scripts`. Gives the one to run.
+pub fn write(folder: &Path) -> Result<PathBuf, PrepError> {
+    let scripts = folder.join("scripts");
+    let package = scripts.join(PACKAGE);
+    std::fs::create_dir_all(&package).map_err(PrepError::io("make", package))?;
+    for (name, text) in SCRIPTS {
+        let path = scripts.join(name);
+        std::fs::write(&path, text).map_err(PrepError::io("write", path))?;
+    }
+    Ok(scripts.join(SCRIPTS[0].0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A script that is not in the list would be missing where the program runs.
+    #[test]
+    fn every_script_is_there() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../blender_scripts");
+        let mut found = Vec::new();
+        for below in ["", PACKAGE] {
+            for entry in std::fs::read_dir(folder.join(below)).unwrap() {
+                let name = Path::new(below).join(entry.unwrap().file_name()).to_string_lossy().into_owned();
+                found.extend(name.ends_with(".py").then_some(name));
+            }
+        }
+        let mut listed = SCRIPTS.map(|(name, _)| name.to_owned());
+        found.sort();
+        listed.sort();
+        assert_eq!(found, listed);
+    }
+}

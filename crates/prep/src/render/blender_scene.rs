@@ -1,0 +1,242 @@
+//! Renders by Blender: a process a scene, tried again where it fails, and taken up where it ended.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::{Finding, Progress, RendererId, SceneId, Severity, json, reference_io};
+
+use super::store::{self, ViewRender};
+use super::{BLENDER, BlenderOptions, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
+use crate::blender::{BlenderResult, BlenderView, JobPlan, JobView, News, Workplace, tail};
+use crate::error::PrepError;
+use crate::verify;
+
+/// Where jobs lie while they are rendered, in the dataset's folder: names with a dot are no part of a dataset.
+const WORK: &str = ".render";
+/// How much of a log a finding shows.
+const TAIL_BYTES: u64 = 1500;
+/// Cycles' seeds are below this.
+const SEEDS: u64 = 1 << 31;
+
+/// Renders the scenes, several at a time if so asked. Those that fail are told of, the others go on.
+pub(super) fn render_scenes(
+    order: &Order<'_>,
+    options: &BlenderOptions,
+    scenes: &[&SceneId],
+    progress: Progress<'_>,
+) -> Result<RenderReport, PrepError> {
+    let queue: Mutex<VecDeque<usize>> = Mutex::new((0..scenes.len()).collect());
+    let done: Mutex<Vec<(usize, Result<RenderReport, PrepError>)>> = Mutex::new(Vec::new());
+    let work = || {
+        // A panic elsewhere leaves a queue and a list that are whole.
+        let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
+        while let Some(at) = next() {
+            let scene = BlenderScene { order, options, id: scenes[at], progress };
+            done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((at, scene.render()));
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..options.jobs.clamp(1, scenes.len().max(1)) {
+            scope.spawn(work);
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+    done.sort_by_key(|(at, _)| *at);
+    let mut all = RenderReport::default();
+    for (_, report) in done {
+        let report = report?;
+        all.rendered += report.rendered;
+        all.kept += report.kept;
+        all.remarks.extend(report.remarks);
+        all.failures.extend(report.failures);
+    }
+    remove_if_empty(order.root.join(WORK));
+    Ok(all)
+}
+
+struct BlenderScene<'a> {
+    order: &'a Order<'a>,
+    options: &'a BlenderOptions,
+    id: &'a SceneId,
+    progress: Progress<'a>,
+}
+
+impl BlenderScene<'_> {
+    fn render(&self) -> Result<RenderReport, PrepError> {
+        let folder = SceneFolder::of(self.order.root, self.id);
+        let scene: SceneFile = json::read(&folder.scene_file())?;
+        let mut report = RenderReport::default();
+        let mut views = self.views_to_render(&folder, &scene);
+        report.kept = scene.views.len() - views.len();
+        if views.is_empty() {
+            return Ok(report);
+        }
+        let work = self.order.root.join(WORK).join(self.id.as_str());
+        if work.exists() {
+            std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?;
+        }
+        let reference = reference_io::read(&folder)?;
+        let parts = verify::part_values(&folder, &scene)?;
+        let mut failure = None;
+        for attempt in 1..=self.options.attempts.max(1) {
+            let plan = JobPlan {
+                scene: self.id,
+                reference: &reference,
+                parts: &parts,
+                views: views.clone(),
+                samples_each_half: self.order.samples,
+                max_bounces: MAX_BOUNCES,
+                threads: self.threads(),
+            };
+            let place = Workplace::prepare(&work, &plan)?;
+            let before = views.len();
+            failure = self.attempt(&place, &folder, &scene, &mut views).err();
+            report.rendered += before - views.len();
+            let Some(failure) = &failure else { break };
+            report.remarks.push(format!("scene '{}': attempt {attempt} failed: {}", self.id, failure.what));
+        }
+        match failure {
+            None => std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?,
+            Some(failure) => report.failures.push(self.finding(failure)),
+        }
+        Ok(report)
+    }
+
+    fn views_to_render(&self, folder: &SceneFolder, scene: &SceneFile) -> Vec<JobView> {
+        let renderer = renderer();
+        let is_missing = |view: &&View| !self.order.is_done(folder, view, &renderer, &seed_texts(self.seeds(view)));
+        let job_view = |view: &View| JobView {
+            id: view.id.clone(),
+            camera: view.camera,
+            seeds: self.seeds(view).map(|seed| u32::try_from(seed).expect("seeds are below 2^31")),
+        };
+        scene.views.iter().filter(is_missing).map(job_view).collect()
+    }
+
+    fn seeds(&self, view: &View) -> [u64; 2] {
+        [0, 1].map(|half| seed(self.id, view, half) % SEEDS)
+    }
+
+    /// Several Blenders share the processors.
+    fn threads(&self) -> u32 {
+        match self.options.jobs {
+            0 | 1 => 0,
+            jobs => (std::thread::available_parallelism().map_or(1, usize::from) / jobs).max(1) as u32,
+        }
+    }
+
+    /// Runs Blender once; takes the views that it finished out of `views`.
+    fn attempt(
+        &self,
+        place: &Workplace,
+        folder: &SceneFolder,
+        scene: &SceneFile,
+        views: &mut Vec<JobView>,
+    ) -> Result<(), Failure> {
+        let mut step = format!("{} start", self.id);
+        let ended = place.run(&self.options.program, &self.options.limits, &mut |news| match news {
+            News::Line(line) => {
+                self.tell(line, &mut step);
+                Ok(())
+            }
+            News::View(view, result, pictures) => {
+                let Some(at) = views.iter().position(|wanted| wanted.id == view.id) else { return Ok(()) };
+                self.keep(folder, scene, &views[at], result, *pictures)?;
+                views.remove(at);
+                Ok(())
+            }
+        });
+        let failed = |what: String| Failure {
+            what,
+            log: tail(&place.log(), TAIL_BYTES),
+            repeat: place.command_text(&self.options.program),
+        };
+        match ended {
+            Err(error) => Err(failed(error.to_string())),
+            Ok(_) if views.is_empty() => Ok(()),
+            Ok(ended) => {
+                let told = place.result().ok().flatten().and_then(|result| result.error);
+                Err(failed(told.map_or(ended.to_string(), |error| format!("{ended}: {error}"))))
+            }
+        }
+    }
+
+    /// Shows how far Blender is: its own lines of samples, ours of views.
+    fn tell(&self, line: &str, step: &mut String) {
+        if let Some(text) = line.strip_prefix("mateval: ") {
+            *step = format!("{} {text}", self.id);
+            (self.progress)(step, 0, 1);
+        } else if let Some((done, all)) = line.rsplit_once("Sample ").and_then(|(_, count)| count.split_once('/'))
+            && let (Ok(done), Ok(all)) = (done.trim().parse(), all.trim().parse())
+        {
+            (self.progress)(step, done, all);
+        }
+    }
+
+    fn keep(
+        &self,
+        folder: &SceneFolder,
+        scene: &SceneFile,
+        view: &JobView,
+        result: &BlenderResult,
+        pictures: BlenderView,
+    ) -> Result<(), PrepError> {
+        let (width, height) = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
+        let [a, b] = &pictures.halves;
+        if (a.rgb.width(), a.rgb.height()) != (width, height) {
+            let what = format!("Blender's picture of '{}' is {}x{}", view.id, a.rgb.width(), a.rgb.height());
+            return Err(PrepError::Scene {
+                scene: self.id.to_string(),
+                what: format!("{what}, expected {width}x{height}"),
+            });
+        }
+        let file = RenderFile {
+            renderer: BLENDER.to_owned(),
+            renderer_version: Some(result.blender.clone()),
+            samples_each_half: self.order.samples,
+            seeds: seed_texts(view.seeds.map(u64::from)),
+            max_bounces: MAX_BOUNCES,
+            capped_throughput: None,
+            denoiser: Some("OpenImageDenoise".to_owned()),
+            noise: RenderNoise::of([&a.rgb, &b.rgb], Some(&pictures.denoised.rgb)),
+            approximations: result.approximations.clone(),
+        };
+        let render = ViewRender {
+            halves: [a.rgb.clone(), b.rgb.clone()],
+            rgb: pictures.denoised.rgb.clone(),
+            passes: Some(pictures),
+        };
+        store::write(&folder.render(&renderer(), &view.id), &render, scene.exposure, &file)
+    }
+
+    fn finding(&self, failure: Failure) -> Finding {
+        Finding {
+            severity: Severity::Error,
+            code: "blender_failed".to_owned(),
+            file: format!("scenes/{}", self.id),
+            place: String::new(),
+            message: format!("{}; the end of its log:\n{}", failure.what, failure.log),
+            action: format!("to see it again: {}; then run `prep render` again", failure.repeat),
+        }
+    }
+}
+
+/// Why an attempt failed, the end of the log, and how to see it again.
+struct Failure {
+    what: String,
+    log: String,
+    repeat: String,
+}
+
+fn renderer() -> RendererId {
+    RendererId::new(BLENDER).expect("our own id is an id")
+}
+
+/// Leaves what failed jobs left.
+fn remove_if_empty(folder: PathBuf) {
+    // It is no fault if it is not empty, or not there.
+    let _ = std::fs::remove_dir(folder);
+}

@@ -1,0 +1,80 @@
+//! Renders by our own tracer.
+
+use std::sync::Arc;
+
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
+use mateval_tracer::{RenderSettings, RenderStats, World};
+
+use super::store::{self, ViewRender};
+use super::{BUILTIN, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
+use crate::blender::mean;
+use crate::error::PrepError;
+
+pub(super) fn render_scenes(
+    order: &Order<'_>,
+    scenes: &[&SceneId],
+    progress: Progress<'_>,
+) -> Result<RenderReport, PrepError> {
+    let mut report = RenderReport::default();
+    for id in scenes {
+        render_scene(order, id, progress, &mut report)?;
+    }
+    Ok(report)
+}
+
+fn render_scene(
+    order: &Order<'_>,
+    id: &SceneId,
+    progress: Progress<'_>,
+    report: &mut RenderReport,
+) -> Result<(), PrepError> {
+    let renderer = RendererId::new(BUILTIN).expect("our own id is an id");
+    let folder = SceneFolder::of(order.root, id);
+    let scene: SceneFile = json::read(&folder.scene_file())?;
+    let mut world: Option<World> = None;
+    for view in &scene.views {
+        let seeds = [0, 1].map(|half| seed(id, view, half));
+        if order.is_done(&folder, view, &renderer, &seed_texts(seeds)) {
+            report.kept += 1;
+            continue;
+        }
+        let world = match &mut world {
+            Some(world) => world,
+            none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
+        };
+        let step = format!("{id} {}", view.id);
+        let half = |half: usize| {
+            let shown = |done: usize, all: usize| progress(&step, half * all + done, 2 * all);
+            let settings = RenderSettings {
+                samples: order.samples,
+                seed: seeds[half],
+                max_bounces: MAX_BOUNCES,
+                ..Default::default()
+            };
+            mateval_tracer::render(world, &view.camera, &settings, &shown)
+        };
+        let (a, b) = (half(0)?, half(1)?);
+        report.remarks.extend(remark(&step, &a.stats).into_iter().chain(remark(&step, &b.stats)));
+        let file = RenderFile {
+            renderer: BUILTIN.to_owned(),
+            renderer_version: None,
+            samples_each_half: order.samples,
+            seeds: seed_texts(seeds),
+            max_bounces: MAX_BOUNCES,
+            capped_throughput: Some((a.stats.capped_throughput + b.stats.capped_throughput) / 2.0),
+            denoiser: None,
+            noise: RenderNoise::of([&a.picture, &b.picture], None),
+            approximations: Vec::new(),
+        };
+        let render = ViewRender { rgb: mean(&a.picture, &b.picture), halves: [a.picture, b.picture], passes: None };
+        store::write(&folder.render(&renderer, &view.id), &render, scene.exposure, &file)?;
+        report.rendered += 1;
+    }
+    Ok(())
+}
+
+fn remark(step: &str, stats: &RenderStats) -> Option<String> {
+    (stats.not_finite > 0).then(|| format!("{step}: {} samples were not finite and left out: a bug", stats.not_finite))
+}

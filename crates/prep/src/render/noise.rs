@@ -1,0 +1,45 @@
+//! How noisy a render is, measured from its two halves.
+
+use mateval_image::{LinearRgb, Picture};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Means over all pixels and channels, linear, before exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RenderNoise {
+    /// Of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
+    pub mean_of_halves_mse: f64,
+    /// Of (rgb - a) (rgb - b): how far the denoised picture is from the truth, the halves' noise taken out (so it may be
+    /// slightly below 0); null where `rgb` is the plain mean.
+    pub denoised_mse: Option<f64>,
+}
+
+impl RenderNoise {
+    /// Of two halves and what the denoiser made of their mean.
+    pub fn of([a, b]: [&Picture<LinearRgb>; 2], denoised: Option<&Picture<LinearRgb>>) -> Self {
+        let halves = || values(a).zip(values(b));
+        let squares = halves().map(|(a, b)| (a - b) * (a - b) / 4.0);
+        let count = 3.0 * a.pixels().len() as f64;
+        let denoised_mse = denoised
+            .map(|rgb| values(rgb).zip(halves()).map(|(rgb, (a, b))| (rgb - a) * (rgb - b)).sum::<f64>() / count);
+        Self { mean_of_halves_mse: squares.sum::<f64>() / count, denoised_mse }
+    }
+}
+
+fn values(picture: &Picture<LinearRgb>) -> impl Iterator<Item = f64> {
+    picture.pixels().iter().flat_map(|pixel| pixel.0.map(f64::from))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn known_values() {
+        let flat = |value: f32| Picture::filled(4, 3, LinearRgb([value; 3]));
+        let noise = RenderNoise::of([&flat(1.0), &flat(3.0)], Some(&flat(2.0)));
+        assert_eq!(noise, RenderNoise { mean_of_halves_mse: 1.0, denoised_mse: Some(-1.0) });
+        assert_eq!(RenderNoise::of([&flat(1.0), &flat(1.0)], Some(&flat(1.5))).denoised_mse, Some(0.25));
+    }
+}
