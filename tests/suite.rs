@@ -10,6 +10,7 @@ mod suite {
     mod arrows;
     mod bad_input;
     mod command;
+    mod compare;
     mod determinism;
     mod full_disk;
     mod help;

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
+use mateval_prep::compare::file::CompareFile;
 use mateval_prep::render::RenderFile;
 use mateval_prep::stats::StatsFile;
 use mateval_prep::survey::SurveyFile;
@@ -39,7 +40,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 10] {
+fn schemas() -> [(&'static str, Schema); 11] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -51,5 +52,6 @@ fn schemas() -> [(&'static str, Schema); 10] {
         ("result", schema_for!(ResultFile)),
         ("stats", schema_for!(StatsFile)),
         ("survey", schema_for!(SurveyFile)),
+        ("compare", schema_for!(CompareFile)),
     ]
 }

@@ -1,0 +1,179 @@
+//! Made-up pictures: how often noise alone is called a difference, what is found, and how a picture is cut.
+
+use mateval_image::{LinearRgb, Normal, Picture};
+
+use super::bounds::{GROUP_SUM, LAMBERT_TILE};
+use super::file::{Quantity, State};
+use super::kind::MaterialKind;
+use super::light::{ShownKinds, compare, sum_check};
+use super::tiles::{Halves, difference, median, tiles};
+
+const SIZE: (usize, usize) = (96, 72);
+
+/// Whole numbers that look random (SplitMix64).
+fn hash(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// A deviate of mean 0 and variance 1, one-sided and long-tailed as light is: the exponential distribution less 1.
+fn deviate(seed: u64) -> f64 {
+    -libm::log((hash(seed) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-300) - 1.0
+}
+
+/// Two halves of a gradient under relative noise of this deviation a pixel; `factor` multiplies what is expected.
+fn halves(seed: u64, noise: f64, factor: impl Fn(usize, usize) -> f64) -> Halves {
+    let half = |half: u64| {
+        Picture::from_fn(SIZE.0, SIZE.1, |x, y| {
+            let level = (0.2 + x as f64 / 96.0 + (y % 7) as f64 / 10.0) * factor(x, y);
+            let at = (((seed * 2 + half) * SIZE.1 as u64 + y as u64) * SIZE.0 as u64 + x as u64) * 4;
+            LinearRgb([0, 1, 2].map(|c| (level * (1.0 + noise * deviate(at + c))) as f32))
+        })
+    };
+    Halves { a: half(0), b: half(1) }
+}
+
+fn plain(seed: u64, noise: f64) -> Halves {
+    halves(seed, noise, |_, _| 1.0)
+}
+
+fn all_lambert() -> ShownKinds {
+    ShownKinds::new(&Picture::filled(SIZE.0, SIZE.1, 1), &[MaterialKind::Lambert])
+}
+
+fn states(ours: &Halves, theirs: &Halves) -> [State; 2] {
+    let (_, checks) = compare("rgb", None, [ours, theirs], &all_lambert(), LAMBERT_TILE);
+    checks.map(|check| check.state)
+}
+
+#[test]
+fn a_picture_is_cut_without_gaps_and_slivers() {
+    for (width, height, expected) in [(96, 72, 30), (480, 270, 510), (103, 71, 24), (104, 72, 35), (5, 3, 1), (1, 40, 3)] {
+        let tiles = tiles(width, height);
+        assert_eq!(tiles.len(), expected, "{width}x{height}");
+        let mut covered = vec![0; width * height];
+        for tile in &tiles {
+            assert!(tile.columns.len() >= width.min(8) && tile.rows.len() >= height.min(8), "{tile:?}");
+            for (y, x) in tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (y, x))) {
+                covered[y * width + x] += 1;
+            }
+        }
+        assert!(covered.iter().all(|count| *count == 1), "{width}x{height}");
+    }
+}
+
+/// The standard error from the halves against the spread of 400 draws: equal to 5 %, in a tile and over the picture.
+#[test]
+fn the_standard_error_is_the_spread() {
+    let all = tiles(SIZE.0, SIZE.1);
+    for tiles in [&all[..1], &all[..]] {
+        let drawn: Vec<_> =
+            (0..400).map(|k| difference(&plain(2 * k, 0.3), &plain(2 * k + 1, 0.3), tiles)).collect();
+        let spread = (drawn.iter().map(|d| d.mean[1] * d.mean[1]).sum::<f64>() / 400.0).sqrt();
+        let told = (drawn.iter().map(|d| d.error[1] * d.error[1]).sum::<f64>() / 400.0).sqrt();
+        assert!((spread / told - 1.0).abs() < 0.1, "{spread} {told}");
+    }
+}
+
+/// Pure noise, 1000 pictures at each of three levels: three standard errors of a tile at 0.6, 2.4 and 4.8 times the bound.
+/// By tiles it is called different once in 1000 at most by design (the bound here: 5 of 1000); by the mean, where three
+/// channels have three standard errors each and the bound on top, less than 8 of 1000 by far.
+#[test]
+fn noise_alone_is_rarely_called_a_difference() {
+    for (noise, most_by_mean) in [(0.05, 0), (0.2, 3), (0.4, 8)] {
+        let (mut by_tiles, mut by_mean, mut noisy) = (0, 0, 0);
+        for draw in 0..1000 {
+            let [tiles, mean] = states(&plain(2 * draw, noise), &plain(2 * draw + 1, noise));
+            by_tiles += usize::from(tiles == State::Differs);
+            by_mean += usize::from(mean == State::Differs);
+            noisy += usize::from(tiles == State::TooNoisy);
+        }
+        eprintln!("noise {noise}: {by_tiles} by tiles, {by_mean} by the mean, {noisy} too noisy");
+        assert!(by_tiles <= 5 && by_mean <= most_by_mean && noisy == 0, "{noise}: {by_tiles} {by_mean} {noisy}");
+    }
+}
+
+/// 3 % everywhere; 8 % in one tile of 30, where 1 % of tiles is none; a tile that is 2 % off is not seen under noise.
+#[test]
+fn planted_differences_are_found() {
+    for draw in 0..100 {
+        let ours = plain(2 * draw, 0.1);
+        let theirs = |factor: &dyn Fn(usize, usize) -> f64| halves(2 * draw + 1, 0.1, factor);
+        assert_eq!(states(&ours, &theirs(&|_, _| 1.03))[1], State::Differs);
+        let tile = |x: usize, y: usize| x / 16 == 2 && y / 16 == 3;
+        assert_eq!(states(&ours, &theirs(&|x, y| if tile(x, y) { 1.08 } else { 1.0 }))[0], State::Differs);
+        assert_eq!(states(&ours, &theirs(&|x, y| if tile(x, y) { 1.01 } else { 1.0 })), [State::Agrees; 2]);
+    }
+}
+
+#[test]
+fn so_much_noise_says_nothing_but_a_large_difference_is_one_all_the_same() {
+    let (ours, theirs) = (plain(1, 1.5), plain(2, 1.5));
+    assert_eq!(states(&ours, &theirs)[0], State::TooNoisy);
+    assert_eq!(states(&ours, &halves(2, 1.5, |_, _| 2.0)), [State::Differs; 2]);
+    // A picture of no noise at all that is the same.
+    assert_eq!(states(&plain(1, 0.0), &plain(2, 0.0)), [State::Agrees; 2]);
+}
+
+#[test]
+fn black_is_black() {
+    let black = || halves(1, 0.0, |_, _| 0.0);
+    assert_eq!(states(&black(), &black()), [State::Agrees; 2]);
+    assert_eq!(states(&black(), &plain(2, 0.1)), [State::Differs; 2]);
+    assert_eq!(states(&plain(2, 0.1), &black()), [State::Differs; 2]);
+    // Red alone: nothing is divided by the mean of green.
+    let red = |seed| {
+        let Halves { a, b } = plain(seed, 0.1);
+        let [a, b] = [a, b].map(|half| half.map(|LinearRgb([r, _, _])| LinearRgb([r, 0.0, 0.0])));
+        Halves { a, b }
+    };
+    assert_eq!(states(&red(1), &red(2)), [State::Agrees; 2]);
+    assert_eq!(states(&red(1), &plain(2, 0.1)), [State::Differs; 2]);
+}
+
+/// The left third shows glass, the middle a metal beside Lambert: they decide nothing, whatever they hold, and are counted.
+#[test]
+fn what_is_known_to_differ_stands_apart() {
+    let kinds = [MaterialKind::Lambert, MaterialKind::Conductor, MaterialKind::Dielectric];
+    let instance = Picture::from_fn(SIZE.0, SIZE.1, |x, _| if x < 32 { 3 } else if x % 16 == 0 && x < 64 { 2 } else { 1 });
+    let shown = ShownKinds::new(&instance, &kinds);
+    let theirs = halves(2, 0.01, |x, _| if x < 32 { 1.5 } else { 1.0 });
+    let (found, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &shown, LAMBERT_TILE);
+    assert_eq!(checks.map(|check| check.state), [State::Agrees; 2]);
+    let apart: Vec<_> = found.apart.iter().map(|apart| (apart.kind, apart.count, apart.over)).collect();
+    assert_eq!(apart, [(MaterialKind::Conductor, 10, 0), (MaterialKind::Dielectric, 10, 10)]);
+    assert_eq!(found.tiles.count, 10);
+    assert!(found.apart[1].largest.is_some_and(|off| off > 0.2), "{:?}", found.apart);
+    // The twin: where they decide, they differ.
+    assert_eq!(states(&plain(1, 0.01), &theirs), [State::Differs; 2]);
+    // Where nothing decides, that is said.
+    let glass = ShownKinds::new(&Picture::filled(SIZE.0, SIZE.1, 3), &kinds);
+    let (_, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &glass, LAMBERT_TILE);
+    assert_eq!(checks.map(|check| check.state), [State::Undecided; 2]);
+}
+
+/// Rounding passes in bright and in dark pixels; a thousandth of a pixel more does not.
+#[test]
+fn sums_of_groups() {
+    let half = Picture::from_fn(8, 8, |x, y| LinearRgb([if x == 0 { 500.0 } else { 1e-4 * (y + 1) as f32 }; 3]));
+    let part = |share: f32| half.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| share * v)));
+    let (a, b) = (part(0.3), part(0.7));
+    let check = sum_check("rgb_a", &half, &[&a, &b]);
+    assert_eq!((check.state, check.quantity), (State::Agrees, Quantity::GroupSum));
+    assert!(check.measured.is_some_and(|off| off < 1e-6), "{check}");
+    assert_eq!(sum_check("rgb_a", &half, &[&a]).state, State::Differs);
+    let off = |share: f32| sum_check("rgb_a", &half, &[&a, &part(0.7 + share)]).state;
+    assert_eq!([off(0.9 * GROUP_SUM as f32), off(1.1 * GROUP_SUM as f32)], [State::Agrees, State::Differs]);
+}
+
+#[test]
+fn medians_and_angles() {
+    assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+    assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+    assert_eq!(median(Vec::new()), None);
+    let angle = |a, b| super::geometry::angle_deg(Normal(a), Normal(b));
+    assert!((angle([1.0, 0.0, 0.0], [1.0, 1.0, 0.0]) - 45.0).abs() < 1e-9);
+    assert_eq!(angle([1.0, 0.0, 0.0], [0.0; 3]), 180.0);
+}
