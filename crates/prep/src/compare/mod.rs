@@ -259,31 +259,38 @@ impl ViewPair<'_> {
         let their_geometry = TheirGeometry::read(theirs, &mut found.checks);
         found.checks.extend(geometry::compare(&ours, &their_geometry));
         let shown = ShownKinds::new(&ours.instance, self.kinds);
-        let rgb = self.compare_light("rgb", None, &light.rgb, theirs, &shown, &mut found);
-        let mut groups = Vec::new();
+        let their_light = self.compare_lights(light, theirs, &shown, &mut found);
+        let Some((out, scene)) = out else { return Ok((found, None)) };
+        let mut previews = ViewPreviews::new(out, scene, &self.view.id)?;
+        let both = std::iter::once(&light.rgb).chain(&light.groups).zip(&their_light);
+        let both = both.filter_map(|(ours, theirs)| theirs.as_ref().map(|theirs| [ours, theirs]));
+        for (light, both) in found.light.iter().zip(both) {
+            previews.add_light(light, both, &shown, self.tile_bound)?;
+        }
+        previews.add_geometry(&ours, &their_geometry)?;
+        Ok((found, Some(previews)))
+    }
+
+    /// Compares RGB, each group, and their sums; gives theirs in this order, where they could be read.
+    fn compare_lights(
+        &self,
+        light: &OurLight,
+        theirs: &TheirView,
+        shown: &ShownKinds,
+        found: &mut ViewComparison,
+    ) -> Vec<Option<Halves>> {
+        let mut all = vec![self.compare_light("rgb", None, &light.rgb, theirs, shown, found)];
         for (at, (ours, group)) in light.groups.iter().zip(&self.reference.lights).enumerate() {
             let name = Some(group.name.clone());
-            groups.push(self.compare_light(&format!("group_{at:02}"), name, ours, theirs, &shown, &mut found));
+            all.push(self.compare_light(&format!("group_{at:02}"), name, ours, theirs, shown, found));
         }
-        if let (Some(rgb), Some(groups)) = (&rgb, groups.iter().map(Option::as_ref).collect::<Option<Vec<&Halves>>>()) {
+        let there: Vec<&Halves> = all.iter().flatten().collect();
+        if let Some((rgb, groups)) = there.split_first().filter(|_| there.len() == all.len()) {
             let sums = |half: fn(&Halves) -> &_| groups.iter().map(|group| half(group)).collect::<Vec<_>>();
             found.checks.push(light::sum_check("rgb_a", &rgb.a, &sums(|group| &group.a)));
             found.checks.push(light::sum_check("rgb_b", &rgb.b, &sums(|group| &group.b)));
         }
-        let previews = match out {
-            None => None,
-            Some((out, scene)) => {
-                let mut previews = ViewPreviews::new(out, scene, &self.view.id)?;
-                previews.add_geometry(&ours, &their_geometry)?;
-                let pictures = std::iter::once((&light.rgb, &rgb)).chain(light.groups.iter().zip(&groups));
-                let theirs = pictures.filter_map(|(ours, theirs)| theirs.as_ref().map(|theirs| (ours, theirs)));
-                for (light, (ours, theirs)) in found.light.iter().zip(theirs) {
-                    previews.add_light(light, ours, theirs, &shown, self.tile_bound)?;
-                }
-                Some(previews)
-            }
-        };
-        Ok((found, previews))
+        all
     }
 
     /// Compares one picture of light; gives theirs, if it could be read.

@@ -93,90 +93,104 @@ impl ViewPreviews {
     pub(super) fn add_light(
         &mut self,
         light: &LightComparison,
-        ours: &Halves,
-        theirs: &Halves,
+        [ours, theirs]: [&Halves; 2],
         kinds: &ShownKinds,
         bound: f64,
     ) -> Result<(), PrepError> {
-        let mean = light.means[0];
-        let level = mean.iter().sum::<f64>() / 3.0;
-        let (gain, note) = match &light.light {
-            None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
-            Some(name) if level > 0.0 => {
-                let gain = GROUP_MEAN / level;
-                (gain, format!("{}, times {gain:.3}", crate::stats::shown(name, 60)))
-            }
-            Some(name) => (1.0, format!("{}, black", crate::stats::shown(name, 60))),
+        let scale = light.means[0];
+        let level = scale.iter().sum::<f64>() / 3.0;
+        let (gain, note) = self.gain(light, level);
+        let means = [ours.mean(), theirs.mean()];
+        let off = |at: usize| {
+            let [a, b] = [0, 1].map(|side: usize| grey(means[side].pixels()[at]));
+            if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { f64::from(a != b) }
         };
-        let (our_mean, their_mean) = (ours.mean(), theirs.mean());
-        let share = |share: f64| format!("{} %", 100.0 * share);
-        let pixels = |at: usize| {
-            let [a, b] = [&our_mean, &their_mean].map(|picture| grey(picture.pixels()[at]));
-            if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { (b - a).signum() * f64::from(a != b) }
-        };
-        let (width, height) = (our_mean.width(), our_mean.height());
-        let by_pixel = Shown {
-            suffix: "pixels",
-            title: "theirs minus ours, of the picture's mean".to_owned(),
-            low: format!("-{}", share(LIGHT_PIXEL)),
-            high: format!("+{}", share(LIGHT_PIXEL)),
-            picture: signed(width, height, pixels),
-        };
-        let end = share(LIGHT_TILE * bound);
-        let by_tile = Shown {
-            suffix: "tiles",
-            title: format!("tiles, worst channel; framed: over the bound of {}; grey frame: apart", share(bound)),
-            low: format!("-{end}"),
-            high: format!("+{end}"),
-            picture: tile_map((width, height), [ours, theirs], kinds, bound, mean),
-        };
-        let previews = [&our_mean, &their_mean].map(|picture| to_bytes(picture, gain));
+        let (width, height) = (means[0].width(), means[0].height());
+        let title = "theirs minus ours, of the picture's mean";
+        let by_pixel = scaled("pixels", title, 100.0 * LIGHT_PIXEL, " %", signed(width, height, off));
+        let title = format!(
+            "tiles, worst channel; dark frame: over the bound of {} %; grey frame: decides nothing",
+            100.0 * bound
+        );
+        let map = tile_map((width, height), [ours, theirs], kinds, bound, scale);
+        let by_tile = scaled("tiles", &title, 100.0 * LIGHT_TILE * bound, " %", map);
+        let previews = means.map(|picture| to_bytes(&picture, gain));
         self.add(&light.picture, note, previews, vec![by_pixel, by_tile])
+    }
+
+    /// What a picture of light is multiplied by in its preview, and the words for that.
+    fn gain(&self, light: &LightComparison, level: f64) -> (f64, String) {
+        match light.light.as_ref().map(|name| crate::stats::shown(name, 60)) {
+            None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
+            Some(name) if level > 0.0 => (GROUP_MEAN / level, format!("{name}, times {:.3}", GROUP_MEAN / level)),
+            Some(name) => (1.0, format!("{name}, black")),
+        }
     }
 
     /// What both have without light.
     pub(super) fn add_geometry(&mut self, ours: &OurGeometry, theirs: &TheirGeometry) -> Result<(), PrepError> {
-        let (width, height) = (ours.depth.width(), ours.depth.height());
         if let Some(base_color) = &theirs.base_color {
-            let off = |at: usize| {
-                let [a, b] = [&ours.base_color, base_color].map(|picture| grey(picture.pixels()[at]));
-                if ours.valid.pixels()[at] { (b - a) / BASE_COLOR } else { 0.0 }
-            };
-            let shown = scaled("mean of channels, valid pixels", BASE_COLOR, "", signed(width, height, off));
-            let previews = [&ours.base_color, base_color].map(|picture| to_bytes(picture, 1.0));
-            self.add("base_color", "linear values, sRGB-encoded".to_owned(), previews, vec![shown])?;
+            self.add_base_color(ours, base_color)?;
         }
         if let Some(depth) = &theirs.depth {
-            let off = |at: usize| f64::from(depth.pixels()[at] - ours.depth.pixels()[at]) / DEPTH_M;
-            let shown = scaled("theirs minus ours", 1e3 * DEPTH_M, " mm", signed(width, height, off));
-            let far = ours.depth.pixels().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
-            let previews = [&ours.depth, depth].map(|picture| picture.map(|depth| [byte_from_unit(depth / far); 3]));
-            self.add("depth", format!("white is {far:.2} m"), previews, vec![shown])?;
+            self.add_depth(&ours.depth, depth)?;
         }
         if let Some(normal) = &theirs.normal {
-            let off = |at: usize| {
-                let (a, b) = (ours.normal.pixels()[at], normal.pixels()[at]);
-                if a == b { 0.0 } else { angle_deg(a, b) / NORMAL_DEG }
-            };
-            let shown = scaled("angle between them", NORMAL_DEG, " degrees", signed(width, height, off));
-            let previews = [&ours.normal, normal].map(|p| p.map(|Normal(v)| v.map(|v| byte_from_unit(0.5 * v + 0.5))));
-            self.add("normal", "world space, 0.5 + 0.5 n".to_owned(), previews, vec![shown])?;
+            self.add_normal(&ours.normal, normal)?;
         }
-        for (name, ours, theirs) in [("instance", &ours.instance, &theirs.instance), ("part", &ours.part, &theirs.part)]
-        {
-            let Some(theirs) = theirs else { continue };
-            let inner = away_from_edges(ours);
-            let color = |at: usize| match (ours.pixels()[at] == theirs.pixels()[at], inner[at]) {
-                (true, _) => DIVERGING[1],
-                (false, true) => DIVERGING[2],
-                (false, false) => APART,
-            };
-            let picture = Picture::from_fn(width, height, |x, y| color(y * width + x));
-            let title = "red: another id; grey: another at an edge, where it does not count".to_owned();
-            let shown = Shown { suffix: "ids", title, low: String::new(), high: String::new(), picture };
-            self.add(name, "a colour an id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])?;
+        let ids = [("instance", &ours.instance, &theirs.instance), ("part", &ours.part, &theirs.part)];
+        for (name, ours, theirs) in ids {
+            if let Some(theirs) = theirs {
+                self.add_ids(name, ours, theirs)?;
+            }
         }
         Ok(())
+    }
+
+    fn add_base_color(&mut self, ours: &OurGeometry, theirs: &Picture<LinearRgb>) -> Result<(), PrepError> {
+        let off = |at: usize| {
+            let [a, b] = [&ours.base_color, theirs].map(|picture| grey(picture.pixels()[at]));
+            if ours.valid.pixels()[at] { (b - a) / BASE_COLOR } else { 0.0 }
+        };
+        let map = signed(theirs.width(), theirs.height(), off);
+        let shown = scaled("difference", "theirs minus ours, mean of channels, valid pixels", BASE_COLOR, "", map);
+        let previews = [&ours.base_color, theirs].map(|picture| to_bytes(picture, 1.0));
+        self.add("base_color", "linear values, sRGB-encoded".to_owned(), previews, vec![shown])
+    }
+
+    fn add_depth(&mut self, ours: &Picture<f32>, theirs: &Picture<f32>) -> Result<(), PrepError> {
+        let off = |at: usize| f64::from(theirs.pixels()[at] - ours.pixels()[at]) / DEPTH_M;
+        let map = signed(ours.width(), ours.height(), off);
+        let shown = scaled("difference", "theirs minus ours", 1e3 * DEPTH_M, " mm", map);
+        let far = ours.pixels().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let previews = [ours, theirs].map(|picture| picture.map(|depth| [byte_from_unit(depth / far); 3]));
+        self.add("depth", format!("white is {far:.2} m"), previews, vec![shown])
+    }
+
+    fn add_normal(&mut self, ours: &Picture<Normal>, theirs: &Picture<Normal>) -> Result<(), PrepError> {
+        let off = |at: usize| {
+            let (a, b) = (ours.pixels()[at], theirs.pixels()[at]);
+            if a == b { 0.0 } else { angle_deg(a, b) / NORMAL_DEG }
+        };
+        let map = signed(ours.width(), ours.height(), off);
+        let mut shown = scaled("difference", "angle between them", NORMAL_DEG, " degrees", map);
+        shown.low = "0".to_owned();
+        let previews = [ours, theirs].map(|p| p.map(|Normal(v)| v.map(|v| byte_from_unit(0.5 * v + 0.5))));
+        self.add("normal", "world space, 0.5 + 0.5 n".to_owned(), previews, vec![shown])
+    }
+
+    fn add_ids(&mut self, name: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Result<(), PrepError> {
+        let inner = away_from_edges(ours);
+        let color = |at: usize| match (ours.pixels()[at] == theirs.pixels()[at], inner[at]) {
+            (true, _) => DIVERGING[1],
+            (false, true) => DIVERGING[2],
+            (false, false) => APART,
+        };
+        let width = ours.width();
+        let picture = Picture::from_fn(width, ours.height(), |x, y| color(y * width + x));
+        let title = "red: another id; grey: another at an edge, where it does not count".to_owned();
+        let shown = Shown { suffix: "difference", title, low: String::new(), high: String::new(), picture };
+        self.add(name, "a colour an id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
     }
 
     fn add(
@@ -201,9 +215,10 @@ impl ViewPreviews {
     }
 }
 
-fn scaled(title: &str, end: f64, unit: &str, picture: Picture<[u8; 3]>) -> Shown {
+/// A picture whose scale ends at plus and minus `end`.
+fn scaled(suffix: &'static str, title: &str, end: f64, unit: &str, picture: Picture<[u8; 3]>) -> Shown {
     let (low, high) = (format!("-{end}{unit}"), format!("+{end}{unit}"));
-    Shown { suffix: "difference", title: title.to_owned(), low, high, picture }
+    Shown { suffix, title: title.to_owned(), low, high, picture }
 }
 
 fn grey(LinearRgb(rgb): LinearRgb) -> f64 {

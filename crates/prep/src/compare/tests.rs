@@ -50,7 +50,9 @@ fn states(ours: &Halves, theirs: &Halves) -> [State; 2] {
 
 #[test]
 fn a_picture_is_cut_without_gaps_and_slivers() {
-    for (width, height, expected) in [(96, 72, 30), (480, 270, 510), (103, 71, 24), (104, 72, 35), (5, 3, 1), (1, 40, 3)] {
+    for (width, height, expected) in
+        [(96, 72, 30), (480, 270, 510), (103, 71, 24), (104, 72, 35), (5, 3, 1), (1, 40, 3)]
+    {
         let tiles = tiles(width, height);
         assert_eq!(tiles.len(), expected, "{width}x{height}");
         let mut covered = vec![0; width * height];
@@ -69,42 +71,50 @@ fn a_picture_is_cut_without_gaps_and_slivers() {
 fn the_standard_error_is_the_spread() {
     let all = tiles(SIZE.0, SIZE.1);
     for tiles in [&all[..1], &all[..]] {
-        let drawn: Vec<_> =
-            (0..400).map(|k| difference(&plain(2 * k, 0.3), &plain(2 * k + 1, 0.3), tiles)).collect();
+        let drawn: Vec<_> = (0..400).map(|k| difference(&plain(2 * k, 0.3), &plain(2 * k + 1, 0.3), tiles)).collect();
         let spread = (drawn.iter().map(|d| d.mean[1] * d.mean[1]).sum::<f64>() / 400.0).sqrt();
         let told = (drawn.iter().map(|d| d.error[1] * d.error[1]).sum::<f64>() / 400.0).sqrt();
         assert!((spread / told - 1.0).abs() < 0.1, "{spread} {told}");
     }
 }
 
-/// Pure noise, 1000 pictures at each of three levels: three standard errors of a tile at 0.6, 2.4 and 4.8 times the bound.
-/// By tiles it is called different once in 1000 at most by design (the bound here: 5 of 1000); by the mean, where three
-/// channels have three standard errors each and the bound on top, less than 8 of 1000 by far.
+/// Pure noise, 1000 pictures at each of four levels: three standard errors of a tile at 0.9, 3.7, 4.7 and 19 times the
+/// bound. By tiles a picture is called different once in 1000 at most by design (5 of 1000 would be a probability of
+/// 6e-4); by its mean, where the bound counts for nothing any more, 8 times in 1000: three channels at three standard
+/// errors. Those who would grant 1 % of tiles alone pay for it.
 #[test]
+#[allow(clippy::print_stderr, reason = "how near it came")]
 fn noise_alone_is_rarely_called_a_difference() {
-    for (noise, most_by_mean) in [(0.05, 0), (0.2, 3), (0.4, 8)] {
-        let (mut by_tiles, mut by_mean, mut noisy) = (0, 0, 0);
+    for (noise, most_by_mean, is_noisy) in [(0.05, 0, false), (0.2, 0, false), (0.25, 1, false), (1.0, 20, true)] {
+        let (mut by_tiles, mut by_mean, mut noisy, mut by_share_alone) = (0, 0, 0, 0);
         for draw in 0..1000 {
-            let [tiles, mean] = states(&plain(2 * draw, noise), &plain(2 * draw + 1, noise));
+            let (ours, theirs) = (plain(2 * draw, noise), plain(2 * draw + 1, noise));
+            let (found, checks) = compare("rgb", None, [&ours, &theirs], &all_lambert(), LAMBERT_TILE);
+            let [tiles, mean] = checks.map(|check| check.state);
             by_tiles += usize::from(tiles == State::Differs);
             by_mean += usize::from(mean == State::Differs);
             noisy += usize::from(tiles == State::TooNoisy);
+            by_share_alone += usize::from(found.tiles.over as f64 > 0.01 * found.tiles.count as f64);
         }
-        eprintln!("noise {noise}: {by_tiles} by tiles, {by_mean} by the mean, {noisy} too noisy");
-        assert!(by_tiles <= 5 && by_mean <= most_by_mean && noisy == 0, "{noise}: {by_tiles} {by_mean} {noisy}");
+        eprintln!(
+            "noise {noise}: {by_tiles} by tiles ({by_share_alone} by 1 % of tiles alone), {by_mean} by the mean, {noisy} too noisy"
+        );
+        assert!(by_tiles <= 5 && by_mean <= most_by_mean, "{noise}: {by_tiles} {by_mean}");
+        assert_eq!(noisy, if is_noisy { 1000 - by_tiles } else { 0 }, "{noise}");
     }
 }
 
-/// 3 % everywhere; 8 % in one tile of 30, where 1 % of tiles is none; a tile that is 2 % off is not seen under noise.
+/// 3 % everywhere; 8 % in one tile of 30, where 1 % of tiles is none. The twin: 0.3 % and 1 % agree.
 #[test]
 fn planted_differences_are_found() {
     for draw in 0..100 {
-        let ours = plain(2 * draw, 0.1);
-        let theirs = |factor: &dyn Fn(usize, usize) -> f64| halves(2 * draw + 1, 0.1, factor);
-        assert_eq!(states(&ours, &theirs(&|_, _| 1.03))[1], State::Differs);
+        let ours = plain(2 * draw, 0.05);
+        let states_at = |factor: &dyn Fn(usize, usize) -> f64| states(&ours, &halves(2 * draw + 1, 0.05, factor));
         let tile = |x: usize, y: usize| x / 16 == 2 && y / 16 == 3;
-        assert_eq!(states(&ours, &theirs(&|x, y| if tile(x, y) { 1.08 } else { 1.0 }))[0], State::Differs);
-        assert_eq!(states(&ours, &theirs(&|x, y| if tile(x, y) { 1.01 } else { 1.0 })), [State::Agrees; 2]);
+        assert_eq!(states_at(&|_, _| 1.03)[1], State::Differs, "{draw}");
+        assert_eq!(states_at(&|x, y| if tile(x, y) { 1.08 } else { 1.0 })[0], State::Differs, "{draw}");
+        assert_eq!(states_at(&|_, _| 1.003), [State::Agrees; 2], "{draw}");
+        assert_eq!(states_at(&|x, y| if tile(x, y) { 1.01 } else { 1.0 }), [State::Agrees; 2], "{draw}");
     }
 }
 
@@ -137,7 +147,15 @@ fn black_is_black() {
 #[test]
 fn what_is_known_to_differ_stands_apart() {
     let kinds = [MaterialKind::Lambert, MaterialKind::Conductor, MaterialKind::Dielectric];
-    let instance = Picture::from_fn(SIZE.0, SIZE.1, |x, _| if x < 32 { 3 } else if x % 16 == 0 && x < 64 { 2 } else { 1 });
+    let instance = Picture::from_fn(SIZE.0, SIZE.1, |x, _| {
+        if x < 32 {
+            3
+        } else if x % 16 == 0 && x < 64 {
+            2
+        } else {
+            1
+        }
+    });
     let shown = ShownKinds::new(&instance, &kinds);
     let theirs = halves(2, 0.01, |x, _| if x < 32 { 1.5 } else { 1.0 });
     let (found, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &shown, LAMBERT_TILE);

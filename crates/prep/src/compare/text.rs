@@ -21,13 +21,15 @@ pub fn faults(file: &CompareFile) -> Vec<String> {
 pub fn verdict(file: &CompareFile) -> String {
     let count = |state: State| file.checks().filter(|(_, _, check)| check.state == state).count();
     let all = file.checks().count();
-    let others =
-        [State::Differs, State::TooNoisy, State::Undecided, State::Missing, State::Unreadable].map(|s| (count(s), s));
-    let others: Vec<String> = others
-        .into_iter()
-        .filter(|(count, _)| *count > 0)
-        .map(|(count, state)| format!("{count} {}", state.word().to_lowercase()))
-        .collect();
+    let others = [
+        (State::Differs, "differ"),
+        (State::TooNoisy, "are too noisy to tell"),
+        (State::Undecided, "are undecided"),
+        (State::Missing, "are missing"),
+        (State::Unreadable, "are unreadable"),
+    ];
+    let others = others.into_iter().map(|(state, word)| (count(state), word)).filter(|(count, _)| *count > 0);
+    let others: Vec<String> = others.map(|(count, word)| format!("{count} {word}")).collect();
     let rest = if others.is_empty() { String::new() } else { format!(", {}", others.join(", ")) };
     let verdict = if file.agrees { "agrees" } else { "does NOT agree" };
     format!("{} {verdict} with our tracer: {} of {all} checks agree{rest}", file.renderer, count(State::Agrees))
@@ -69,38 +71,35 @@ fn shown(check: &Check, unit: &dyn Fn(f64) -> String) -> String {
 }
 
 fn light(file: &CompareFile) -> Table {
-    let head = ["scene", "view", "picture", "mean", "error", "over", "tiles", "allowed", "apart", "median", "noise"];
+    let head =
+        ["scene", "view", "picture", "state", "mean off", "error", "over", "tiles", "allowed", "apart", "median"];
     let mut rows = vec![row(head)];
-    rows[0].push("state".to_owned());
+    rows[0].push("noise".to_owned());
     for (scene, view) in views(file) {
         for light in &view.light {
-            let mut cells = row([scene.scene.as_str(), view.view.as_str(), &name(light)]);
-            let mean = light.mean.map_or([None; 2], |mean| [mean.difference, mean.standard_error]);
-            cells.push(mean[0].map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off)));
-            cells.push(mean[1].map_or_else(|| "none".to_owned(), |error| format!("{:.2} %", 100.0 * error)));
+            let words = [scene.scene.as_str(), view.view.as_str(), &name(light), state(view, light).word()];
+            let [off, error] = light.mean.map_or([None; 2], |mean| [mean.difference, mean.standard_error]);
+            let off = off.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
             let apart = light.apart.iter().map(|apart| apart.count).sum::<usize>();
             let counts = [light.tiles.over, light.tiles.count, light.tiles.allowed, apart];
+            let noise = light.tiles.noise.map_or_else(|| "none".to_owned(), |noise| format!("{noise:.1}"));
+            let mut cells = row(words);
+            cells.extend([off, percent(error)]);
             cells.extend(counts.map(|count| count.to_string()));
-            cells.push(percent(light.tiles.median));
-            cells.push(light.tiles.noise.map_or_else(|| "none".to_owned(), |noise| format!("{noise:.1}")));
-            cells.push(state(view, light).word().to_owned());
+            cells.extend([percent(light.tiles.median), noise]);
             rows.push(cells);
         }
     }
-    let bounds = file
-        .scenes
-        .iter()
-        .map(|scene| scene.tile_bound)
-        .fold((f64::MAX, 0.0_f64), |(low, high), bound| (low.min(bound), high.max(bound)));
-    let bound = match bounds {
-        (low, high) if low < high => format!("{} or {} %", 100.0 * low, 100.0 * high),
-        (_, high) => format!("{} %", 100.0 * high),
-    };
+    let mut bounds: Vec<f64> = file.scenes.iter().map(|scene| scene.tile_bound).collect();
+    bounds.sort_by(f64::total_cmp);
+    bounds.dedup();
+    let bounds: Vec<String> = bounds.iter().map(|bound| format!("{} %", 100.0 * bound)).collect();
     let title = format!(
-        "Pictures of light: the mean and its standard error; tiles over {bound} and 3 standard errors; tiles apart; \
-         noise: 3 standard errors of a tile over the bound"
+        "Pictures of light: how far the mean is off, and its standard error; tiles over {} and 3 standard errors; \
+         tiles apart; noise: 3 standard errors of a tile over the bound",
+        bounds.join(" or ")
     );
-    Table { title, words: 3, rows }
+    Table { title, words: 4, rows }
 }
 
 /// The worse of the picture's two checks.
