@@ -60,7 +60,7 @@ pub const DEPTH_MEDIAN_M: f64 = 1e-3;
 /// Largest median angle between normals, degrees. Ours are stored as 16-bit floats, which turns them by up to 0.04.
 pub const NORMAL_MEDIAN_DEG: f64 = 0.5;
 
-/// How far a tile may be off where all materials are Lambert: there our tracer, Mitsuba and Blender agree to 0.02 %, so
+/// How far a tile may be off, of the picture's mean over valid pixels, where all materials are Lambert: there our tracer, Mitsuba and Blender agree to 0.02 %, so
 /// that what is left is how each samples textures and edges.
 pub const LAMBERT_TILE: f64 = 0.01;
 

@@ -50,7 +50,7 @@ pub struct SceneComparison {
     pub scene: SceneId,
     /// The kinds of material that its surfaces are of, sorted.
     pub kinds: Vec<MaterialKind>,
-    /// How far a tile of light may be off, as a share of its picture's mean: less where all is Lambert.
+    /// How far a tile of light may be off, as a share of the mean ([`LightComparison::means`]): less where all is Lambert.
     pub tile_bound: f64,
     /// Samples a pixel of each of our halves; 0 where no view was compared.
     pub samples_each_half: u32,
@@ -106,7 +106,7 @@ pub enum Quantity {
     MedianDeg,
     /// Tiles over the tile bound; at most the bound, which is a number of tiles.
     TilesOver,
-    /// Relative difference of the picture's mean in its worst channel. The bound has the noise in it.
+    /// Relative difference of the means in the worst channel. The bound has the noise in it.
     MeanDifference,
     /// Largest difference of a half's groups, summed, from the half, relative to the pixel.
     GroupSum,
@@ -140,9 +140,10 @@ pub struct LightComparison {
     pub picture: String,
     /// The group's name; null for RGB.
     pub light: Option<String>,
-    /// Mean of each channel over the whole picture, ours and theirs.
+    /// Mean of each channel, ours and theirs, over the valid pixels of the tiles that decide (over all of their pixels where
+    /// none is valid). Ours is what every difference is relative to.
     pub means: [[f64; 3]; 2],
-    /// The mean of the tiles that decide; null where none does, or where all is black.
+    /// How far those means are apart; null where no tile decides.
     pub mean: Option<MeanDifference>,
     /// The tiles that decide.
     pub tiles: TilesCompared,
@@ -150,8 +151,8 @@ pub struct LightComparison {
     pub apart: Vec<TilesApart>,
 }
 
-/// How far means are apart, for the channel where that is most against what is allowed. All relative to our picture's
-/// mean in that channel.
+/// How far means are apart, for the channel where that is most against what is allowed. All relative to our mean in that
+/// channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeanDifference {

@@ -2,29 +2,37 @@
 
 use std::collections::BTreeMap;
 
-use mateval_image::{LinearRgb, Picture};
+use mateval_image::{LinearRgb, Mask, Picture};
 
 use super::bounds::{GROUP_SUM, NOISE_OVER_BOUND, PICTURE_MEAN, STANDARD_ERRORS};
 use super::file::{Check, LightComparison, MeanDifference, Quantity, State, TilesApart, TilesCompared, WorstTile};
 use super::kind::MaterialKind;
 use super::tiles::{Difference, Halves, Tile, allowance, difference, median, tiles};
 
-/// What tiles of a view show.
+/// What a view shows, as far as it matters for its light.
 pub(super) struct ShownKinds {
     /// With the last kind, in their order, of all that the tile shows; none where it shows nothing.
     tiles: Vec<(Tile, Option<MaterialKind>)>,
+    /// Pixels whose mean is compared, and differences are relative to: the valid ones of the tiles that decide, or all of
+    /// these where none is valid. Lamps, sky and glass are not valid: a window that fills a tenth of the picture would
+    /// be most of the mean, and no light in the room could be off by more than a share of that.
+    counted: Vec<(usize, usize)>,
 }
 
 impl ShownKinds {
     /// Instance k of `instance` is of the kind `kinds[k - 1]`; a number beyond them, which no sound dataset holds, is none.
-    pub(super) fn new(instance: &Picture<u16>, kinds: &[MaterialKind]) -> Self {
+    pub(super) fn new(instance: &Picture<u16>, kinds: &[MaterialKind], valid: &Mask) -> Self {
         let kind_at = |x: usize, y: usize| kinds.get(usize::from(instance.get(x, y)).checked_sub(1)?).copied();
-        let of = |tile: &Tile| {
-            let pixels = tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (x, y)));
-            pixels.filter_map(|(x, y)| kind_at(x, y)).max()
-        };
+        let of = |tile: &Tile| tile.pixels().filter_map(|(x, y)| kind_at(x, y)).max();
         let tiles = tiles(instance.width(), instance.height());
-        Self { tiles: tiles.into_iter().map(|tile| (tile.clone(), of(&tile))).collect() }
+        let tiles = tiles.into_iter().map(|tile| (tile.clone(), of(&tile))).collect();
+        let mut shown = Self { tiles, counted: Vec::new() };
+        let all: Vec<(usize, usize)> = shown.deciding().into_iter().flat_map(Tile::pixels).collect();
+        shown.counted = all.iter().copied().filter(|&(x, y)| valid.get(x, y)).collect();
+        if shown.counted.is_empty() {
+            shown.counted = all;
+        }
+        shown
     }
 
     /// Every tile, and whether it decides.
@@ -55,14 +63,14 @@ pub(super) fn compare(
     kinds: &ShownKinds,
     bound: f64,
 ) -> (LightComparison, [Check; 2]) {
-    let means = [ours.means(), theirs.means()];
+    let means = [ours.means(&kinds.counted), theirs.means(&kinds.counted)];
     let scale = means[0];
     let deciding = kinds.deciding();
-    let off: Vec<Difference> = deciding.iter().map(|tile| difference(ours, theirs, [*tile])).collect();
-    let mean = difference(ours, theirs, deciding.iter().copied());
+    let off: Vec<Difference> = deciding.iter().map(|tile| difference(ours, theirs, tile.pixels())).collect();
+    let mean = difference(ours, theirs, kinds.counted.iter().copied());
     let tiles = compare_tiles(&deciding, &off, bound, scale);
     let apart = kinds.apart().into_iter().map(|(kind, tiles)| {
-        let off: Vec<Difference> = tiles.iter().map(|tile| difference(ours, theirs, [*tile])).collect();
+        let off: Vec<Difference> = tiles.iter().map(|tile| difference(ours, theirs, tile.pixels())).collect();
         apart_tiles(kind, &off, bound, scale)
     });
     let found = LightComparison {
@@ -73,7 +81,7 @@ pub(super) fn compare(
         tiles,
         apart: apart.collect(),
     };
-    let checks = [tile_check(picture, &tiles, bound), mean_check(picture, &mean, scale, deciding.len())];
+    let checks = [tile_check(picture, &tiles, bound), mean_check(picture, &mean, scale, kinds.counted.len())];
     (found, checks)
 }
 
@@ -138,7 +146,7 @@ fn tile_check(picture: &str, tiles: &TilesCompared, bound: f64) -> Check {
             percent(bound),
         ),
         _ => format!(
-            "{} of {} tiles are off by more than {} of the picture's mean and {STANDARD_ERRORS} standard errors, expected at most {}{}",
+            "{} of {} tiles are off by more than {} of the mean and {STANDARD_ERRORS} standard errors, expected at most {}{}",
             tiles.over,
             tiles.count,
             percent(bound),
@@ -163,10 +171,10 @@ fn worst_text(worst: &WorstTile) -> String {
     format!("; the worst, at ({}, {}): {off}", worst.x, worst.y)
 }
 
-fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], tiles: usize) -> Check {
+fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) -> Check {
     let noisy = mean.noise(PICTURE_MEAN, scale).is_some_and(|noise| noise > NOISE_OVER_BOUND);
     let state = match () {
-        () if tiles == 0 => State::Undecided,
+        () if pixels == 0 => State::Undecided,
         () if mean.is_over(PICTURE_MEAN, scale) => State::Differs,
         () if noisy => State::TooNoisy,
         () => State::Agrees,
@@ -187,8 +195,8 @@ fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], tiles: usize) -
         _ => "ours is black, theirs is not".to_owned(),
     };
     let quantity = Quantity::MeanDifference;
-    let (measured, bound) = if tiles > 0 { (worst.difference, bound) } else { (None, None) };
-    Check { picture: picture.to_owned(), quantity, state, measured, bound, count: tiles, message }
+    let (measured, bound) = if pixels > 0 { (worst.difference, bound) } else { (None, None) };
+    Check { picture: picture.to_owned(), quantity, state, measured, bound, count: pixels, message }
 }
 
 /// Whether the groups of one half sum to it. Each pixel's difference is held against that pixel, since rounding goes with

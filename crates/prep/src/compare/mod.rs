@@ -258,7 +258,7 @@ impl ViewPair<'_> {
         let mut found = ViewComparison { view: self.view.id.clone(), checks: Vec::new(), light: Vec::new() };
         let their_geometry = TheirGeometry::read(theirs, &mut found.checks);
         found.checks.extend(geometry::compare(&ours, &their_geometry));
-        let shown = ShownKinds::new(&ours.instance, self.kinds);
+        let shown = ShownKinds::new(&ours.instance, self.kinds, &ours.valid);
         let their_light = self.compare_lights(light, theirs, &shown, &mut found);
         let Some((out, scene)) = out else { return Ok((found, None)) };
         let mut previews = ViewPreviews::new(out, scene, &self.view.id)?;

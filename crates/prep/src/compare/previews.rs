@@ -15,7 +15,7 @@ use super::light::ShownKinds;
 use super::tiles::{Halves, difference};
 use crate::error::PrepError;
 
-/// Ends of the difference's scale: a pixel of light, of its picture's mean.
+/// Ends of the difference's scale: a pixel of light, of its picture's mean over valid pixels that decide.
 const LIGHT_PIXEL: f64 = 0.5;
 /// A tile of light, in bounds.
 const LIGHT_TILE: f64 = 5.0;
@@ -25,7 +25,7 @@ const BASE_COLOR: f64 = 0.1;
 const DEPTH_M: f64 = 0.01;
 /// A normal, degrees.
 const NORMAL_DEG: f64 = 5.0;
-/// What a group of lights is brightened to in its preview: linear, its picture's mean.
+/// What a group of lights is brightened to in its preview: linear, the same mean.
 const GROUP_MEAN: f64 = 0.2;
 
 /// Theirs is darker, equal, brighter (ColorBrewer's RdBu, whose ends all people tell apart).
@@ -106,7 +106,7 @@ impl ViewPreviews {
             if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { f64::from(a != b) }
         };
         let (width, height) = (means[0].width(), means[0].height());
-        let title = "theirs minus ours, of the picture's mean";
+        let title = "theirs minus ours, of our mean";
         let by_pixel = scaled("pixels", title, 100.0 * LIGHT_PIXEL, " %", signed(width, height, off));
         let title = format!(
             "tiles, worst channel; dark frame: over the bound of {} %; grey frame: decides nothing",
@@ -254,7 +254,7 @@ fn tile_map(
 ) -> Picture<[u8; 3]> {
     let mut map = Picture::filled(width, height, DIVERGING[1]);
     for (tile, decides) in kinds.all() {
-        let off = difference(ours, theirs, [tile]);
+        let off = difference(ours, theirs, tile.pixels());
         let channel = off.worst_channel(bound, scale);
         let value = match scale[channel] > 0.0 {
             true => off.mean[channel] / scale[channel] / (LIGHT_TILE * bound),
@@ -265,7 +265,7 @@ fn tile_map(
             (true, true) => Some([20; 3]),
             (true, false) => None,
         };
-        for (y, x) in tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (y, x))) {
+        for (x, y) in tile.pixels() {
             let at_rim =
                 x == tile.columns.start || x + 1 == tile.columns.end || y == tile.rows.start || y + 1 == tile.rows.end;
             map.set(x, y, frame.filter(|_| at_rim).unwrap_or_else(|| diverging(value)));

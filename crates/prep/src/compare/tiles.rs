@@ -50,16 +50,24 @@ fn cuts(length: usize) -> Vec<Range<usize>> {
     (0..count).map(|k| k * TILE..if k + 1 == count { length } else { (k + 1) * TILE }).collect()
 }
 
+impl Tile {
+    /// Columns and rows of its pixels, row by row.
+    pub(super) fn pixels(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows.clone().flat_map(|y| self.columns.clone().map(move |x| (x, y)))
+    }
+}
+
 impl Halves {
-    /// The mean of each channel over the whole picture.
-    pub(super) fn means(&self) -> [f64; 3] {
+    /// The mean of each channel over some pixels; 0 over none.
+    pub(super) fn means(&self, pixels: &[(usize, usize)]) -> [f64; 3] {
         let mut sum = [0.0_f64; 3];
-        for (a, b) in self.a.pixels().iter().zip(self.b.pixels()) {
-            for (channel, sum) in sum.iter_mut().enumerate() {
-                *sum += (f64::from(a.0[channel]) + f64::from(b.0[channel])) / 2.0;
+        for &(x, y) in pixels {
+            let [a, b] = [&self.a, &self.b].map(|half| half.get(x, y).0);
+            for c in 0..3 {
+                sum[c] += (f64::from(a[c]) + f64::from(b[c])) / 2.0;
             }
         }
-        sum.map(|sum| sum / self.a.pixels().len().max(1) as f64)
+        sum.map(|sum| sum / pixels.len().max(1) as f64)
     }
 
     /// The mean of both halves.
@@ -70,18 +78,20 @@ impl Halves {
     }
 }
 
-/// The difference of the means over all pixels of some tiles.
-pub(super) fn difference<'a>(ours: &Halves, theirs: &Halves, tiles: impl IntoIterator<Item = &'a Tile>) -> Difference {
+/// The difference of the means over some pixels.
+pub(super) fn difference(
+    ours: &Halves,
+    theirs: &Halves,
+    pixels: impl IntoIterator<Item = (usize, usize)>,
+) -> Difference {
     let (mut sum, mut variance, mut count) = ([0.0_f64; 3], [0.0_f64; 3], 0_usize);
-    for tile in tiles {
-        for (y, x) in tile.rows.clone().flat_map(|y| tile.columns.clone().map(move |x| (y, x))) {
-            let [a, b, p, q] = [&ours.a, &ours.b, &theirs.a, &theirs.b].map(|half| half.get(x, y).0.map(f64::from));
-            for c in 0..3 {
-                sum[c] += (p[c] + q[c] - a[c] - b[c]) / 2.0;
-                variance[c] += ((a[c] - b[c]) / 2.0).powi(2) + ((p[c] - q[c]) / 2.0).powi(2);
-            }
-            count += 1;
+    for (x, y) in pixels {
+        let [a, b, p, q] = [&ours.a, &ours.b, &theirs.a, &theirs.b].map(|half| half.get(x, y).0.map(f64::from));
+        for c in 0..3 {
+            sum[c] += (p[c] + q[c] - a[c] - b[c]) / 2.0;
+            variance[c] += ((a[c] - b[c]) / 2.0).powi(2) + ((p[c] - q[c]) / 2.0).powi(2);
         }
+        count += 1;
     }
     let count = count.max(1) as f64;
     Difference { mean: sum.map(|sum| sum / count), error: variance.map(|variance| variance.sqrt() / count) }
