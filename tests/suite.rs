@@ -11,6 +11,7 @@ mod suite {
     mod bad_input;
     mod blender;
     mod command;
+    mod compare;
     mod determinism;
     mod full_disk;
     mod help;

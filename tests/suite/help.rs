@@ -19,9 +19,13 @@ fn the_version() {
 #[test]
 fn what_is_not_there() {
     let not_there = "No such file or directory (os error 2)\n";
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 8] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
         (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
+        (
+            &["prep", "compare", "nowhere", "--out", "page"],
+            "cannot compare the dataset's pictures: cannot read 'nowhere/dataset.json': ",
+        ),
         (&["prep", "stats", "nowhere"], "cannot open the dataset: cannot read 'nowhere/dataset.json': "),
         (
             &["prep", "mitsuba", "nowhere", "--scene", "room", "--out", "out"],
@@ -67,13 +71,14 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 13] = [
+    let subcommands: [&[&str]; 14] = [
         &["demo"],
         &["sample"],
         &["prep"],
         &["prep", "build"],
         &["prep", "survey"],
         &["prep", "render"],
+        &["prep", "compare"],
         &["prep", "verify"],
         &["prep", "stats"],
         &["prep", "mitsuba"],

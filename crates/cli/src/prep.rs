@@ -1,6 +1,7 @@
 //! `mateval prep`.
 
 pub mod blender;
+mod compare;
 mod survey;
 
 use std::path::{Path, PathBuf};
@@ -27,6 +28,8 @@ pub enum Command {
     Survey(survey::SurveyArgs),
     /// Renders the dataset's RGB pictures.
     Render(RenderArgs),
+    /// Holds Blender's pictures against our own tracer's; exit code 1 where they do not agree.
+    Compare(compare::CompareArgs),
     /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
     Verify(VerifyArgs),
     /// Counts what a dataset holds: the paper's Table I, objects by category, scene by scene.
@@ -141,6 +144,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Build(args) => build(args),
         Command::Survey(args) => survey::run(args),
         Command::Render(args) => render(args),
+        Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify(args),
         Command::Stats(args) => count(args),
         Command::Mitsuba(args) => mitsuba(args),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
+use mateval_prep::compare::file::CompareFile;
 use mateval_prep::render::RenderFile;
 use mateval_prep::stats::StatsFile;
 use mateval_prep::survey::SurveyFile;
@@ -40,7 +41,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 12] {
+fn schemas() -> [(&'static str, Schema); 13] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -54,5 +55,6 @@ fn schemas() -> [(&'static str, Schema); 12] {
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
+        ("compare", schema_for!(CompareFile)),
     ]
 }

@@ -5,7 +5,7 @@
 //!
 //! Between: [`recipe`] is checked whole, [`front3d`] or [`bitterli`] reads each source, [`instances`] numbers, [`atlas`] unwraps, [`bake`]
 //! fills textures, [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth,
-//! [`verify`] doubts it all, [`stats`] counts it.
+//! [`compare`] holds another renderer's against it, [`verify`] doubts it all, [`stats`] counts it.
 
 pub mod atlas;
 pub mod bake;
@@ -13,6 +13,7 @@ pub mod bitterli;
 pub mod blender;
 pub mod build;
 pub mod build_scene;
+pub mod compare;
 pub mod error;
 pub mod front3d;
 pub mod instances;
@@ -26,6 +27,7 @@ pub mod sample;
 pub mod source;
 pub mod stats;
 pub mod survey;
+pub(crate) mod table;
 pub mod verify;
 pub mod views;
 

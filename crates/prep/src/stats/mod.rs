@@ -336,7 +336,7 @@ fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a 
 
 /// A name of a stranger for people to read: one line without characters that steer a terminal or turn the text around,
 /// at most `most` characters.
-fn shown(name: &str, most: usize) -> String {
+pub(crate) fn shown(name: &str, most: usize) -> String {
     let steers = |c: char| {
         c.is_control()
             || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')

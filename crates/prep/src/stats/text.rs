@@ -1,24 +1,15 @@
 //! The counts as tables for people: numbers are rounded here, the JSON has them whole.
 
-use std::fmt::Write as _;
-
 use mateval_scene::Severity;
 
 use super::{Counts, SUPER_CATEGORIES, SceneStats, Spread, StatsFile, shown};
+use crate::table::{Table, row};
 
 /// Longest name that is written whole.
 const LONGEST: usize = 60;
 
 /// Heads of the eight super-categories' columns, in their order.
 const HEADS: [&str; 8] = ["cabinet", "sofa", "lighting", "chair", "others", "bed", "table", "stool"];
-
-/// Rows of cells; the first row is the head.
-struct Table {
-    title: String,
-    /// Columns from the left that hold words; all others hold numbers.
-    words: usize,
-    rows: Vec<Vec<String>>,
-}
 
 /// All tables. Table I comes first, in the paper's words.
 pub fn text(stats: &StatsFile) -> String {
@@ -141,34 +132,4 @@ fn scenes_by_super_category(stats: &StatsFile) -> Table {
 /// A number of objects, or of their kinds, where the scene says what they are.
 fn known(scene: &SceneStats, number: usize) -> String {
     if scene.knows_its_objects() { number.to_string() } else { "?".to_owned() }
-}
-
-fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
-    cells.map(str::to_owned).to_vec()
-}
-
-impl Table {
-    /// Title and rows, in columns: words to the left, numbers to the right.
-    fn text(&self) -> String {
-        let mut text = format!("{}\n", self.title);
-        if self.rows.len() == 1 {
-            text.push_str("  none\n");
-            return text;
-        }
-        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..columns).map(|column| self.width(column)).collect();
-        for row in &self.rows {
-            let cells = row.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at < self.words {
-                true => format!("{cell:<width$}"),
-                false => format!("{cell:>width$}"),
-            });
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "  {}", cells.collect::<Vec<_>>().join("  ").trim_end());
-        }
-        text
-    }
-
-    fn width(&self, column: usize) -> usize {
-        self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)
-    }
 }

@@ -1,0 +1,172 @@
+//! Differences of noisy pictures, tile by tile.
+//!
+//! In: two halves of a picture from either renderer. A pixel's mean of halves a and b has the variance ((a - b) / 2)² on
+//! the average, whatever the distribution; over a tile's pixels these add up, and over both renderers.
+
+use std::ops::Range;
+
+use mateval_image::{LinearRgb, Picture};
+
+use super::bounds::{FALSE_ALARM, STANDARD_ERRORS, TILE_SHARE_OVER};
+
+/// Pixels along a tile's side.
+pub(super) const TILE: usize = 16;
+
+/// Two independent estimates of one picture, of one size.
+#[derive(Clone, Debug)]
+pub(super) struct Halves {
+    pub(super) a: Picture<LinearRgb>,
+    pub(super) b: Picture<LinearRgb>,
+}
+
+/// A rectangle of a picture.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Tile {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+}
+
+/// How far the means over some pixels are apart, channel by channel: theirs minus ours.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Difference {
+    /// Of the means.
+    pub(super) mean: [f64; 3],
+    /// Their standard errors.
+    pub(super) error: [f64; 3],
+}
+
+/// The picture in tiles of 16x16 pixels. What remains at the right and lower edge is a tile of its own from 8 pixels on;
+/// less belongs to the neighbour, since the variance of a few pixels is not known well enough for a test.
+pub(super) fn tiles(width: usize, height: usize) -> Vec<Tile> {
+    let columns = cuts(width);
+    let rows = cuts(height);
+    rows.iter()
+        .flat_map(|rows| columns.iter().map(|columns| Tile { columns: columns.clone(), rows: rows.clone() }))
+        .collect()
+}
+
+fn cuts(length: usize) -> Vec<Range<usize>> {
+    let count = ((length + TILE / 2) / TILE).max(1);
+    (0..count).map(|k| k * TILE..if k + 1 == count { length } else { (k + 1) * TILE }).collect()
+}
+
+impl Tile {
+    /// Columns and rows of its pixels, row by row.
+    pub(super) fn pixels(&self) -> impl Iterator<Item = (usize, usize)> {
+        self.rows.clone().flat_map(|y| self.columns.clone().map(move |x| (x, y)))
+    }
+}
+
+impl Halves {
+    /// The mean of each channel over some pixels; 0 over none.
+    pub(super) fn means(&self, pixels: &[(usize, usize)]) -> [f64; 3] {
+        let mut sum = [0.0_f64; 3];
+        for &(x, y) in pixels {
+            let [a, b] = [&self.a, &self.b].map(|half| half.get(x, y).0);
+            for c in 0..3 {
+                sum[c] += (f64::from(a[c]) + f64::from(b[c])) / 2.0;
+            }
+        }
+        sum.map(|sum| sum / pixels.len().max(1) as f64)
+    }
+
+    /// The mean of both halves.
+    pub(super) fn mean(&self) -> Picture<LinearRgb> {
+        let pixel = |(a, b): (&LinearRgb, &LinearRgb)| LinearRgb([0, 1, 2].map(|c| (a.0[c] + b.0[c]) / 2.0));
+        let pixels = self.a.pixels().iter().zip(self.b.pixels()).map(pixel).collect();
+        Picture::new(self.a.width(), self.a.height(), pixels).expect("both halves are of one size")
+    }
+}
+
+/// The difference of the means over some pixels.
+pub(super) fn difference(
+    ours: &Halves,
+    theirs: &Halves,
+    pixels: impl IntoIterator<Item = (usize, usize)>,
+) -> Difference {
+    let (mut sum, mut variance, mut count) = ([0.0_f64; 3], [0.0_f64; 3], 0_usize);
+    for (x, y) in pixels {
+        let [a, b, p, q] = [&ours.a, &ours.b, &theirs.a, &theirs.b].map(|half| half.get(x, y).0.map(f64::from));
+        for c in 0..3 {
+            sum[c] += (p[c] + q[c] - a[c] - b[c]) / 2.0;
+            variance[c] += ((a[c] - b[c]) / 2.0).powi(2) + ((p[c] - q[c]) / 2.0).powi(2);
+        }
+        count += 1;
+    }
+    let count = count.max(1) as f64;
+    Difference { mean: sum.map(|sum| sum / count), error: variance.map(|variance| variance.sqrt() / count) }
+}
+
+impl Difference {
+    /// How far it is off in each channel over what is allowed there: the bound, times `scale`, and three standard
+    /// errors. Above 1 it is over; a channel that is black in both is 0.
+    pub(super) fn excess(&self, bound: f64, scale: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|c| match self.mean[c].abs() {
+            0.0 => 0.0,
+            off => off / (bound * scale[c] + STANDARD_ERRORS * self.error[c]),
+        })
+    }
+
+    /// The channel that is furthest off, by [`Self::excess`].
+    pub(super) fn worst_channel(&self, bound: f64, scale: [f64; 3]) -> usize {
+        let excess = self.excess(bound, scale);
+        (1..3).fold(0, |worst, c| if excess[c] > excess[worst] { c } else { worst })
+    }
+
+    /// Whether it is over in any channel.
+    pub(super) fn is_over(&self, bound: f64, scale: [f64; 3]) -> bool {
+        self.excess(bound, scale).iter().any(|excess| *excess > 1.0)
+    }
+
+    /// Three standard errors over the bound, in the channel where that is most; none where nothing has a scale.
+    pub(super) fn noise(&self, bound: f64, scale: [f64; 3]) -> Option<f64> {
+        let of = |c: usize| (scale[c] > 0.0).then(|| STANDARD_ERRORS * self.error[c] / (bound * scale[c]));
+        (0..3).filter_map(of).max_by(f64::total_cmp)
+    }
+
+    /// The chance (at most) that noise alone puts it over where the expectations are equal: two tails of a normal in
+    /// each channel.
+    fn false_alarm(&self, bound: f64, scale: [f64; 3]) -> f64 {
+        let tails = |c: usize| {
+            let errors = STANDARD_ERRORS + bound * scale[c] / self.error[c];
+            if self.error[c] > 0.0 { libm::erfc(errors / std::f64::consts::SQRT_2) } else { 0.0 }
+        };
+        (0..3).map(tails).sum::<f64>().min(1.0)
+    }
+}
+
+/// How many of the tiles may be over, and how many noise alone puts there on the average: 1 %, and as many as noise alone
+/// exceeds at most once in 1000 pictures. Where noise is small against the bound the latter is 0; where it is not, three
+/// channels at three standard errors would spend the 1 % on noise.
+pub(super) fn allowance(tiles: &[Difference], bound: f64, scale: [f64; 3]) -> (usize, f64) {
+    let expected = tiles.iter().map(|tile| tile.false_alarm(bound, scale)).sum();
+    ((TILE_SHARE_OVER * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
+}
+
+/// The least k that a Poisson variable of this mean exceeds with a probability of at most [`FALSE_ALARM`].
+fn poisson_quantile(mean: f64) -> usize {
+    // Far from 0 it is nearly normal, and 3.3 deviations are more than enough for its skewness.
+    if mean > 100.0 {
+        return (mean + 3.3 * mean.sqrt()).ceil() as usize;
+    }
+    let mut term = libm::exp(-mean);
+    let mut below = term;
+    let mut k = 0;
+    while 1.0 - below > FALSE_ALARM {
+        k += 1;
+        term *= mean / k as f64;
+        below += term;
+    }
+    k
+}
+
+/// The middle value, or the mean of the two middle ones; none of nothing.
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(values[middle]),
+        _ => Some((values[middle - 1] + values[middle]) / 2.0),
+    }
+}

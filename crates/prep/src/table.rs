@@ -1,0 +1,44 @@
+//! Tables for people: rows of cells, set in columns.
+
+use std::fmt::Write as _;
+
+/// Rows of cells; the first row is the head.
+pub(crate) struct Table {
+    /// Said above.
+    pub(crate) title: String,
+    /// Columns from the left that hold words; all others hold numbers.
+    pub(crate) words: usize,
+    /// Of any length each.
+    pub(crate) rows: Vec<Vec<String>>,
+}
+
+/// A row of a table.
+pub(crate) fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
+    cells.map(str::to_owned).to_vec()
+}
+
+impl Table {
+    /// Title and rows, in columns: words to the left, numbers to the right.
+    pub(crate) fn text(&self) -> String {
+        let mut text = format!("{}\n", self.title);
+        if self.rows.len() == 1 {
+            text.push_str("  none\n");
+            return text;
+        }
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns).map(|column| self.width(column)).collect();
+        for row in &self.rows {
+            let cells = row.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at < self.words {
+                true => format!("{cell:<width$}"),
+                false => format!("{cell:>width$}"),
+            });
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "  {}", cells.collect::<Vec<_>>().join("  ").trim_end());
+        }
+        text
+    }
+
+    fn width(&self, column: usize) -> usize {
+        self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0)
+    }
+}
