@@ -7,6 +7,7 @@ use mateval_image::{LinearRgb, Mask, Picture};
 use super::bounds::{GROUP_SUM, NOISE_OVER_BOUND, PICTURE_MEAN, STANDARD_ERRORS};
 use super::file::{Check, LightComparison, MeanDifference, Quantity, State, TilesApart, TilesCompared, WorstTile};
 use super::kind::MaterialKind;
+use super::theirs::file_check;
 use super::tiles::{Difference, Halves, Tile, allowance, difference, median, tiles};
 
 /// What a view shows, as far as it matters for its light.
@@ -197,6 +198,14 @@ fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) 
     let quantity = Quantity::MeanDifference;
     let (measured, bound) = if pixels > 0 { (worst.difference, bound) } else { (None, None) };
     Check { picture: picture.to_owned(), quantity, state, measured, bound, count: pixels, message }
+}
+
+/// A fault where both halves are one picture, and not black: then they tell of no noise.
+pub(super) fn same_halves(picture: &str, halves: &Halves) -> Option<Check> {
+    let is_black = |pixel: &LinearRgb| pixel.0 == [0.0; 3];
+    let same = halves.a == halves.b && !halves.a.pixels().iter().all(is_black);
+    let message = "both halves are the same, pixel by pixel; render them with two seeds".to_owned();
+    same.then(|| file_check(picture, State::Differs, message))
 }
 
 /// Whether the groups of one half sum to it. Each pixel's difference is held against that pixel, since rounding goes with

@@ -305,6 +305,7 @@ impl ViewPair<'_> {
     ) -> Option<Halves> {
         match theirs.halves(picture) {
             Ok(theirs) => {
+                found.checks.extend(light::same_halves(picture, &theirs));
                 let (light, checks): (LightComparison, _) =
                     light::compare(picture, name, [ours, &theirs], shown, self.tile_bound);
                 found.light.push(light);

@@ -5,7 +5,7 @@ use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use super::bounds::{GROUP_SUM, LAMBERT_TILE};
 use super::file::{Quantity, State};
 use super::kind::MaterialKind;
-use super::light::{ShownKinds, compare, sum_check};
+use super::light::{ShownKinds, compare, same_halves, sum_check};
 use super::tiles::{Halves, difference, median, tiles};
 
 const SIZE: (usize, usize) = (96, 72);
@@ -209,6 +209,15 @@ fn sums_of_groups() {
     assert_eq!(sum_check("rgb_a", &half, &[&a]).state, State::Differs);
     let off = |share: f32| sum_check("rgb_a", &half, &[&a, &part(0.7 + share)]).state;
     assert_eq!([off(0.9 * GROUP_SUM as f32), off(1.1 * GROUP_SUM as f32)], [State::Agrees, State::Differs]);
+}
+
+/// Halves of one seed are told; two of two seeds, and black ones, are none.
+#[test]
+fn halves_of_one_seed() {
+    let twice = |Halves { a, .. }: Halves| Halves { a: a.clone(), b: a };
+    assert_eq!(same_halves("rgb", &twice(plain(1, 0.1))).map(|check| check.state), Some(State::Differs));
+    assert_eq!(same_halves("rgb", &plain(1, 0.1)), None);
+    assert_eq!(same_halves("rgb", &twice(halves(1, 0.1, |_, _| 0.0))), None);
 }
 
 #[test]

@@ -23,10 +23,10 @@ pub fn verdict(file: &CompareFile) -> String {
     let all = file.checks().count();
     let others = [
         (State::Differs, "differ"),
-        (State::TooNoisy, "are too noisy to tell"),
-        (State::Undecided, "are undecided"),
-        (State::Missing, "are missing"),
-        (State::Unreadable, "are unreadable"),
+        (State::TooNoisy, "too noisy to tell"),
+        (State::Undecided, "undecided"),
+        (State::Missing, "missing"),
+        (State::Unreadable, "unreadable"),
     ];
     let others = others.into_iter().map(|(state, word)| (count(state), word)).filter(|(count, _)| *count > 0);
     let others: Vec<String> = others.map(|(count, word)| format!("{count} {word}")).collect();
