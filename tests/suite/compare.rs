@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
 use mateval_prep::compare::file::{CompareFile, Quantity, State};
-use mateval_prep::views::{SeenTriangle, ViewScene};
+use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{ColorInput, MaterialModel};
@@ -113,9 +113,14 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
         for (at, (a, b)) in a.pictures().iter().zip(b.pictures()).enumerate() {
             write(&format!("group_{at:02}"), a, b);
         }
-        let (geometry, truth) = pictures.pictures(&view.camera, &cameras[0].camera);
+        let (geometry, _) = pictures.pictures(&view.camera, &cameras[0].camera);
         let part = |seen: Option<SeenTriangle>| seen.and_then(|s| parts.get(&(s.surface.0, s.triangle)).copied());
-        exr_io::write_linear(&folder.join("base_color.exr"), &truth.albedo, Precision::Float).unwrap();
+        exr_io::write_linear(
+            &folder.join("base_color.exr"),
+            &base_color_at_centres(&world, &view.camera),
+            Precision::Float,
+        )
+        .unwrap();
         exr_io::write_scalar(&folder.join("depth.exr"), &geometry.depth, Precision::Float).unwrap();
         exr_io::write_normal(&folder.join("normal.exr"), &geometry.normal, Precision::Half).unwrap();
         png_io::write_ids(&folder.join("instance.png"), &geometry.instance).unwrap();

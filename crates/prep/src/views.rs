@@ -148,18 +148,6 @@ impl<'a> ViewScene<'a> {
         (geometry, truth)
     }
 
-    /// base_color at pixel centres, linear, of whatever has one, glowing or not; 0 elsewhere.
-    pub fn base_color_at_centres(&self, camera: &Camera) -> Picture<LinearRgb> {
-        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-        let base_color = |x: usize, y: usize| {
-            let hit = hit_through(self.world, camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-            let seen = hit.and_then(|hit| self.appearance(&hit));
-            LinearRgb(seen.map_or([0.0; 3], |seen| seen.base_color))
-        };
-        let rows = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| base_color(x, y)));
-        Picture::new(width, height, rows.collect()).expect("there is a pixel for every place")
-    }
-
     /// Pixel (x, y) of the pictures of `camera`'s view.
     pub fn pixel(&self, camera: &Camera, input: &Camera, x: usize, y: usize) -> ViewPixel {
         let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
@@ -215,13 +203,7 @@ impl<'a> ViewScene<'a> {
         if glows || !self.scored[hit.surface.0] {
             return None;
         }
-        self.appearance(hit)
-    }
-
-    fn appearance(&self, hit: &PixelHit) -> Option<Appearance> {
-        let surface = &self.reference.surfaces[hit.surface.0];
-        let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
-        self.reference.materials[surface.material.0].appearance(&self.textures, uv)
+        appearance(self.reference, &self.textures, hit)
     }
 
     /// Whether the surface point at `pixel` of `camera` shows in the input view: inside its frame and not hidden.
@@ -236,6 +218,27 @@ impl<'a> ViewScene<'a> {
         camera.position() == input.position()
             || hit_through(self.world, input, place).is_some_and(|first| first.depth >= depth * (1.0 - OCCLUSION_SLACK))
     }
+}
+
+/// base_color, roughness and metallic of the surface that is hit.
+fn appearance(reference: &ReferenceScene, textures: &[Texture], hit: &PixelHit) -> Option<Appearance> {
+    let surface = &reference.surfaces[hit.surface.0];
+    let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
+    reference.materials[surface.material.0].appearance(textures, uv)
+}
+
+/// base_color at pixel centres, linear, of whatever has one, glowing or not; 0 elsewhere.
+pub fn base_color_at_centres(world: &World, camera: &Camera) -> Picture<LinearRgb> {
+    let textures = world.scene().texture_list();
+    let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+    let base_color = |x: usize, y: usize| {
+        let hit = hit_through(world, camera, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+        let seen = hit.and_then(|hit| appearance(world.scene(), &textures, &hit));
+        LinearRgb(seen.map_or([0.0; 3], |seen| seen.base_color))
+    };
+    let base_color = &base_color;
+    let pixels = (0..height).into_par_iter().flat_map_iter(|y| (0..width).map(move |x| base_color(x, y)));
+    Picture::new(width, height, pixels.collect()).expect("there is a pixel for every place")
 }
 
 /// A point counts as hidden where something is nearer by more than this share of its depth.

@@ -2,13 +2,15 @@
 
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_metrics::{Psnr, mse};
-use mateval_scene::ViewId;
+use mateval_scene::dataset::View;
 use mateval_scene::layout::SceneFolder;
+use mateval_tracer::World;
 
 use super::bounds::{BASE_COLOR_PSNR_DB, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG};
 use super::file::{Check, Quantity, State};
 use super::theirs::TheirView;
 use super::tiles::median;
+use crate::views::base_color_at_centres;
 
 /// The dataset's own pictures of a view.
 pub(super) struct OurGeometry {
@@ -31,10 +33,11 @@ pub(super) struct TheirGeometry {
 }
 
 impl OurGeometry {
-    pub(super) fn read(folder: &SceneFolder, view: &ViewId) -> Result<Self, ImageError> {
-        let shown = folder.view(view);
+    /// Reads the view's pictures; base colours are looked up anew, at pixel centres as theirs are.
+    pub(super) fn read(folder: &SceneFolder, view: &View, world: &World) -> Result<Self, ImageError> {
+        let shown = folder.view(&view.id);
         Ok(Self {
-            base_color: exr_io::read_linear(&folder.truth_view(view).join("albedo.exr"))?,
+            base_color: base_color_at_centres(world, &view.camera),
             instance: png_io::read_ids(&shown.join("instance.png"))?,
             part: png_io::read_ids(&shown.join("part.png"))?,
             depth: exr_io::read_scalar(&shown.join("depth.exr"))?,

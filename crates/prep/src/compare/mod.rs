@@ -29,6 +29,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
+use mateval_tracer::World;
 use serde::Deserialize;
 
 use crate::error::PrepError;
@@ -173,6 +174,7 @@ fn compare_scene(
     progress: Progress<'_>,
 ) -> Result<(SceneComparison, Vec<ViewPreviews>), PrepError> {
     let reference = Arc::new(reference_io::read(folder)?);
+    let world = World::new(reference.clone())?;
     let kinds = MaterialKind::of_surfaces(&reference);
     let tile_bound = match kinds.iter().all(|kind| *kind == MaterialKind::Lambert) {
         true => LAMBERT_TILE,
@@ -186,7 +188,7 @@ fn compare_scene(
     };
     let mut ours = match there.is_empty() {
         true => Vec::new(),
-        false => ours::render(&reference, &scene.id, &there, samples, progress)?,
+        false => ours::render(&world, &scene.id, &there, samples, progress)?,
     }
     .into_iter();
     let (mut views, mut previews) = (Vec::new(), Vec::new());
@@ -199,7 +201,7 @@ fn compare_scene(
             continue;
         };
         let theirs = TheirView { folder: place, size: size(view) };
-        let pair = ViewPair { folder, view, reference: &reference, kinds: &kinds, tile_bound };
+        let pair = ViewPair { folder, view, reference: &reference, world: &world, kinds: &kinds, tile_bound };
         let (found, shown) = pair.compare(&light, &theirs, out.map(|out| (out, scene)))?;
         views.push(found);
         previews.extend(shown);
@@ -237,6 +239,7 @@ struct ViewPair<'a> {
     folder: &'a SceneFolder,
     view: &'a View,
     reference: &'a ReferenceScene,
+    world: &'a World,
     kinds: &'a [MaterialKind],
     tile_bound: f64,
 }
@@ -248,7 +251,7 @@ impl ViewPair<'_> {
         theirs: &TheirView,
         out: Option<(&Path, &SceneFile)>,
     ) -> Result<(ViewComparison, Option<ViewPreviews>), PrepError> {
-        let ours = OurGeometry::read(self.folder, &self.view.id)?;
+        let ours = OurGeometry::read(self.folder, self.view, self.world)?;
         if !ours.has_size(theirs.size) {
             let (width, height) = theirs.size;
             let what =

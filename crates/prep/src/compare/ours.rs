@@ -1,11 +1,8 @@
 //! Our own pictures of light, rendered on the spot.
 
-use std::sync::Arc;
-
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::View;
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Progress, SceneId};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
@@ -35,16 +32,15 @@ pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
 /// Renders `views` of the scene, all from one set of paths where they share a centre and their pictures fit in memory, or
 /// else one after the other.
 pub(super) fn render(
-    scene: &Arc<ReferenceScene>,
+    world: &World,
     id: &SceneId,
     views: &[&View],
     samples: u32,
     progress: Progress<'_>,
 ) -> Result<Vec<OurLight>, PrepError> {
-    let world = World::new(scene.clone())?;
     let settings = RenderSettings { samples, max_bounces: MAX_BOUNCES, ..Default::default() };
     let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
-    let lights = scene.lights.len();
+    let lights = world.scene().lights.len();
     let merged = |cameras: &[Camera]| {
         Ok::<_, PrepError>(LightGroups::within(DEFAULT_BASIS_BYTES, lights, cameras, 2)?.is_merged())
     };
@@ -59,7 +55,7 @@ pub(super) fn render(
         }
         let step = format!("{id} ours");
         let told = |done: usize, all: usize| progress(&step, pass * all + done, passes * all);
-        let rendered = render_views(&world, cameras, &groups, &settings, &seeds(id), &told)?;
+        let rendered = render_views(world, cameras, &groups, &settings, &seeds(id), &told)?;
         found.extend(rendered.views.iter().map(light));
     }
     Ok(found)
