@@ -39,19 +39,28 @@ struct Plan {
     files: Vec<(String, String)>,
 }
 
-/// Makes the scene in `folder`, from its source below `source`. Gives the licence that came with it.
+/// What a scene leaves beside its folder.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The licence that came with it.
+    pub licence: Option<LicenceText>,
+    /// Files that were looked for and were not there, as `scene.json` would tell them; sorted.
+    pub absent: Vec<String>,
+}
+
+/// Makes the scene in `folder`, from its source below `source`.
 pub fn build(
     recipe: &Recipe,
     entry: &RecipeScene,
     source: &Path,
     folder: &SceneFolder,
     progress: Progress<'_>,
-) -> Result<Option<LicenceText>, PrepError> {
+) -> Result<Built, PrepError> {
     progress("read the source", 0, 1);
     let read = source::read(recipe, entry, source)?;
     let licence = read.licence.clone();
     let (kind, house) = (read.kind.to_owned(), entry.house.clone().unwrap_or_else(|| read.house.clone()));
-    let mut plan = plan(recipe, entry, source, read)?;
+    let (mut plan, absent) = plan(recipe, entry, source, read)?;
     check_inputs(entry, &plan.files)?;
     make_folders(folder, &plan)?;
 
@@ -68,7 +77,7 @@ pub fn build(
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
     write_scene_file(plan, entry, [kind, house], &atlases, folder)?;
-    Ok(licence)
+    Ok(Built { licence, absent })
 }
 
 /// Every file read must be what the recipe pins, if it pins any.
@@ -92,7 +101,12 @@ fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), P
     Err(PrepError::Scene { scene: entry.id.to_string(), what })
 }
 
-fn plan(recipe: &Recipe, entry: &RecipeScene, source: &Path, mut read: SourceScene) -> Result<Plan, PrepError> {
+fn plan(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Path,
+    mut read: SourceScene,
+) -> Result<(Plan, Vec<String>), PrepError> {
     let fault = |what: String| PrepError::Scene { scene: entry.id.to_string(), what };
     if read.scene.surfaces.is_empty() {
         let what = format!("not one surface could be read of it:{}", Finding::list(&read.findings));
@@ -103,7 +117,8 @@ fn plan(recipe: &Recipe, entry: &RecipeScene, source: &Path, mut read: SourceSce
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
     let views = views_of(recipe, read.camera);
     let scene = std::sync::Arc::new(read.scene);
-    Ok(Plan { scene, instances, part_splits, views, findings: read.findings, file: read.file, files: read.files })
+    let SourceScene { findings, file, files, absent, .. } = read;
+    Ok((Plan { scene, instances, part_splits, views, findings, file, files }, absent))
 }
 
 /// The source's own parts, then those of the recipe's labels.
@@ -127,8 +142,11 @@ fn part_splits(
     if !faults.is_empty() {
         return Err(PrepError::Scene { scene: entry.id.to_string(), what: faults.join("; ") });
     }
-    read.files.extend(folder.into_hashes());
+    let labels = folder.into_files();
+    read.files.extend(labels.hashes);
     read.files.sort();
+    read.absent.extend(labels.absent);
+    read.absent.sort();
     splits.insert(0, own);
     Ok(splits)
 }
