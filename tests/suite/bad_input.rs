@@ -188,6 +188,45 @@ fn a_folder_that_is_no_dataset() {
     assert_eq!(files_below(folder.path()), [Path::new("none/notes.txt")]);
 }
 
+/// The room seen by a camera of its own; the views are those of the text.
+fn built_from(camera: &str, views: &str) -> Run {
+    let source = Source::new();
+    let text = std::fs::read_to_string(&source.recipe).unwrap();
+    std::fs::write(&source.recipe, format!("{}camera = {camera}\n", text.replace("views = []", views))).unwrap();
+    let built = source.build();
+    assert_eq!(built.code == Some(0), source.out().join("dataset.json").exists());
+    if built.code == Some(0) {
+        run(&mut verify(&source.out())).ends_with(0);
+    }
+    built
+}
+
+/// An input view without anything to score makes no scene; another view is told.
+#[test]
+fn cameras_that_see_nothing() {
+    let away = "{ position = [2.0, 1.5, 20.0], target = [2.0, 1.5, 30.0], fov_y_deg = 40.0 }";
+    let refused = built_from(away, "views = []").ends_with(2);
+    refused.says("scene 'room': the camera sees nothing that is scored").says("in the input view");
+    let towards = "{ position = [2.0, 1.5, 20.0], target = [2.0, 1.5, 2.0], fov_y_deg = 40.0 }";
+    let turned = "views = [{ id = \"behind\", x_deg = 0.0, y_deg = 180.0 }]";
+    let built = built_from(towards, turned).ends_with(0);
+    let told = "warning [nothing_seen] 'scene.xml' view 'behind': the camera sees nothing that is scored";
+    built.says(told);
+    // The twin.
+    assert!(!built_from(towards, "views = []").ends_with(0).stderr.contains("nothing_seen"));
+}
+
+/// Half a millimetre above the floor, where xatlas once aborted the program for lack of a fixed atlas size.
+#[test]
+fn a_camera_that_is_too_near() {
+    let above =
+        |height: f64| format!("{{ position = [2.0, {height}, 2.0], target = [1.0, {height}, 1.0], fov_y_deg = 60.0 }}");
+    let built = built_from(&above(0.000_2), "views = []").ends_with(0);
+    built.says("warning [camera_too_near] 'scene.xml' view 'input': something is ");
+    // The twin.
+    assert!(!built_from(&above(0.1), "views = []").ends_with(0).stderr.contains("camera_too_near"));
+}
+
 /// Nothing is overwritten without `--force`, and even with it nothing that is not what would be made.
 #[test]
 fn outputs_that_are_there() {

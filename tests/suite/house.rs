@@ -133,6 +133,34 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     build_from(&recipe, &source, &dataset).ends_with(0);
 }
 
+/// A designer's camera 2 mm from a wall: half its picture would be that wall's noise.
+#[test]
+fn cameras_in_a_wall_are_not_offered() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("source");
+    super::sample::copy_folder(&SURVEYED.source, &source);
+    let camera = r#"{ "pos": [0.002, 1.2, 0.5], "target": [0.002, 1.2, 4.0], "fov": 60.0 }"#;
+    let entry = format!(r#"{{ "cc000000-5a3b-4e00-8000-000000000001_7.jpg": {{ "camera": {camera} }} }}"#);
+    std::fs::write(source.join("cameras.json"), entry).unwrap();
+    let room_with = |name: &str, more: &str| {
+        let [rules, out] = [format!("{name}.toml"), name.to_owned()].map(|name| folder.path().join(name));
+        std::fs::write(&rules, format!("min_seen_objects = 0\nmax_outside = 1.0\n{more}")).unwrap();
+        let mut command = survey_of(&source, &out);
+        command.args(["--cameras", "cameras.json", "--rules"]).arg(&rules);
+        run(&mut command).ends_with(0);
+        json(&out.join("survey.json"))["houses"][0]["rooms"][0].clone()
+    };
+    let origins = |room: &Value| {
+        let cameras = room["cameras"].as_array().unwrap().iter();
+        cameras.map(|camera| camera["origin"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(origins(&room_with("default", "")), ["seed 1"]);
+    // The twin.
+    let mut both = origins(&room_with("any", "min_nearest_m = 0.0"));
+    both.sort();
+    assert_eq!(both, ["designer 7", "seed 1"]);
+}
+
 /// What every house needs is looked for first; a house named twice is surveyed once.
 #[test]
 fn a_survey_refuses_folders_that_are_not_there() {

@@ -91,6 +91,24 @@ fn half_written_scenes_are_made_again() {
     assert!(manifest(&out) == WHOLE.manifest);
 }
 
+/// A file that was missing when the scene was made is there now: the scene is made again, as a fresh build would make it.
+#[test]
+fn what_has_come_since_is_taken_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let (source, out) = (folder.path().join("source"), folder.path().join("dataset"));
+    let recipe = write_source(&source, SMALL, &["first", "second"]);
+    let [texture, aside] = ["room/textures/planks.png", "planks.png"].map(|name| source.join(name));
+    std::fs::rename(&texture, &aside).unwrap();
+    kill_when(&mut build(&recipe, &out), || out.join(".build/first.json").is_file());
+    // The twin: while it is missing still, the scene is as it would be.
+    kill_when(&mut build(&recipe, &out), || out.join("scenes/.second.partial/views/input/depth.exr").is_file());
+    assert!(out.join(".build/first.json").is_file() && !out.join("scenes/.first.partial").exists());
+    std::fs::rename(&aside, &texture).unwrap();
+    let again = run(&mut build(&recipe, &out)).ends_with(0);
+    assert!(!again.stderr.contains("already made"), "{}", again.stderr);
+    assert!(manifest(&out) == WHOLE.manifest);
+}
+
 #[test]
 fn another_recipe_does_not_go_on() {
     let folder = tempfile::tempdir().unwrap();

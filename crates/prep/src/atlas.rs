@@ -13,6 +13,8 @@ pub const CHOSEN_SIZES: (u32, u32) = (256, 4096);
 const XATLAS_LENGTH: f32 = 1000.0;
 /// Times that packing is tried at a smaller scale before giving up.
 const MAX_PACKS: u32 = 24;
+/// How much coarser packing is tried where it is not known by how much it was too fine.
+const OVERFLOW_STEP: f64 = 0.7;
 
 /// How large an atlas shall be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,18 +72,19 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
     let mut atlas = Xatlas::new();
     atlas.add_mesh(&decl).map_err(|error| AtlasError::Refused(format!("{error:?}")))?;
     atlas.compute_charts(&ChartOptions::default());
+    let side = mesh.area().sqrt() * f64::from(scale);
     match wish {
         SizeWish::Fixed(size) => {
-            pack_into(&mut atlas, f64::from(size) / f64::from(XATLAS_LENGTH), size)?;
+            pack_into(&mut atlas, f64::from(size) / f64::from(XATLAS_LENGTH), side, size)?;
             read_back(&atlas, mesh, size)
         }
         SizeWish::Texel(texel_m) => {
-            let mut size = pack_at_least(&mut atlas, 1.0 / (texel_m * f64::from(scale)))?;
+            let mut size = pack_at_least(&mut atlas, 1.0 / (texel_m * f64::from(scale)), side)?;
             let mut unwrapped = read_back(&atlas, mesh, size)?;
             // Packing may have had to go coarser than was asked for.
             while unwrapped.texel_m > texel_m && size < CHOSEN_SIZES.1 {
                 size *= 2;
-                pack_into(&mut atlas, 1.0 / (texel_m * f64::from(scale)), size)?;
+                pack_into(&mut atlas, 1.0 / (texel_m * f64::from(scale)), side, size)?;
                 unwrapped = read_back(&atlas, mesh, size)?;
             }
             Ok(unwrapped)
@@ -105,51 +108,74 @@ fn scaled_positions(mesh: &TriangleMesh) -> Result<(Vec<f32>, f32), AtlasError> 
 }
 
 /// Packs at `texels_per_unit` or finer into the least power of two that holds it; where even the largest does not, as
-/// fine as fits.
-fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64) -> Result<u32, AtlasError> {
+/// fine as fits. `side` is that of a square of the mesh's area, in units.
+fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64) -> Result<u32, AtlasError> {
     let (least, most) = CHOSEN_SIZES;
-    // As in `pack_into`.
-    let bounded = texels_per_unit.min(f64::from(most) / f64::from(XATLAS_LENGTH) * 4.0);
-    let side = pack(atlas, bounded);
-    if side == 0 {
-        return Err(AtlasError::NoArea);
-    }
-    if side > most {
-        pack_into(atlas, bounded * f64::from(most) / f64::from(side), most)?;
-        return Ok(most);
-    }
-    let size = side.next_power_of_two().clamp(least, most);
-    pack_into(atlas, bounded * f64::from(size) / f64::from(side), size)?;
+    // Charts do not overlap: no more than the largest square's own area can fit.
+    let density = texels_per_unit.min(f64::from(most) / side).min(density_bound(most, side));
+    let mut size = ((side * density).ceil() as u32).clamp(least, most).next_power_of_two();
+    let packed = loop {
+        match pack(atlas, density, size)? {
+            Packed::Side(packed) => break f64::from(packed),
+            Packed::Overflow if size == most => break f64::from(most) / OVERFLOW_STEP,
+            Packed::Overflow => size *= 2,
+        }
+    };
+    let size = (packed.ceil() as u32).next_power_of_two().clamp(least, most);
+    pack_into(atlas, density * f64::from(size) / packed, side, size)?;
     Ok(size)
 }
 
 /// Packs at `texels_per_unit`, or as little coarser as it takes, so that the atlas is no larger than `size`.
-fn pack_into(atlas: &mut Xatlas<'_>, texels_per_unit: f64, size: u32) -> Result<(), AtlasError> {
-    // Beyond four times its side no mesh fits, and xatlas would raster charts of any size.
-    let mut density = texels_per_unit.min(4.0 * f64::from(size) / f64::from(XATLAS_LENGTH));
+fn pack_into(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64, size: u32) -> Result<(), AtlasError> {
+    let mut density = texels_per_unit.min(density_bound(size, side));
     for _ in 0..MAX_PACKS {
-        let side = pack(atlas, density);
-        if side == 0 {
-            return Err(AtlasError::NoArea);
+        match pack(atlas, density, size)? {
+            Packed::Side(packed) if packed <= size => return Ok(()),
+            Packed::Side(packed) => density *= (f64::from(size) / f64::from(packed)).min(0.99) * 0.995,
+            Packed::Overflow => density *= OVERFLOW_STEP,
         }
-        if side <= size {
-            return Ok(());
-        }
-        density *= (f64::from(size) / f64::from(side)).min(0.99) * 0.995;
     }
     Err(AtlasError::DoesNotFit { charts: atlas.chart_count(), size })
 }
 
-/// Packs and gives the longer side in texels; 0 where there is no chart.
-fn pack(atlas: &mut Xatlas<'_>, texels_per_unit: f64) -> u32 {
+/// Texels a unit at which no mesh fits into `size` any more; finer, and xatlas would raster charts of any size.
+fn density_bound(size: u32, side: f64) -> f64 {
+    4.0 * f64::from(size) / f64::from(XATLAS_LENGTH).max(side)
+}
+
+/// What packing gave.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Packed {
+    /// The longer side in texels.
+    Side(u32),
+    /// More than the room that xatlas was given: at least a chart was made smaller, or is in another atlas.
+    Overflow,
+}
+
+/// Packs into a room of four times `size`, at most twice the largest atlas.
+///
+/// Without a room xatlas lets its atlas grow, tries 4096 random places for each chart, and **aborts** where none is free:
+/// of an atlas of 4096 texels, of which only the last rows and columns are, one time in fifty. With a room it makes a
+/// chart that is too long smaller and begins another atlas where it finds no place, and so always comes to an end.
+fn pack(atlas: &mut Xatlas<'_>, texels_per_unit: f64, size: u32) -> Result<Packed, AtlasError> {
+    let room = (4 * size).min(2 * CHOSEN_SIZES.1);
     atlas.pack_charts(&PackOptions {
         padding: GUTTER,
         texels_per_unit: texels_per_unit as f32,
-        resolution: 0,
+        resolution: room,
         bilinear: true,
         ..PackOptions::default()
     });
-    if atlas.chart_count() == 0 { 0 } else { atlas.width().max(atlas.height()) }
+    if atlas.chart_count() == 0 {
+        return Err(AtlasError::NoArea);
+    }
+    let meshes = atlas.meshes();
+    let vertices = meshes.into_iter().flat_map(|mesh| mesh.vertex_array).filter(|vertex| vertex.atlas_index >= 0);
+    let farthest = vertices.fold(0.0_f32, |farthest, vertex| farthest.max(vertex.uv[0]).max(vertex.uv[1]));
+    // Charts end in the middle of a texel; less what is lost in rounding.
+    let side = (farthest - 1e-3).ceil() as u32;
+    Ok(if atlas.atlas_count() > 1 || side >= room { Packed::Overflow } else { Packed::Side(side) })
 }
 
 fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwrapped, AtlasError> {
@@ -227,6 +253,7 @@ fn uv_area(mesh: &TriangleMesh) -> f64 {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use proptest::prelude::*;
 
     use super::*;
 
@@ -349,5 +376,75 @@ mod tests {
     fn the_same_twice() {
         let unwrap_once = || unwrap(&cuboid(Vec3::new(1.0, 2.0, 3.0)), SizeWish::Texel(0.01)).unwrap();
         assert_eq!(unwrap_once().mesh, unwrap_once().mesh);
+    }
+
+    /// A sheet of cells, each apart from its neighbours and turned another way, so that it is a chart of its own.
+    fn cells(count: u32, length: f32, width: f32) -> TriangleMesh {
+        let mut mesh = TriangleMesh::default();
+        for at in 0..count {
+            let (first, turn) = (4 * at, glam::Quat::from_rotation_y(0.7 * at as f32));
+            let corner = |x: f32, z: f32| turn * Vec3::new(x, 0.0, z) + Vec3::Y * (at as f32 * 0.1);
+            mesh.positions.extend([corner(0.0, 0.0), corner(0.0, width), corner(length, width), corner(length, 0.0)]);
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+        mesh
+    }
+
+    /// A band around the Y axis, open at both rims.
+    fn hoop(corners: u32, height: f32) -> TriangleMesh {
+        let angle = |at: u32| at as f32 / corners as f32 * std::f32::consts::TAU;
+        let at = |at: u32, y: f32| Vec3::new(angle(at).cos(), y, angle(at).sin());
+        TriangleMesh {
+            positions: (0..corners).flat_map(|k| [at(k, 0.0), at(k, height)]).collect(),
+            triangles: (0..corners)
+                .map(|k| [2 * k, 2 * k + 1, 2 * ((k + 1) % corners), 2 * ((k + 1) % corners) + 1])
+                .flat_map(|[a, b, c, d]| [[a, b, c], [c, b, d]])
+                .collect(),
+            ..Default::default()
+        }
+    }
+
+    /// As a camera at a wall wishes it: xatlas once aborted the program.
+    #[test]
+    fn a_wish_that_no_atlas_grants_gets_the_largest() {
+        for mesh in [cuboid(Vec3::new(4.0, 2.6, 0.1)), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)] {
+            for texel_m in [1e-5, 1e-12] {
+                let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
+                assert_eq!(unwrapped.size, 4096);
+                assert!(unwrapped.texel_m > texel_m);
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        /// Whatever is wished of whatever shape, there is an answer, on which everything has its place.
+        #[test]
+        fn every_wish_has_an_answer(
+            kind in 0..3,
+            count in 1_u32..120,
+            sides in [-3.0_f32..2.0, -3.0_f32..2.0, -3.0_f32..2.0],
+            wish in -13.0_f64..2.0,
+            fixed in prop::option::of(64_u32..=2048),
+        ) {
+            let [x, y, z] = sides.map(|side| 10.0_f32.powf(side));
+            let mesh = match kind {
+                0 => cuboid(Vec3::new(x, y, z)),
+                1 => cells(count, x, y),
+                _ => hoop(count.max(3), y),
+            };
+            let wish = fixed.map_or(SizeWish::Texel(10.0_f64.powf(wish)), SizeWish::Fixed);
+            match unwrap(&mesh, wish) {
+                Ok(unwrapped) => {
+                    let size = unwrapped.size;
+                    prop_assert!(SizeWish::Fixed(size) == wish || (256..=4096).contains(&size));
+                    let uvs = unwrapped.mesh.uvs.unwrap();
+                    prop_assert!(uvs.iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0));
+                    prop_assert!(unwrapped.coverage <= 1.0);
+                }
+                Err(error) => prop_assert!(matches!(error, AtlasError::DoesNotFit { .. }), "{error}"),
+            }
+        }
     }
 }

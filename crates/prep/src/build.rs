@@ -1,5 +1,6 @@
 //! A recipe carried out: scene by scene, each whole or not at all, going on where an earlier run was killed.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use mateval_scene::dataset::{DatasetFile, FORMAT, Licence, SceneFile, SourceFile, Target, TargetsFile};
@@ -8,8 +9,9 @@ use mateval_scene::work_folder::{WorkFolder, put_aside, remove_aside};
 use mateval_scene::{Finding, SceneId, json, manifest};
 use serde::{Deserialize, Serialize};
 
-use crate::build_scene;
+use crate::build_scene::{self, Built};
 use crate::error::PrepError;
+use crate::part_labels;
 use crate::recipe::{self, Recipe, RecipeScene};
 use mateval_scene::Progress;
 
@@ -67,19 +69,19 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         progress(&format!("scene {}", entry.id), at, recipe.scenes.len());
         let mark = options.out.join(BUILD).join(format!("{}.json", entry.id));
         let folder = SceneFolder::of(&options.out, &entry.id);
-        let finished = if resumes { finished_scene(&folder, &mark, &entry.root(&source)) } else { None };
-        let licence = match finished {
-            Some(licence) => {
+        let finished = if resumes { finished_scene(&folder, &mark, entry, &source) } else { None };
+        let made = match finished {
+            Some(mark) => {
                 // Of a run killed between making a scene anew and removing the old one.
                 remove_aside(folder.path())?;
                 report.resumed.push(entry.id.clone());
-                licence
+                mark
             }
             None => make_scene(&recipe, entry, &source, &folder, &mark, progress)?,
         };
         let file: SceneFile = json::read(&folder.scene_file())?;
         report.dataset.scenes.push(entry.id.clone());
-        report.dataset.licences.extend(licence.0);
+        report.dataset.licences.extend(made.licence);
         report.findings.push((entry.id.clone(), file.findings));
     }
     finish(&options.out, &recipe, &text, &mut report.dataset)?;
@@ -186,16 +188,35 @@ fn holds_only(folder: &Path, names: &[&str]) -> bool {
         .is_ok_and(|entries| entries.flatten().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
 }
 
-/// What a finished scene leaves in the build folder: its licence.
+/// What a finished scene leaves in the build folder.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-struct SceneMark(Option<Licence>);
+struct SceneMark {
+    licence: Option<Licence>,
+    /// Files that were looked for and were not there, as `scene.json` would tell them.
+    absent: Vec<String>,
+    /// All that was in the folders of labels, whether used or not.
+    labels: BTreeSet<PathBuf>,
+}
 
-/// A scene that an earlier run made of the same files as are there now.
-fn finished_scene(folder: &SceneFolder, mark: &Path, root: &Path) -> Option<SceneMark> {
-    let mark = json::read(mark).ok()?;
+/// A scene that an earlier run made of the same files as are there now: none is another one, and none has come since.
+fn finished_scene(folder: &SceneFolder, mark: &Path, entry: &RecipeScene, source: &Path) -> Option<SceneMark> {
+    let mark: SceneMark = json::read(mark).ok()?;
     let scene: SceneFile = json::read(&folder.scene_file()).ok()?;
+    let root = entry.root(source);
     let is_same = |file: &SourceFile| manifest::sha256_of_file(&root.join(&file.path)).is_ok_and(|h| h == file.sha256);
-    scene.source.files.iter().all(is_same).then_some(mark)
+    let is_absent = |file: &String| !root.join(file).exists();
+    let same = scene.source.files.iter().all(is_same) && mark.absent.iter().all(is_absent);
+    (same && mark.labels == label_files(entry, source)).then_some(mark)
+}
+
+/// The files in the folders of a scene's labels.
+fn label_files(entry: &RecipeScene, source: &Path) -> BTreeSet<PathBuf> {
+    let files = |folder: &PathBuf| {
+        // One that cannot be listed fails where it is read.
+        let names = part_labels::file_names(&entry.root(source).join(folder)).unwrap_or_default();
+        names.into_iter().map(|name| folder.join(name)).collect::<Vec<_>>()
+    };
+    entry.part_labels.values().flat_map(files).collect()
 }
 
 fn make_scene(
@@ -211,12 +232,15 @@ fn make_scene(
         std::fs::remove_file(mark).map_err(PrepError::io("remove", mark))?;
     }
     let work = WorkFolder::start(folder.path())?;
-    let licence = build_scene::build(recipe, entry, source, &SceneFolder::at(work.path().to_owned()), progress)?;
+    let labels = label_files(entry, source);
+    let Built { licence, absent } =
+        build_scene::build(recipe, entry, source, &SceneFolder::at(work.path().to_owned()), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
+    let made = SceneMark { licence, absent, labels };
     work.finish()?;
     // Only now: a scene without its mark is made again.
-    json::write(mark, &SceneMark(licence.clone()))?;
-    Ok(SceneMark(licence))
+    json::write(mark, &made)?;
+    Ok(made)
 }
 
 fn finish(out: &Path, recipe: &Recipe, text: &str, dataset: &mut DatasetFile) -> Result<(), PrepError> {

@@ -9,6 +9,7 @@ use mateval_scene::{PartSetId, SceneId, ViewId};
 use serde::Deserialize;
 
 use crate::error::PrepError;
+use crate::source::folder::SourceFolder;
 
 /// A recipe as written.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -270,6 +271,16 @@ impl RecipeScene {
             }
             (Ok(_), _) => {}
         }
+        for (set, folder) in &self.part_labels {
+            if SourceFolder::relative(&folder.to_string_lossy()).is_err() {
+                let below = if self.bitterli.is_some() { "the XML's folder" } else { "where the recipe's paths are" };
+                faults.push(format!(
+                    "scene '{}': part_labels.{set} = '{}': expected a folder below {below}, relative to it",
+                    self.id,
+                    folder.display()
+                ));
+            }
+        }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             faults.push(format!("scene '{}': exposure = {}: expected a number above 0", self.id, self.exposure));
         }
@@ -329,6 +340,20 @@ mod tests {
         let error = read_text(text).unwrap_err().to_string();
         for part in ["resolution = [4, 9]", "samples = 0", "'a' is there twice", "exposure = 0", "atlas_size = 9"] {
             assert!(error.contains(part), "{part} not in {error}");
+        }
+    }
+
+    #[test]
+    fn labels_lie_below_the_scenes_folder() {
+        let with = |folder: &str| {
+            let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'\npart_labels = { one = ";
+            read_text(&format!("{text}'{folder}' }}"))
+        };
+        with("labels/one").unwrap();
+        with("labels/../one").unwrap();
+        for bad in ["/labels", "../labels", "labels/../..", "."] {
+            let error = with(bad).unwrap_err().to_string();
+            assert!(error.contains(&format!("part_labels.one = '{bad}'")) && error.contains("XML's folder"), "{error}");
         }
     }
 

@@ -56,6 +56,8 @@ pub struct BitterliScene {
     pub licence: Option<LicenceText>,
     /// Every file read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
     pub source_files: Vec<(String, String)>,
+    /// Every file that was looked for and was not there; sorted.
+    pub absent_files: Vec<String>,
 }
 
 /// Reads the scene whose XML is at `xml_path`.
@@ -88,13 +90,15 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
     report_unused(&mut reader, &document);
     let title = title(licence.as_ref(), xml_path);
     let Reader { scene, log, source, .. } = reader;
+    let files = source.into_files();
     Ok(BitterliScene {
         title,
         scene,
         camera,
         findings: log.into_findings(),
         licence,
-        source_files: source.into_hashes(),
+        source_files: files.hashes,
+        absent_files: files.absent,
     })
 }
 

@@ -12,7 +12,7 @@ use mateval_scene::Camera;
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, PartSet, SceneFile, SceneSource, SourceFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::{Finding, ViewId, json, reference_io};
+use mateval_scene::{Finding, Severity, ViewId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
@@ -39,36 +39,46 @@ struct Plan {
     files: Vec<(String, String)>,
 }
 
-/// Makes the scene in `folder`, from its source below `source`. Gives the licence that came with it.
+/// What a scene leaves beside its folder.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The licence that came with it.
+    pub licence: Option<LicenceText>,
+    /// Files that were looked for and were not there, as `scene.json` would tell them; sorted.
+    pub absent: Vec<String>,
+}
+
+/// Makes the scene in `folder`, from its source below `source`.
 pub fn build(
     recipe: &Recipe,
     entry: &RecipeScene,
     source: &Path,
     folder: &SceneFolder,
     progress: Progress<'_>,
-) -> Result<Option<LicenceText>, PrepError> {
+) -> Result<Built, PrepError> {
     progress("read the source", 0, 1);
     let read = source::read(recipe, entry, source)?;
     let licence = read.licence.clone();
     let (kind, house) = (read.kind.to_owned(), entry.house.clone().unwrap_or_else(|| read.house.clone()));
-    let mut plan = plan(recipe, entry, source, read)?;
+    let (mut plan, absent) = plan(recipe, entry, source, read)?;
     check_inputs(entry, &plan.files)?;
     make_folders(folder, &plan)?;
 
     let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
     let hoped: Vec<bool> = plan.scene.surfaces.iter().map(has_appearance).collect();
-    let nearest = write_views(&plan, folder, &hoped, progress)?;
+    let mut seen = write_views(&plan, folder, &hoped, progress)?.or_refuse(entry)?;
     let atlas_size = entry.atlas_size.or(recipe.atlas_size);
-    let atlases = materials::write(&mut plan, folder, atlas_size, &nearest, progress)?;
+    let atlases = materials::write(&mut plan, folder, atlas_size, &seen.nearest, progress)?;
     let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
     if scored != hoped {
         // An instance without an atlas cannot be scored: its pixels must not be valid.
-        write_views(&plan, folder, &scored, progress)?;
+        seen = write_views(&plan, folder, &scored, progress)?.or_refuse(entry)?;
     }
+    plan.findings.extend(seen.findings);
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
     write_scene_file(plan, entry, [kind, house], &atlases, folder)?;
-    Ok(licence)
+    Ok(Built { licence, absent })
 }
 
 /// Every file read must be what the recipe pins, if it pins any.
@@ -92,7 +102,12 @@ fn check_inputs(entry: &RecipeScene, files: &[(String, String)]) -> Result<(), P
     Err(PrepError::Scene { scene: entry.id.to_string(), what })
 }
 
-fn plan(recipe: &Recipe, entry: &RecipeScene, source: &Path, mut read: SourceScene) -> Result<Plan, PrepError> {
+fn plan(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Path,
+    mut read: SourceScene,
+) -> Result<(Plan, Vec<String>), PrepError> {
     let fault = |what: String| PrepError::Scene { scene: entry.id.to_string(), what };
     if read.scene.surfaces.is_empty() {
         let what = format!("not one surface could be read of it:{}", Finding::list(&read.findings));
@@ -103,7 +118,8 @@ fn plan(recipe: &Recipe, entry: &RecipeScene, source: &Path, mut read: SourceSce
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
     let views = views_of(recipe, read.camera);
     let scene = std::sync::Arc::new(read.scene);
-    Ok(Plan { scene, instances, part_splits, views, findings: read.findings, file: read.file, files: read.files })
+    let SourceScene { findings, file, files, absent, .. } = read;
+    Ok((Plan { scene, instances, part_splits, views, findings, file, files }, absent))
 }
 
 /// The source's own parts, then those of the recipe's labels.
@@ -127,8 +143,11 @@ fn part_splits(
     if !faults.is_empty() {
         return Err(PrepError::Scene { scene: entry.id.to_string(), what: faults.join("; ") });
     }
-    read.files.extend(folder.into_hashes());
+    let labels = folder.into_files();
+    read.files.extend(labels.hashes);
     read.files.sort();
+    read.absent.extend(labels.absent);
+    read.absent.sort();
     splits.insert(0, own);
     Ok(splits)
 }
@@ -154,30 +173,80 @@ fn make_folders(folder: &SceneFolder, plan: &Plan) -> Result<(), PrepError> {
     Ok(())
 }
 
-/// Writes the pictures of every view. Gives the nearest depth in metres at which each instance is seen: in the input view,
-/// or where that does not show it in any other.
-fn write_views(
-    plan: &Plan,
-    folder: &SceneFolder,
-    scored: &[bool],
-    progress: Progress<'_>,
-) -> Result<Vec<Option<f64>>, PrepError> {
+/// What the pictures of all views showed.
+#[derive(Default)]
+struct Seen {
+    /// The nearest depth in metres at which each instance is seen: in the input view, or where that does not show it in any
+    /// other.
+    nearest: Vec<Option<f64>>,
+    /// Why there is nothing to score in the input view, if there is nothing.
+    nothing_in_input: Option<String>,
+    /// Of views that are hardly of use.
+    findings: Vec<Finding>,
+}
+
+impl Seen {
+    /// Without anything to score in the input view there is no scene.
+    fn or_refuse(self, entry: &RecipeScene) -> Result<Self, PrepError> {
+        match self.nothing_in_input {
+            Some(what) => Err(PrepError::Scene { scene: entry.id.to_string(), what }),
+            None => Ok(self),
+        }
+    }
+}
+
+/// Nearer than this many metres a surface fills the picture with its texels, and one that the camera lies in with noise.
+const TOO_NEAR_M: f64 = 0.001;
+
+/// Writes the pictures of every view.
+fn write_views(plan: &Plan, folder: &SceneFolder, scored: &[bool], progress: Progress<'_>) -> Result<Seen, PrepError> {
     let world = World::new(plan.scene.clone())?;
     let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
     let parts: Vec<(String, Vec<Vec<u16>>)> =
         plan.part_splits.iter().map(|split| (part_picture(split.id.as_ref()), split.values())).collect();
     let scene = ViewScene::new(&plan.scene, &world, &instances, scored);
+    let mut seen = Seen::default();
     let mut in_input = vec![None; plan.instances.len()];
     let mut elsewhere = vec![None; plan.instances.len()];
     for (at, view) in plan.views.iter().enumerate() {
         progress("views", at, plan.views.len());
         let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
+        note_use(plan, &view.id, &geometry, &mut seen);
         write_view(folder, &view.id, &geometry, &truth)?;
         write_parts(&folder.view(&view.id), &geometry, &parts)?;
     }
     progress("views", plan.views.len(), plan.views.len());
-    Ok(in_input.into_iter().zip(elsewhere).map(|(first, other): (Option<f64>, _)| first.or(other)).collect())
+    seen.nearest = in_input.into_iter().zip(elsewhere).map(|(first, other)| first.or(other)).collect();
+    Ok(seen)
+}
+
+/// Notes what makes a view of little use: nothing in it counts, or something is all but in the camera.
+fn note_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut Seen) {
+    let mut warn = |code: &str, message: String, action: &str| {
+        seen.findings.push(Finding {
+            severity: Severity::Warning,
+            code: code.to_owned(),
+            file: plan.file.clone(),
+            place: format!("view '{view}'"),
+            message,
+            action: action.to_owned(),
+        });
+    };
+    let nearest = geometry.depth.pixels().iter().copied().filter(|depth| *depth > 0.0).reduce(f32::min);
+    if let Some(nearest) = nearest.filter(|nearest| f64::from(*nearest) < TOO_NEAR_M) {
+        let message = format!("something is {nearest:.1e} m in front of the camera, expected {TOO_NEAR_M} m or more");
+        warn("camera_too_near", message, "kept; choose another camera, what is so near may be noise");
+    }
+    if geometry.valid.pixels().contains(&true) {
+        return;
+    }
+    let what = "the camera sees nothing that is scored: no pixel is valid";
+    if view.as_str() == INPUT {
+        seen.nothing_in_input = Some(format!("{what} in the input view; name another camera"));
+    } else {
+        warn("nothing_seen", what.to_owned(), "kept; it adds nothing to any score");
+    }
 }
 
 fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {

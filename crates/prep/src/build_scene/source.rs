@@ -39,6 +39,7 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
         findings: read.findings,
         licence: read.licence,
         files: read.source_files,
+        absent: read.absent_files,
     })
 }
 

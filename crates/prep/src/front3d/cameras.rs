@@ -31,7 +31,7 @@ pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut 
         let message = format!("it has no camera of the house '{}'", house.uid);
         log.push(mateval_scene::Severity::Note, "no_camera", &shown_path(beside), "", message, "used the house's own");
     }
-    let hash = folder.into_hashes().into_iter().next().map(|(_, hash)| (shown_path(beside), hash));
+    let hash = folder.into_files().hashes.into_iter().next().map(|(_, hash)| (shown_path(beside), hash));
     Ok(Cameras { all: if all.is_empty() { house.cameras.clone() } else { all }, hash })
 }
 

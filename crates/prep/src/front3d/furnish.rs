@@ -11,7 +11,7 @@ use super::house::{DesignerCamera, House};
 use super::limits::Limits;
 use super::model::Library;
 use super::{cameras, document, house_reader};
-use crate::source::folder::SourceFolder;
+use crate::source::folder::{LookedFor, SourceFolder};
 use crate::source::log::Log;
 use crate::source::{InstanceOrigin, SourceError};
 
@@ -83,6 +83,8 @@ pub struct FurnishedHouse {
     pub findings: Vec<Finding>,
     /// Every file read, relative to the root, and its SHA-256; sorted.
     pub files: Vec<(String, String)>,
+    /// Every file that was looked for and was not there; sorted.
+    pub absent: Vec<String>,
 }
 
 /// Reads a house, its models and its textures.
@@ -100,10 +102,9 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.room(room)).collect();
     let Furnished { scene, placed, mut log, libraries } = furnisher.finish();
     let cameras = cameras::all(&house, files, limits, &mut log)?;
-    let mut hashes: Vec<(String, String)> = libraries.into_iter().flat_map(Library::into_hashes).collect();
-    hashes.extend(house_folder.into_hashes().into_iter().map(|(_, hash)| (file.clone(), hash)));
-    hashes.extend(cameras.hash);
-    hashes.sort();
+    let mut looked_for = house_folder.into_files().renamed(|_| file.clone());
+    libraries.into_iter().map(Library::into_files).for_each(|files| looked_for.extend(files));
+    looked_for.extend(LookedFor { hashes: cameras.hash.into_iter().collect(), absent: Vec::new() });
     Ok(FurnishedHouse {
         cameras: cameras.all.into_iter().map(|camera| mirrored(camera, files.blenderproc_compat)).collect(),
         house,
@@ -112,7 +113,8 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
         placed,
         wanted_pieces,
         findings: log.into_findings(),
-        files: hashes,
+        files: looked_for.hashes,
+        absent: looked_for.absent,
     })
 }
 

@@ -5,7 +5,7 @@ use mateval_scene::{Severity, TriangleMesh};
 
 use super::limits::Limits;
 use crate::parts::labelled_parts;
-use crate::source::folder::SourceFolder;
+use crate::source::folder::{LookedFor, SourceFolder};
 use crate::source::log::{Log, shortened};
 use crate::source::obj::{self, ObjLimits, ObjMesh};
 use crate::source::surface_mesh::{has_area, to_world};
@@ -138,10 +138,9 @@ fn size_of_used(mesh: &TriangleMesh) -> f32 {
 }
 
 impl Library {
-    /// Every file read of it, as findings tell it, and its SHA-256.
-    pub(super) fn into_hashes(self) -> Vec<(String, String)> {
+    /// Every file looked for in it, as findings tell it.
+    pub(super) fn into_files(self) -> LookedFor {
         let name = self.name;
-        let shown = |file: String| if name.is_empty() { file } else { format!("{name}/{file}") };
-        self.folder.into_hashes().into_iter().map(|(file, hash)| (shown(file), hash)).collect()
+        self.folder.into_files().renamed(|file| if name.is_empty() { file } else { format!("{name}/{file}") })
     }
 }

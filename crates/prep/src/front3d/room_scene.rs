@@ -41,6 +41,7 @@ pub fn room_scene(house: &FurnishedHouse, room: usize, views: &[Camera]) -> Resu
         findings: house.findings.clone(),
         licence: None,
         files: house.files.clone(),
+        absent: house.absent.clone(),
     })
 }
 

@@ -1,6 +1,6 @@
 //! The scene's folder: file names from the XML made safe, files read within limits, each one's hash kept.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -23,13 +23,40 @@ pub(crate) struct SourceFolder {
     root: PathBuf,
     file_bytes: u64,
     hashes: BTreeMap<String, String>,
+    /// What was looked for and was not there.
+    absent: BTreeSet<String>,
+}
+
+/// Files that were looked for; both lists are sorted.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LookedFor {
+    /// What was read, and its SHA-256.
+    pub(crate) hashes: Vec<(String, String)>,
+    /// What was not there.
+    pub(crate) absent: Vec<String>,
+}
+
+impl LookedFor {
+    /// The same, with other names.
+    pub(crate) fn renamed(self, name: impl Fn(String) -> String) -> Self {
+        let hashes = self.hashes.into_iter().map(|(file, hash)| (name(file), hash)).collect();
+        Self { hashes, absent: self.absent.into_iter().map(name).collect() }
+    }
+
+    /// Takes in another's.
+    pub(crate) fn extend(&mut self, other: Self) {
+        self.hashes.extend(other.hashes);
+        self.hashes.sort();
+        self.absent.extend(other.absent);
+        self.absent.sort();
+    }
 }
 
 impl SourceFolder {
     /// `root` is the folder of the XML; no file of more than `file_bytes` is read.
     pub(crate) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
-        Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new() })
+        Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new(), absent: BTreeSet::new() })
     }
 
     /// The folder of the file at `path`, that file's name and its bytes; it may have at most `most_bytes`, others of the
@@ -92,11 +119,12 @@ impl SourceFolder {
     }
 
     /// Where the file `relative` is: an ordinary file inside the folder and within the limit.
-    pub(crate) fn path(&self, relative: &str) -> Result<PathBuf, FileFault> {
+    pub(crate) fn path(&mut self, relative: &str) -> Result<PathBuf, FileFault> {
         let short = crate::source::log::shortened(relative);
         let path = match self.root.join(relative).canonicalize() {
             Ok(path) => path,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                self.absent.insert(relative.to_owned());
                 return Err(FileFault { code: "missing_file", message: format!("the file '{short}' is not there") });
             }
             Err(error) => {
@@ -125,9 +153,14 @@ impl SourceFolder {
         self.hashes.get(relative).cloned()
     }
 
-    /// Every file that was read and its SHA-256, sorted by name.
-    pub(crate) fn into_hashes(self) -> Vec<(String, String)> {
-        self.hashes.into_iter().collect()
+    /// Where it is.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// What was looked for in it.
+    pub(crate) fn into_files(self) -> LookedFor {
+        LookedFor { hashes: self.hashes.into_iter().collect(), absent: self.absent.into_iter().collect() }
     }
 }
 
@@ -163,7 +196,8 @@ mod tests {
         assert_eq!(source.read("c").unwrap_err().code, "missing_file");
         std::fs::create_dir(folder.path().join("d")).unwrap();
         assert_eq!(source.read("d").unwrap_err().code, "unreadable_file");
-        assert_eq!(source.into_hashes().len(), 1);
+        let looked_for = source.into_files();
+        assert_eq!((looked_for.hashes.len(), looked_for.absent), (1, vec!["c".to_owned()]));
     }
 
     #[cfg(unix)]

@@ -3,6 +3,7 @@
 mod error;
 pub(crate) mod folder;
 pub(crate) mod log;
+pub(crate) mod npy;
 pub(crate) mod obj;
 pub(crate) mod surface_mesh;
 
@@ -51,4 +52,6 @@ pub struct SourceScene {
     pub licence: Option<LicenceText>,
     /// Every file read and its SHA-256 in hex; sorted.
     pub files: Vec<(String, String)>,
+    /// Every file that was looked for and was not there; sorted.
+    pub absent: Vec<String>,
 }

@@ -24,8 +24,8 @@ use crate::recipe::Offset;
 /// sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;
 
-/// Width of thumbnails.
-const THUMBNAIL_WIDTH: u32 = 320;
+/// Longer side of thumbnails.
+const THUMBNAIL_SIDE: u32 = 320;
 
 /// A house looked through.
 pub(super) struct HouseSurvey {
@@ -215,9 +215,9 @@ impl Look<'_> {
         let seen = self.seen(&small);
         let pieces: BTreeSet<usize> =
             seen.iter().flatten().map(|hit| hit.0).filter(|&k| self.is_furniture_of(k, room)).collect();
-        let turned = self.views.iter().map(|view| self.seen(&small.turned(view.x_deg, view.y_deg)));
-        let misses = |seen: &[Option<Seen>]| seen.iter().filter(|hit| hit.is_none()).count();
-        let all = misses(&seen) + turned.map(|seen| misses(&seen)).sum::<usize>();
+        let turned: Vec<Vec<Option<Seen>>> =
+            self.views.iter().map(|view| self.seen(&small.turned(view.x_deg, view.y_deg))).collect();
+        let all: usize = turned.iter().chain([&seen]).map(|seen| seen.iter().filter(|hit| hit.is_none()).count()).sum();
         let outside = all as f64 / (seen.len() * (1 + self.views.len())) as f64;
         let rules = &self.options.rules;
         if all == seen.len() * (1 + self.views.len()) || outside > rules.max_outside {
@@ -225,6 +225,13 @@ impl Look<'_> {
         }
         if pieces.len() < rules.min_seen_objects {
             return Err(format!("it sees {} pieces of furniture", pieces.len()));
+        }
+        let nearest_of_all = turned.iter().map(|seen| nearest(seen)).fold(nearest(&seen), f64::min);
+        if nearest_of_all < rules.min_nearest_m {
+            return Err(format!(
+                "something is {nearest_of_all:.1e} m away, expected at least {} m",
+                rules.min_nearest_m
+            ));
         }
         let surfaces: Vec<Option<usize>> =
             score_grid(&small.intrinsics).map(|place| Some(self.look_at(&small, place)?.0)).collect();
@@ -239,7 +246,7 @@ impl Look<'_> {
             target: (position + forward).to_array(),
             fov_y_deg,
             score: score(self.house, &surfaces),
-            nearest_m: seen.iter().flatten().map(|hit| hit.1).fold(f64::INFINITY, f64::min),
+            nearest_m: nearest(&seen),
             outside,
             seen_objects: pieces.len(),
         };
@@ -278,19 +285,24 @@ impl Look<'_> {
 /// Surface, distance in metres, colour as sRGB bytes.
 type Seen = (usize, f64, [u8; 3]);
 
+/// Metres to the nearest of what is seen; infinite where nothing is.
+fn nearest(seen: &[Option<Seen>]) -> f64 {
+    seen.iter().flatten().map(|hit| hit.1).fold(f64::INFINITY, f64::min)
+}
+
 /// The colour of what is outside: none that a room has.
 const OUTSIDE: [u8; 3] = [255, 0, 255];
 
 fn thumbnail_camera(camera: &Camera) -> Camera {
     let old = camera.intrinsics;
-    let scale = f64::from(THUMBNAIL_WIDTH) / f64::from(old.width);
-    let height = (f64::from(old.height) * scale).round().max(1.0);
+    let scale = f64::from(THUMBNAIL_SIDE) / f64::from(old.width.max(old.height));
+    let [width, height] = [old.width, old.height].map(|side| (f64::from(side) * scale).round().max(1.0));
     let intrinsics = Intrinsics {
-        width: THUMBNAIL_WIDTH,
+        width: width as u32,
         height: height as u32,
         fx: old.fx * scale,
         fy: old.fy * scale,
-        cx: old.cx * scale,
+        cx: (old.cx - f64::from(old.width) / 2.0) * scale + width / 2.0,
         cy: (old.cy - f64::from(old.height) / 2.0) * scale + height / 2.0,
     };
     Camera { intrinsics, ..*camera }
@@ -299,6 +311,23 @@ fn thumbnail_camera(camera: &Camera) -> Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn thumbnails_are_small_whatever_the_resolution() {
+        for ([width, height], expected) in [
+            ([480, 270], (320, 180)),
+            ([96, 72], (320, 240)),
+            ([16, 8192], (1, 320)),
+            ([8192, 16], (320, 1)),
+            ([300, 400], (240, 320)),
+        ] {
+            let intrinsics = Intrinsics::from_fov_y(width, height, 0.8);
+            let camera = Camera::look_at(glam::DVec3::ZERO, glam::DVec3::X, glam::DVec3::Y, intrinsics).unwrap();
+            let small = thumbnail_camera(&camera).intrinsics;
+            assert_eq!((small.width, small.height), expected);
+            assert_eq!((small.cx, small.cy), (f64::from(small.width) / 2.0, f64::from(small.height) / 2.0));
+        }
+    }
 
     #[test]
     fn ids_are_given_once() {

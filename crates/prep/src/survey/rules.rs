@@ -29,6 +29,10 @@ pub struct SelectionRules {
     pub max_outside: f64,
     /// Least pieces that the input view sees.
     pub min_seen_objects: usize,
+    /// Least metres from the camera to what any of the five views sees. Designers do stand close to things, unlike drawn
+    /// cameras, which keep a metre; but some of their cameras lie in the very plane of a wall, and half of such a picture
+    /// is noise.
+    pub min_nearest_m: f64,
 }
 
 impl Default for SelectionRules {
@@ -44,6 +48,7 @@ impl Default for SelectionRules {
             max_missing: 0,
             max_outside: 0.2,
             min_seen_objects: 2,
+            min_nearest_m: 0.01,
         }
     }
 }
