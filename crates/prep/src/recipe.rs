@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_image::limits::read_at_most;
 use mateval_scene::{PartSetId, SceneId, ViewId};
 use serde::Deserialize;
 
@@ -191,8 +192,10 @@ pub(crate) fn default_views() -> Vec<Offset> {
         .to_vec()
 }
 
-/// Largest recipe that is read, in bytes.
+/// Largest recipe, and file of rules, that is read, in bytes.
 const MAX_RECIPE_BYTES: u64 = 16 << 20;
+/// Farthest that a camera may stand, in metres along an axis: beyond, neighbouring numbers are centimetres apart.
+const FARTHEST_M: f64 = 1e6;
 /// Least and most pixels of a side.
 pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
 /// Least and most texels of an atlas's side.
@@ -200,15 +203,18 @@ pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 
 /// Reads a recipe; gives its text too, which the dataset keeps. Every fault is named at once.
 pub fn read(path: &Path) -> Result<(Recipe, String), PrepError> {
-    let length = std::fs::metadata(path).map_err(PrepError::io("read", path))?.len();
     let fault = |faults| PrepError::Recipe { path: path.to_owned(), faults };
-    if length > MAX_RECIPE_BYTES {
-        return Err(fault(vec![format!("{length} bytes; expected at most {MAX_RECIPE_BYTES}")]));
-    }
-    let text = std::fs::read_to_string(path).map_err(PrepError::io("read", path))?;
+    let text = read_text(path)?;
     let recipe: Recipe = toml::from_str(&text).map_err(|error| fault(vec![error.to_string().trim_end().to_owned()]))?;
     let faults = recipe.faults();
     if faults.is_empty() { Ok((recipe, text)) } else { Err(fault(faults)) }
+}
+
+/// The text of an ordinary file of at most [`MAX_RECIPE_BYTES`].
+pub(crate) fn read_text(path: &Path) -> Result<String, PrepError> {
+    let bytes = read_at_most(path, MAX_RECIPE_BYTES).map_err(PrepError::io("read", path))?;
+    let no_text = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "expected UTF-8, found other bytes");
+    String::from_utf8(bytes).map_err(no_text).map_err(PrepError::io("read", path))
 }
 
 impl Recipe {
