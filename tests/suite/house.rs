@@ -85,6 +85,11 @@ fn a_list_rejects_with_its_reason_and_a_survey_is_repeated_to_the_byte() {
     assert_eq!(listed["rejections"][0]["rule"], "listed");
     assert!(listed["rejections"][0]["reason"].as_str().unwrap().contains("the bed is made"), "{listed}");
     run(&mut survey_of(&SURVEYED.source, &out)).ends_with(2).says("--force");
+    for notes in ["notes.txt", "thumbnails/notes.txt"] {
+        std::fs::write(out.join(notes), "mine").unwrap();
+        run(survey_of(&SURVEYED.source, &out).arg("--force")).ends_with(2).says("choose another --out");
+        std::fs::remove_file(out.join(notes)).unwrap();
+    }
     run(survey_of(&SURVEYED.source, &out).arg("--force")).ends_with(0);
     for file in ["survey.json", "recipe.toml", "index.html"] {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
@@ -159,6 +164,56 @@ fn cameras_in_a_wall_are_not_offered() {
     let mut both = origins(&room_with("any", "min_nearest_m = 0.0"));
     both.sort();
     assert_eq!(both, ["designer 7", "seed 1"]);
+}
+
+/// What is rejected for its number of pieces is not searched for pairs that intersect: with thousands that takes minutes.
+#[test]
+fn crowded_rooms_are_not_searched() {
+    let folder = tempfile::tempdir().unwrap();
+    let [rules, out] = ["rules.toml", "survey"].map(|name| folder.path().join(name));
+    std::fs::write(&rules, "min_objects = 0\nmax_objects = 0\n").unwrap();
+    run(survey_of(&SURVEYED.source, &out).arg("--rules").arg(&rules)).ends_with(1);
+    let rooms = json(&out.join("survey.json"))["houses"][0]["rooms"].clone();
+    for room in rooms.as_array().unwrap() {
+        assert_eq!(room["rejections"][0]["rule"], "max_objects", "{room}");
+        assert_eq!(room["intersecting"], Value::Array(Vec::new()), "{room}");
+    }
+}
+
+/// Where things are on a machine is no part of a dataset: absolute paths are made relative, or refused.
+#[test]
+fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = &SURVEYED.source;
+    let [houses, models] = ["3D-FRONT", "3D-FUTURE-model"].map(|name| source.join("house").join(name));
+    let survey = |out: &str, more: &[&Path]| {
+        let mut command = mateval();
+        command.args(["prep", "survey", "--cameras-per-room", "1", "--resolution", "96", "72", "--out"]);
+        run(command.arg(folder.path().join(out)).arg(&houses).arg("--models").arg(&models).args(more))
+    };
+    let holds_place = |path: &Path| std::fs::read_to_string(path).unwrap().contains(source.to_str().unwrap());
+    let told = survey("absolute", &[]).ends_with(0);
+    let common = source.join("house").canonicalize().unwrap();
+    told.says(&format!("build with --source '{}'", common.display()));
+    let [recipe, surveyed] = ["recipe.toml", "survey.json"].map(|name| folder.path().join("absolute").join(name));
+    assert!(!holds_place(&recipe) && !holds_place(&surveyed));
+    survey("named", &[Path::new("--source"), source]).ends_with(0);
+    let text = std::fs::read_to_string(folder.path().join("named/recipe.toml")).unwrap();
+    assert!(text.contains("models = \"house/3D-FUTURE-model\""), "{text}");
+    survey("elsewhere", &[Path::new("--source"), &houses]).ends_with(2).says("with --source");
+
+    // A recipe by hand: what lies below the source is told relative to it, the rest is refused.
+    let text = std::fs::read_to_string(&recipe).unwrap();
+    let first = text.find("[scene.inputs]").unwrap();
+    let absolute = format!("atlas_size = 256\nviews = []\n{}", &text[..first])
+        .replace("models = \"3D-FUTURE-model\"", &format!("models = {models:?}"));
+    assert!(absolute.contains(models.to_str().unwrap()), "{absolute}");
+    std::fs::write(&recipe, &absolute).unwrap();
+    let dataset = folder.path().join("dataset");
+    build_from(&recipe, &houses, &dataset).ends_with(2).says("models: ").says("does not lie below").says("--source");
+    build_from(&recipe, &common, &dataset).ends_with(0);
+    let scene = json(&dataset.join("dataset.json"))["scenes"][0].as_str().unwrap().to_owned();
+    assert!(!holds_place(&dataset.join("scenes").join(scene).join("scene.json")));
 }
 
 /// What every house needs is looked for first; a house named twice is surveyed once.

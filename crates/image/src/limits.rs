@@ -1,5 +1,7 @@
-//! What the largest picture is that is read; checked on the header, before memory is taken.
+//! What the largest picture is that is read, checked on the header, before memory is taken; reading no more of any file
+//! than is wanted.
 
+use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
 use crate::ImageError;
@@ -27,11 +29,53 @@ pub fn check_size(path: &Path, width: u64, height: u64) -> Result<(), ImageError
 
 /// The file's bytes; fails where there are more than [`MAX_FILE_BYTES`].
 pub fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
-    let io = |source| ImageError::Io { action: "read", path: path.to_owned(), source };
-    let length = std::fs::metadata(path).map_err(io)?.len();
-    if length > MAX_FILE_BYTES {
-        let what = format!("{length} bytes; expected at most {MAX_FILE_BYTES}");
-        return Err(ImageError::Invalid { path: path.to_owned(), what });
+    read_at_most(path, MAX_FILE_BYTES).map_err(|source| ImageError::Io {
+        action: "read",
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// The bytes of an ordinary file; fails where there are more than `most`. What is no ordinary file, as `/dev/zero` or a
+/// pipe, is not opened: its length is not known, and it may have no end.
+pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
+    let data = std::fs::metadata(path)?;
+    if data.is_dir() {
+        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, expected a file"));
     }
-    std::fs::read(path).map_err(io)
+    if !data.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "it is not an ordinary file"));
+    }
+    let mut bytes = Vec::new();
+    // It may grow while it is read.
+    if data.len() <= most {
+        std::fs::File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    if data.len().max(bytes.len() as u64) > most {
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it has more than {most} bytes")));
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_is_read_than_is_wanted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, "abc").unwrap();
+        assert_eq!(read_at_most(&path, 3).unwrap(), b"abc");
+        assert_eq!(read_at_most(&path, 2).unwrap_err().kind(), ErrorKind::FileTooLarge);
+        assert_eq!(read_at_most(folder.path(), 3).unwrap_err().kind(), ErrorKind::IsADirectory);
+        assert_eq!(read_at_most(&folder.path().join("none"), 3).unwrap_err().kind(), ErrorKind::NotFound);
+    }
+
+    /// Their length is told as 0.
+    #[cfg(unix)]
+    #[test]
+    fn what_has_no_end_is_not_begun() {
+        assert!(read_at_most(Path::new("/dev/zero"), 3).unwrap_err().to_string().contains("not an ordinary file"));
+    }
 }

@@ -13,6 +13,7 @@ use crate::build_scene::{self, Built};
 use crate::error::PrepError;
 use crate::part_labels;
 use crate::recipe::{self, Recipe, RecipeScene};
+use crate::source::below::relative_below;
 use mateval_scene::Progress;
 
 /// The recipe as the dataset keeps it.
@@ -54,8 +55,9 @@ struct BuildKey {
 
 /// Carries the recipe out. `tool` is the name and version that the dataset is marked with.
 pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Result<BuildReport, PrepError> {
-    let (recipe, text) = recipe::read(&options.recipe)?;
+    let (mut recipe, text) = recipe::read(&options.recipe)?;
     let source = source_folder(options);
+    place_below(options, &mut recipe, &source)?;
     check_sources(options, &recipe, &source)?;
     let key = BuildKey {
         tool: tool.to_owned(),
@@ -93,6 +95,26 @@ fn source_folder(options: &BuildOptions) -> PathBuf {
     options.source.clone().unwrap_or_else(beside)
 }
 
+/// Makes the paths of all rooms relative to `source`: they end in the dataset.
+fn place_below(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
+    let mut faults = Vec::new();
+    for scene in &mut recipe.scenes {
+        let Some(room) = &mut scene.front3d else { continue };
+        let paths = [("house", Some(&mut room.house)), ("models", Some(&mut room.models))];
+        let paths = paths.into_iter().chain([("textures", room.textures.as_mut()), ("cameras", room.cameras.as_mut())]);
+        for (key, path) in paths.filter_map(|(key, path)| Some((key, path?))) {
+            match relative_below(path, source) {
+                Ok(relative) => *path = relative,
+                Err(what) => {
+                    let hint = "name the folder that holds house, models, textures and cameras with --source";
+                    faults.push(format!("scene '{}': {key}: {what}; {hint}", scene.id));
+                }
+            }
+        }
+    }
+    if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
+}
+
 /// Whatever can fail early must: every scene's sources are there, and are what the recipe pins, before the first is made.
 fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
     let mut faults: Vec<String> = recipe.scenes.iter().flat_map(|scene| missing_sources(scene, source)).collect();
@@ -128,7 +150,11 @@ fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<String> {
 /// What of `inputs` is missing or another file than it says.
 fn changed_inputs(scene: &RecipeScene, root: &Path) -> Vec<String> {
     let fault = |(path, pinned): (&String, &String)| {
-        let found = match manifest::sha256_of_file(&root.join(path)) {
+        let file = root.join(path);
+        if !file.is_file() {
+            return Some(format!("scene '{}': input '{path}' is not there, or is no ordinary file", scene.id));
+        }
+        let found = match manifest::sha256_of_file(&file) {
             Ok(found) if found == *pinned => return None,
             Ok(found) => format!("is {found}"),
             Err(error) => format!("cannot be read ({error})"),
@@ -183,7 +209,8 @@ fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepEr
     Ok(false)
 }
 
-fn holds_only(folder: &Path, names: &[&str]) -> bool {
+/// Whether nothing in the folder has another name.
+pub(crate) fn holds_only(folder: &Path, names: &[&str]) -> bool {
     std::fs::read_dir(folder)
         .is_ok_and(|entries| entries.flatten().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
 }

@@ -5,11 +5,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_image::limits::read_at_most;
 use mateval_scene::{PartSetId, SceneId, ViewId};
 use serde::Deserialize;
 
 use crate::error::PrepError;
 use crate::source::folder::SourceFolder;
+use crate::source::log::shortened;
 
 /// A recipe as written.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -191,8 +193,10 @@ pub(crate) fn default_views() -> Vec<Offset> {
         .to_vec()
 }
 
-/// Largest recipe that is read, in bytes.
+/// Largest recipe, and file of rules, that is read, in bytes.
 const MAX_RECIPE_BYTES: u64 = 16 << 20;
+/// Farthest that a camera may stand, in metres along an axis: beyond, neighbouring numbers are centimetres apart.
+const FARTHEST_M: f64 = 1e6;
 /// Least and most pixels of a side.
 pub(crate) const RESOLUTION: std::ops::RangeInclusive<u32> = 16..=8192;
 /// Least and most texels of an atlas's side.
@@ -200,15 +204,18 @@ pub const ATLAS_SIZES: std::ops::RangeInclusive<u32> = 64..=4096;
 
 /// Reads a recipe; gives its text too, which the dataset keeps. Every fault is named at once.
 pub fn read(path: &Path) -> Result<(Recipe, String), PrepError> {
-    let length = std::fs::metadata(path).map_err(PrepError::io("read", path))?.len();
     let fault = |faults| PrepError::Recipe { path: path.to_owned(), faults };
-    if length > MAX_RECIPE_BYTES {
-        return Err(fault(vec![format!("{length} bytes; expected at most {MAX_RECIPE_BYTES}")]));
-    }
-    let text = std::fs::read_to_string(path).map_err(PrepError::io("read", path))?;
+    let text = read_text(path)?;
     let recipe: Recipe = toml::from_str(&text).map_err(|error| fault(vec![error.to_string().trim_end().to_owned()]))?;
     let faults = recipe.faults();
     if faults.is_empty() { Ok((recipe, text)) } else { Err(fault(faults)) }
+}
+
+/// The text of an ordinary file of at most [`MAX_RECIPE_BYTES`].
+pub(crate) fn read_text(path: &Path) -> Result<String, PrepError> {
+    let bytes = read_at_most(path, MAX_RECIPE_BYTES).map_err(PrepError::io("read", path))?;
+    let no_text = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "expected UTF-8, found other bytes");
+    String::from_utf8(bytes).map_err(no_text).map_err(PrepError::io("read", path))
 }
 
 impl Recipe {
@@ -284,16 +291,28 @@ impl RecipeScene {
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             faults.push(format!("scene '{}': exposure = {}: expected a number above 0", self.id, self.exposure));
         }
-        let (finite, field) = match &self.camera {
+        for (file, hash) in &self.inputs {
+            if SourceFolder::relative(file).is_err() {
+                faults.push(format!("scene '{}': inputs: '{file}': expected a path below the scene's folder", self.id));
+            }
+            if hash.len() != 64 || !hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f')) {
+                let what = "expected a SHA-256, 64 lower-case hexadecimal digits";
+                faults.push(format!("scene '{}': inputs: '{file}' = '{}': {what}", self.id, shortened(hash)));
+            }
+        }
+        let (near, field) = match &self.camera {
             Some(RecipeCamera::Given(camera)) => {
-                (camera.position.iter().chain(&camera.target).all(|v| v.is_finite()), camera.fov_y_deg)
+                (camera.position.iter().chain(&camera.target).all(|v| v.abs() <= FARTHEST_M), camera.fov_y_deg)
             }
             Some(RecipeCamera::Seed { fov_y_deg, .. }) => (true, *fov_y_deg),
             Some(RecipeCamera::Designer(_)) | None => (true, 60.0),
         };
-        let sound = finite && field > 0.0 && field < 179.0;
+        let sound = near && field > 0.0 && field < 179.0;
         if !sound {
-            faults.push(format!("scene '{}': camera: expected finite points and 0 < fov_y_deg < 179", self.id));
+            faults.push(format!(
+                "scene '{}': camera: expected coordinates of at most {FARTHEST_M} m and 0 < fov_y_deg < 179",
+                self.id
+            ));
         }
     }
 }
@@ -340,6 +359,38 @@ mod tests {
         let error = read_text(text).unwrap_err().to_string();
         for part in ["resolution = [4, 9]", "samples = 0", "'a' is there twice", "exposure = 0", "atlas_size = 9"] {
             assert!(error.contains(part), "{part} not in {error}");
+        }
+    }
+
+    #[test]
+    fn cameras_stand_on_earth() {
+        let at = |x: &str| {
+            let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\n";
+            read_text(&format!("{text}camera = {{ position = [{x}, 0, 0], target = [0, 0, 0], fov_y_deg = 40 }}"))
+        };
+        at("1e6").unwrap();
+        for far in ["1.1e6", "-1e300", "inf", "nan"] {
+            assert!(at(far).unwrap_err().to_string().contains("camera: expected coordinates"), "{far}");
+        }
+    }
+
+    #[test]
+    fn inputs_are_hashes_of_files_below() {
+        let with = |file: &str, hash: &str| {
+            read_text(&format!("name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\ninputs = {{ '{file}' = '{hash}' }}"))
+        };
+        with("b/c.obj", &"0a".repeat(32)).unwrap();
+        for hash in ["", "0a", &"0A".repeat(32), &"0g".repeat(32), &"0a".repeat(33)] {
+            assert!(
+                with("c.obj", hash).unwrap_err().to_string().contains("64 lower-case hexadecimal digits"),
+                "{hash}"
+            );
+        }
+        for file in ["/dev/zero", "../c.obj"] {
+            assert!(
+                with(file, &"0a".repeat(32)).unwrap_err().to_string().contains("below the scene's folder"),
+                "{file}"
+            );
         }
     }
 

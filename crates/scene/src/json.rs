@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -26,11 +27,7 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
 
 /// Reads a file; what does not fit is an error with the line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
-    let length = std::fs::metadata(path).map_err(SceneError::io("read", path))?.len();
-    if length > MAX_JSON_BYTES {
-        return Err(invalid(path, String::new(), format!("{length} bytes; expected at most {MAX_JSON_BYTES}")));
-    }
-    let text = std::fs::read(path).map_err(SceneError::io("read", path))?;
+    let text = read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?;
     serde_json::from_slice(&text)
         .map_err(|error| invalid(path, format!("line {} column {}", error.line(), error.column()), error.to_string()))
 }

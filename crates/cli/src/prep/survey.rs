@@ -1,10 +1,10 @@
 //! `mateval prep survey`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use mateval_prep::survey::rules::{RejectionLists, SelectionRules};
-use mateval_prep::survey::{SurveyFile, SurveyOptions, survey};
+use mateval_prep::survey::{SurveyFile, SurveyOptions, Surveyed, survey};
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -16,9 +16,10 @@ pub struct SurveyArgs {
     /// Houses of 3D-FRONT (JSON), or folders of them, relative to --source.
     #[arg(required = true)]
     houses: Vec<PathBuf>,
-    /// Folder that all paths are relative to, as in a recipe.
-    #[arg(long, default_value = ".")]
-    source: PathBuf,
+    /// Folder that all paths are relative to, as in a recipe; the current one if absent, or the one that absolute paths
+    /// have in common.
+    #[arg(long)]
+    source: Option<PathBuf>,
     /// Folder of 3D-FUTURE's models, relative to --source.
     #[arg(long)]
     models: PathBuf,
@@ -82,10 +83,13 @@ pub fn run(args: &SurveyArgs) -> anyhow::Result<Outcome> {
         force: args.force,
     };
     let bars = Bars::new();
-    let file =
+    let Surveyed { file, source } =
         survey(&options, TOOL, &|step, done, all| bars.step(step, done, all)).context("cannot survey the houses")?;
     drop(bars);
     tell(&file);
+    if args.source.is_none() && source != Path::new(".") {
+        say(&format!("its paths are relative to '{0}': build with --source '{0}'", source.display()));
+    }
     let rooms = || file.houses.iter().flat_map(|house| &house.rooms);
     let offered = rooms().filter(|room| !room.cameras.is_empty()).count();
     let page = args.out.join("index.html");

@@ -1,5 +1,6 @@
 //! What readers of all kinds of source share: findings, files of strangers, OBJ, and the scene that comes of it.
 
+pub(crate) mod below;
 mod error;
 pub(crate) mod folder;
 pub(crate) mod log;

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::intersect::intersecting_pairs;
 use super::rules::{Rejection, RoomFacts};
-use super::{CandidateCamera, SurveyOptions, SurveyedRoom};
+use super::{CandidateCamera, SurveyOptions, SurveyedRoom, THUMBNAILS};
 use crate::error::PrepError;
 use crate::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
 use crate::front3d::{FurnishedHouse, Role};
@@ -47,7 +47,7 @@ pub(super) fn look_through(
         let (mut room, pictures) = look.room(room)?;
         for (camera, picture) in room.cameras.iter_mut().zip(pictures) {
             camera.scene = free_id(&camera.scene, taken);
-            camera.thumbnail = format!("thumbnails/{}.png", camera.scene);
+            camera.thumbnail = format!("{THUMBNAILS}/{}.png", camera.scene);
             survey.pictures.push((camera.thumbnail.clone(), picture));
         }
         survey.rooms.push(room);
@@ -92,7 +92,9 @@ impl Look<'_> {
         if rejections.is_empty() {
             let (found, refused) = self.cameras(room);
             if found.is_empty() {
-                rejections.push(Rejection::new("no_camera", refused.join("; ")));
+                let none = "none was drawn, and no designer's is in the room".to_owned();
+                let reason = if refused.is_empty() { none } else { refused.join("; ") };
+                rejections.push(Rejection::new("no_camera", reason));
             }
             for (camera, picture) in found {
                 pictures.push(picture);
@@ -118,7 +120,9 @@ impl Look<'_> {
         let furniture: Vec<usize> = (0..house.placed.len()).filter(|&k| self.is_furniture_of(k, room)).collect();
         let meshes: Vec<&TriangleMesh> = furniture.iter().map(|&k| &house.scene.surfaces[k].mesh).collect();
         let name = |place: usize| house.scene.surfaces[furniture[place]].name.clone();
-        let pairs = intersecting_pairs(&meshes)?;
+        // Each with each other: the room is rejected anyway.
+        let too_many = furniture.len() > self.options.rules.max_objects;
+        let pairs = if too_many { Vec::new() } else { intersecting_pairs(&meshes)? };
         let complete = |k: &&usize| matches!(house.placed[**k].role, Role::Furniture { complete: true, .. });
         let kinds: BTreeSet<&str> =
             furniture.iter().filter_map(|&k| house.placed[k].origin.super_category.as_deref()).collect();

@@ -22,8 +22,10 @@ use mateval_scene::{Progress, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::build::{RECIPE, holds_only};
 use crate::error::PrepError;
 use crate::front3d::{self, HouseFiles};
+use crate::source::below::{common_folder, relative_below};
 use crate::stats::{FindingCount, finding_counts};
 use candidates::HouseSurvey;
 use rules::{Rejection, RejectionLists, SelectionRules};
@@ -34,11 +36,16 @@ pub const SURVEY_FORMAT: &str = "mateval-survey/1";
 /// Its place in the output's folder.
 pub const SURVEY: &str = "survey.json";
 
+/// Other names in it.
+const PAGE: &str = "index.html";
+const THUMBNAILS: &str = "thumbnails";
+
 /// What to look through, and how.
 #[derive(Clone, Debug)]
 pub struct SurveyOptions {
-    /// Folder that all paths are relative to, as in a recipe.
-    pub source: PathBuf,
+    /// Folder that all paths are relative to, as in a recipe. Where there is none it is the current one or, if a path is
+    /// absolute, the one that all of them have in common.
+    pub source: Option<PathBuf>,
     /// Houses, or folders of houses.
     pub houses: Vec<PathBuf>,
     /// 3D-FUTURE's folder.
@@ -109,7 +116,7 @@ pub struct SurveyedRoom {
     pub super_categories: usize,
     /// Sides of its floor's box, metres; zeros without a floor.
     pub size_m: [f64; 2],
-    /// Pairs of pieces that stand in each other.
+    /// Pairs of pieces that stand in each other; not looked for in a room of more than `max_objects`.
     pub intersecting: Vec<[String; 2]>,
     /// Valid pieces without their model or texture.
     pub missing: usize,
@@ -145,35 +152,59 @@ pub struct CandidateCamera {
     pub thumbnail: String,
 }
 
+/// What a survey gave.
+#[derive(Clone, Debug)]
+pub struct Surveyed {
+    /// What was written as `survey.json`.
+    pub file: SurveyFile,
+    /// The folder that its paths, and its recipe's, are relative to.
+    pub source: PathBuf,
+}
+
 /// Looks through all houses and writes survey, page, thumbnails and recipe. A house that cannot be read is told in the
 /// survey and does not stop it.
-pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<SurveyFile, PrepError> {
+pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Result<Surveyed, PrepError> {
     check_folders(options)?;
-    let houses = house_files(options)?;
+    let source = source_folder(options)?;
+    let options = &below(options, &source)?;
+    let houses = house_files(options, &source)?;
     if options.out.exists() && !options.force {
         let what = "is already there; choose another --out, or add --force to replace it".to_owned();
         return Err(PrepError::Output { path: options.out.clone(), what });
     }
-    let is_survey = json::read::<SurveyFile>(&options.out.join(SURVEY)).is_ok_and(|file| file.format == SURVEY_FORMAT);
-    if options.out.exists() && !is_survey {
-        let what = "is there and is no survey: it is not replaced; choose another --out".to_owned();
+    if options.out.exists() && !is_only_a_survey(&options.out) {
+        let what =
+            "is there and is no survey, or holds more than one: it is not replaced; choose another --out".to_owned();
         return Err(PrepError::Output { path: options.out.clone(), what });
     }
     let work = WorkFolder::start(&options.out)?;
-    let thumbnails = work.path().join("thumbnails");
+    let thumbnails = work.path().join(THUMBNAILS);
     std::fs::create_dir_all(&thumbnails).map_err(PrepError::io("make", &thumbnails))?;
     let mut file =
         SurveyFile { format: SURVEY_FORMAT.to_owned(), tool: tool.to_owned(), seed: options.seed, houses: Vec::new() };
     let mut texts = RecipeTexts { head: recipe_text::head(options), ..Default::default() };
     for (at, house) in houses.iter().enumerate() {
         progress(&format!("house {}", house.display()), at, houses.len());
-        file.houses.push(survey_house(options, house, work.path(), &mut texts)?);
+        file.houses.push(survey_house(options, [&source, house], work.path(), &mut texts)?);
     }
     json::write(&work.path().join(SURVEY), &file)?;
-    write_whole(&work.path().join("recipe.toml"), texts.of_best(&file).as_bytes())?;
-    write_whole(&work.path().join("index.html"), page::page(&file, &texts).as_bytes())?;
+    write_whole(&work.path().join(RECIPE), texts.of_best(&file).as_bytes())?;
+    write_whole(&work.path().join(PAGE), page::page(&file, &texts).as_bytes())?;
     work.finish()?;
-    Ok(file)
+    Ok(Surveyed { file, source })
+}
+
+/// Whether a folder holds a survey and nothing that a survey does not make.
+fn is_only_a_survey(out: &Path) -> bool {
+    let Ok(file) = json::read::<SurveyFile>(&out.join(SURVEY)) else { return false };
+    let rooms = file.houses.iter().flat_map(|house| &house.rooms);
+    let pictures: Vec<&str> = rooms
+        .flat_map(|room| &room.cameras)
+        .filter_map(|camera| camera.thumbnail.strip_prefix("thumbnails/"))
+        .collect();
+    file.format == SURVEY_FORMAT
+        && holds_only(out, &[SURVEY, RECIPE, PAGE, THUMBNAILS])
+        && holds_only(&out.join(THUMBNAILS), &pictures)
 }
 
 /// Pieces of recipes, for whatever is picked.
@@ -205,12 +236,12 @@ impl RecipeTexts {
 
 fn survey_house(
     options: &SurveyOptions,
-    house: &Path,
+    [source, house]: [&Path; 2],
     out: &Path,
     texts: &mut RecipeTexts,
 ) -> Result<SurveyedHouse, PrepError> {
     let files = HouseFiles {
-        root: options.source.clone(),
+        root: source.to_owned(),
         house: house.to_owned(),
         models: options.models.clone(),
         textures: options.textures.clone(),
@@ -247,11 +278,53 @@ fn survey_house(
     })
 }
 
+/// The current folder.
+const HERE: &str = ".";
+
+/// Every path that was named.
+fn named_paths(options: &SurveyOptions) -> impl Iterator<Item = &PathBuf> {
+    options.houses.iter().chain([&options.models]).chain(&options.textures).chain(&options.cameras)
+}
+
+/// The folder that all paths shall be relative to.
+fn source_folder(options: &SurveyOptions) -> Result<PathBuf, PrepError> {
+    if let Some(source) = &options.source {
+        return Ok(source.clone());
+    }
+    if named_paths(options).all(|path| relative_below(path, Path::new(HERE)).is_ok()) {
+        return Ok(HERE.into());
+    }
+    common_folder(named_paths(options).map(PathBuf::as_path)).ok_or_else(|| {
+        let what = "has no folder in common with the other paths; put them into one, and name it with --source";
+        PrepError::Output { path: options.models.clone(), what: what.to_owned() }
+    })
+}
+
+/// The same with all paths relative to `source`: they end in the survey, in its recipe and in what is built from that.
+fn below(options: &SurveyOptions, source: &Path) -> Result<SurveyOptions, PrepError> {
+    let place = |path: &PathBuf| {
+        let chosen = options.source.is_none() && source != Path::new(HERE);
+        let path = if chosen { std::path::absolute(path).map_err(PrepError::io("find", path))? } else { path.clone() };
+        relative_below(&path, source).map_err(|what| PrepError::Output {
+            path: path.clone(),
+            what: format!("cannot be told in a recipe: {what}; name the folder that holds all with --source"),
+        })
+    };
+    Ok(SurveyOptions {
+        houses: options.houses.iter().map(place).collect::<Result<_, _>>()?,
+        models: place(&options.models)?,
+        textures: options.textures.as_ref().map(place).transpose()?,
+        cameras: options.cameras.as_ref().map(place).transpose()?,
+        ..options.clone()
+    })
+}
+
 /// What all houses need must be there: else each of them would have the same fault.
 fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
+    let source = options.source.as_deref().unwrap_or(Path::new(HERE));
     let folders = [Some(&options.models), options.textures.as_ref()].into_iter().flatten();
-    let missing_folder = folders.map(|path| options.source.join(path)).find(|path| !path.is_dir());
-    let files = options.cameras.iter().chain(&options.houses).map(|path| options.source.join(path));
+    let missing_folder = folders.map(|path| source.join(path)).find(|path| !path.is_dir());
+    let files = options.cameras.iter().chain(&options.houses).map(|path| source.join(path));
     let missing = missing_folder.or_else(|| files.into_iter().find(|path| !path.exists()));
     match missing {
         Some(path) => Err(PrepError::Output { path, what: "is not there; mend the path, or name --source".to_owned() }),
@@ -260,10 +333,10 @@ fn check_folders(options: &SurveyOptions) -> Result<(), PrepError> {
 }
 
 /// The files, and all JSON files of the folders, each once, sorted by folder; relative to the source's folder.
-fn house_files(options: &SurveyOptions) -> Result<Vec<PathBuf>, PrepError> {
+fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<PathBuf>, PrepError> {
     let mut files = Vec::new();
     for path in &options.houses {
-        let at = options.source.join(path);
+        let at = source.join(path);
         if !at.is_dir() {
             files.push(path.clone());
             continue;
@@ -275,10 +348,10 @@ fn house_files(options: &SurveyOptions) -> Result<Vec<PathBuf>, PrepError> {
         files.extend(names);
     }
     let mut seen = BTreeSet::new();
-    files.retain(|file| seen.insert(options.source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
+    files.retain(|file| seen.insert(source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
     if files.is_empty() {
         let what = "holds no house: expected JSON files of 3D-FRONT".to_owned();
-        return Err(PrepError::Output { path: options.source.clone(), what });
+        return Err(PrepError::Output { path: source.to_owned(), what });
     }
     Ok(files)
 }

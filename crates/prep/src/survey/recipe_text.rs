@@ -8,7 +8,8 @@ use super::{CandidateCamera, SurveyOptions};
 /// What stands before the scenes.
 pub(super) fn head(options: &SurveyOptions) -> String {
     let [width, height] = options.resolution;
-    format!("name = \"picked\"\nresolution = [{width}, {height}]\n")
+    let remark = "# Paths are relative to the folder that was surveyed: name it with --source.\n";
+    format!("{remark}name = \"picked\"\nresolution = [{width}, {height}]\n")
 }
 
 /// One scene but for its inputs, which follow.

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_image::limits::read_at_most;
 use serde::Deserialize;
 
 use crate::error::PrepError;
+use crate::recipe::read_text;
 
 /// What a room must be like. Every key may be left out of the file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -83,7 +85,7 @@ pub(super) struct RoomFacts {
 impl SelectionRules {
     /// Reads them from a TOML file.
     pub fn read(path: &Path) -> Result<Self, PrepError> {
-        let text = std::fs::read_to_string(path).map_err(PrepError::io("read", path))?;
+        let text = read_text(path)?;
         let faults = |what: String| PrepError::Rules { path: path.to_owned(), what };
         toml::from_str(&text).map_err(|error| faults(error.to_string().trim_end().to_owned()))
     }
@@ -128,6 +130,8 @@ pub struct RejectionLists {
     reasons: BTreeMap<String, String>,
 }
 
+/// Largest list that is read, in bytes.
+const MAX_LIST_BYTES: u64 = 64 << 20;
 /// Most rows of all lists together.
 const MAX_ROWS: usize = 1_000_000;
 
@@ -135,10 +139,10 @@ impl RejectionLists {
     /// Adds a CSV file of rows `id,reason`; the reason may be missing, lines that begin with `#` are remarks.
     pub fn add(&mut self, path: &Path) -> Result<(), PrepError> {
         let fault = |what: String| PrepError::Rules { path: path.to_owned(), what };
-        let file = std::fs::File::open(path).map_err(PrepError::io("read", path))?;
+        let rows = read_at_most(path, MAX_LIST_BYTES).map_err(PrepError::io("read", path))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut reader =
-            csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(file);
+            csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(&*rows);
         for row in reader.records() {
             let row = row.map_err(|error| fault(error.to_string()))?;
             let Some(id) = row.get(0).map(str::trim).filter(|id| !id.is_empty()) else { continue };
@@ -191,6 +195,7 @@ mod tests {
         assert_eq!(lists.reason("Room-2").unwrap().reason, "'Room-2' is in bad.csv: no reason given");
         assert_eq!(lists.reason("# rooms"), None);
         assert!(lists.add(&folder.path().join("none.csv")).is_err());
+        assert!(cfg!(not(unix)) || lists.add(Path::new("/dev/zero")).is_err());
     }
 
     #[test]
@@ -199,6 +204,7 @@ mod tests {
         let path = folder.path().join("rules.toml");
         std::fs::write(&path, "min_objects = 7\n").unwrap();
         assert_eq!(SelectionRules::read(&path).unwrap(), SelectionRules { min_objects: 7, ..Default::default() });
+        assert!(cfg!(not(unix)) || SelectionRules::read(Path::new("/dev/zero")).is_err());
         std::fs::write(&path, "min_object = 7\n").unwrap();
         assert!(SelectionRules::read(&path).unwrap_err().to_string().contains("min_object"));
     }
