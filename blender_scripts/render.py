@@ -3,9 +3,9 @@
     python render.py JOB.json                  with the bpy module
     blender -b -P render.py -- JOB.json        with a Blender
 
-Beside the job it writes, for each view, `<view>/geometry.exr`, `a.exr`, `b.exr` and `denoised.exr`, and `result.json`,
-which names the views that are whole. Lines on stdout that begin with `mateval:` tell how far it is. It ends with 0, or with
-1 and the reason in `result.json`.
+Beside the job it writes, for each view, `<view>/geometry.exr`, `centre.exr`, `a.exr`, `b.exr` and `denoised.exr`, and
+`result.json`, which names the views that are whole. Lines on stdout that begin with `mateval:` tell how far it
+is. It ends with 0, or with 1 and the reason in `result.json`.
 """
 
 import os
@@ -17,7 +17,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
-import bpy  # noqa: E402: the folder of this file must come first
+import bpy  # noqa: E402 (the folder of this file must come first)
 from mateval.cycles import light_passes, render_to, set_up  # noqa: E402
 from mateval.denoise import denoise_to  # noqa: E402
 from mateval.job import RESULT_FORMAT, Job, read_job, write_result  # noqa: E402
@@ -31,8 +31,13 @@ def main() -> None:
     """Carries out the job that the last word of the command line names."""
     path = Path(sys.argv[-1]).resolve()
     threading.Thread(target=end_with, kwargs={"parent": os.getppid()}, daemon=True).start()
-    result: Job = {"format": RESULT_FORMAT, "blender": bpy.app.version_string, "approximations": [], "views": [],
-                   "error": None}
+    result: Job = {
+        "format": RESULT_FORMAT,
+        "blender": bpy.app.version_string,
+        "approximations": [],
+        "views": [],
+        "error": None,
+    }
     code = 1
     try:
         carry_out_or_tell(path=path, result=result)
@@ -40,7 +45,7 @@ def main() -> None:
         sys.stdout.flush()
         sys.stderr.flush()
     finally:
-        # bpy 4.5 may hang when it is taken down in the ordinary way, and where the disk is full even a word about it fails.
+        # bpy 4.5 may hang when it is taken down in the ordinary way; where the disk is full even a word about it fails.
         os._exit(code)
 
 
@@ -48,7 +53,7 @@ def carry_out_or_tell(*, path: Path, result: Job) -> None:
     """Carries the job out; whatever stops it is told in the result."""
     try:
         carry_out(path=path, result=result)
-    except BaseException as error:  # noqa: BLE001: whatever it is
+    except BaseException as error:  # noqa: BLE001 (whatever it is)
         result["error"] = f"{type(error).__name__}: {error}"
         write_result(folder=path.parent, result=result)
         traceback.print_exc()
@@ -80,7 +85,9 @@ def carry_out(*, path: Path, result: Job) -> None:
         render_to(scene=built.scene, path=folder / view["id"] / "geometry.exr", samples=1, seed=0)
     built.show_light()
     for view in job["views"]:
-        result["views"].append({"id": view["id"], "seconds": render_view(built=built, job=job, view=view, folder=folder)})
+        result["views"].append(
+            {"id": view["id"], "seconds": render_view(built=built, job=job, view=view, folder=folder)}
+        )
         write_result(folder=folder, result=result)
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import bpy
+
 from mateval.job import Job, group_name
 from mateval.materials import BASE_COLOR, INSTANCE, PART
 

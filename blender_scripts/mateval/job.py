@@ -65,7 +65,9 @@ def lights_of_surfaces(*, job: Job) -> dict[int, int]:
             continue
         for surface in emission["surfaces"]:
             if surface in owner:
-                raise JobError(f"surface {surface} is in the light groups {owner[surface]} and {group}; Blender knows one")
+                raise JobError(
+                    f"surface {surface} is in the light groups {owner[surface]} and {group}; Blender knows one"
+                )
             owner[surface] = group
     return owner
 

@@ -4,13 +4,26 @@ The names of models and inputs are those of `reference.json` and `lights.json` (
 Cycles can only come near is said by `approximation`.
 """
 
-
 from pathlib import Path
 
 import bpy
+
 from mateval.job import Job
 from mateval.metal import edge_tint, reflectance
-from mateval.nodes import Socket, Tree, backfacing, constant, is_camera_ray, linear_map, mix, new, number, put, scaled, times
+from mateval.nodes import (
+    Socket,
+    Tree,
+    backfacing,
+    constant,
+    is_camera_ray,
+    linear_map,
+    mix,
+    new,
+    number,
+    put,
+    scaled,
+    times,
+)
 from mateval.nodes import math as operation
 from mateval.plastic import base_under_coat
 
@@ -145,12 +158,21 @@ def diffuse(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 def principled(*, tree: Tree, textures: Textures, model: Job) -> Socket:
     """Principled with all else at its default."""
     node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
-    put(tree=tree, socket=node.inputs["Base Color"],
-        value=color_of(tree=tree, textures=textures, given=model["base_color"]))
-    put(tree=tree, socket=node.inputs["Roughness"],
-        value=number_of(tree=tree, textures=textures, given=model["roughness"]))
-    put(tree=tree, socket=node.inputs["Metallic"],
-        value=number_of(tree=tree, textures=textures, given=model["metallic"]))
+    put(
+        tree=tree,
+        socket=node.inputs["Base Color"],
+        value=color_of(tree=tree, textures=textures, given=model["base_color"]),
+    )
+    put(
+        tree=tree,
+        socket=node.inputs["Roughness"],
+        value=number_of(tree=tree, textures=textures, given=model["roughness"]),
+    )
+    put(
+        tree=tree,
+        socket=node.inputs["Metallic"],
+        value=number_of(tree=tree, textures=textures, given=model["metallic"]),
+    )
     node.inputs["Specular IOR Level"].default_value = model["specular"]
     node.inputs["IOR"].default_value = 1.5
     return node.outputs[0]
@@ -174,10 +196,16 @@ def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
     node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
     node.distribution = "GGX"
     put(tree=tree, socket=node.inputs["Base Color"], value=color)
-    put(tree=tree, socket=node.inputs["Roughness"],
-        value=roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"]))
-    put(tree=tree, socket=node.inputs["Specular Tint"],
-        value=color_of(tree=tree, textures=textures, given=model["specular_reflectance"]))
+    put(
+        tree=tree,
+        socket=node.inputs["Roughness"],
+        value=roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"]),
+    )
+    put(
+        tree=tree,
+        socket=node.inputs["Specular Tint"],
+        value=color_of(tree=tree, textures=textures, given=model["specular_reflectance"]),
+    )
     node.inputs["IOR"].default_value = model["eta"]
     return node.outputs[0]
 
@@ -224,8 +252,9 @@ def thin_dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
     index = operation(tree=tree, operation="MULTIPLY_ADD", values=[behind, 1.0 / eta - eta, eta])
     one = new(tree=tree, kind="ShaderNodeFresnel", IOR=index).outputs[0]
     twice = operation(tree=tree, operation="MULTIPLY", values=[one, 2.0])
-    both = operation(tree=tree, operation="DIVIDE",
-                     values=[twice, operation(tree=tree, operation="ADD", values=[one, 1.0])])
+    both = operation(
+        tree=tree, operation="DIVIDE", values=[twice, operation(tree=tree, operation="ADD", values=[one, 1.0])]
+    )
     through = color_of(tree=tree, textures=textures, given=model["specular_transmittance"])
     back = color_of(tree=tree, textures=textures, given=model["specular_reflectance"])
     clear = new(tree=tree, kind="ShaderNodeBsdfTransparent", Color=through).outputs[0]
@@ -310,8 +339,11 @@ def clear(*, tree: Tree) -> Socket:
 
 def is_covered(*, tree: Tree, opacity: Socket) -> Socket:
     """1 where the surface counts as there."""
-    return operation(tree=tree, operation="LESS_THAN", values=[COVERED, operation(
-        tree=tree, operation="ADD", values=[opacity, 1e-6])])
+    return operation(
+        tree=tree,
+        operation="LESS_THAN",
+        values=[COVERED, operation(tree=tree, operation="ADD", values=[opacity, 1e-6])],
+    )
 
 
 def bend(*, tree: Tree, textures: Textures, bump: Job | None) -> None:
@@ -326,7 +358,7 @@ def bend(*, tree: Tree, textures: Textures, bump: Job | None) -> None:
 
 
 def lamp(*, tree: Tree, textures: Textures, surface: Socket, light: Job) -> Socket:
-    """A surface that glows; one hidden from the camera shows it the surface alone, and every other ray the light alone."""
+    """A surface that glows; a hidden one shows the camera the surface alone and every other ray the light alone."""
     emission = light["emission"]
     radiance = constant(tree=tree, color=emission["radiance"])
     if emission.get("map") is not None:

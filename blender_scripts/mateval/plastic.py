@@ -25,8 +25,8 @@ def diffuse_reflectance(*, eta: float) -> float:
 def base_under_coat(*, eta: float, nonlinear: bool) -> tuple[float, float]:
     """(scale, inner): a base of reflectance rho looks like rho * scale / (1 - rho * inner) through the coat.
 
-    Mitsuba's plastic: what enters (1 - F outside) / eta^2, times what leaves after any number of reflections inside. With
-    `nonlinear` the base's colour takes part in each of them, without it none of them takes anything.
+    Mitsuba's plastic: what enters, (1 - F outside) / eta^2, times what leaves after any number of reflections inside.
+    With `nonlinear` the base's colour takes part in each of them, without it none of them takes anything.
     """
     outside, inside = diffuse_reflectance(eta=eta), diffuse_reflectance(eta=1.0 / eta)
     enters = (1.0 - outside) / (eta * eta)

@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import bpy
+from mathutils import Matrix
+
 from mateval.camera import lens
 from mateval.job import Job, group_name, lights_of_surfaces, read_numbers
 from mateval.materials import INSTANCE, PART, UV_LAYER, Textures, approximation, geometry_material, surface_material
-from mathutils import Matrix
 from mateval.world import add_world
 
 SENSOR_WIDTH = 36.0

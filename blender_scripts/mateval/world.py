@@ -1,6 +1,7 @@
 """What shines from outside."""
 
 import bpy
+
 from mateval.environment import blender_from_world
 from mateval.job import Job, group_name, light_of_world
 from mateval.materials import Textures
@@ -20,8 +21,9 @@ def add_world(*, scene: bpy.types.Scene, job: Job, textures: Textures) -> None:
         return
     light = job["lights"][group]
     world.lightgroup = group_name(group=group)
-    shader = new(tree=tree, kind="ShaderNodeBackground", Color=radiance(tree=tree, textures=textures, light=light),
-                 Strength=1.0).outputs[0]
+    shader = new(
+        tree=tree, kind="ShaderNodeBackground", Color=radiance(tree=tree, textures=textures, light=light), Strength=1.0
+    ).outputs[0]
     if not light["camera_visible"]:
         black = new(tree=tree, kind="ShaderNodeBackground", Strength=0.0).outputs[0]
         shader = mix(tree=tree, factor=is_camera_ray(tree=tree), first=shader, second=black)

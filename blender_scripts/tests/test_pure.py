@@ -10,7 +10,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mateval.camera import lens  # noqa: E402: the folder above must come first
+from mateval.camera import lens  # noqa: E402 (the folder above must come first)
 from mateval.environment import blender_from_world  # noqa: E402
 from mateval.job import JobError, light_of_world, lights_of_surfaces, read_job, read_numbers, write_result  # noqa: E402
 from mateval.metal import EDGE_COSINE, edge_tint, reflectance  # noqa: E402

@@ -189,6 +189,8 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     let survey = |out: &str, more: &[&Path]| {
         let mut command = mateval();
         command.args(["prep", "survey", "--cameras-per-room", "1", "--resolution", "96", "72", "--out"]);
+        // Elsewhere: where all paths lie below the current folder, that is the source.
+        command.current_dir(folder.path());
         run(command.arg(folder.path().join(out)).arg(&houses).arg("--models").arg(&models).args(more))
     };
     let holds_place = |path: &Path| std::fs::read_to_string(path).unwrap().contains(source.to_str().unwrap());

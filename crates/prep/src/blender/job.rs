@@ -1,7 +1,7 @@
 //! A job for `blender_scripts/render.py`: its JSON and the files beside it.
 //!
-//! In: a reference scene, its instances' parts, views. Out: a folder with `job.json`, meshes as raw little-endian numbers
-//! and textures as linear EXR. Textures are decoded here: Cycles interpolates 8-bit sRGB before it decodes
+//! In: a reference scene, its instances' parts, views. Out: a folder with `job.json`, meshes as raw little-endian
+//! numbers and textures as linear EXR. Textures are decoded here: Cycles interpolates 8-bit sRGB before it decodes
 //! it, and we after.
 
 use std::path::Path;

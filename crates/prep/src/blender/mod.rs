@@ -1,7 +1,7 @@
 //! Blender's Cycles as a renderer: a job goes out, pictures come back.
 //!
-//! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes what Blender needs into a folder,
-//! `scripts` puts `blender_scripts` beside it, `process` runs Blender and watches it, `view_files` reads what it made.
+//! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes what Blender needs into a
+//! folder, `scripts` puts `blender_scripts` beside it, `process` runs Blender and watches it, `view_files` reads what it made.
 
 pub mod job;
 mod process;

@@ -31,21 +31,28 @@ pub struct BlenderLimits {
 pub enum Ended {
     /// By itself.
     Itself(ExitStatus),
-    /// It took longer than it may, and was ended.
-    TooLong,
-    /// It said nothing for longer than it may, and was ended.
-    Silent,
-    /// It took more memory than it may (so many bytes), and was ended.
-    TooMuchMemory(u64),
+    /// It took longer than this, which it may, and was ended.
+    TooLong(Duration),
+    /// It said nothing for longer than this, which it may, and was ended.
+    Silent(Duration),
+    /// It took so many bytes of memory, more than it may, and was ended.
+    TooMuchMemory {
+        /// What it took.
+        bytes: u64,
+        /// What it may take.
+        most: u64,
+    },
 }
 
 impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Itself(status) => write!(f, "it ended with {status}"),
-            Self::TooLong => write!(f, "it took longer than it may and was ended"),
-            Self::Silent => write!(f, "it said nothing for longer than it may and was ended"),
-            Self::TooMuchMemory(bytes) => write!(f, "it took {} MiB, more than it may, and was ended", bytes >> 20),
+            Self::TooLong(most) => write!(f, "it took longer than {} s and was ended", most.as_secs()),
+            Self::Silent(most) => write!(f, "it said nothing for {} s and was ended", most.as_secs()),
+            Self::TooMuchMemory { bytes, most } => {
+                write!(f, "it took {} MiB of memory, more than {} MiB, and was ended", bytes >> 20, most >> 20)
+            }
         }
     }
 }
@@ -69,8 +76,8 @@ impl BlenderProgram {
     }
 }
 
-/// Runs the command until it ends or breaks a limit. All that it prints goes to `log`, and line by line to `hear`, which is
-/// also called with nothing now and then.
+/// Runs the command until it ends or breaks a limit. All that it prints goes to `log`, and line by line to `hear`, which
+/// is also called with nothing now and then.
 pub fn run(
     mut command: Command,
     log: &Path,
@@ -97,13 +104,14 @@ pub fn run(
             return Ok(Ended::Itself(status));
         }
         if start.elapsed() > limits.time {
-            return Ok(Ended::TooLong);
+            return Ok(Ended::TooLong(limits.time));
         }
         if last_line.elapsed() > limits.silence {
-            return Ok(Ended::Silent);
+            return Ok(Ended::Silent(limits.silence));
         }
-        if let Some(bytes) = resident_bytes(child.0.id()).filter(|bytes| *bytes > limits.memory_bytes) {
-            return Ok(Ended::TooMuchMemory(bytes));
+        let most = limits.memory_bytes;
+        if let Some(bytes) = resident_bytes(child.0.id()).filter(|bytes| *bytes > most) {
+            return Ok(Ended::TooMuchMemory { bytes, most });
         }
         std::thread::sleep(LOOK);
     }

@@ -113,8 +113,8 @@ pub struct RenderFile {
     pub seeds: [String; 2],
     /// Scatterings after which a path is cut.
     pub max_bounces: u32,
-    /// What cut paths still carried, averaged over all: times the radiance there, the light that is missing. Null where the
-    /// renderer does not tell.
+    /// What cut paths still carried, averaged over all: times the radiance there, the light that is missing. Null
+    /// where the renderer does not tell.
     pub capped_throughput: Option<f64>,
     /// What took the noise out of `rgb`; null where that is the plain mean of the halves.
     pub denoiser: Option<String>,
@@ -124,8 +124,8 @@ pub struct RenderFile {
     pub approximations: Vec<String>,
 }
 
-/// Renders, then names the scored renderer and renews the manifest. Views that are there with the same settings are kept, so
-/// that a killed run goes on; a scene that Blender cannot render is a failure in the report, and the others go on.
+/// Renders, then names the scored renderer and renews the manifest. Views that are there with the same settings are
+/// kept, so that a killed run goes on; a scene that Blender cannot render is a failure in the report, and the others go on.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let mut dataset: DatasetFile = json::read(&root.join(DATASET))?;
     check_scenes(root, &dataset, options)?;

@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct RenderNoise {
     /// Of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
     pub mean_of_halves_mse: f64,
-    /// Of (rgb - a) (rgb - b): how far the denoised picture is from the truth, the halves' noise taken out (so it may be
-    /// slightly below 0); null where `rgb` is the plain mean.
+    /// Of (rgb - a) (rgb - b): how far the denoised picture is from the truth, the halves' noise taken out (so it
+    /// may be slightly below 0); null where `rgb` is the plain mean.
     pub denoised_mse: Option<f64>,
 }
 
