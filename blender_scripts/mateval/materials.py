@@ -23,6 +23,7 @@ from mateval.nodes import (
     put,
     scaled,
     times,
+    vector_math,
 )
 from mateval.nodes import math as operation
 from mateval.plastic import base_under_coat
@@ -65,8 +66,7 @@ class Textures:
         uv.uv_map = UV_LAYER
         place = uv.outputs["UV"]
         if lookup["uv"] != IDENTITY:
-            place = new(tree=tree, kind="ShaderNodeVectorMath", Vector=place).outputs["Vector"]
-            place.node.inputs[1].default_value = (0.0, 0.0, 1.0)
+            place = vector_math(tree=tree, operation="ADD", values=[place, (0.0, 0.0, 1.0)])
             place = linear_map(tree=tree, vector=place, rows=lookup["uv"])
         tree.links.new(place, node.inputs["Vector"])
         return node.outputs["Color"]
@@ -157,25 +157,15 @@ def diffuse(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 def principled(*, tree: Tree, textures: Textures, model: Job) -> Socket:
     """Principled with all else at its default."""
-    node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
-    put(
+    return new(
         tree=tree,
-        socket=node.inputs["Base Color"],
-        value=color_of(tree=tree, textures=textures, given=model["base_color"]),
-    )
-    put(
-        tree=tree,
-        socket=node.inputs["Roughness"],
-        value=number_of(tree=tree, textures=textures, given=model["roughness"]),
-    )
-    put(
-        tree=tree,
-        socket=node.inputs["Metallic"],
-        value=number_of(tree=tree, textures=textures, given=model["metallic"]),
-    )
-    node.inputs["Specular IOR Level"].default_value = model["specular"]
-    node.inputs["IOR"].default_value = 1.5
-    return node.outputs[0]
+        kind="ShaderNodeBsdfPrincipled",
+        Base_Color=color_of(tree=tree, textures=textures, given=model["base_color"]),
+        Roughness=number_of(tree=tree, textures=textures, given=model["roughness"]),
+        Metallic=number_of(tree=tree, textures=textures, given=model["metallic"]),
+        Specular_IOR_Level=model["specular"],
+        IOR=1.5,
+    ).outputs[0]
 
 
 def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
@@ -185,28 +175,17 @@ def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
     color = times(tree=tree, color=given, factor=(scale, scale, scale))
     if inner > 0.0:
         lost = times(tree=tree, color=given, factor=(-inner, -inner, -inner))
-        rest = tree.nodes.new("ShaderNodeVectorMath")
-        tree.links.new(lost, rest.inputs[0])
-        rest.inputs[1].default_value = (1.0, 1.0, 1.0)
-        divide = tree.nodes.new("ShaderNodeVectorMath")
-        divide.operation = "DIVIDE"
-        tree.links.new(color, divide.inputs[0])
-        tree.links.new(rest.outputs["Vector"], divide.inputs[1])
-        color = divide.outputs["Vector"]
-    node = new(tree=tree, kind="ShaderNodeBsdfPrincipled")
+        rest = vector_math(tree=tree, operation="ADD", values=[lost, (1.0, 1.0, 1.0)])
+        color = vector_math(tree=tree, operation="DIVIDE", values=[color, rest])
+    node = new(
+        tree=tree,
+        kind="ShaderNodeBsdfPrincipled",
+        Base_Color=color,
+        Roughness=roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"]),
+        Specular_Tint=color_of(tree=tree, textures=textures, given=model["specular_reflectance"]),
+        IOR=model["eta"],
+    )
     node.distribution = "GGX"
-    put(tree=tree, socket=node.inputs["Base Color"], value=color)
-    put(
-        tree=tree,
-        socket=node.inputs["Roughness"],
-        value=roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"]),
-    )
-    put(
-        tree=tree,
-        socket=node.inputs["Specular Tint"],
-        value=color_of(tree=tree, textures=textures, given=model["specular_reflectance"]),
-    )
-    node.inputs["IOR"].default_value = model["eta"]
     return node.outputs[0]
 
 

@@ -47,13 +47,18 @@ def math(*, tree: Tree, operation: str, values: Sequence[Socket | float]) -> Soc
     return node.outputs[0]
 
 
+def vector_math(*, tree: Tree, operation: str, values: Sequence[Socket | Sequence[float]]) -> Socket:
+    """One operation on vectors or colours, channel by channel."""
+    node = tree.nodes.new("ShaderNodeVectorMath")
+    node.operation = operation
+    for socket, value in zip(node.inputs, values, strict=False):
+        put(tree=tree, socket=socket, value=value)
+    return node.outputs["Vector"]
+
+
 def times(*, tree: Tree, color: Socket, factor: Socket | Sequence[float]) -> Socket:
     """Two colours multiplied, channel by channel."""
-    node = tree.nodes.new("ShaderNodeVectorMath")
-    node.operation = "MULTIPLY"
-    tree.links.new(color, node.inputs[0])
-    put(tree=tree, socket=node.inputs[1], value=factor)
-    return node.outputs["Vector"]
+    return vector_math(tree=tree, operation="MULTIPLY", values=[color, factor])
 
 
 def scaled(*, tree: Tree, color: Socket, factor: Socket) -> Socket:

@@ -56,7 +56,7 @@ pub fn by_mitsuba(cases: Vec<Case>) -> Vec<Rendered> {
         .collect();
     let job = folder.path().join("job.json");
     std::fs::write(&job, serde_json::json!({ "scenes": scenes }).to_string()).unwrap();
-    python::run(python::Python::Mitsuba, "render_mitsuba.py", &job);
+    python::run("render_mitsuba.py", &job);
     let result: serde_json::Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("result.json")).unwrap()).unwrap();
     let rendered = |(index, case): (usize, Case)| Rendered {

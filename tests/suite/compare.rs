@@ -9,6 +9,7 @@ use std::sync::{Arc, LazyLock};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
 use mateval_prep::compare::file::{CompareFile, Quantity, State};
+use mateval_prep::render::{BLENDER, RenderFile, RenderNoise};
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
@@ -125,7 +126,17 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
         exr_io::write_normal(&folder.join("normal.exr"), &geometry.normal, Precision::Half).unwrap();
         png_io::write_ids(&folder.join("instance.png"), &geometry.instance).unwrap();
         png_io::write_ids(&folder.join("part.png"), &geometry.triangle.map(|seen| part(seen).unwrap_or(0))).unwrap();
-        let render = serde_json::json!({ "renderer": "blender", "samples_each_half": samples });
+        let render = RenderFile {
+            renderer: BLENDER.to_owned(),
+            renderer_version: None,
+            samples_each_half: samples,
+            seeds: [71, 72].map(|seed| format!("{seed:016x}")),
+            max_bounces: settings.max_bounces,
+            capped_throughput: None,
+            denoiser: None,
+            noise: RenderNoise::of([&a.sum(), &b.sum()], None),
+            approximations: Vec::new(),
+        };
         mateval_scene::json::write(&folder.join("render.json"), &render).unwrap();
     }
 }

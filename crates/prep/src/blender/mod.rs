@@ -10,7 +10,6 @@ mod view_files;
 
 use std::path::{Path, PathBuf};
 
-use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{SceneError, json};
 
 use crate::error::PrepError;
@@ -101,11 +100,4 @@ impl Workplace {
         }
         Ok(Some(result))
     }
-}
-
-/// The mean of two pictures of one size.
-pub(crate) fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    let pixels = a.pixels().iter().zip(b.pixels());
-    let pixels = pixels.map(|(a, b)| LinearRgb(std::array::from_fn(|c| (a.0[c] + b.0[c]) / 2.0))).collect();
-    Picture::new(a.width(), a.height(), pixels).expect("both halves are of one size")
 }

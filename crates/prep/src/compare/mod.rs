@@ -30,9 +30,9 @@ use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
 use mateval_tracer::World;
-use serde::Deserialize;
 
 use crate::error::PrepError;
+use crate::render::{BLENDER, RenderFile};
 use bounds::{BOUNDS, LAMBERT_TILE, OTHER_TILE};
 use file::{COMPARE_FORMAT, CompareFile, ComparedDataset, LightComparison, SceneComparison, State, ViewComparison};
 use geometry::{OurGeometry, TheirGeometry};
@@ -42,9 +42,6 @@ use ours::OurLight;
 use previews::ViewPreviews;
 use theirs::{TheirView, file_check};
 use tiles::Halves;
-
-/// The renderer whose pictures are compared.
-pub const BLENDER: &str = "blender";
 
 /// Its place in the output's folder.
 pub const COMPARE: &str = "compare.json";
@@ -62,12 +59,6 @@ pub struct CompareOptions {
     pub out: Option<PathBuf>,
     /// Replace a comparison that is there.
     pub force: bool,
-}
-
-/// What this needs of their `render.json`.
-#[derive(Deserialize)]
-struct TheirRender {
-    samples_each_half: u32,
 }
 
 /// Compares. Fails where no view of any scene was rendered; a scene or view that was not is told as `missing`.
@@ -222,7 +213,7 @@ fn size(view: &View) -> (usize, usize) {
 fn their_samples(folder: &SceneFolder, views: &[&View]) -> Result<u32, PrepError> {
     let mut most = 1;
     for place in views.iter().filter_map(|view| rendered(folder, view)) {
-        let render: TheirRender = json::read(&place.join("render.json"))?;
+        let render: RenderFile = json::read(&place.join("render.json"))?;
         most = most.max(render.samples_each_half);
     }
     Ok(most)

@@ -9,9 +9,7 @@ use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views
 
 use super::tiles::Halves;
 use crate::error::PrepError;
-
-/// Scatterings after which a path is cut, as in the reference renders of both renderers.
-const MAX_BOUNCES: u32 = 16;
+use crate::render::MAX_BOUNCES;
 
 /// Our pictures of one view.
 pub(super) struct OurLight {

@@ -144,7 +144,7 @@ impl BlenderScene<'_> {
             }
             News::View(view, result, pictures) => {
                 let Some(at) = views.iter().position(|wanted| wanted.id == view.id) else { return Ok(()) };
-                self.keep(folder, scene, &views[at], result, *pictures)?;
+                self.keep(folder, scene, &views[at], result, &pictures)?;
                 views.remove(at);
                 Ok(())
             }
@@ -182,7 +182,7 @@ impl BlenderScene<'_> {
         scene: &SceneFile,
         view: &JobView,
         result: &BlenderResult,
-        pictures: BlenderView,
+        pictures: &BlenderView,
     ) -> Result<(), PrepError> {
         let (width, height) = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
         let [a, b] = &pictures.halves;
@@ -204,11 +204,7 @@ impl BlenderScene<'_> {
             noise: RenderNoise::of([&a.rgb, &b.rgb], Some(&pictures.denoised.rgb)),
             approximations: result.approximations.clone(),
         };
-        let render = ViewRender {
-            halves: [a.rgb.clone(), b.rgb.clone()],
-            rgb: pictures.denoised.rgb.clone(),
-            passes: Some(pictures),
-        };
+        let render = ViewRender { halves: [&a.rgb, &b.rgb], rgb: &pictures.denoised.rgb, passes: Some(pictures) };
         store::write(&folder.render(&renderer(), &view.id), &render, scene.exposure, &file)
     }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
@@ -9,7 +10,6 @@ use mateval_tracer::{RenderSettings, RenderStats, World};
 
 use super::store::{self, ViewRender};
 use super::{BUILTIN, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
-use crate::blender::mean;
 use crate::error::PrepError;
 
 pub(super) fn render_scenes(
@@ -68,7 +68,8 @@ fn render_scene(
             noise: RenderNoise::of([&a.picture, &b.picture], None),
             approximations: Vec::new(),
         };
-        let render = ViewRender { rgb: mean(&a.picture, &b.picture), halves: [a.picture, b.picture], passes: None };
+        let rgb = mean(&a.picture, &b.picture);
+        let render = ViewRender { halves: [&a.picture, &b.picture], rgb: &rgb, passes: None };
         store::write(&folder.render(&renderer, &view.id), &render, scene.exposure, &file)?;
         report.rendered += 1;
     }
@@ -77,4 +78,11 @@ fn render_scene(
 
 fn remark(step: &str, stats: &RenderStats) -> Option<String> {
     (stats.not_finite > 0).then(|| format!("{step}: {} samples were not finite and left out: a bug", stats.not_finite))
+}
+
+/// The mean of two pictures of one size.
+fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    let pixels = a.pixels().iter().zip(b.pixels());
+    let pixels = pixels.map(|(a, b)| LinearRgb(std::array::from_fn(|c| (a.0[c] + b.0[c]) / 2.0))).collect();
+    Picture::new(a.width(), a.height(), pixels).expect("both halves are of one size")
 }

@@ -15,16 +15,16 @@ use crate::error::PrepError;
 pub(super) const MARK: &str = "render.json";
 
 /// What is kept of a view.
-pub(super) struct ViewRender {
-    pub(super) halves: [Picture<LinearRgb>; 2],
+pub(super) struct ViewRender<'a> {
+    pub(super) halves: [&'a Picture<LinearRgb>; 2],
     /// What people see: denoised, or the halves' mean.
-    pub(super) rgb: Picture<LinearRgb>,
+    pub(super) rgb: &'a Picture<LinearRgb>,
     /// What else Blender gives.
-    pub(super) passes: Option<BlenderView>,
+    pub(super) passes: Option<&'a BlenderView>,
 }
 
 /// Writes the pictures; the mark goes first and comes last.
-pub(super) fn write(place: &Path, render: &ViewRender, exposure: f64, file: &RenderFile) -> Result<(), PrepError> {
+pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: &RenderFile) -> Result<(), PrepError> {
     std::fs::create_dir_all(place).map_err(PrepError::io("make", place))?;
     // It must not vouch for pictures that are half replaced.
     let mark = place.join(MARK);
@@ -34,13 +34,12 @@ pub(super) fn write(place: &Path, render: &ViewRender, exposure: f64, file: &Ren
     let light = |name: &str, picture: &Picture<LinearRgb>| {
         exr_io::write_linear(&place.join(format!("{name}.exr")), picture, Precision::Float)
     };
-    let [a, b] = &render.halves;
-    light("rgb_a", a)?;
-    light("rgb_b", b)?;
-    light("rgb", &render.rgb)?;
+    light("rgb_a", render.halves[0])?;
+    light("rgb_b", render.halves[1])?;
+    light("rgb", render.rgb)?;
     let exposed = render.rgb.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
     png_io::write_srgb(&place.join("rgb.png"), &exposed.to_srgb())?;
-    if let Some(view) = &render.passes {
+    if let Some(view) = render.passes {
         write_passes(place, view)?;
     }
     Ok(json::write(&mark, file)?)

@@ -1,7 +1,8 @@
 //! A NumPy array of whole numbers along one axis (`.npy`, versions 1 to 3).
 //!
-//! The format's own reader (numpy/lib/format.py) evaluates the header as a Python expression. Here nothing is followed:
-//! a header is the three keys that NumPy writes, each once, or it is refused; and a file holds its numbers and no more.
+//! The reader takes memory for the header's length, follows its brackets as deep as they go and multiplies the shape's
+//! numbers unchecked. So a header is held against what NumPy writes for a plain array before it is interpreted; and a file
+//! holds its numbers and no more.
 
 /// Largest header: NumPy's own are below 200 bytes.
 pub(crate) const MAX_HEADER_BYTES: usize = 4096;
@@ -9,49 +10,60 @@ pub(crate) const MAX_HEADER_BYTES: usize = 4096;
 pub(crate) const MAX_PREFIX_BYTES: usize = 12;
 /// The widest whole number, in bytes.
 pub(crate) const MAX_NUMBER_BYTES: usize = 8;
-
-/// What a header says.
-#[derive(Debug, PartialEq, Eq)]
-struct Header {
-    /// As in `<i8`.
-    descr: String,
-    shape: Vec<u64>,
-}
+/// Most digits in a header: so few that the product of any numbers written with them, times a width, is below 10^17.
+const MAX_HEADER_DIGITS: usize = 16;
 
 /// The numbers of an array with at most one axis that is not 1: (N,), (N, 1) or (1, N). Those above 2^63 come back as
 /// their negative complements. In words what is wrong with any other.
 pub(crate) fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, String> {
     let (header, data) = split(bytes)?;
-    let header = Words(header).header().ok_or("its header is none that NumPy writes for an array of whole numbers")?;
-    let count = length(&header.shape)?;
-    let (big_endian, signed, width) = number_type(&header.descr)?;
-    let expected = count.checked_mul(width as u64).ok_or("more numbers than there can be")?;
-    if (data.len() as u64) < expected {
-        return Err(format!("it ends early: {} bytes of numbers, expected {expected}", data.len()));
+    if !is_plain(header) {
+        return Err("its header is none that NumPy writes for an array of whole numbers".to_owned());
     }
-    if data.len() as u64 > expected {
-        return Err(format!("{} bytes behind its numbers, expected none", data.len() as u64 - expected));
+    let file = npyz::NpyFile::new(bytes).map_err(|error| format!("no sound NumPy array: {error}"))?;
+    let count = length(file.shape())?;
+    let descr = file.dtype().descr();
+    macro_rules! try_types {
+        ($file:expr; $($number:ty),*) => {{
+            let file = $file;
+            $(let file = match file.try_data::<$number>() {
+                Ok(numbers) => {
+                    check_length(data.len(), count, size_of::<$number>())?;
+                    let numbers = numbers.map(|number| number.map(|number| number as i64));
+                    return numbers.collect::<Result<_, _>>().map_err(|error| format!("it ends early: {error}"));
+                }
+                Err(file) => file,
+            };)*
+            drop(file);
+        }};
     }
-    Ok(data.chunks_exact(width).map(|number| whole_number(number, big_endian, signed)).collect())
+    try_types!(file; i64, i32, i16, i8, u64, u32, u16, u8);
+    Err(format!("an array of {descr}; expected whole numbers, as in '<i8'"))
 }
 
 /// The header's text and what follows it.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
     let cut_off = || "no NumPy array: it is too short".to_owned();
-    if bytes.get(..6).ok_or_else(cut_off)? != b"\x93NUMPY" {
-        return Err("no NumPy array: it does not begin as one".to_owned());
-    }
-    let from = match bytes.get(6).ok_or_else(cut_off)? {
-        1 => 10,
-        2 | 3 => 12,
-        version => return Err(format!("a NumPy array of version {version}; expected 1, 2 or 3")),
-    };
+    let from = if bytes.get(6) == Some(&1) { 10 } else { MAX_PREFIX_BYTES };
     let length = bytes.get(8..from).ok_or_else(cut_off)?;
     let length = length.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte));
     if length > MAX_HEADER_BYTES {
         return Err(format!("its header is {length} bytes long; expected at most {MAX_HEADER_BYTES}"));
     }
     bytes[from..].split_at_checked(length).ok_or_else(|| "no NumPy array: its header is cut off".to_owned())
+}
+
+/// Whether it is one dictionary with one tuple of decimal numbers, without escapes, lists and large numbers.
+fn is_plain(header: &[u8]) -> bool {
+    let count = |bytes: &[u8]| header.iter().filter(|byte| bytes.contains(byte)).count();
+    let digits = header.iter().filter(|byte| byte.is_ascii_digit()).count();
+    let shape = header.split(|byte| *byte == b'(').nth(1).and_then(|rest| rest.split(|byte| *byte == b')').next());
+    let is_decimal = |shape: &[u8]| shape.iter().all(|byte| byte.is_ascii_digit() || b", ".contains(byte));
+    count(b"{") == 1
+        && count(b"(") == 1
+        && count(b"[\\") == 0
+        && digits <= MAX_HEADER_DIGITS
+        && shape.is_some_and(is_decimal)
 }
 
 /// The length of its one axis that is not 1. With two of them the order of the numbers would be anybody's guess.
@@ -65,98 +77,13 @@ fn length(shape: &[u64]) -> Result<u64, String> {
     }
 }
 
-/// Whether it is big-endian, whether it has a sign, and its bytes.
-fn number_type(descr: &str) -> Result<(bool, bool, usize), String> {
-    let other = || format!("an array of '{descr}'; expected whole numbers, as in '<i8'");
-    let [order, kind, width] = *descr.as_bytes() else { return Err(other()) };
-    let signed = match kind {
-        b'i' => true,
-        b'u' => false,
-        _ => return Err(other()),
-    };
-    match (order, width) {
-        (b'|' | b'<' | b'>', b'1') => Ok((false, signed, 1)),
-        (b'<' | b'>', b'2' | b'4' | b'8') => Ok((order == b'>', signed, usize::from(width - b'0'))),
-        _ => Err(other()),
-    }
-}
-
-fn whole_number(bytes: &[u8], big_endian: bool, signed: bool) -> i64 {
-    let mut number = [0; MAX_NUMBER_BYTES];
-    number[..bytes.len()].copy_from_slice(bytes);
-    if big_endian {
-        number[..bytes.len()].reverse();
-    }
-    let (number, unused) = (i64::from_le_bytes(number), 64 - 8 * bytes.len() as u32);
-    // Up and down again: the sign's bit fills what is above it.
-    if signed { number << unused >> unused } else { number }
-}
-
-/// What is left of a header.
-struct Words<'a>(&'a [u8]);
-
-impl Words<'_> {
-    /// `{'descr': '<i8', 'fortran_order': False, 'shape': (3,), }`, the keys in any order; none for anything else.
-    fn header(mut self) -> Option<Header> {
-        let (mut descr, mut order, mut shape) = (None, None, None);
-        self.take(b"{")?;
-        for _ in 0..3 {
-            let key = self.text()?;
-            self.take(b":")?;
-            match key.as_str() {
-                "descr" if descr.is_none() => descr = Some(self.text()?),
-                // Of one axis there is no other order.
-                "fortran_order" if order.is_none() => order = Some(self.take(b"False").or_else(|| self.take(b"True"))?),
-                "shape" if shape.is_none() => shape = Some(self.shape()?),
-                _ => return None,
-            }
-            if self.take(b",").is_none() {
-                break;
-            }
-        }
-        self.take(b"}")?;
-        self.skip_spaces();
-        order?;
-        self.0.is_empty().then_some(Header { descr: descr?, shape: shape? })
-    }
-
-    fn skip_spaces(&mut self) {
-        self.0 = self.0.trim_ascii_start();
-    }
-
-    /// The word, and spaces before it.
-    fn take(&mut self, word: &[u8]) -> Option<()> {
-        self.skip_spaces();
-        self.0 = self.0.strip_prefix(word)?;
-        Some(())
-    }
-
-    /// What stands in quotes; without escapes, which no key and no type has.
-    fn text(&mut self) -> Option<String> {
-        let quote = [b"'", b"\""].into_iter().find(|quote| self.take(*quote).is_some())?;
-        let end = self.0.iter().position(|byte| byte == &quote[0])?;
-        let (text, rest) = self.0.split_at(end);
-        self.0 = &rest[1..];
-        let plain = text.iter().all(|byte| byte.is_ascii_graphic() && *byte != b'\\');
-        plain.then(|| String::from_utf8_lossy(text).into_owned())
-    }
-
-    /// Decimal numbers between brackets. Python wants a comma behind a single one.
-    fn shape(&mut self) -> Option<Vec<u64>> {
-        let (mut axes, mut comma) = (Vec::new(), false);
-        self.take(b"(")?;
-        while self.take(b")").is_none() {
-            if !axes.is_empty() && !comma {
-                return None;
-            }
-            self.skip_spaces();
-            let digits = self.0.iter().take_while(|byte| byte.is_ascii_digit()).count();
-            let (number, rest) = self.0.split_at(digits);
-            axes.push(std::str::from_utf8(number).ok()?.parse().ok()?);
-            self.0 = rest;
-            comma = self.take(b",").is_some();
-        }
-        (axes.len() != 1 || comma).then_some(axes)
+/// There are as many bytes as the numbers take.
+fn check_length(found: usize, count: u64, width: usize) -> Result<(), String> {
+    let (found, expected) = (found as u64, count * width as u64);
+    match found.checked_sub(expected) {
+        None => Err(format!("it ends early: {found} bytes of numbers, expected {expected}")),
+        Some(0) => Ok(()),
+        Some(behind) => Err(format!("{behind} bytes behind its numbers, expected none")),
     }
 }
 

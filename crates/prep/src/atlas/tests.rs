@@ -1,0 +1,206 @@
+use glam::Vec3;
+use proptest::prelude::*;
+
+use super::*;
+
+/// A box of the given size with 12 triangles and shared vertices.
+pub(crate) fn cuboid(size: Vec3) -> TriangleMesh {
+    let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32) * size;
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    TriangleMesh {
+        positions: (0..8).map(corner).collect(),
+        normals: None,
+        uvs: None,
+        triangles: quads.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect(),
+    }
+}
+
+fn texels_of(unwrapped: &Unwrapped, triangle: usize) -> [Vec2; 3] {
+    let uvs = unwrapped.mesh.uvs.as_ref().unwrap();
+    unwrapped.mesh.triangles[triangle].map(|v| uvs[v as usize] * unwrapped.size as f32)
+}
+
+/// xatlas' own threads can miss their last wake-up and hang; `.cargo/config.toml` builds it without. Threads bear
+/// the name of the one that made them.
+#[cfg(target_os = "linux")]
+#[test]
+fn xatlas_has_no_threads_of_its_own() {
+    let named = |name: &str| {
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+        let names = tasks.filter_map(|task| std::fs::read_to_string(task.unwrap().path().join("comm")).ok());
+        names.filter(|found| found.trim() == name).count()
+    };
+    let count = move || {
+        let atlas = Xatlas::new();
+        let count = named("unwraps-alone");
+        drop(atlas);
+        count
+    };
+    let alone = std::thread::Builder::new().name("unwraps-alone".into()).spawn(count).unwrap();
+    assert_eq!(alone.join().unwrap(), 1);
+}
+
+#[test]
+fn triangles_keep_their_order_and_place() {
+    let mesh = cuboid(Vec3::new(1.0, 0.5, 0.25));
+    let unwrapped = unwrap(&mesh, SizeWish::Fixed(256)).unwrap();
+    for triangle in 0..12 {
+        assert_eq!(unwrapped.mesh.corners(triangle), mesh.corners(triangle));
+    }
+    assert!(unwrapped.mesh.uvs.as_ref().unwrap().iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0));
+    assert_eq!(unwrapped.unmapped, 0);
+}
+
+#[test]
+fn a_chosen_size_is_fine_enough_and_no_finer_than_a_step() {
+    let mesh = cuboid(Vec3::new(2.0, 1.0, 1.0));
+    for texel_m in [0.05, 0.01, 0.002] {
+        let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
+        assert!(unwrapped.texel_m <= texel_m * 1.02, "{} for {texel_m}", unwrapped.texel_m);
+        assert!(unwrapped.size == 256 || unwrapped.texel_m >= texel_m / 2.5, "{} for {texel_m}", unwrapped.texel_m);
+    }
+}
+
+#[test]
+fn charts_keep_their_distance() {
+    let unwrapped = unwrap(&cuboid(Vec3::ONE), SizeWish::Fixed(128)).unwrap();
+    let charts = charts_by_uv(&unwrapped);
+    let mut least = f32::INFINITY;
+    for a in 0..12 {
+        for b in 0..a {
+            if charts[a] != charts[b] {
+                least = least.min(gap(texels_of(&unwrapped, a), texels_of(&unwrapped, b)));
+            }
+        }
+    }
+    assert!(least >= GUTTER as f32 - 0.01 && least.is_finite(), "{least} texels");
+}
+
+/// Triangles that share a split vertex share a chart.
+fn charts_by_uv(unwrapped: &Unwrapped) -> Vec<usize> {
+    let mut chart: Vec<usize> = (0..12).collect();
+    for _ in 0..12 {
+        for a in 0..12 {
+            for b in 0..12 {
+                if unwrapped.mesh.triangles[a].iter().any(|v| unwrapped.mesh.triangles[b].contains(v)) {
+                    chart[a] = chart[a].min(chart[b]);
+                }
+            }
+        }
+    }
+    chart
+}
+
+/// The least distance between the edges of two triangles, by sampling.
+fn gap(a: [Vec2; 3], b: [Vec2; 3]) -> f32 {
+    let points =
+        |t: [Vec2; 3]| (0..3).flat_map(move |k| (0..=50).map(move |i| t[k].lerp(t[(k + 1) % 3], i as f32 / 50.0)));
+    points(a).flat_map(|p| points(b).map(move |q| (p - q).length())).fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn degenerate_faces_are_counted_and_placed() {
+    let mut mesh = cuboid(Vec3::ONE);
+    mesh.triangles.push([0, 0, 1]);
+    let unwrapped = unwrap(&mesh, SizeWish::Fixed(128)).unwrap();
+    assert_eq!(unwrapped.unmapped, 1);
+    let [a, b, c] = texels_of(&unwrapped, 12);
+    assert!(a == b && b == c && unwrapped.coverage < 1.0);
+    assert!(texels_of(&unwrapped, 12).iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 128.0));
+}
+
+#[test]
+fn nothing_to_unwrap_is_an_error() {
+    let flat = TriangleMesh { positions: vec![Vec3::ZERO; 3], triangles: vec![[0, 1, 2]], ..Default::default() };
+    assert_eq!(unwrap(&flat, SizeWish::Fixed(64)).unwrap_err(), AtlasError::NoArea);
+    assert_eq!(unwrap(&TriangleMesh::default(), SizeWish::Fixed(64)).unwrap_err(), AtlasError::NoArea);
+}
+
+#[test]
+fn the_same_twice() {
+    let unwrap_once = || unwrap(&cuboid(Vec3::new(1.0, 2.0, 3.0)), SizeWish::Texel(0.01)).unwrap();
+    assert_eq!(unwrap_once().mesh, unwrap_once().mesh);
+}
+
+/// A sheet of cells, each apart from its neighbours and turned another way, so that it is a chart of its own.
+fn cells(count: u32, length: f32, width: f32) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    for at in 0..count {
+        let (first, turn) = (4 * at, glam::Quat::from_rotation_y(0.7 * at as f32));
+        let corner = |x: f32, z: f32| turn * Vec3::new(x, 0.0, z) + Vec3::Y * (at as f32 * 0.1);
+        mesh.positions.extend([corner(0.0, 0.0), corner(0.0, width), corner(length, width), corner(length, 0.0)]);
+        mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+    }
+    mesh
+}
+
+/// A band around the Y axis, open at both rims.
+fn hoop(corners: u32, height: f32) -> TriangleMesh {
+    let angle = |at: u32| at as f32 / corners as f32 * std::f32::consts::TAU;
+    let at = |at: u32, y: f32| Vec3::new(angle(at).cos(), y, angle(at).sin());
+    TriangleMesh {
+        positions: (0..corners).flat_map(|k| [at(k, 0.0), at(k, height)]).collect(),
+        triangles: (0..corners)
+            .map(|k| [2 * k, 2 * k + 1, 2 * ((k + 1) % corners), 2 * ((k + 1) % corners) + 1])
+            .flat_map(|[a, b, c, d]| [[a, b, c], [c, b, d]])
+            .collect(),
+        ..Default::default()
+    }
+}
+
+/// Triangles across each other, some more than once, some of a single corner.
+fn soup(corners: &[[f32; 3]], count: u32, size: Vec3) -> TriangleMesh {
+    let corner = |at: u32| at.wrapping_mul(2_654_435_761).rotate_left(9) % corners.len() as u32;
+    TriangleMesh {
+        positions: corners.iter().map(|corner| Vec3::from_array(*corner) * size).collect(),
+        triangles: (0..count).map(|at| [3 * at, 3 * at + 1, 3 * at + 2].map(corner)).collect(),
+        ..Default::default()
+    }
+}
+
+/// As a camera at a wall wishes it: xatlas once aborted the program.
+#[test]
+fn a_wish_that_no_atlas_grants_gets_the_largest() {
+    for mesh in [cuboid(Vec3::new(4.0, 2.6, 0.1)), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)] {
+        for texel_m in [1e-5, 1e-12] {
+            let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
+            assert_eq!(unwrapped.size, 4096);
+            assert!(unwrapped.texel_m > texel_m);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// Whatever is wished of whatever shape, there is an answer, on which everything has its place.
+    #[test]
+    fn every_wish_has_an_answer(
+        kind in 0..4,
+        soup in prop::collection::vec([-1.0_f32..1.0, -1.0..1.0, -1.0..1.0], 3..60),
+        count in 1_u32..120,
+        sides in [-3.0_f32..2.0, -3.0_f32..2.0, -3.0_f32..2.0],
+        wish in -13.0_f64..2.0,
+        fixed in prop::option::of(64_u32..=2048),
+    ) {
+        let [x, y, z] = sides.map(|side| 10.0_f32.powf(side));
+        let mesh = match kind {
+            0 => cuboid(Vec3::new(x, y, z)),
+            1 => cells(count, x, y),
+            2 => hoop(count.max(3), y),
+            _ => self::soup(&soup, count, Vec3::new(x, y, z)),
+        };
+        let wish = fixed.map_or(SizeWish::Texel(10.0_f64.powf(wish)), SizeWish::Fixed);
+        match unwrap(&mesh, wish) {
+            Ok(unwrapped) => {
+                let size = unwrapped.size;
+                prop_assert!(SizeWish::Fixed(size) == wish || (256..=4096).contains(&size));
+                let uvs = unwrapped.mesh.uvs.unwrap();
+                prop_assert!(uvs.iter().all(|uv| uv.min_element() >= 0.0 && uv.max_element() <= 1.0));
+                prop_assert!(unwrapped.coverage <= 1.0);
+            }
+            Err(AtlasError::DoesNotFit { .. } | AtlasError::NoArea) => {}
+            Err(error) => prop_assert!(false, "{error}"),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+use super::*;
+
+fn read_text(text: &str) -> Result<Recipe, PrepError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recipe.toml");
+    std::fs::write(&path, text).unwrap();
+    read(&path).map(|(recipe, _)| recipe)
+}
+
+#[test]
+fn the_least_recipe() {
+    let recipe = read_text("name = 'mini'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'").unwrap();
+    assert_eq!(recipe.views.len(), 4);
+    assert_eq!((recipe.views[1].id.as_str(), recipe.views[1].x_deg, recipe.views[1].y_deg), ("up_right", 5.0, -5.0));
+    assert_eq!((recipe.samples, recipe.scenes[0].exposure), (64, 1.0));
+}
+
+#[test]
+fn every_fault_at_once() {
+    let text = "name = 'x'\nresolution = [4, 9]\nsamples = 0\n\
+        [[scene]]\nid = 'a'\nbitterli = 'a'\nexposure = 0.0\n[[scene]]\nid = 'a'\nbitterli = 'b'\natlas_size = 9";
+    let error = read_text(text).unwrap_err().to_string();
+    for part in ["resolution = [4, 9]", "samples = 0", "'a' is there twice", "exposure = 0", "atlas_size = 9"] {
+        assert!(error.contains(part), "{part} not in {error}");
+    }
+}
+
+#[test]
+fn cameras_stand_on_earth() {
+    let at = |x: &str| {
+        let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\n";
+        read_text(&format!("{text}camera = {{ position = [{x}, 0, 0], target = [0, 0, 0], fov_y_deg = 40 }}"))
+    };
+    at("1e6").unwrap();
+    for far in ["1.1e6", "-1e300", "inf", "nan"] {
+        assert!(at(far).unwrap_err().to_string().contains("camera: expected coordinates"), "{far}");
+    }
+}
+
+#[test]
+fn inputs_are_hashes_of_files_below() {
+    let with = |file: &str, hash: &str| {
+        read_text(&format!("name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\ninputs = {{ '{file}' = '{hash}' }}"))
+    };
+    with("b/c.obj", &"0a".repeat(32)).unwrap();
+    for hash in ["", "0a", &"0A".repeat(32), &"0g".repeat(32), &"0a".repeat(33)] {
+        assert!(with("c.obj", hash).unwrap_err().to_string().contains("64 lower-case hexadecimal digits"), "{hash}");
+    }
+    for file in ["/dev/zero", "../c.obj"] {
+        assert!(with(file, &"0a".repeat(32)).unwrap_err().to_string().contains("below the scene's folder"), "{file}");
+    }
+}
+
+#[test]
+fn labels_lie_below_the_scenes_folder() {
+    let with = |folder: &str| {
+        let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'\npart_labels = { one = ";
+        read_text(&format!("{text}'{folder}' }}"))
+    };
+    with("labels/one").unwrap();
+    with("labels/../one").unwrap();
+    for bad in ["/labels", "../labels", "labels/../..", "."] {
+        let error = with(bad).unwrap_err().to_string();
+        assert!(error.contains(&format!("part_labels.one = '{bad}'")) && error.contains("XML's folder"), "{error}");
+    }
+}
+
+#[test]
+fn unknown_words_are_refused_with_their_line() {
+    let error = read_text("name = 'x'\nresolutoin = [4, 9]").unwrap_err().to_string();
+    assert!(error.contains("resolutoin") && error.contains("line 2"), "{error}");
+}
