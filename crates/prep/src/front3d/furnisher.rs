@@ -7,6 +7,7 @@ use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
+use super::coincident;
 use super::furnish::{Placed, Role, world_from_layout};
 use super::house::{Child, ChildKind, House};
 use super::limits::Limits;
@@ -77,6 +78,7 @@ impl<'a> Furnisher<'a> {
     pub(super) fn finish(mut self) -> Furnished {
         self.note_private_pieces();
         self.appearances.note_untextured(&mut self.log);
+        coincident::separate(&mut self.surfaces, &self.placed, &mut self.log);
         let Appearances { materials, textures, .. } = self.appearances;
         let scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
         let libraries = [Some(self.models), self.textures].into_iter().flatten().collect();

@@ -11,6 +11,7 @@
 mod appearance;
 pub mod camera_sampler;
 mod cameras;
+mod coincident;
 mod document;
 mod furnish;
 mod furnisher;
