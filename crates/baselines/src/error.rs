@@ -21,10 +21,58 @@ pub enum BaselineError {
     /// `--force` would remove something that is no submission.
     #[error("'{}' is there and holds no submission.json: it is not replaced; choose another --out", .0.display())]
     NotASubmission(PathBuf),
+    /// A scene without the view that estimates are of.
+    #[error("'{}' has no view 'input'; run `mateval prep verify`", .0.display())]
+    NoInputView(PathBuf),
+    /// The input picture is missing.
+    #[error("'{}' is not there: the scene has not been rendered; run `mateval prep render`", .0.display())]
+    NoPhoto(PathBuf),
+    /// No adapter of that name, and no file.
+    #[error("no adapter '{name}', and no file of that path; expected one of {known}, or a TOML file")]
+    NoAdapter {
+        /// What was asked for.
+        name: String,
+        /// Those that come with the tool.
+        known: String,
+    },
+    /// An adapter that cannot be used.
+    #[error("adapter '{}': {what}", path.display())]
+    BadAdapter {
+        /// Its file or name.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+    /// None of an adapter's files is there.
+    #[error("no estimate: expected {}; fix the adapter's `files`, or run the method", list(paths))]
+    NoEstimate {
+        /// Where it was looked for.
+        paths: Vec<PathBuf>,
+    },
+    /// An adapter that gives nothing.
+    #[error("the estimate of scene '{0}' holds no picture")]
+    EmptyEstimate(String),
+    /// Pictures of one estimate differ in size.
+    #[error("the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size", folder.display(), sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
+    Sizes {
+        /// The folder.
+        folder: PathBuf,
+        /// The scene's id.
+        scene: String,
+        /// Columns and rows of two.
+        sizes: [(usize, usize); 2],
+    },
+    /// The geometry cannot be traced.
+    #[error(transparent)]
+    Tracer(#[from] mateval_tracer::TracerError),
     /// The dataset could not be read, or the submission not written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
     /// A picture could not be written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| format!("'{}'", path.display())).collect::<Vec<_>>().join(" or ")
 }

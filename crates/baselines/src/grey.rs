@@ -8,15 +8,15 @@ use mateval_scene::open::Dataset;
 use mateval_scene::submission::{GREY, MAP_SIZES, Map};
 
 use crate::error::BaselineError;
-use crate::submission;
+use crate::submission::{self, Method};
 
 /// Writes base colour 0.5 (linear) for every instance; roughness and metallic are left at their defaults. Gives the
 /// number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
     let texel = [byte_from_unit(srgb_from_linear(GREY)); 3];
     let size = *MAP_SIZES.start();
-    let description = "base colour 0.5 (linear) everywhere, roughness 0.5, metallic 0";
-    submission::write(dataset, out, force, "grey", description, |_, _, folder| {
+    let method = Method::new("grey", "base colour 0.5 (linear) everywhere, roughness 0.5, metallic 0");
+    submission::write(dataset, out, force, &method, |_, _, folder| {
         let path = folder.join(Map::BaseColor.stem()).with_extension("png");
         Ok(png_io::write_rgb_bytes(&path, &Picture::filled(size, size, texel))?)
     })

@@ -1,10 +1,24 @@
 //! Baselines: methods that come with the tool.
 //!
-//! In: a dataset. Out: a submission folder like any other. [`truth`] copies the baked truth (the ceiling that an atlas
-//! of this size can reach), [`grey`] knows nothing (the floor).
+//! In: a dataset, and for most an estimate of the input view ([`estimate`]; other people's pictures by an [`adapter`]).
+//! Out: a submission folder like any other. [`truth`] copies the baked truth (the ceiling that an atlas of this size can
+//! reach), [`grey`] knows nothing (the floor), [`nn`] lifts the estimate to the atlases, [`homogeneous`] takes its medians.
+//!
+//! Between: [`geometry`] is the scene as methods see it, [`seen`] which instance each pixel shows; [`lift`] writes the
+//! picture into an atlas, [`fill`] finds what is not seen, [`maps`] writes files.
 
+pub mod adapter;
 pub mod error;
+pub mod estimate;
+pub mod fill;
+pub mod geometry;
 pub mod grey;
+pub mod homogeneous;
+pub mod lift;
+pub mod maps;
+pub mod median;
+pub mod nn;
+pub mod seen;
 pub mod submission;
 pub mod truth;
 

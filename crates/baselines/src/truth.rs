@@ -6,12 +6,12 @@ use mateval_scene::open::Dataset;
 use mateval_scene::submission::Map;
 
 use crate::error::BaselineError;
-use crate::submission;
+use crate::submission::{self, Method};
 
 /// Copies the baked maps of every instance. Gives the number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
-    let description = "the source materials baked to the dataset's own atlases";
-    submission::write(dataset, out, force, "gt", description, |scene, instance, folder| {
+    let method = Method::new("gt", "the source materials baked to the dataset's own atlases");
+    submission::write(dataset, out, force, &method, |scene, instance, folder| {
         let truth = dataset.folder(&scene.id).truth_material(&instance.id);
         for map in Map::ALL {
             let name = Path::new(map.stem()).with_extension("png");

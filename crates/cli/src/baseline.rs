@@ -1,17 +1,39 @@
 //! `mateval baseline`.
 
+use std::num::NonZero;
 use std::path::PathBuf;
 
-use clap::ValueEnum;
+use anyhow::bail;
+use clap::Subcommand;
+use mateval_baselines::adapter::Adapter;
+use mateval_baselines::estimate::EstimateSource;
+use mateval_baselines::fill::FillRule;
+use mateval_baselines::nn::NnOptions;
+use mateval_baselines::{grey, homogeneous, nn, truth};
+use mateval_scene::PartSetId;
 use mateval_scene::open::Dataset;
 
+use crate::bars::Bars;
 use crate::outcome::{Outcome, print};
 
-/// What it is given.
+/// Which baseline.
+#[derive(Subcommand)]
+pub enum Command {
+    /// The source materials baked to the dataset's own atlases: the ceiling.
+    Gt(Places),
+    /// Base colour 0.5 (linear) everywhere: the floor.
+    Grey(Places),
+    /// An estimate of the input view lifted to the atlases; what is not seen by nearest neighbours.
+    Nn(NnArgs),
+    /// One colour an instance: the median of an estimate under its mask (IM2CAD).
+    Median(MedianArgs),
+    /// One colour a part: the median of an estimate under its mask.
+    MedianPart(MedianPartArgs),
+}
+
+/// What every baseline is given.
 #[derive(clap::Args)]
-pub struct Args {
-    /// Which.
-    name: Name,
+pub struct Places {
     /// The dataset's folder.
     #[arg(long)]
     dataset: PathBuf,
@@ -23,22 +45,120 @@ pub struct Args {
     force: bool,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Name {
-    /// The source materials baked to the dataset's own atlases: the ceiling.
-    Gt,
-    /// Base colour 0.5 (linear) everywhere: the floor.
-    Grey,
+/// Where an estimate comes from.
+#[derive(clap::Args)]
+pub struct EstimateArgs {
+    /// `gt` (the truth of the input view), `input` (the input picture itself), or a folder of a method's pictures.
+    #[arg(long, value_name = "gt|input|FOLDER")]
+    estimate: Option<PathBuf>,
+    /// What the folder's files are: colorful-shading, intrinsic, marigold, plain, rgbx, or a TOML file like those.
+    #[arg(long, value_name = "NAME|FILE.toml")]
+    adapter: Option<String>,
+}
+
+impl EstimateArgs {
+    fn source(&self, default: EstimateSource) -> anyhow::Result<EstimateSource> {
+        let named = self.estimate.as_ref().map(|path| path.to_string_lossy());
+        let source = match (named.as_deref(), &self.adapter) {
+            (None, None) => default,
+            (Some("gt"), None) => EstimateSource::Truth,
+            (Some("input"), None) => EstimateSource::Input,
+            (Some("gt" | "input") | None, Some(_)) => {
+                bail!("--adapter tells what a folder holds; give --estimate FOLDER")
+            }
+            (Some(folder), adapter) => {
+                let adapter = Box::new(Adapter::find(adapter.as_deref().unwrap_or("plain"))?);
+                let folder = PathBuf::from(folder);
+                if !folder.is_dir() {
+                    bail!("'{}' is no folder; expected gt, input or a folder of a method's pictures", folder.display());
+                }
+                EstimateSource::Files { folder, adapter }
+            }
+        };
+        Ok(source)
+    }
+}
+
+/// Of `nn`.
+#[derive(clap::Args)]
+pub struct NnArgs {
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+    /// Seen points that an unseen texel follows from: 1 as the paper, 3 as Point-UV (weighted by the inverse square of the
+    /// distance).
+    #[arg(long, default_value_t = NonZero::<u8>::MIN)]
+    neighbours: NonZero<u8>,
+    /// Metres that opposite normals count as, so that the back of a board does not take its front's colour.
+    #[arg(long, default_value_t = 0.0, value_name = "METRES")]
+    normal_weight: f64,
+    /// Take the nearest seen point of any instance, not only of the same.
+    #[arg(long)]
+    any_instance: bool,
+    /// Texels a side of every atlas; the dataset's own sizes if absent.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(64..=4096))]
+    atlas_size: Option<u32>,
+}
+
+/// Of `median`.
+#[derive(clap::Args)]
+pub struct MedianArgs {
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+}
+
+/// Of `median-part`.
+#[derive(clap::Args)]
+pub struct MedianPartArgs {
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+    /// The set of parts, as in `partfield`; the source's own if absent.
+    #[arg(long)]
+    part_set: Option<PartSetId>,
 }
 
 /// Makes the submission.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let dataset = Dataset::open(&args.dataset)?;
-    let write = match args.name {
-        Name::Gt => mateval_baselines::truth::write,
-        Name::Grey => mateval_baselines::grey::write,
-    };
-    let instances = write(&dataset, &args.out, args.force)?;
-    print(&format!("{}: {instances} instances\n", args.out.display()))?;
+pub fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Gt(places) => done(places, truth::write(&open(places)?, &places.out, places.force)?),
+        Command::Grey(places) => done(places, grey::write(&open(places)?, &places.out, places.force)?),
+        Command::Nn(args) => {
+            let places = &args.places;
+            let source = args.estimate.source(EstimateSource::Truth)?;
+            if !(args.normal_weight.is_finite() && args.normal_weight >= 0.0) {
+                bail!("--normal-weight {}; expected 0 m or more", args.normal_weight);
+            }
+            let rule = FillRule { neighbours: args.neighbours.into(), normal_weight_m: args.normal_weight };
+            let options = NnOptions { rule, any_instance: args.any_instance, atlas_size: args.atlas_size };
+            let bars = Bars::new();
+            let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
+            let count = nn::write(&open(places)?, &places.out, places.force, &source, &options, &progress)?;
+            drop(bars);
+            done(places, count)
+        }
+        Command::Median(args) => {
+            let source = args.estimate.source(EstimateSource::Input)?;
+            let places = &args.places;
+            done(places, homogeneous::write_by_instance(&open(places)?, &places.out, places.force, &source)?)
+        }
+        Command::MedianPart(args) => {
+            let source = args.estimate.source(EstimateSource::Input)?;
+            let (places, set) = (&args.places, args.part_set.as_ref());
+            done(places, homogeneous::write_by_part(&open(places)?, &places.out, places.force, &source, set)?)
+        }
+    }
+}
+
+fn open(places: &Places) -> anyhow::Result<Dataset> {
+    Ok(Dataset::open(&places.dataset)?)
+}
+
+fn done(places: &Places, instances: usize) -> anyhow::Result<Outcome> {
+    print(&format!("{}: {instances} instances\n", places.out.display()))?;
     Ok(Outcome::Good)
 }

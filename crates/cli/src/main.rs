@@ -38,7 +38,8 @@ enum Command {
     #[command(subcommand)]
     Prep(prep::Command),
     /// Makes a submission by a baseline that comes with the tool.
-    Baseline(baseline::Args),
+    #[command(subcommand)]
+    Baseline(baseline::Command),
     /// Scores submissions.
     #[command(subcommand)]
     Eval(eval::Command),
@@ -57,7 +58,7 @@ fn run() -> std::process::ExitCode {
         Command::Demo(args) => demo::run(&args),
         Command::Sample(args) => sample::run(&args),
         Command::Prep(command) => prep::run(&command),
-        Command::Baseline(args) => baseline::run(&args),
+        Command::Baseline(command) => baseline::run(&command),
         Command::Eval(command) => eval::run(&command),
         Command::Schema(args) => schema::run(&args),
     };

@@ -46,6 +46,23 @@ pub struct Camera {
     pub intrinsics: Intrinsics,
 }
 
+/// A camera made ready to say where many points lie in its picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Projection {
+    camera_from_world: DMat4,
+    intrinsics: Intrinsics,
+}
+
+impl Projection {
+    /// See [`Camera::project`].
+    pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
+        let camera: DVec4 = self.camera_from_world * world.extend(1.0);
+        let depth = -camera.z;
+        let k = &self.intrinsics;
+        (depth > 0.0).then(|| (DVec2::new(k.cx + k.fx * camera.x / depth, k.cy - k.fy * camera.y / depth), depth))
+    }
+}
+
 impl Camera {
     /// A camera at `position` that looks at `target`, its right side level as `up` says.
     pub fn look_at(position: DVec3, target: DVec3, up: DVec3, intrinsics: Intrinsics) -> Option<Self> {
@@ -106,10 +123,20 @@ impl Camera {
 
     /// Where a world point lies in the picture, and its depth along the camera's axis in metres; none behind the camera.
     pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
-        let camera: DVec4 = self.matrix().inverse() * world.extend(1.0);
-        let depth = -camera.z;
+        self.projection().project(world)
+    }
+
+    /// The same for many points.
+    pub fn projection(&self) -> Projection {
+        Projection { camera_from_world: self.matrix().inverse(), intrinsics: self.intrinsics }
+    }
+
+    /// The camera of the same picture at `width` times `height` pixels.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
         let k = &self.intrinsics;
-        (depth > 0.0).then(|| (DVec2::new(k.cx + k.fx * camera.x / depth, k.cy - k.fy * camera.y / depth), depth))
+        let (x, y) = (f64::from(width) / f64::from(k.width), f64::from(height) / f64::from(k.height));
+        let intrinsics = Intrinsics { width, height, fx: k.fx * x, fy: k.fy * y, cx: k.cx * x, cy: k.cy * y };
+        Self { intrinsics, ..*self }
     }
 
     /// Whether the point `pixel` lies in the picture.

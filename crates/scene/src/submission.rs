@@ -60,7 +60,12 @@ impl Map {
     }
 }
 
+/// The folder of one scene's instances.
+pub fn scene_folder(submission: &Path, scene: &SceneId) -> PathBuf {
+    submission.join("scenes").join(scene.as_str())
+}
+
 /// The folder of one instance's maps.
 pub fn instance_folder(submission: &Path, scene: &SceneId, instance: &InstanceId) -> PathBuf {
-    submission.join("scenes").join(scene.as_str()).join(instance.as_str())
+    scene_folder(submission, scene).join(instance.as_str())
 }

@@ -1,0 +1,252 @@
+//! Adapters: what files a method writes and what their numbers mean, as data.
+//!
+//! An adapter is a TOML file; `adapters/` holds those of known methods. Another method needs a file, no code.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::texture_io::{self, read_texture};
+use mateval_image::transfer::linear_from_srgb;
+use mateval_image::{LinearRgb, Picture, Wrap};
+use serde::Deserialize;
+
+use crate::error::BaselineError;
+use crate::estimate::Estimate;
+
+/// Stands for the scene's id in a path.
+const SCENE: &str = "{scene}";
+/// Of the pixels of a picture of free scale, this share has its largest channel at or below 1 afterwards.
+const FREE_SCALE_SHARE: f64 = 0.99;
+
+/// The adapters that come with the tool, by name.
+const BUILT_IN: [(&str, &str); 5] = [
+    ("colorful-shading", include_str!("../adapters/colorful-shading.toml")),
+    ("intrinsic", include_str!("../adapters/intrinsic.toml")),
+    ("marigold", include_str!("../adapters/marigold.toml")),
+    ("plain", include_str!("../adapters/plain.toml")),
+    ("rgbx", include_str!("../adapters/rgbx.toml")),
+];
+
+/// What a method writes.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Adapter {
+    /// The method's name.
+    pub name: String,
+    /// What makes the files, for people.
+    #[serde(default)]
+    pub about: String,
+    /// Base colour.
+    pub base_color: Option<AdaptedFile>,
+    /// Perceptual roughness.
+    pub roughness: Option<AdaptedFile>,
+    /// Metallic.
+    pub metallic: Option<AdaptedFile>,
+}
+
+/// One of its files.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptedFile {
+    /// Path below the folder of estimates; `{scene}` stands for the scene's id. Several: the first that is there.
+    pub files: Vec<String>,
+    /// How its numbers stand for light.
+    pub encoding: Encoding,
+    /// The stored numbers that mean 0 and 1; whole numbers are divided by their largest first.
+    #[serde(default = "unit_range")]
+    pub range: [f32; 2],
+    /// `free`: known only up to a factor.
+    #[serde(default)]
+    pub scale: Scale,
+    /// The channel of a scalar.
+    #[serde(default)]
+    pub channel: Channel,
+}
+
+fn unit_range() -> [f32; 2] {
+    [0.0, 1.0]
+}
+
+/// How numbers stand for light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Encoding {
+    /// As they are.
+    Linear,
+    /// IEC 61966-2-1.
+    Srgb,
+    /// The power 2.2.
+    Gamma22,
+}
+
+impl Encoding {
+    /// The linear value of a stored one; below 0 it is 0.
+    pub fn decode(self, stored: f32) -> f32 {
+        let stored = stored.max(0.0);
+        match self {
+            Self::Linear => stored,
+            Self::Srgb => linear_from_srgb(stored),
+            Self::Gamma22 => libm::powf(stored, 2.2),
+        }
+    }
+}
+
+/// Whether a factor is known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scale {
+    /// The values are what they say.
+    #[default]
+    Absolute,
+    /// One factor is free: the 99th percentile of the pixels' largest channel becomes 1.
+    Free,
+}
+
+/// A channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// The first.
+    #[default]
+    R,
+    /// The second.
+    G,
+    /// The third.
+    B,
+}
+
+impl Adapter {
+    /// The adapter of that name, or the one in the file of that path.
+    pub fn find(name: &str) -> Result<Self, BaselineError> {
+        if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
+            return Self::parse(text, Path::new(name));
+        }
+        let path = Path::new(name);
+        if !path.is_file() {
+            return Err(BaselineError::NoAdapter { name: name.to_owned(), known: Self::names().join(", ") });
+        }
+        let text = std::fs::read_to_string(path);
+        let text = text.map_err(|source| BaselineError::Io { action: "read", path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// The names of those that come with the tool.
+    pub fn names() -> [&'static str; BUILT_IN.len()] {
+        BUILT_IN.map(|(name, _)| name)
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self, BaselineError> {
+        let invalid = |what: String| BaselineError::BadAdapter { path: path.to_owned(), what };
+        let adapter: Self = toml::from_str(text).map_err(|error| invalid(error.to_string()))?;
+        let maps = [&adapter.base_color, &adapter.roughness, &adapter.metallic];
+        if maps.iter().all(|map| map.is_none()) {
+            return Err(invalid("it names no file; expected base_color, roughness or metallic".to_owned()));
+        }
+        for map in maps.into_iter().flatten() {
+            if map.files.is_empty() {
+                return Err(invalid("`files` is empty; expected a path or several".to_owned()));
+            }
+            if !(map.range[1] > map.range[0] && map.range.iter().all(|v| v.is_finite())) {
+                return Err(invalid(format!("range {:?}; expected a smaller number, then a larger one", map.range)));
+            }
+        }
+        Ok(adapter)
+    }
+
+    /// Reads a scene's pictures below `folder`. Those that are there must have one size.
+    pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
+        let base_color = self.base_color.as_ref().map(|file| file.read(folder, scene)).transpose()?;
+        let scalar = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
+            let picture = file.as_ref().map(|file| file.read(folder, scene)).transpose()?;
+            Ok(picture.map(|picture| picture.map(|LinearRgb(rgb)| rgb[0])))
+        };
+        let estimate = Estimate { base_color, roughness: scalar(&self.roughness)?, metallic: scalar(&self.metallic)? };
+        let size = estimate.size().unwrap_or_default();
+        let scalars = [&estimate.roughness, &estimate.metallic].into_iter().flatten();
+        let sizes: Vec<(usize, usize)> = scalars.map(|picture| (picture.width(), picture.height())).collect();
+        match sizes.into_iter().find(|other| *other != size) {
+            None => Ok(estimate),
+            Some(other) => {
+                let (folder, scene) = (folder.to_owned(), scene.to_owned());
+                Err(BaselineError::Sizes { folder, scene, sizes: [size, other] })
+            }
+        }
+    }
+}
+
+impl AdaptedFile {
+    /// The picture, linear; a scalar is the same in all channels.
+    fn read(&self, folder: &Path, scene: &str) -> Result<Picture<LinearRgb>, BaselineError> {
+        let path = self.path(folder, scene)?;
+        // Straight: the adapter says what the numbers mean, in float files too.
+        let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
+        let [low, high] = self.range;
+        let decode = |v: f32| self.encoding.decode((v - low) / (high - low));
+        let picture = Picture::from_fn(stored.width(), stored.height(), |x, y| {
+            LinearRgb(self.meant(stored.texel(x, y)).map(decode))
+        });
+        Ok(match self.scale {
+            Scale::Absolute => picture,
+            Scale::Free => scaled(&picture),
+        })
+    }
+
+    fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, BaselineError> {
+        let paths: Vec<PathBuf> = self.files.iter().map(|file| folder.join(file.replace(SCENE, scene))).collect();
+        let found = paths.iter().find(|path| path.is_file()).cloned();
+        found.ok_or(BaselineError::NoEstimate { paths })
+    }
+
+    /// For a scalar the one channel that counts; colours say no channel and keep all.
+    fn meant(&self, rgb: [f32; 3]) -> [f32; 3] {
+        match self.channel {
+            Channel::R => rgb,
+            Channel::G => [rgb[1]; 3],
+            Channel::B => [rgb[2]; 3],
+        }
+    }
+}
+
+/// One factor for all, so that all but a hundredth of the pixels fit in 0 to 1.
+fn scaled(picture: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    let mut largest: Vec<f32> = picture.pixels().iter().map(|LinearRgb([r, g, b])| r.max(*g).max(*b)).collect();
+    largest.sort_by(f32::total_cmp);
+    let at = (FREE_SCALE_SHARE * (largest.len().saturating_sub(1)) as f64).round() as usize;
+    match largest.get(at) {
+        Some(&white) if white > 0.0 => picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v / white))),
+        _ => picture.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn those_that_come_with_the_tool_are_sound() {
+        for name in Adapter::names() {
+            let adapter = Adapter::find(name).unwrap();
+            assert_eq!(adapter.name, name);
+            assert!(!adapter.about.is_empty() && adapter.base_color.is_some());
+        }
+    }
+
+    #[test]
+    fn bad_ones_are_refused_with_the_reason() {
+        let refused = |text: &str| Adapter::parse(text, Path::new("a.toml")).unwrap_err().to_string();
+        assert!(refused("name = \"x\"").contains("names no file"));
+        assert!(refused("name = \"x\"\n[base_color]\nfiles = []\nencoding = \"srgb\"").contains("`files` is empty"));
+        let range = "name = \"x\"\n[metallic]\nfiles = [\"a\"]\nencoding = \"linear\"\nrange = [1.0, 0.0]";
+        assert!(refused(range).contains("range [1.0, 0.0]"));
+        assert!(refused("name = \"x\"\n[base_color]\nfiles = [\"a\"]\nencoding = \"log\"").contains("gamma22"));
+        assert!(Adapter::find("no-such").unwrap_err().to_string().contains("marigold"));
+    }
+
+    #[test]
+    fn a_free_scale_is_set_by_the_brightest() {
+        let ramp = Picture::from_fn(101, 1, |x, _| LinearRgb([x as f32, x as f32 / 2.0, 0.0]));
+        let scaled = scaled(&ramp);
+        assert_eq!(scaled.get(99, 0).0, [1.0, 0.5, 0.0]);
+        let black = Picture::filled(3, 1, LinearRgb([0.0; 3]));
+        assert_eq!(super::scaled(&black), black);
+    }
+}

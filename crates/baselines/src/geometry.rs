@@ -1,0 +1,80 @@
+//! A scene as a method sees it: the instances' meshes with their atlas uv, and rays through them.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use mateval_image::png_io;
+use mateval_image::{Mask, Picture};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::{SceneFolder, part_picture};
+use mateval_scene::material::{ColorInput, Material, MaterialModel};
+use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::{PartSetId, SceneError, TriangleMesh, glb};
+use mateval_tracer::World;
+
+use crate::error::BaselineError;
+use crate::estimate::input_view;
+
+/// The public part of one scene. Surface k of the world is instance k of `scene.json`.
+pub struct SceneGeometry<'a> {
+    /// `scene.json`.
+    pub scene: &'a SceneFile,
+    /// The input view.
+    pub view: &'a View,
+    /// Where its files are.
+    pub folder: SceneFolder,
+    /// All instances, opaque and without light.
+    pub world: World,
+    /// `valid.png` of the input view.
+    pub valid: Mask,
+    /// `instance.png` of the input view.
+    pub instances: Picture<u16>,
+}
+
+impl<'a> SceneGeometry<'a> {
+    /// Reads what methods may see of a scene; nothing of the truth.
+    pub fn read(folder: SceneFolder, scene: &'a SceneFile) -> Result<Self, BaselineError> {
+        let view = input_view(&folder, scene)?;
+        let shown = folder.view(&view.id);
+        let world = world(&folder.instances(), scene)?;
+        let valid = png_io::read_mask(&shown.join("valid.png"))?;
+        let instances = png_io::read_ids(&shown.join("instance.png"))?;
+        let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
+        if (valid.width(), valid.height()) != size || (instances.width(), instances.height()) != size {
+            let what =
+                "valid.png or instance.png is not as large as scene.json says; run `mateval prep verify`".to_owned();
+            return Err(SceneError::Unsupported { path: shown, what }.into());
+        }
+        Ok(Self { scene, view, folder, world, valid, instances })
+    }
+
+    /// An instance's mesh, its uv the atlas's.
+    pub fn mesh(&self, instance: usize) -> &TriangleMesh {
+        &self.world.scene().surfaces[instance].mesh
+    }
+
+    /// The input view's picture of a set of parts.
+    pub fn part_picture(&self, set: Option<&PartSetId>) -> Result<Picture<u16>, BaselineError> {
+        Ok(png_io::read_ids(&self.folder.view(&self.view.id).join(part_picture(set)))?)
+    }
+}
+
+fn world(path: &Path, scene: &SceneFile) -> Result<World, BaselineError> {
+    let nodes = glb::read(path)?;
+    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
+    if !(nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids)) {
+        let what = "its nodes are not the instances of scene.json; run `mateval prep verify`".to_owned();
+        return Err(SceneError::Unsupported { path: path.to_owned(), what }.into());
+    }
+    let surface = |node: glb::GlbNode| Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) };
+    let plain = Material {
+        name: String::new(),
+        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
+        two_sided: true,
+        opacity: None,
+        bump: None,
+    };
+    let surfaces = nodes.into_iter().map(surface).collect();
+    let scene = ReferenceScene { surfaces, materials: vec![plain], ..ReferenceScene::default() };
+    World::new(Arc::new(scene)).map_err(BaselineError::from)
+}

@@ -1,0 +1,69 @@
+//! An instance's maps as a submission holds them.
+
+use std::path::Path;
+
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{Picture, png_io};
+use mateval_scene::SceneError;
+use mateval_scene::submission::{MAP_SIZES, Map};
+
+use crate::error::BaselineError;
+use crate::estimate::{Estimate, Values};
+use crate::lift::{PartialAtlas, Texel};
+use crate::median::DEFAULT;
+
+/// Base colour as sRGB bytes; roughness and metallic as linear bytes, where anything is said of them.
+pub struct Maps {
+    base_color: Picture<[u8; 3]>,
+    roughness: Option<Picture<u8>>,
+    metallic: Option<Picture<u8>>,
+}
+
+impl Maps {
+    /// The whole atlas, its gutters filled. What the estimate does not say stays at the format's default, with no file.
+    pub fn of_atlas(known: &PartialAtlas, estimate: &Estimate) -> Self {
+        let picture = known.texels.map(|texel| match texel {
+            Texel::Seen(values) => values,
+            Texel::Unused | Texel::Unseen => DEFAULT,
+        });
+        let mut maps = Self::of_values(&picture, estimate);
+        known.atlas.fill_gutters(&mut maps.base_color);
+        for map in [&mut maps.roughness, &mut maps.metallic].into_iter().flatten() {
+            known.atlas.fill_gutters(map);
+        }
+        maps
+    }
+
+    /// The same everywhere.
+    pub fn constant(values: Values, estimate: &Estimate) -> Self {
+        let size = *MAP_SIZES.start();
+        Self::of_values(&Picture::filled(size, size, values), estimate)
+    }
+
+    fn of_values(values: &Picture<Values>, estimate: &Estimate) -> Self {
+        let says_color = estimate.base_color.is_some();
+        let color = |[r, g, b, ..]: Values| {
+            let rgb = if says_color { [r, g, b] } else { [DEFAULT[0], DEFAULT[1], DEFAULT[2]] };
+            rgb.map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+        };
+        let scalar = |said: bool, channel: usize| said.then(|| values.map(|values| byte_from_unit(values[channel])));
+        Self {
+            base_color: values.map(color),
+            roughness: scalar(estimate.roughness.is_some(), 3),
+            metallic: scalar(estimate.metallic.is_some(), 4),
+        }
+    }
+
+    /// Writes them into the instance's folder, which is made.
+    pub fn write(&self, folder: &Path) -> Result<(), BaselineError> {
+        std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+        let path = |map: Map| folder.join(map.stem()).with_extension("png");
+        png_io::write_rgb_bytes(&path(Map::BaseColor), &self.base_color)?;
+        for (map, picture) in [(Map::Roughness, &self.roughness), (Map::Metallic, &self.metallic)] {
+            if let Some(picture) = picture {
+                png_io::write_grey_bytes(&path(map), picture)?;
+            }
+        }
+        Ok(())
+    }
+}

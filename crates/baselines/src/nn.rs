@@ -1,0 +1,111 @@
+//! Lifting by nearest neighbours: an estimate of the input view becomes a whole atlas (the paper's strongest family).
+//!
+//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance; an instance
+//! that is not seen at all takes the median of its category in the picture, or is grey.
+
+use std::path::Path;
+
+use mateval_scene::Progress;
+use mateval_scene::open::Dataset;
+
+use crate::error::BaselineError;
+use crate::estimate::{Estimate, EstimateSource, Values};
+use crate::fill::{FillRule, SeenCloud};
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, lift};
+use crate::maps::Maps;
+use crate::median::Medians;
+use crate::seen::{SeenPixels, SeenPoint};
+use crate::submission::{self, Method};
+
+/// How unseen texels are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NnOptions {
+    /// From how many, and what is near.
+    pub rule: FillRule,
+    /// Take the nearest seen point of any instance, not only of the same.
+    pub any_instance: bool,
+    /// Texels a side; none: the dataset's own size of each instance.
+    pub atlas_size: Option<u32>,
+}
+
+impl NnOptions {
+    fn description(&self, source: &EstimateSource) -> String {
+        let count = self.rule.neighbours;
+        let mean = if count.get() == 1 { "the nearest seen point" } else { "an inverse-square mean of the nearest" };
+        let near = if count.get() == 1 { String::new() } else { format!(" {count}") };
+        let whose = if self.any_instance { "any instance" } else { "the same instance" };
+        let normals = match self.rule.normal_weight_m {
+            weight if weight > 0.0 => format!(", opposite normals counting as {weight} m"),
+            _ => String::new(),
+        };
+        format!(
+            "{} lifted to the atlases; unseen texels: {mean}{near} of {whose}{normals}; instances that are not seen: the \
+             median of their category in the picture, else base colour 0.5 (linear), roughness 0.5, metallic 0",
+            source.description()
+        )
+    }
+}
+
+/// Writes a submission. Gives the number of instances.
+pub fn write(
+    dataset: &Dataset,
+    out: &Path,
+    force: bool,
+    source: &EstimateSource,
+    options: &NnOptions,
+    progress: Progress<'_>,
+) -> Result<usize, BaselineError> {
+    let method = Method { name: format!("nn-{}", source.name()), description: options.description(source) };
+    submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+        let estimate = source.read(dataset, scene)?;
+        lift_scene(&geometry, &estimate, options, progress, |instance, known, medians| {
+            let maps = match known {
+                Some(known) => Maps::of_atlas(&known, &estimate),
+                None => Maps::constant(medians.of(&geometry, instance), &estimate),
+            };
+            maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
+        })
+    })
+}
+
+/// Lifts an estimate to every instance that has an atlas, one after the other: `each` is given its number and its whole
+/// atlas, or none where nothing of it follows from what is seen. Gives how many there were.
+pub fn lift_scene(
+    geometry: &SceneGeometry<'_>,
+    estimate: &Estimate,
+    options: &NnOptions,
+    progress: Progress<'_>,
+    each: impl Fn(usize, Option<PartialAtlas>, &Medians) -> Result<(), BaselineError>,
+) -> Result<usize, BaselineError> {
+    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(geometry.scene.id.to_string()))?;
+    let seen = SeenPixels::new(geometry, size);
+    let medians = Medians::new(geometry, &seen, estimate);
+    let with_atlas: Vec<(usize, usize)> = geometry
+        .scene
+        .instances
+        .iter()
+        .enumerate()
+        .filter_map(|(at, instance)| Some((at, options.atlas_size.unwrap_or(instance.atlas.as_ref()?.size) as usize)))
+        .collect();
+    let points: Vec<(SeenPoint, Values)> =
+        seen.points(geometry).into_iter().map(|point| (point, estimate.at(point.pixel.0, point.pixel.1))).collect();
+    let all = options.any_instance.then(|| SeenCloud::new(options.rule, points.iter().copied()));
+    let step = format!("{} lift", geometry.scene.id);
+    for (done, &(instance, size)) in with_atlas.iter().enumerate() {
+        progress(&step, done, with_atlas.len());
+        let mut known = lift(geometry, &seen, estimate, instance, size);
+        let mesh = geometry.mesh(instance);
+        let filled = match &all {
+            Some(all) => all.fill(&mut known, mesh),
+            None => {
+                let own = points.iter().filter(|(point, _)| point.instance == instance).copied();
+                SeenCloud::new(options.rule, own).fill(&mut known, mesh)
+            }
+        };
+        each(instance, filled.then_some(known), &medians)?;
+    }
+    progress(&step, with_atlas.len(), with_atlas.len());
+    Ok(with_atlas.len())
+}

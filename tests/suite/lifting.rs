@@ -1,0 +1,226 @@
+//! `baseline nn`, `median`, `median-part`: what is lifted is what is seen, no colour goes where it does not belong, and the
+//! encodings of estimates mean what they say.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::transfer::srgb_from_linear;
+use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_scene::glb;
+use mateval_scene::uv_atlas::UvAtlas;
+use serde_json::Value;
+
+use super::command::{Run, baseline, build, mateval, run, score};
+use super::sample::{json, kept_folder, write_source};
+
+/// The sample's room, 160x120 pixels, atlas sizes chosen by the tool.
+static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
+    let folder = kept_folder("lifting");
+    let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
+    run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
+    folder.join("dataset")
+});
+
+/// Summary of a baseline's score under `mateval-1`, without LPIPS.
+fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let (submission, result) = (folder.path().join("submission"), folder.path().join("result.json"));
+    run(baseline(name, dataset, &submission).args(words)).ends_with(0);
+    let mut command = score(&submission, dataset, &result);
+    run(command.env("MATEVAL_CACHE", folder.path().join("no-such-folder"))).ends_with(0);
+    json(&result)["protocols"]["mateval-1"]["summary"].clone()
+}
+
+fn psnr(summary: &Value, key: &str) -> f64 {
+    summary[format!("{key}.psnr")].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
+}
+
+fn truth(dataset: &Path) -> Picture<LinearRgb> {
+    exr_io::read_linear(&dataset.join("scenes/room/ground_truth/views/input/albedo.exr")).unwrap()
+}
+
+/// A folder with an adapter `a.toml` and one picture of the room, as it reads them.
+fn estimate(encoding: &str, picture: &Picture<LinearRgb>) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let adapter = format!("name = \"a\"\n[base_color]\nfiles = [\"{{scene}}.exr\"]\nencoding = \"{encoding}\"\n");
+    std::fs::write(folder.path().join("a.toml"), adapter).unwrap();
+    exr_io::write_linear(&folder.path().join("room.exr"), picture, Precision::Float).unwrap();
+    folder
+}
+
+fn lifted_words(folder: &tempfile::TempDir) -> [String; 4] {
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    ["--estimate".to_owned(), path(""), "--adapter".to_owned(), path("a.toml")]
+}
+
+fn scored_estimate(encoding: &str, picture: &Picture<LinearRgb>) -> Value {
+    let folder = estimate(encoding, picture);
+    let words = lifted_words(&folder);
+    scored(&ROOM, "nn", &words.each_ref().map(String::as_str))
+}
+
+#[test]
+fn what_is_lifted_and_rendered_back_is_the_estimate() {
+    let lifted = scored(&ROOM, "nn", &[]);
+    assert!(psnr(&lifted, "albedo.input") >= 35.0, "{lifted}");
+    assert!(psnr(&lifted, "albedo.unobserved") < psnr(&lifted, "albedo.input"), "{lifted}");
+    // Twin: half a pixel beside it costs more than all else together.
+    let picture = truth(&ROOM);
+    let shifted = Picture::from_fn(picture.width(), picture.height(), |x, y| {
+        let (a, b) = (picture.get(x, y).0, picture.get((x + 1).min(picture.width() - 1), y).0);
+        LinearRgb(std::array::from_fn(|c| (a[c] + b[c]) / 2.0))
+    });
+    let shifted = scored_estimate("linear", &shifted);
+    assert!(psnr(&shifted, "albedo.input") < 35.0, "{shifted}");
+    assert!(psnr(&shifted, "albedo.input") < psnr(&lifted, "albedo.input") - 3.0, "{shifted}");
+}
+
+#[test]
+fn baselines_come_in_their_order() {
+    let [nn, part, instance, grey] = [
+        scored(&ROOM, "nn", &["--estimate", "gt"]),
+        scored(&ROOM, "median-part", &["--estimate", "gt"]),
+        scored(&ROOM, "median", &["--estimate", "gt"]),
+        scored(&ROOM, "grey", &[]),
+    ]
+    .map(|summary| psnr(&summary, "albedo.input"));
+    assert!(nn > part + 5.0 && part >= instance && instance > grey + 5.0, "{nn} {part} {instance} {grey}");
+}
+
+/// The bytes of all base colours of a submission, by instance.
+fn base_colors(submission: &Path) -> Vec<(String, Picture<[u8; 3]>)> {
+    let mut folders: Vec<PathBuf> =
+        std::fs::read_dir(submission.join("scenes/room")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    folders.sort();
+    let named = |folder: PathBuf| {
+        let picture = png_io::read_rgb_bytes(&folder.join("base_color.png")).unwrap();
+        (folder.file_name().unwrap().to_string_lossy().into_owned(), picture)
+    };
+    folders.into_iter().map(named).collect()
+}
+
+#[test]
+fn three_encodings_of_one_estimate_give_one_atlas() {
+    type Encode = fn(f32) -> f32;
+    let encodings: [(&str, Encode); 3] =
+        [("linear", |v| v), ("srgb", srgb_from_linear), ("gamma22", |v| v.max(0.0).powf(1.0 / 2.2))];
+    let folder = tempfile::tempdir().unwrap();
+    let picture = truth(&ROOM);
+    let atlases = encodings.map(|(name, encode)| {
+        let estimate = estimate(name, &picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(encode))));
+        let out = folder.path().join(name);
+        run(baseline("nn", &ROOM, &out).args(lifted_words(&estimate))).ends_with(0);
+        base_colors(&out)
+    });
+    for other in &atlases[1..] {
+        let (mut texels, mut rounded) = (0, 0);
+        for ((name, a), (_, b)) in atlases[0].iter().zip(other) {
+            for (a, b) in a.pixels().as_flattened().iter().zip(b.pixels().as_flattened()) {
+                assert!(a.abs_diff(*b) <= 1, "{name}: {a} {b}");
+                texels += 1;
+                rounded += usize::from(a != b);
+            }
+        }
+        // Half a step apart at most: only what lies on the edge of two bytes may fall to either.
+        assert!(rounded * 1000 < texels, "{rounded} of {texels}");
+    }
+    // Twin: a wrong word for the encoding shows.
+    let wrong = estimate("srgb", &picture);
+    let out = folder.path().join("wrong");
+    run(baseline("nn", &ROOM, &out).args(lifted_words(&wrong))).ends_with(0);
+    assert!(atlases[0] != base_colors(&out));
+}
+
+/// A red and a green box that touch, a blue sheet a millimetre before a yellow one, and a mirror that shows them all.
+const BOXES: &str = r#"<scene version="3.0.0">
+<sensor type="perspective"><float name="fov" value="60"/><transform name="to_world">
+<lookat origin="0.3, 0.4, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
+<film type="hdrfilm"><integer name="width" value="96"/><integer name="height" value="72"/></film></sensor>
+<shape type="cube" id="red"><transform name="to_world"><scale value="0.4"/><translate x="-0.4"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.1, 0.1"/></bsdf></shape>
+<shape type="cube" id="green"><transform name="to_world"><scale value="0.4"/><translate x="0.4"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.1, 0.8, 0.1"/></bsdf></shape>
+<shape type="rectangle" id="blue"><transform name="to_world"><scale value="3"/><translate z="-1"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.1, 0.1, 0.8"/></bsdf></shape>
+<shape type="rectangle" id="yellow"><transform name="to_world"><scale value="2.9"/><translate z="-1.001"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.8, 0.8, 0.1"/></bsdf></shape>
+<shape type="rectangle" id="mirror"><transform name="to_world"><scale x="0.5" y="0.5"/><rotate y="1" angle="40"/>
+<translate x="-1.3" y="0.3" z="0.2"/></transform>
+<bsdf type="conductor"><string name="material" value="none"/></bsdf></shape>
+<shape type="rectangle" id="lamp"><transform name="to_world"><rotate x="1" angle="90"/><translate y="2.5"/></transform>
+<bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>
+<emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>
+</scene>"#;
+
+fn boxes() -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("boxes.xml"), BOXES).unwrap();
+    let recipe = folder.path().join("recipe.toml");
+    let text = "name = \"boxes\"\nviews = []\natlas_size = 128\n[[scene]]\nid = \"room\"\nbitterli = \"boxes.xml\"\n";
+    std::fs::write(&recipe, text).unwrap();
+    let dataset = folder.path().join("dataset");
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    (folder, dataset)
+}
+
+/// Whether all texels that an instance looks up are within a byte of the colour.
+fn is_all(dataset: &Path, submission: &Path, instance: &str, linear: [f32; 3]) -> bool {
+    let nodes = glb::read(&dataset.join("scenes/room/geometry/instances.glb")).unwrap();
+    let mesh = &nodes.iter().find(|node| node.name == instance).unwrap().mesh;
+    let path = submission.join("scenes/room").join(instance).join("base_color.png");
+    let picture = png_io::read_rgb_bytes(&path).unwrap();
+    let atlas = UvAtlas::new(mesh, picture.width());
+    let expected = linear.map(|v| (srgb_from_linear(v) * 255.0).round());
+    let places = (0..picture.width()).flat_map(|x| (0..picture.height()).map(move |y| (x, y)));
+    let near = |(x, y)| (0..3).all(|c| (f32::from(picture.get(x, y)[c]) - expected[c]).abs() <= 1.0);
+    places.filter(|&(x, y)| atlas.owner(x, y).is_some()).all(near)
+}
+
+#[test]
+fn no_colour_goes_from_one_instance_to_another() {
+    let (folder, dataset) = boxes();
+    let grey = [0.5; 3];
+    let expected = [
+        ("red", [0.8, 0.1, 0.1]),
+        ("green", [0.1, 0.8, 0.1]),
+        ("blue", [0.1, 0.1, 0.8]),
+        ("yellow", grey),
+        ("mirror", [1.0; 3]),
+    ];
+    for (name, words) in
+        [("one", &["--neighbours", "1"][..]), ("three", &["--neighbours", "3", "--normal-weight", "0.5"])]
+    {
+        let out = folder.path().join(name);
+        run(baseline("nn", &dataset, &out).args(words)).ends_with(0);
+        for (instance, color) in expected {
+            assert!(is_all(&dataset, &out, instance, color), "{name} {instance}");
+        }
+    }
+    // Twin: from any instance, the sheet behind takes the colour of the sheet before it.
+    let out = folder.path().join("any");
+    run(baseline("nn", &dataset, &out).arg("--any-instance")).ends_with(0);
+    assert!(!is_all(&dataset, &out, "yellow", grey));
+    let out = folder.path().join("median");
+    run(baseline("median", &dataset, &out).args(["--estimate", "gt"])).ends_with(0);
+    for (instance, color) in expected {
+        assert!(is_all(&dataset, &out, instance, color), "median {instance}");
+    }
+}
+
+#[test]
+fn what_cannot_be_lifted_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let nn = |words: &[&str]| -> Run { run(baseline("nn", &ROOM, &out).args(words)).ends_with(2) };
+    nn(&["--estimate", "no-such-folder"]).says("expected gt, input or a folder");
+    nn(&["--estimate", "input"]).says("run `mateval prep render`");
+    nn(&["--estimate", "gt", "--adapter", "rgbx"]).says("give --estimate FOLDER");
+    let here = folder.path().to_string_lossy().into_owned();
+    nn(&["--estimate", &here, "--adapter", "marigold"]).says("albedo.png");
+    nn(&["--estimate", &here, "--adapter", "no-such"]).says("colorful-shading");
+    let mut command = mateval();
+    command.args(["baseline", "median-part", "--part-set", "none", "--estimate", "gt", "--dataset"]).arg(&*ROOM);
+    run(command.arg("--out").arg(&out)).ends_with(2).says("no set of parts 'none'");
+    assert!(!out.exists());
+}
