@@ -224,3 +224,59 @@ fn what_cannot_be_lifted_is_said() {
     run(command.arg("--out").arg(&out)).ends_with(2).says("no set of parts 'none'");
     assert!(!out.exists());
 }
+
+#[test]
+fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
+    let folder = tempfile::tempdir().unwrap();
+    let (objects, results) = (folder.path().join("objects"), folder.path().join("results"));
+    let mut command = mateval();
+    command.args(["baseline", "texgen-export", "--dataset"]).arg(&*ROOM).arg("--out").arg(&objects);
+    run(&mut command).ends_with(0);
+
+    // The stand-in copies the partial atlas, and paints what is not seen: red at the lower edge, green at the upper one.
+    std::fs::create_dir(&results).unwrap();
+    let list = std::fs::read_to_string(objects.join("objects.jsonl")).unwrap();
+    let ids: Vec<String> = list
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap()["id"].as_str().unwrap().to_owned())
+        .collect();
+    assert!(ids.len() > 10, "{ids:?}");
+    for id in &ids {
+        let object = objects.join(&id[..2]).join(id);
+        let partial = png_io::read_rgb_bytes(&object.join("model.png")).unwrap();
+        let seen = png_io::read_mask(&object.join("mask_partial.png")).unwrap();
+        assert_eq!((partial.width(), partial.height()), (1024, 1024));
+        let lower = |y: usize| if y >= 512 { [255, 0, 0] } else { [0, 255, 0] };
+        let painted = Picture::from_fn(1024, 1024, |x, y| if seen.get(x, y) { partial.get(x, y) } else { lower(y) });
+        png_io::write_rgb_bytes(&results.join(format!("{id}.png")), &painted).unwrap();
+        let mesh = std::fs::read_to_string(object.join("model.obj")).unwrap();
+        assert!(mesh.lines().any(|line| line.starts_with("vt ")) && object.join("position.exr").is_file());
+        assert_eq!(png_io::read_rgb_bytes(&object.join("picture.png")).unwrap().width(), 512);
+    }
+    let [imported, nn] = ["imported", "nn"].map(|name| folder.path().join(name));
+    let mut command = mateval();
+    command.args(["baseline", "texgen-import"]).arg(&results).arg("--dataset").arg(&*ROOM).arg("--out").arg(&imported);
+    run(&mut command).ends_with(0);
+    run(&mut baseline("nn", &ROOM, &nn)).ends_with(0);
+    let (mut kept, mut painted) = (0, [0; 2]);
+    for ((name, ours), (_, theirs)) in base_colors(&nn).iter().zip(&base_colors(&imported)) {
+        assert_eq!((ours.width(), ours.height()), (theirs.width(), theirs.height()), "{name}");
+        for (at, (a, b)) in ours.pixels().iter().zip(theirs.pixels()).enumerate() {
+            let half = usize::from(at / ours.width() < ours.height() / 2);
+            match b {
+                [255, 0, 0] | [0, 255, 0] => painted[half] += usize::from(b[half] == 255),
+                _ => kept += usize::from(a == b),
+            }
+        }
+    }
+    // Everything is one of the two, but for the seams of the two colours and for texels that 1024 a side did not resolve.
+    let all: usize = base_colors(&nn).iter().map(|(_, picture)| picture.pixels().len()).sum();
+    assert!(kept * 10 > all && painted.iter().all(|half| half * 20 > all), "{kept} {painted:?} of {all}");
+    assert!((kept + painted[0] + painted[1]) * 100 > all * 97, "{kept} {painted:?} of {all}");
+
+    std::fs::remove_dir_all(&results).unwrap();
+    std::fs::create_dir(&results).unwrap();
+    let mut command = mateval();
+    command.args(["baseline", "texgen-import"]).arg(&results).arg("--dataset").arg(&*ROOM).arg("--out").arg(&imported);
+    run(command.arg("--force")).ends_with(2).says("living-00012.png");
+}

@@ -62,6 +62,9 @@ pub enum BaselineError {
         /// Columns and rows of two.
         sizes: [(usize, usize); 2],
     },
+    /// No texture of an object is there.
+    #[error("'{}' holds no <id>.png of an object of this dataset, as living-00012.png; expected what TEXGen made of `baseline texgen-export`", .0.display())]
+    NoTextures(PathBuf),
     /// The geometry cannot be traced.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

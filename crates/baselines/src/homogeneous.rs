@@ -18,7 +18,7 @@ use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;
 use crate::median::{Medians, median};
-use crate::seen::SeenPixels;
+use crate::nn::seen_pixels;
 use crate::submission::{self, Method};
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
@@ -35,7 +35,7 @@ pub fn write_by_instance(
     submission::write_scenes(dataset, out, force, &method, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
-        let medians = Medians::new(&geometry, &seen(&geometry, &estimate)?, &estimate);
+        let medians = Medians::new(&geometry, &seen_pixels(&geometry, &estimate)?, &estimate);
         let mut written = 0;
         for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
             Maps::constant(medians.of(&geometry, at), &estimate).write(&folder.join(instance.id.as_str()))?;
@@ -84,11 +84,6 @@ fn name(stem: &str, source: &EstimateSource) -> String {
     }
 }
 
-fn seen(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<SeenPixels, BaselineError> {
-    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(geometry.scene.id.to_string()))?;
-    Ok(SeenPixels::new(geometry, size))
-}
-
 /// The colour of each part of a scene.
 struct PartColors {
     /// Of each instance: its triangles' corners by their bits, and the part's colour.
@@ -100,7 +95,7 @@ impl PartColors {
     fn new(geometry: &SceneGeometry<'_>, set: Option<&PartSetId>, estimate: &Estimate) -> Result<Self, BaselineError> {
         let parts = parts_of(geometry, set)?;
         let picture = geometry.part_picture(set)?;
-        let seen = seen(geometry, estimate)?;
+        let seen = seen_pixels(geometry, estimate)?;
         let medians = Medians::new(geometry, &seen, estimate);
         let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); parts.len()];
         let (width, height) = estimate.size().unwrap_or_default();

@@ -12,7 +12,7 @@ use crate::error::BaselineError;
 use crate::estimate::{Estimate, EstimateSource, Values};
 use crate::fill::{FillRule, SeenCloud};
 use crate::geometry::SceneGeometry;
-use crate::lift::{PartialAtlas, lift};
+use crate::lift::{PartialAtlas, Texel, lift};
 use crate::maps::Maps;
 use crate::median::Medians;
 use crate::seen::{SeenPixels, SeenPoint};
@@ -60,9 +60,10 @@ pub fn write(
     submission::write_scenes(dataset, out, force, &method, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
-        lift_scene(&geometry, &estimate, options, progress, |instance, known, medians| {
-            let maps = match known {
-                Some(known) => Maps::of_atlas(&known, &estimate),
+        let seen = seen_pixels(&geometry, &estimate)?;
+        lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
+            let maps = match lifted {
+                Some(lifted) => Maps::of_atlas(&lifted.whole, &estimate),
                 None => Maps::constant(medians.of(&geometry, instance), &estimate),
             };
             maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
@@ -70,18 +71,31 @@ pub fn write(
     })
 }
 
+/// An instance's atlas, lifted and filled.
+pub struct Lifted {
+    /// Every texel that a triangle looks up is known.
+    pub whole: PartialAtlas,
+    /// Whether each texel was seen, row by row: what filling found is not.
+    pub seen: Vec<bool>,
+}
+
+/// Which instance each pixel of the estimate shows.
+pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<SeenPixels, BaselineError> {
+    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(geometry.scene.id.to_string()))?;
+    Ok(SeenPixels::new(geometry, size))
+}
+
 /// Lifts an estimate to every instance that has an atlas, one after the other: `each` is given its number and its whole
 /// atlas, or none where nothing of it follows from what is seen. Gives how many there were.
 pub fn lift_scene(
     geometry: &SceneGeometry<'_>,
     estimate: &Estimate,
+    seen: &SeenPixels,
     options: &NnOptions,
     progress: Progress<'_>,
-    each: impl Fn(usize, Option<PartialAtlas>, &Medians) -> Result<(), BaselineError>,
+    each: impl Fn(usize, Option<Lifted>, &Medians) -> Result<(), BaselineError>,
 ) -> Result<usize, BaselineError> {
-    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(geometry.scene.id.to_string()))?;
-    let seen = SeenPixels::new(geometry, size);
-    let medians = Medians::new(geometry, &seen, estimate);
+    let medians = Medians::new(geometry, seen, estimate);
     let with_atlas: Vec<(usize, usize)> = geometry
         .scene
         .instances
@@ -95,16 +109,17 @@ pub fn lift_scene(
     let step = format!("{} lift", geometry.scene.id);
     for (done, &(instance, size)) in with_atlas.iter().enumerate() {
         progress(&step, done, with_atlas.len());
-        let mut known = lift(geometry, &seen, estimate, instance, size);
+        let mut whole = lift(geometry, seen, estimate, instance, size);
+        let is_seen = whole.texels.pixels().iter().map(|texel| matches!(texel, Texel::Seen(_))).collect();
         let mesh = geometry.mesh(instance);
         let filled = match &all {
-            Some(all) => all.fill(&mut known, mesh),
+            Some(all) => all.fill(&mut whole, mesh),
             None => {
                 let own = points.iter().filter(|(point, _)| point.instance == instance).copied();
-                SeenCloud::new(options.rule, own).fill(&mut known, mesh)
+                SeenCloud::new(options.rule, own).fill(&mut whole, mesh)
             }
         };
-        each(instance, filled.then_some(known), &medians)?;
+        each(instance, filled.then_some(Lifted { whole, seen: is_seen }), &medians)?;
     }
     progress(&step, with_atlas.len(), with_atlas.len());
     Ok(with_atlas.len())

@@ -9,7 +9,7 @@ use mateval_baselines::adapter::Adapter;
 use mateval_baselines::estimate::EstimateSource;
 use mateval_baselines::fill::FillRule;
 use mateval_baselines::nn::NnOptions;
-use mateval_baselines::{grey, homogeneous, nn, truth};
+use mateval_baselines::{grey, homogeneous, nn, texgen, truth};
 use mateval_scene::PartSetId;
 use mateval_scene::open::Dataset;
 
@@ -29,6 +29,10 @@ pub enum Command {
     Median(MedianArgs),
     /// One colour a part: the median of an estimate under its mask.
     MedianPart(MedianPartArgs),
+    /// Writes each instance that is seen as TEXGen reads objects: mesh, partial atlas, masks, positions, picture, list.
+    TexgenExport(TexgenExportArgs),
+    /// TEXGen's textures where nothing is seen, the estimate where something is.
+    TexgenImport(TexgenImportArgs),
 }
 
 /// What every baseline is given.
@@ -122,6 +126,30 @@ pub struct MedianPartArgs {
     part_set: Option<PartSetId>,
 }
 
+/// Of `texgen-export`.
+#[derive(clap::Args)]
+pub struct TexgenExportArgs {
+    /// The dataset's folder.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// Folder of the objects.
+    #[arg(long)]
+    out: PathBuf,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+}
+
+/// Of `texgen-import`.
+#[derive(clap::Args)]
+pub struct TexgenImportArgs {
+    /// Folder with a texture an object, <id>.png.
+    results: PathBuf,
+    #[command(flatten)]
+    places: Places,
+    #[command(flatten)]
+    estimate: EstimateArgs,
+}
+
 /// Makes the submission.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
@@ -150,6 +178,25 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             let source = args.estimate.source(EstimateSource::Input)?;
             let (places, set) = (&args.places, args.part_set.as_ref());
             done(places, homogeneous::write_by_part(&open(places)?, &places.out, places.force, &source, set)?)
+        }
+        Command::TexgenExport(args) => {
+            let source = args.estimate.source(EstimateSource::Truth)?;
+            let bars = Bars::new();
+            let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
+            let count = texgen::export(&Dataset::open(&args.dataset)?, &args.out, &source, &progress)?;
+            drop(bars);
+            print(&format!("{}: {count} objects\n", args.out.display()))?;
+            Ok(Outcome::Good)
+        }
+        Command::TexgenImport(args) => {
+            let (places, source) = (&args.places, args.estimate.source(EstimateSource::Truth)?);
+            let bars = Bars::new();
+            let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
+            let dataset = open(places)?;
+            let found = texgen::import(&dataset, &args.results, &places.out, places.force, &source, &progress)?;
+            drop(bars);
+            print(&format!("{}: {} textures found\n", args.results.display(), found.textured))?;
+            done(places, found.instances)
         }
     }
 }

@@ -1,0 +1,138 @@
+//! Instances as TEXGen's loader reads objects.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::{DVec2, DVec3};
+use mateval_image::exr_io::{Precision, write_linear};
+use mateval_image::store::write_whole;
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::{Progress, SceneError, TriangleMesh};
+use serde_json::json;
+
+use super::{TEXELS, object_folder, object_id};
+use crate::error::BaselineError;
+use crate::estimate::{Estimate, EstimateSource};
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, Texel, lift, place_of};
+use crate::nn::seen_pixels;
+use crate::seen::SeenPixels;
+
+/// Pixels a side of the picture that TEXGen is conditioned on.
+const PICTURE: usize = 512;
+
+/// Writes `objects.jsonl` and a folder an instance that is seen: `model.obj`, `model.png` (the partial atlas, black where
+/// nothing is seen), `mask.png` (texels of the surface), `mask_partial.png` (those that are seen), `position.exr` (in
+/// TEXGen's own space) and `picture.png` (what the estimate shows of the instance, else white). Gives how many there are.
+pub fn export(
+    dataset: &Dataset,
+    out: &Path,
+    source: &EstimateSource,
+    progress: Progress<'_>,
+) -> Result<usize, BaselineError> {
+    if out.exists() {
+        return Err(BaselineError::Exists(out.to_owned()));
+    }
+    let work = WorkFolder::start(out)?;
+    let (mut lines, mut count) = (String::new(), 0);
+    for scene in &dataset.scenes {
+        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+        let estimate = source.read(dataset, scene)?;
+        let seen = seen_pixels(&geometry, &estimate)?;
+        for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
+            progress(&format!("{} export", scene.id), at, scene.instances.len());
+            let known = lift(&geometry, &seen, &estimate, at, TEXELS);
+            if !known.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_))) {
+                continue;
+            }
+            let id = object_id(&scene.id, instance);
+            let folder = work.path().join(object_folder(&id));
+            std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+            write_object(&folder, geometry.mesh(at), &known)?;
+            png_io::write_rgb_bytes(&folder.join("picture.png"), &picture(&seen, &estimate, at))?;
+            let prompt = instance.category.as_deref().unwrap_or(&instance.name);
+            let line = json!({ "id": id, "result": prompt, "root_dir": "." });
+            writeln!(lines, "{line}").expect("a text takes any line");
+            count += 1;
+        }
+    }
+    write_whole(&work.path().join("objects.jsonl"), lines.as_bytes())?;
+    work.finish()?;
+    Ok(count)
+}
+
+fn write_object(folder: &Path, mesh: &TriangleMesh, known: &PartialAtlas) -> Result<(), BaselineError> {
+    write_whole(&folder.join("model.obj"), obj(mesh).as_bytes())?;
+    png_io::write_rgb_bytes(&folder.join("model.png"), &known.texels.map(shown))?;
+    png_io::write_mask(&folder.join("mask.png"), &known.texels.map(|texel| texel != Texel::Unused))?;
+    let is_seen = |texel| matches!(texel, Texel::Seen(_));
+    png_io::write_mask(&folder.join("mask_partial.png"), &known.texels.map(is_seen))?;
+    write_linear(&folder.join("position.exr"), &positions(mesh, known), Precision::Float)?;
+    Ok(())
+}
+
+fn shown(texel: Texel) -> [u8; 3] {
+    match texel {
+        Texel::Seen([r, g, b, ..]) => [r, g, b].map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)))),
+        Texel::Unused | Texel::Unseen => [0; 3],
+    }
+}
+
+/// Each corner as it stands: TEXGen's loader turns and scales by itself.
+fn obj(mesh: &TriangleMesh) -> String {
+    let mut text = String::new();
+    let mut line = |words: std::fmt::Arguments<'_>| {
+        text.write_fmt(words).expect("a text takes any line");
+        text.push('\n');
+    };
+    for p in &mesh.positions {
+        line(format_args!("v {} {} {}", p.x, p.y, p.z));
+    }
+    for uv in mesh.uvs.iter().flatten() {
+        line(format_args!("vt {} {}", uv.x, uv.y));
+    }
+    for [a, b, c] in mesh.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 1)) {
+        line(format_args!("f {a}/{a} {b}/{b} {c}/{c}"));
+    }
+    text
+}
+
+/// The place of each texel in TEXGen's space: (x, -z, y), centred, the longest side 1; 0 where there is no surface.
+fn positions(mesh: &TriangleMesh, known: &PartialAtlas) -> Picture<LinearRgb> {
+    let turned = |p: DVec3| DVec3::new(p.x, -p.z, p.y);
+    let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let bounds =
+        mesh.positions.iter().map(|p| turned(p.as_dvec3())).fold(start, |(low, high), p| (low.min(p), high.max(p)));
+    let (centre, scale) = ((bounds.0 + bounds.1) / 2.0, 1.0 / (bounds.1 - bounds.0).max_element().max(1e-6));
+    Picture::from_fn(TEXELS, TEXELS, |x, y| {
+        let Some((triangle, _)) = known.atlas.owner(x, y) else { return LinearRgb([0.0; 3]) };
+        let place = place_of(&known.atlas, mesh, triangle, DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+        LinearRgb(((turned(place) - centre) * scale).as_vec3().to_array())
+    })
+}
+
+/// The square around the instance's pixels, all others white.
+fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[u8; 3]> {
+    let pixels: Vec<(usize, usize)> =
+        seen.telling().filter(|(_, _, of)| *of == instance).map(|(x, y, _)| (x, y)).collect();
+    let range =
+        |all: &mut dyn Iterator<Item = usize>| all.fold((usize::MAX, 0), |(low, high), v| (low.min(v), high.max(v)));
+    let (columns, rows) =
+        (range(&mut pixels.iter().map(|pixel| pixel.0)), range(&mut pixels.iter().map(|pixel| pixel.1)));
+    let side = (columns.1.saturating_sub(columns.0)).max(rows.1.saturating_sub(rows.0)) + 1;
+    let corner = |(low, high): (usize, usize)| (low + high + 1) as f64 / 2.0 - side as f64 / 2.0;
+    let (left, top) = (corner(columns), corner(rows));
+    Picture::from_fn(PICTURE, PICTURE, |x, y| {
+        let place = |corner: f64, at: usize| corner + (at as f64 + 0.5) * side as f64 / PICTURE as f64;
+        let (px, py) = (place(left, x), place(top, y));
+        let inside = seen.camera.holds(DVec2::new(px, py)) && seen.tells_of(instance, px as usize, py as usize);
+        if !inside {
+            return [255; 3];
+        }
+        let [r, g, b, ..] = estimate.at(px as usize, py as usize);
+        [r, g, b].map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+    })
+}

@@ -1,0 +1,85 @@
+//! TEXGen's textures as a submission.
+
+use std::path::Path;
+
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Texture, Wrap};
+use mateval_scene::Progress;
+use mateval_scene::open::Dataset;
+
+use super::object_id;
+use crate::error::BaselineError;
+use crate::estimate::EstimateSource;
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, Texel};
+use crate::maps::Maps;
+use crate::nn::{self, NnOptions};
+use crate::submission::{self, Method};
+
+/// What came of an import.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Imported {
+    /// Instances of the submission.
+    pub instances: usize,
+    /// Those with a texture of TEXGen's.
+    pub textured: usize,
+}
+
+/// Writes a submission: seen texels hold the estimate, all others what `results/<id>.png` (sRGB, any square size) says at
+/// their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with its defaults makes
+/// them from the same estimate. Fails where no file at all is there.
+pub fn import(
+    dataset: &Dataset,
+    results: &Path,
+    out: &Path,
+    force: bool,
+    source: &EstimateSource,
+    progress: Progress<'_>,
+) -> Result<Imported, BaselineError> {
+    let textured = dataset.scenes.iter().flat_map(|scene| scene.instances.iter().map(move |i| object_id(&scene.id, i)));
+    let textured = textured.filter(|id| file(results, id).is_file()).count();
+    if textured == 0 {
+        return Err(BaselineError::NoTextures(results.to_owned()));
+    }
+    let description = format!(
+        "TEXGen's textures where the input view shows nothing, {} where it does; {textured} textures; the rest as nn",
+        source.description()
+    );
+    let method = Method { name: format!("texgen-{}", source.name()), description };
+    let instances = submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+        let estimate = source.read(dataset, scene)?;
+        let (seen, options) = (nn::seen_pixels(&geometry, &estimate)?, NnOptions::default());
+        nn::lift_scene(&geometry, &estimate, &seen, &options, progress, |at, known, medians| {
+            let instance = &geometry.scene.instances[at];
+            let path = file(results, &object_id(&scene.id, instance));
+            let texture = path.is_file().then(|| read_texture(&path, Encoding::Srgb, Wrap::Clamp)).transpose()?;
+            let maps = match (known, texture) {
+                (Some(mut lifted), Some(texture)) => {
+                    composite(&mut lifted, &texture);
+                    Maps::of_atlas(&lifted.whole, &estimate)
+                }
+                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, &estimate),
+                (None, _) => Maps::constant(medians.of(&geometry, at), &estimate),
+            };
+            maps.write(&folder.join(instance.id.as_str()))
+        })
+    })?;
+    Ok(Imported { instances, textured })
+}
+
+fn file(results: &Path, id: &str) -> std::path::PathBuf {
+    results.join(format!("{id}.png"))
+}
+
+/// The texture's colour for every texel that was not seen before it was filled.
+fn composite(lifted: &mut nn::Lifted, texture: &Texture) {
+    let PartialAtlas { atlas, texels } = &mut lifted.whole;
+    let size = atlas.size();
+    for (at, texel) in texels.pixels_mut().iter_mut().enumerate() {
+        if let (Texel::Seen(values), false) = (texel, lifted.seen[at]) {
+            let uv = [at % size, size - 1 - at / size].map(|v| (v as f32 + 0.5) / size as f32);
+            values[..3].copy_from_slice(&texture.sample(uv));
+        }
+    }
+}
