@@ -52,8 +52,8 @@ fn what_is_no_dataset() {
 
 #[test]
 fn words_that_are_not_known() {
-    let error = "error: invalid value 'gray' for '<NAME>'\n  [possible values: gt, grey]\n\n  \
-                 tip: a similar value exists: 'grey'\n\nFor more information, try '--help'.\n";
+    let error = "error: unrecognized subcommand 'gray'\n\n  tip: a similar subcommand exists: 'grey'\n\n\
+                 Usage: mateval baseline <COMMAND>\n\nFor more information, try '--help'.\n";
     check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
     let error = "error: invalid value '../up' for '--scene <SCENES>': '../up' is not an id: expected \
                  ^[a-z0-9][a-z0-9_-]{0,63}$\n\nFor more information, try '--help'.\n";

@@ -280,3 +280,56 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
     command.args(["baseline", "texgen-import"]).arg(&results).arg("--dataset").arg(&*ROOM).arg("--out").arg(&imported);
     run(command.arg("--force")).ends_with(2).says("living-00012.png");
 }
+
+/// The header of a NumPy file of whole numbers of 64 bits, and the numbers.
+fn npy(labels: &[i64]) -> Vec<u8> {
+    let header = format!("{{'descr': '<i8', 'fortran_order': False, 'shape': ({},), }}", labels.len());
+    let padded = format!("{header:<117}\n");
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend(118_u16.to_le_bytes());
+    bytes.extend(padded.as_bytes());
+    bytes.extend(labels.iter().flat_map(|label| label.to_le_bytes()));
+    bytes
+}
+
+#[test]
+fn partfield_gets_meshes_and_gives_back_a_second_set_of_parts() {
+    let (folder, dataset) = boxes();
+    let [meshes, clusters] = ["meshes", "clusters"].map(|name| folder.path().join(name));
+    run(mateval().args(["baseline", "partfield-export", "--dataset"]).arg(&dataset).arg("--out").arg(&meshes))
+        .ends_with(0);
+    let faces = |id: &str| {
+        let text = std::fs::read_to_string(meshes.join(id)).unwrap();
+        text.lines().filter(|line| line.starts_with("f ")).count()
+    };
+    assert_eq!((faces("room-00001.obj"), faces("room-00003.obj")), (12, 2));
+
+    std::fs::create_dir(&clusters).unwrap();
+    std::fs::write(clusters.join("room-00001_0_03.npy"), npy(&[0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2])).unwrap();
+    let labels = folder.path().join("labels");
+    let import = |out: &Path| {
+        let mut command = mateval();
+        command.args(["baseline", "partfield-import", "--parts", "5", "--dataset"]).arg(&dataset).arg(&clusters);
+        run(command.arg("--out").arg(out))
+    };
+    assert!(import(&labels).ends_with(0).stdout.contains("labels of 1 instances"));
+    let recipe = folder.path().join("recipe.toml");
+    let text = std::fs::read_to_string(&recipe).unwrap() + "part_labels = { partfield = \"labels/room\" }\n";
+    std::fs::write(&recipe, text).unwrap();
+    let again = folder.path().join("again");
+    run(&mut build(&recipe, &again)).ends_with(0);
+    let scene = json(&again.join("scenes/room/scene.json"));
+    let parts = scene["part_sets"][0]["parts"].as_array().unwrap();
+    assert_eq!(parts.iter().filter(|part| part["instance"] == "red").count(), 3);
+    let out = folder.path().join("median");
+    let words = ["--estimate", "gt", "--part-set", "partfield"];
+    run(baseline("median-part", &again, &out).args(words)).ends_with(0);
+    assert!(is_all(&again, &out, "red", [0.8, 0.1, 0.1]));
+
+    std::fs::write(clusters.join("room-00002_0_01.npy"), npy(&[0; 11])).unwrap();
+    let bad = folder.path().join("bad");
+    import(&bad).ends_with(2).says("11 labels; 'green' has 12 triangles");
+    std::fs::remove_dir_all(&clusters).unwrap();
+    import(&bad).ends_with(2).says("living-00012_0_05.npy");
+    assert!(!bad.exists());
+}

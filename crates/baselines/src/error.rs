@@ -65,6 +65,22 @@ pub enum BaselineError {
     /// No texture of an object is there.
     #[error("'{}' holds no <id>.png of an object of this dataset, as living-00012.png; expected what TEXGen made of `baseline texgen-export`", .0.display())]
     NoTextures(PathBuf),
+    /// No labels of any instance.
+    #[error("'{}' holds no <id>_0_{parts:02}.npy or one of fewer parts, as living-00012_0_{parts:02}.npy; expected what PartField made of `baseline partfield-export`", folder.display())]
+    NoLabels {
+        /// Where they were looked for.
+        folder: PathBuf,
+        /// How many parts were asked for.
+        parts: u8,
+    },
+    /// Labels that do not fit.
+    #[error("'{}': {what}; export the instances anew and run PartField on them", path.display())]
+    BadLabels {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
     /// The geometry cannot be traced.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

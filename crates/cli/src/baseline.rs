@@ -9,7 +9,7 @@ use mateval_baselines::adapter::Adapter;
 use mateval_baselines::estimate::EstimateSource;
 use mateval_baselines::fill::FillRule;
 use mateval_baselines::nn::NnOptions;
-use mateval_baselines::{grey, homogeneous, nn, texgen, truth};
+use mateval_baselines::{grey, homogeneous, nn, partfield, texgen, truth};
 use mateval_scene::PartSetId;
 use mateval_scene::open::Dataset;
 
@@ -33,6 +33,10 @@ pub enum Command {
     TexgenExport(TexgenExportArgs),
     /// TEXGen's textures where nothing is seen, the estimate where something is.
     TexgenImport(TexgenImportArgs),
+    /// Writes each instance as a mesh that PartField reads.
+    PartfieldExport(PartfieldExportArgs),
+    /// PartField's labels as a recipe's `part_labels` wants them: a folder a scene.
+    PartfieldImport(PartfieldImportArgs),
 }
 
 /// What every baseline is given.
@@ -150,6 +154,33 @@ pub struct TexgenImportArgs {
     estimate: EstimateArgs,
 }
 
+/// Of `partfield-export`.
+#[derive(clap::Args)]
+pub struct PartfieldExportArgs {
+    /// The dataset's folder.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// Folder of the meshes.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Of `partfield-import`.
+#[derive(clap::Args)]
+pub struct PartfieldImportArgs {
+    /// PartField's `cluster_out`, with <id>_0_<parts>.npy.
+    clusters: PathBuf,
+    /// Parts an instance is split into.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=64))]
+    parts: u8,
+    /// The dataset's folder.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// Folder of the labels.
+    #[arg(long)]
+    out: PathBuf,
+}
+
 /// Makes the submission.
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
@@ -197,6 +228,17 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             drop(bars);
             print(&format!("{}: {} textures found\n", args.results.display(), found.textured))?;
             done(places, found.instances)
+        }
+        Command::PartfieldExport(args) => {
+            let count = partfield::export(&Dataset::open(&args.dataset)?, &args.out)?;
+            print(&format!("{}: {count} meshes\n", args.out.display()))?;
+            Ok(Outcome::Good)
+        }
+        Command::PartfieldImport(args) => {
+            let dataset = Dataset::open(&args.dataset)?;
+            let count = partfield::import(&dataset, &args.clusters, args.parts, &args.out)?;
+            print(&format!("{}: labels of {count} instances\n", args.out.display()))?;
+            Ok(Outcome::Good)
         }
     }
 }

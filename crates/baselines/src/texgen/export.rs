@@ -13,12 +13,13 @@ use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{Progress, SceneError, TriangleMesh};
 use serde_json::json;
 
-use super::{TEXELS, object_folder, object_id};
+use super::{TEXELS, object_folder};
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, EstimateSource};
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift, place_of};
 use crate::nn::seen_pixels;
+use crate::objects::{obj_text, object_id};
 use crate::seen::SeenPixels;
 
 /// Pixels a side of the picture that TEXGen is conditioned on.
@@ -65,7 +66,7 @@ pub fn export(
 }
 
 fn write_object(folder: &Path, mesh: &TriangleMesh, known: &PartialAtlas) -> Result<(), BaselineError> {
-    write_whole(&folder.join("model.obj"), obj(mesh).as_bytes())?;
+    write_whole(&folder.join("model.obj"), obj_text(mesh).as_bytes())?;
     png_io::write_rgb_bytes(&folder.join("model.png"), &known.texels.map(shown))?;
     png_io::write_mask(&folder.join("mask.png"), &known.texels.map(|texel| texel != Texel::Unused))?;
     let is_seen = |texel| matches!(texel, Texel::Seen(_));
@@ -79,25 +80,6 @@ fn shown(texel: Texel) -> [u8; 3] {
         Texel::Seen([r, g, b, ..]) => [r, g, b].map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)))),
         Texel::Unused | Texel::Unseen => [0; 3],
     }
-}
-
-/// Each corner as it stands: TEXGen's loader turns and scales by itself.
-fn obj(mesh: &TriangleMesh) -> String {
-    let mut text = String::new();
-    let mut line = |words: std::fmt::Arguments<'_>| {
-        text.write_fmt(words).expect("a text takes any line");
-        text.push('\n');
-    };
-    for p in &mesh.positions {
-        line(format_args!("v {} {} {}", p.x, p.y, p.z));
-    }
-    for uv in mesh.uvs.iter().flatten() {
-        line(format_args!("vt {} {}", uv.x, uv.y));
-    }
-    for [a, b, c] in mesh.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + 1)) {
-        line(format_args!("f {a}/{a} {b}/{b} {c}/{c}"));
-    }
-    text
 }
 
 /// The place of each texel in TEXGen's space: (x, -z, y), centred, the longest side 1; 0 where there is no surface.

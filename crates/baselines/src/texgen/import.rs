@@ -7,13 +7,13 @@ use mateval_image::{Texture, Wrap};
 use mateval_scene::Progress;
 use mateval_scene::open::Dataset;
 
-use super::object_id;
 use crate::error::BaselineError;
 use crate::estimate::EstimateSource;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;
 use crate::nn::{self, NnOptions};
+use crate::objects::object_id;
 use crate::submission::{self, Method};
 
 /// What came of an import.
