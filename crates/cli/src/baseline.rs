@@ -146,7 +146,7 @@ pub struct TexgenExportArgs {
 /// Of `texgen-import`.
 #[derive(clap::Args)]
 pub struct TexgenImportArgs {
-    /// Folder with a texture an object, <id>.png.
+    /// Folder with a texture an object, `<id>.png`.
     results: PathBuf,
     #[command(flatten)]
     places: Places,
@@ -168,7 +168,7 @@ pub struct PartfieldExportArgs {
 /// Of `partfield-import`.
 #[derive(clap::Args)]
 pub struct PartfieldImportArgs {
-    /// PartField's `cluster_out`, with <id>_0_<parts>.npy.
+    /// PartField's `cluster_out`, with `<id>_0_<parts>.npy`.
     clusters: PathBuf,
     /// Parts an instance is split into.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u8).range(1..=64))]
