@@ -1,6 +1,6 @@
 //! What a method says of the input view: pictures of base colour, roughness and metallic, any of them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use mateval_image::exr_io::{read_linear, read_scalar};
 use mateval_image::{LinearRgb, Picture};
@@ -106,7 +106,7 @@ fn truth(folder: &SceneFolder, view: &View) -> Result<Estimate, BaselineError> {
 
 fn photo(folder: &SceneFolder, view: &View, exposure: f32) -> Result<Estimate, BaselineError> {
     let path = folder.view(&view.id).join("rgb.exr");
-    if !Path::new(&path).is_file() {
+    if !path.is_file() {
         return Err(BaselineError::NoPhoto(path));
     }
     let shown = read_linear(&path)?.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (v * exposure).clamp(0.0, 1.0))));
