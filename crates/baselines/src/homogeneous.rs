@@ -19,6 +19,7 @@ use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;
 use crate::median::{Medians, median};
 use crate::nn::seen_pixels;
+use crate::seen::view_pixel;
 use crate::submission::{self, Method};
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
@@ -68,7 +69,7 @@ pub fn write_by_part(
         let mut written = 0;
         for (at, instance) in scene.instances.iter().enumerate() {
             let Some(atlas) = &instance.atlas else { continue };
-            let known = parts.paint(&geometry, at, atlas.size as usize)?;
+            let known = parts.paint(&geometry, at, atlas.size as usize);
             Maps::of_atlas(&known, &estimate).write(&folder.join(instance.id.as_str()))?;
             written += 1;
         }
@@ -98,10 +99,9 @@ impl PartColors {
         let seen = seen_pixels(geometry, estimate)?;
         let medians = Medians::new(geometry, &seen, estimate);
         let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); parts.len()];
-        let (width, height) = estimate.size().unwrap_or_default();
         for (x, y, _) in seen.telling() {
-            let of_view = ((2 * x + 1) * picture.width() / (2 * width), (2 * y + 1) * picture.height() / (2 * height));
-            let index = picture.get(of_view.0, of_view.1);
+            let (x_of_view, y_of_view) = view_pixel(geometry, &seen.camera, x, y);
+            let index = picture.get(x_of_view, y_of_view);
             if let Some(at) = parts.iter().position(|part| part.index.0.get() == index) {
                 pixels[at].push(estimate.at(x, y));
             }
@@ -121,7 +121,7 @@ impl PartColors {
     }
 
     /// The atlas of an instance, each texel in its part's colour.
-    fn paint(&self, geometry: &SceneGeometry<'_>, instance: usize, size: usize) -> Result<PartialAtlas, BaselineError> {
+    fn paint(&self, geometry: &SceneGeometry<'_>, instance: usize, size: usize) -> PartialAtlas {
         let mesh = geometry.mesh(instance);
         let atlas = UvAtlas::new(mesh, size);
         let fallback = self.medians.of(geometry, instance);
@@ -134,7 +134,7 @@ impl PartColors {
         let texels = Picture::from_fn(size, size, |x, y| {
             atlas.owner(x, y).map_or(Texel::Unused, |(triangle, _)| Texel::Seen(of_triangle[triangle]))
         });
-        Ok(PartialAtlas { atlas, texels })
+        PartialAtlas { atlas, texels }
     }
 }
 

@@ -12,6 +12,11 @@ use crate::estimate::{Estimate, Values};
 use crate::lift::{PartialAtlas, Texel};
 use crate::median::DEFAULT;
 
+/// A linear colour as PNG holds it, clipped.
+pub(crate) fn srgb_bytes(linear: [f32; 3]) -> [u8; 3] {
+    linear.map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+}
+
 /// Base colour as sRGB bytes; roughness and metallic as linear bytes, where anything is said of them.
 pub struct Maps {
     base_color: Picture<[u8; 3]>,
@@ -44,7 +49,7 @@ impl Maps {
         let says_color = estimate.base_color.is_some();
         let color = |[r, g, b, ..]: Values| {
             let rgb = if says_color { [r, g, b] } else { [DEFAULT[0], DEFAULT[1], DEFAULT[2]] };
-            rgb.map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+            srgb_bytes(rgb)
         };
         let scalar = |said: bool, channel: usize| said.then(|| values.map(|values| byte_from_unit(values[channel])));
         Self {

@@ -1,7 +1,7 @@
 //! Lifting by nearest neighbours: an estimate of the input view becomes a whole atlas (the paper's strongest family).
 //!
-//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance; an instance
-//! that is not seen at all takes the median of its category in the picture, or is grey.
+//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance; an
+//! instance that is not seen at all takes the median of its category in the picture, or is grey.
 
 use std::path::Path;
 

@@ -94,13 +94,15 @@ impl SeenPixels {
     }
 }
 
+/// The pixel of the input view that holds the centre of a pixel of the same picture at `camera`'s size.
+pub(crate) fn view_pixel(geometry: &SceneGeometry<'_>, camera: &Camera, x: usize, y: usize) -> (usize, usize) {
+    let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+    ((2 * x + 1) * geometry.valid.width() / (2 * width), (2 * y + 1) * geometry.valid.height() / (2 * height))
+}
+
 fn owner(geometry: &SceneGeometry<'_>, camera: &Camera, x: usize, y: usize) -> Owner {
     let nobody = Owner { instance: NOBODY, whole: false };
-    let (across, down) = (geometry.valid.width(), geometry.valid.height());
-    let of_view = (
-        (2 * x + 1) * across / (2 * camera.intrinsics.width as usize),
-        (2 * y + 1) * down / (2 * camera.intrinsics.height as usize),
-    );
+    let of_view = view_pixel(geometry, camera, x, y);
     if !geometry.valid.get(of_view.0, of_view.1) {
         return nobody;
     }

@@ -6,7 +6,6 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 use mateval_image::exr_io::{Precision, write_linear};
 use mateval_image::store::write_whole;
-use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::WorkFolder;
@@ -18,6 +17,7 @@ use crate::error::BaselineError;
 use crate::estimate::{Estimate, EstimateSource};
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift, place_of};
+use crate::maps::srgb_bytes;
 use crate::nn::seen_pixels;
 use crate::objects::{obj_text, object_id};
 use crate::seen::SeenPixels;
@@ -77,7 +77,7 @@ fn write_object(folder: &Path, mesh: &TriangleMesh, known: &PartialAtlas) -> Res
 
 fn shown(texel: Texel) -> [u8; 3] {
     match texel {
-        Texel::Seen([r, g, b, ..]) => [r, g, b].map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0)))),
+        Texel::Seen([r, g, b, ..]) => srgb_bytes([r, g, b]),
         Texel::Unused | Texel::Unseen => [0; 3],
     }
 }
@@ -115,6 +115,6 @@ fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[
             return [255; 3];
         }
         let [r, g, b, ..] = estimate.at(px as usize, py as usize);
-        [r, g, b].map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
+        srgb_bytes([r, g, b])
     })
 }
