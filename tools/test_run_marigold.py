@@ -125,6 +125,8 @@ class Plan(unittest.TestCase):
         expected = {"base_color": ("{scene}/albedo.png", None)}
         expected |= {"roughness": ("{scene}/material.png", "r"), "metallic": ("{scene}/material.png", "g")}
         self.assertEqual(found, expected)
+        # The power that the model's authors encode its targets by, and that `pictures` encodes a linear albedo by.
+        self.assertEqual({adapter[key]["encoding"] for key in expected}, {"gamma22"})
 
     def test_a_folder_of_other_pictures_is_refused(self) -> None:
         out, asked = self.folder / "out", {"seed": 1}
