@@ -17,6 +17,7 @@ mod suite {
     mod help;
     mod house;
     mod images;
+    mod importing;
     mod lifting;
     mod mitsuba_export;
     mod part_labels;

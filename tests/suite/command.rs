@@ -49,6 +49,13 @@ impl Run {
         self
     }
 
+    /// Panics where stdout does not hold the text.
+    #[track_caller]
+    pub fn prints(self, text: &str) -> Self {
+        assert!(self.stdout.contains(text), "expected '{text}' in stdout:\n{}", self.stdout);
+        self
+    }
+
     /// The one line of stderr that starts with `error:` (and all that follows it); empty where there is none.
     pub fn error(&self) -> &str {
         self.stderr.find("error:").map_or("", |at| &self.stderr[at..])

@@ -15,7 +15,7 @@ use super::command::{Run, baseline, build, mateval, run, score};
 use super::sample::{json, kept_folder, write_source};
 
 /// The sample's room, 160x120 pixels, atlas sizes chosen by the tool.
-static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
+pub static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("lifting");
     let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
@@ -23,7 +23,7 @@ static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
 });
 
 /// Summary of a baseline's score under `mateval-1`, without LPIPS.
-fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
+pub fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let (submission, result) = (folder.path().join("submission"), folder.path().join("result.json"));
     run(baseline(name, dataset, &submission).args(words)).ends_with(0);
@@ -32,7 +32,7 @@ fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
     json(&result)["protocols"]["mateval-1"]["summary"].clone()
 }
 
-fn psnr(summary: &Value, key: &str) -> f64 {
+pub fn psnr(summary: &Value, key: &str) -> f64 {
     summary[format!("{key}.psnr")].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
 }
 
@@ -153,7 +153,7 @@ const BOXES: &str = r#"<scene version="3.0.0">
 <emitter type="area"><rgb name="radiance" value="5"/></emitter></shape>
 </scene>"#;
 
-fn boxes() -> (tempfile::TempDir, PathBuf) {
+pub fn boxes() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("boxes.xml"), BOXES).unwrap();
     let recipe = folder.path().join("recipe.toml");
@@ -165,7 +165,7 @@ fn boxes() -> (tempfile::TempDir, PathBuf) {
 }
 
 /// Whether all texels that an instance looks up are within a byte of the colour.
-fn is_all(dataset: &Path, submission: &Path, instance: &str, linear: [f32; 3]) -> bool {
+pub fn is_all(dataset: &Path, submission: &Path, instance: &str, linear: [f32; 3]) -> bool {
     let nodes = glb::read(&dataset.join("scenes/room/geometry/instances.glb")).unwrap();
     let mesh = &nodes.iter().find(|node| node.name == instance).unwrap().mesh;
     let path = submission.join("scenes/room").join(instance).join("base_color.png");

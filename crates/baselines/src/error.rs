@@ -81,6 +81,29 @@ pub enum BaselineError {
         /// What is wrong.
         what: String,
     },
+    /// A folder without anything to import.
+    #[error("'{}' holds nothing for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, .obj) or <scene>.json", .0.display())]
+    NothingToImport(PathBuf),
+    /// A file that cannot be imported.
+    #[error("'{}': {what}", path.display())]
+    BadImport {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+    /// Files that lie elsewhere than the scene.
+    #[error("'{}': nothing for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb", folder.display())]
+    NothingNear {
+        /// The folder of imports.
+        folder: PathBuf,
+        /// The scene's id.
+        scene: String,
+        /// How near the files come.
+        nearest_m: f64,
+        /// How near they should.
+        max_distance_m: f64,
+    },
     /// The geometry cannot be traced.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

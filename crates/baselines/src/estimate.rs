@@ -72,7 +72,27 @@ pub struct Estimate {
     pub metallic: Option<Picture<f32>>,
 }
 
+/// Which of the three is said; what is not has no map, and stays at the format's default.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Says {
+    /// Linear red, green, blue.
+    pub base_color: bool,
+    /// Perceptual roughness.
+    pub roughness: bool,
+    /// Metallic.
+    pub metallic: bool,
+}
+
 impl Estimate {
+    /// Which pictures it has.
+    pub fn says(&self) -> Says {
+        Says {
+            base_color: self.base_color.is_some(),
+            roughness: self.roughness.is_some(),
+            metallic: self.metallic.is_some(),
+        }
+    }
+
     /// Columns and rows; none where there is no picture.
     pub fn size(&self) -> Option<(usize, usize)> {
         let color = self.base_color.as_ref().map(|picture| (picture.width(), picture.height()));

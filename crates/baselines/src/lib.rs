@@ -2,8 +2,9 @@
 //!
 //! In: a dataset, and for most an estimate of the input view ([`estimate`]; other people's pictures by an [`adapter`]).
 //! Out: a submission folder like any other. [`truth`] copies the baked truth (the ceiling that an atlas of this size can
-//! reach), [`grey`] knows nothing (the floor), [`nn`] lifts the estimate to the atlases, [`homogeneous`] takes its medians, [`texgen`] lets
-//! another project's network fill what is not seen, [`partfield`] lets one split instances into parts.
+//! reach), [`grey`] knows nothing (the floor), [`nn`] lifts the estimate to the atlases, [`homogeneous`] takes its
+//! medians, [`import`] rebakes meshes with uv of their own, [`texgen`] lets another project's network fill what is not seen,
+//! [`partfield`] lets one split instances into parts.
 //!
 //! Between: [`geometry`] is the scene as methods see it, [`seen`] which instance each pixel shows; [`lift`] writes the
 //! picture into an atlas, [`fill`] finds what is not seen, [`maps`] writes files.
@@ -15,11 +16,13 @@ pub mod fill;
 pub mod geometry;
 pub mod grey;
 pub mod homogeneous;
+pub mod import;
 pub mod lift;
 pub mod maps;
 pub mod median;
 pub mod nn;
 pub mod objects;
+pub mod part_colors;
 pub mod partfield;
 pub mod seen;
 pub mod submission;

@@ -72,6 +72,39 @@ pub fn place_of(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize, place: DV
     a * weights.x + b * weights.y + c * weights.z
 }
 
+/// How many metres a texel's side covers in a triangle.
+pub fn texel_size_m(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize) -> f64 {
+    let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
+    let area = (b - a).cross(c - a).length() / 2.0;
+    (area / atlas.texel_area(triangle).max(1e-12)).sqrt()
+}
+
+/// `a_side` times `a_side` places of an owned texel's square, those of its triangle alone; of one beside its triangle the
+/// triangle's nearest. None for a texel that nobody owns.
+pub fn places_of<'a>(
+    atlas: &'a UvAtlas,
+    mesh: &'a TriangleMesh,
+    (x, y): (usize, usize),
+    a_side: usize,
+) -> impl Iterator<Item = DVec3> + 'a {
+    let corner = DVec2::new(x as f64, y as f64);
+    let within = move |at: usize| DVec2::new((at % a_side) as f64, (at / a_side) as f64);
+    let owner = atlas.owner(x, y).into_iter();
+    owner.flat_map(move |(triangle, inside)| {
+        let squares = (0..a_side * a_side).map(move |at| corner + (within(at) + 0.5) / a_side as f64);
+        // Another triangle has what lies beside; a texel beside its triangle has no place inside.
+        let own = squares.filter(move |&place| !inside || atlas.barycentrics(triangle, place).min_element() >= -1e-9);
+        own.map(move |place| place_of(atlas, mesh, triangle, place))
+    })
+}
+
+/// The mean of each number; none of nothing.
+pub fn mean(all: &[Values]) -> Option<Values> {
+    let count = all.len() as f64;
+    let sum = |channel: usize| all.iter().map(|values| f64::from(values[channel])).sum::<f64>();
+    (!all.is_empty()).then(|| std::array::from_fn(|channel| (sum(channel) / count) as f32))
+}
+
 struct Lifter<'a> {
     geometry: &'a SceneGeometry<'a>,
     seen: &'a SeenPixels,
@@ -86,30 +119,16 @@ struct Lifter<'a> {
 
 impl Lifter<'_> {
     fn texel(&self, x: usize, y: usize) -> Texel {
-        let Some((triangle, inside)) = self.atlas.owner(x, y) else { return Texel::Unused };
-        let corner = DVec2::new(x as f64, y as f64);
-        let places = self.places_a_side(triangle, corner + 0.5);
-        let (mut sum, mut count) = ([0.0_f64; 5], 0.0);
-        for row in 0..places {
-            for column in 0..places {
-                let place = corner + (DVec2::new(column as f64, row as f64) + 0.5) / places as f64;
-                // Another triangle has that corner of the texel; one beside its triangle has none inside.
-                if inside && self.atlas.barycentrics(triangle, place).min_element() < -1e-9 {
-                    continue;
-                }
-                let Some(values) = self.look(place_of(self.atlas, self.mesh, triangle, place)) else { continue };
-                sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += f64::from(value));
-                count += 1.0;
-            }
-        }
-        if count == 0.0 { Texel::Unseen } else { Texel::Seen(sum.map(|sum| (sum / count) as f32)) }
+        let Some((triangle, _)) = self.atlas.owner(x, y) else { return Texel::Unused };
+        let centre = DVec2::new(x as f64, y as f64) + 0.5;
+        let places = places_of(self.atlas, self.mesh, (x, y), self.places_a_side(triangle, centre));
+        let said: Vec<Values> = places.filter_map(|place| self.look(place)).collect();
+        mean(&said).map_or(Texel::Unseen, Texel::Seen)
     }
 
     /// So many that neighbours lie half a pixel apart at most.
     fn places_a_side(&self, triangle: usize, centre: DVec2) -> usize {
-        let [a, b, c] = self.mesh.corners(triangle).map(|corner| corner.as_dvec3());
-        let area = (b - a).cross(c - a).length() / 2.0;
-        let texel_m = (area / self.atlas.texel_area(triangle).max(1e-12)).sqrt();
+        let texel_m = texel_size_m(self.atlas, self.mesh, triangle);
         let distance = place_of(self.atlas, self.mesh, triangle, centre).distance(self.origin).max(1e-6);
         (2.0 * self.focal * texel_m / distance).ceil().clamp(1.0, MAX_PLACES) as usize
     }

@@ -8,7 +8,7 @@ use mateval_scene::SceneError;
 use mateval_scene::submission::{MAP_SIZES, Map};
 
 use crate::error::BaselineError;
-use crate::estimate::{Estimate, Values};
+use crate::estimate::{Says, Values};
 use crate::lift::{PartialAtlas, Texel};
 use crate::median::DEFAULT;
 
@@ -25,13 +25,13 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// The whole atlas, its gutters filled. What the estimate does not say stays at the format's default, with no file.
-    pub fn of_atlas(known: &PartialAtlas, estimate: &Estimate) -> Self {
+    /// The whole atlas, its gutters filled. What is not said stays at the format's default, with no file.
+    pub fn of_atlas(known: &PartialAtlas, says: Says) -> Self {
         let picture = known.texels.map(|texel| match texel {
             Texel::Seen(values) => values,
             Texel::Unused | Texel::Unseen => DEFAULT,
         });
-        let mut maps = Self::of_values(&picture, estimate);
+        let mut maps = Self::of_values(&picture, says);
         known.atlas.fill_gutters(&mut maps.base_color);
         for map in [&mut maps.roughness, &mut maps.metallic].into_iter().flatten() {
             known.atlas.fill_gutters(map);
@@ -40,23 +40,18 @@ impl Maps {
     }
 
     /// The same everywhere.
-    pub fn constant(values: Values, estimate: &Estimate) -> Self {
+    pub fn constant(values: Values, says: Says) -> Self {
         let size = *MAP_SIZES.start();
-        Self::of_values(&Picture::filled(size, size, values), estimate)
+        Self::of_values(&Picture::filled(size, size, values), says)
     }
 
-    fn of_values(values: &Picture<Values>, estimate: &Estimate) -> Self {
-        let says_color = estimate.base_color.is_some();
+    fn of_values(values: &Picture<Values>, says: Says) -> Self {
         let color = |[r, g, b, ..]: Values| {
-            let rgb = if says_color { [r, g, b] } else { [DEFAULT[0], DEFAULT[1], DEFAULT[2]] };
+            let rgb = if says.base_color { [r, g, b] } else { [DEFAULT[0], DEFAULT[1], DEFAULT[2]] };
             srgb_bytes(rgb)
         };
         let scalar = |said: bool, channel: usize| said.then(|| values.map(|values| byte_from_unit(values[channel])));
-        Self {
-            base_color: values.map(color),
-            roughness: scalar(estimate.roughness.is_some(), 3),
-            metallic: scalar(estimate.metallic.is_some(), 4),
-        }
+        Self { base_color: values.map(color), roughness: scalar(says.roughness, 3), metallic: scalar(says.metallic, 4) }
     }
 
     /// Writes them into the instance's folder, which is made.

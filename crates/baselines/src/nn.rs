@@ -63,8 +63,8 @@ pub fn write(
         let seen = seen_pixels(&geometry, &estimate)?;
         lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
             let maps = match lifted {
-                Some(lifted) => Maps::of_atlas(&lifted.whole, &estimate),
-                None => Maps::constant(medians.of(&geometry, instance), &estimate),
+                Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.says()),
+                None => Maps::constant(medians.of(&geometry, instance), estimate.says()),
             };
             maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
         })

@@ -1,5 +1,7 @@
 //! `mateval baseline`.
 
+mod import;
+
 use std::num::NonZero;
 use std::path::PathBuf;
 
@@ -29,6 +31,8 @@ pub enum Command {
     Median(MedianArgs),
     /// One colour a part: the median of an estimate under its mask.
     MedianPart(MedianPartArgs),
+    /// A method's own meshes and textures, or one material a part, rebaked to the atlases by surface.
+    Import(import::ImportArgs),
     /// Writes each instance that is seen as TEXGen reads objects: mesh, partial atlas, masks, positions, picture, list.
     TexgenExport(TexgenExportArgs),
     /// TEXGen's textures where nothing is seen, the estimate where something is.
@@ -210,6 +214,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             let (places, set) = (&args.places, args.part_set.as_ref());
             done(places, homogeneous::write_by_part(&open(places)?, &places.out, places.force, &source, set)?)
         }
+        Command::Import(args) => import::run(args),
         Command::TexgenExport(args) => {
             let source = args.estimate.source(EstimateSource::Truth)?;
             let bars = Bars::new();

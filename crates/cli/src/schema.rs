@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::result::ResultFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
@@ -41,7 +42,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 13] {
+fn schemas() -> [(&'static str, Schema); 15] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -56,5 +57,7 @@ fn schemas() -> [(&'static str, Schema); 13] {
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
         ("compare", schema_for!(CompareFile)),
+        ("import", schema_for!(ImportReport)),
+        ("import_materials", schema_for!(FlatMaterials)),
     ]
 }

@@ -23,6 +23,13 @@ pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Textu
     Ok(picture)
 }
 
+/// The same from a file's bytes; `path` is what errors call it. No OpenEXR.
+pub fn texture_of_bytes(path: &Path, bytes: Vec<u8>, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
+    let decoded = decode(path, bytes)?;
+    let (width, height) = (decoded.width() as usize, decoded.height() as usize);
+    Texture::new(width, height, color_texels(path, decoded, encoding)?, wrap)
+}
+
 /// Reads a picture's alpha channel as a texture of scalars; none where it has no alpha.
 pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError> {
     let (_, alpha) = read_with_alpha(path, Encoding::Linear, wrap)?;

@@ -13,9 +13,9 @@ use mateval_scene::{Finding, PartSetId, Severity};
 use crate::instances::InstanceEntry;
 use crate::part_split::PartSplit;
 use crate::parts::{MAX_PARTS, parts_of_labels};
-use crate::source::folder::SourceFolder;
-use crate::source::log::shortened;
 use crate::source::npy;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
 
 /// Largest file that is read: more than any instance's triangles need.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;

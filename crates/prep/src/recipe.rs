@@ -10,8 +10,8 @@ use mateval_scene::{PartSetId, SceneId, ViewId};
 use serde::Deserialize;
 
 use crate::error::PrepError;
-use crate::source::folder::SourceFolder;
-use crate::source::log::shortened;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
 
 /// A recipe as written.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -60,3 +60,20 @@ impl std::fmt::Display for Finding {
         write!(f, ": {}; {}", self.message, self.action)
     }
 }
+
+/// At most 80 characters of a stranger's text, without control characters.
+pub fn shortened(text: &str) -> String {
+    let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
+    if text.chars().nth(80).is_some() { format!("{short}...") } else { short }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_texts_are_cut() {
+        assert_eq!(shortened("a\nb"), "a\\nb");
+        assert_eq!(shortened(&"x".repeat(100)).len(), 83);
+    }
+}

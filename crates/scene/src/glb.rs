@@ -1,6 +1,6 @@
 //! Geometry as binary glTF: one node and one mesh a name, world space, identity transforms, no materials.
 //!
-//! glTF counts v from the top of a picture, our meshes count it from the bottom; it is turned here and nowhere else.
+//! glTF counts v from the top of a picture, our meshes count it from the bottom; it is turned here.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -10,6 +10,7 @@ use gltf_json as json;
 use json::validation::{Checked, USize64};
 use mateval_image::store::write_whole;
 
+use crate::gltf_accessor::{floats, indices, parse, triangles};
 use crate::mesh::TriangleMesh;
 use crate::{Finding, SceneError, Severity};
 
@@ -174,7 +175,7 @@ pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
         return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
     }
     let bytes = std::fs::read(path).map_err(SceneError::io("read", path))?;
-    let file = gltf::Gltf::from_slice(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
+    let file = parse(&bytes).map_err(|what| invalid(path, "", what))?;
     let blob = file.blob.as_deref().unwrap_or_default();
     file.document
         .nodes()
@@ -200,8 +201,8 @@ fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, String>
     let positions: Vec<Vec3> = floats::<3>(&positions, blob)?.into_iter().map(Vec3::from_array).collect();
     let normals = accessor(gltf::Semantic::Normals).map(|a| floats::<3>(&a, blob)).transpose()?;
     let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| floats::<2>(&a, blob)).transpose()?;
-    let indices = primitive.indices().ok_or("expected indices")?;
-    let triangles = triangles(&indices, blob, positions.len())?;
+    let accessor = primitive.indices().ok_or("expected indices")?;
+    let triangles = triangles(indices(&accessor, blob)?, positions.len())?;
     let same_count = |count: Option<usize>| count.is_none_or(|count| count == positions.len());
     if !same_count(normals.as_ref().map(Vec::len)) || !same_count(uvs.as_ref().map(Vec::len)) {
         return Err("expected as many NORMAL and TEXCOORD_0 as POSITION".to_owned());
@@ -212,59 +213,6 @@ fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, String>
         uvs: uvs.map(|all| all.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()),
         triangles,
     })
-}
-
-fn floats<const N: usize>(accessor: &gltf::Accessor<'_>, blob: &[u8]) -> Result<Vec<[f32; N]>, String> {
-    if accessor.data_type() != gltf::accessor::DataType::F32 || accessor.dimensions().multiplicity() != N {
-        return Err(format!("accessor {}: expected {N} floats an entry", accessor.index()));
-    }
-    let entries = entries(accessor, blob, 4 * N)?;
-    let values: Vec<[f32; N]> = entries
-        .map(|entry| {
-            std::array::from_fn(|c| {
-                f32::from_le_bytes([entry[4 * c], entry[4 * c + 1], entry[4 * c + 2], entry[4 * c + 3]])
-            })
-        })
-        .collect();
-    if let Some(at) = values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {
-        return Err(format!("accessor {}: entry {at} is not finite", accessor.index()));
-    }
-    Ok(values)
-}
-
-fn triangles(accessor: &gltf::Accessor<'_>, blob: &[u8], vertices: usize) -> Result<Vec<[u32; 3]>, String> {
-    if accessor.data_type() != gltf::accessor::DataType::U32 || accessor.dimensions().multiplicity() != 1 {
-        return Err(format!("accessor {}: expected 32-bit indices", accessor.index()));
-    }
-    let indices: Vec<u32> =
-        entries(accessor, blob, 4)?.map(|entry| u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3]])).collect();
-    if let Some(at) = indices.iter().position(|index| *index as usize >= vertices) {
-        return Err(format!("index {at} is {}, expected less than {vertices}", indices[at]));
-    }
-    let (triangles, rest) = indices.as_chunks::<3>();
-    if rest.is_empty() {
-        Ok(triangles.to_vec())
-    } else {
-        Err(format!("{} indices, expected three a triangle", indices.len()))
-    }
-}
-
-/// The accessor's entries of `size` bytes, once they are known to lie in the file.
-fn entries<'a>(
-    accessor: &gltf::Accessor<'_>,
-    blob: &'a [u8],
-    size: usize,
-) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, String> {
-    let outside = || format!("accessor {} reaches outside its buffer", accessor.index());
-    let view = accessor.view().filter(|_| accessor.sparse().is_none()).ok_or("sparse accessors are not read")?;
-    let start = view.offset();
-    let slice = start.checked_add(view.length()).and_then(|end| blob.get(start..end)).ok_or_else(outside)?;
-    let stride = view.stride().unwrap_or(size).max(size);
-    let count = accessor.count();
-    let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
-    let end = used.and_then(|used| used.checked_add(accessor.offset())).filter(|end| *end <= slice.len());
-    let data = slice.get(accessor.offset()..end.ok_or_else(outside)?).ok_or_else(outside)?;
-    Ok((0..count).map(move |index| &data[index * stride..index * stride + size]))
 }
 
 fn invalid(path: &Path, node: &str, message: String) -> SceneError {

@@ -3,6 +3,7 @@
 //! In: what `prep` converted, or a dataset folder on disk. Out: the same on disk, or as checked Rust values.
 //!
 //! Between: [`ids`] and [`findings`] are the words that everything shares; [`camera`] is the one camera model;
+//! [`obj`], [`gltf_accessor`] and [`source_folder`] read strangers' files without trust;
 //! [`mesh`], [`material`] and [`mod@reference`] describe a scene as its makers meant it.
 
 pub mod camera;
@@ -10,16 +11,19 @@ pub mod dataset;
 pub mod error;
 pub mod findings;
 pub mod glb;
+pub mod gltf_accessor;
 pub mod ids;
 pub mod json;
 pub mod layout;
 pub mod manifest;
 pub mod material;
 pub mod mesh;
+pub mod obj;
 pub mod open;
 pub mod progress;
 pub mod reference;
 pub mod reference_io;
+pub mod source_folder;
 pub mod submission;
 pub mod uv_atlas;
 pub mod work_folder;

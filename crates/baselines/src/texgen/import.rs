@@ -57,10 +57,10 @@ pub fn import(
             let maps = match (known, texture) {
                 (Some(mut lifted), Some(texture)) => {
                     composite(&mut lifted, &texture);
-                    Maps::of_atlas(&lifted.whole, &estimate)
+                    Maps::of_atlas(&lifted.whole, estimate.says())
                 }
-                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, &estimate),
-                (None, _) => Maps::constant(medians.of(&geometry, at), &estimate),
+                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, estimate.says()),
+                (None, _) => Maps::constant(medians.of(&geometry, at), estimate.says()),
             };
             maps.write(&folder.join(instance.id.as_str()))
         })

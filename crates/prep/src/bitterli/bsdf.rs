@@ -6,7 +6,7 @@ use mateval_scene::reference::MaterialIndex;
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use crate::source::log::shortened;
+use mateval_scene::findings::shortened;
 
 /// More wrappers than this are a loop of references.
 const MOST_WRAPPERS: usize = 16;

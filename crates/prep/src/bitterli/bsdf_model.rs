@@ -7,7 +7,7 @@ use super::parameters::Parameters;
 use super::reader::Reader;
 use super::texture::Bounds;
 use super::{ior, value};
-use crate::source::log::shortened;
+use mateval_scene::findings::shortened;
 
 /// Mitsuba's own lower bound of alpha.
 const LEAST_ALPHA: f32 = 1e-4;

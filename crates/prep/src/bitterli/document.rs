@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::limits::Limits;
 use crate::source::SourceError;
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
+use mateval_scene::findings::shortened;
 
 /// One XML element.
 #[derive(Debug)]

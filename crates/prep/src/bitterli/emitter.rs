@@ -9,8 +9,8 @@ use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::texture::{Bounds, all_texels, mean_color};
-use crate::source::folder::SourceFolder;
-use crate::source::log::shortened;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
 
 impl<'a> Reader<'a> {
     /// The emitter of a shape: it glows on its front side.

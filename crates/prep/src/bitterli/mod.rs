@@ -34,11 +34,12 @@ use std::path::Path;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
-use crate::source::folder::SourceFolder;
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
 use crate::source::{LicenceText, SourceError};
 use document::Document;
 pub use limits::Limits;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
 use reader::{Reader, Totals};
 
 /// A scene of Bitterli's resources.
@@ -103,7 +104,7 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
 }
 
 fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
-    let (source, name, bytes) = SourceFolder::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
+    let (source, name, bytes) = crate::source::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
     let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
     let text = String::from_utf8(bytes).map_err(|_| invalid("expected UTF-8, found other bytes".to_owned()))?;
     Ok((source, name, text))

@@ -4,7 +4,8 @@ use glam::DMat4;
 
 use super::document::{Element, Ids};
 use super::{transform, value};
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
+use mateval_scene::findings::shortened;
 
 /// A plugin's children, references followed.
 pub(super) struct Parameters<'a> {

@@ -10,8 +10,8 @@ use super::document::{Element, Ids};
 use super::limits::Limits;
 use super::parameters::Parameters;
 use super::texture::TextureKey;
-use crate::source::folder::{FileFault, SourceFolder};
 use crate::source::log::Log;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 /// A scene while it is read.
 pub(super) struct Reader<'a> {

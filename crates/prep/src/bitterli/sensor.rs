@@ -7,7 +7,8 @@ use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::value;
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
+use mateval_scene::findings::shortened;
 
 /// Columns of a camera's rotation may miss right angles and unit length by this much without being reported; the scenes
 /// at hand are written with six digits.

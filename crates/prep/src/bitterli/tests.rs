@@ -1,6 +1,6 @@
 //! Whole scenes, built here, with and without faults.
 
-use crate::source::obj;
+use mateval_scene::obj;
 use std::path::Path;
 
 use mateval_image::Texels;
@@ -424,7 +424,7 @@ proptest! {
     #[test]
     fn any_faces_never_panic(faces in prop::collection::vec("f( -?[0-9]{1,20}(/-?[0-9]{0,20}){0,2}){0,6}", 0..6)) {
         let text = format!("{TRIANGLE}{}\n", faces.join("\n"));
-        let _ = obj::read(text.as_bytes(), obj::ObjLimits { triangles: 100, corners: 300 });
+        let _ = obj::read(text.as_bytes(), obj::ObjLimits { triangles: 100, corners: 300 }, obj::Materials::Ignored);
     }
 }
 

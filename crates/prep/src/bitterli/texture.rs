@@ -9,8 +9,8 @@ use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::value;
-use crate::source::folder::{FileFault, SourceFolder};
-use crate::source::log::shortened;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 /// What stands for a texture that cannot be read: linear mid-grey. (Mitsuba would refuse the scene.)
 const MISSING: [f32; 3] = [0.5; 3];

@@ -14,7 +14,7 @@ pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
             Ok(matrix) => product = matrix * product,
             Err(what) => {
                 let message =
-                    format!("line {}: <{}>: {what}", element.line, crate::source::log::shortened(&element.tag));
+                    format!("line {}: <{}>: {what}", element.line, mateval_scene::findings::shortened(&element.tag));
                 log.warn("bad_transform", place, message, "left this step out");
             }
         }

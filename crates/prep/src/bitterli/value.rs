@@ -5,7 +5,7 @@ use super::document::Element;
 /// One finite number; what was found instead otherwise.
 pub(super) fn number(text: &str) -> Result<f64, String> {
     let trimmed = text.trim();
-    let refused = || format!("expected a finite number, found '{}'", crate::source::log::shortened(trimmed));
+    let refused = || format!("expected a finite number, found '{}'", mateval_scene::findings::shortened(trimmed));
     trimmed.parse::<f64>().ok().filter(|n| n.is_finite()).ok_or_else(refused)
 }
 
@@ -39,7 +39,7 @@ pub(super) fn boolean(text: &str) -> Result<bool, String> {
     match text.trim().to_ascii_lowercase().as_str() {
         "true" => Ok(true),
         "false" => Ok(false),
-        other => Err(format!("expected true or false, found '{}'", crate::source::log::shortened(other))),
+        other => Err(format!("expected true or false, found '{}'", mateval_scene::findings::shortened(other))),
     }
 }
 

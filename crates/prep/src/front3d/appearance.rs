@@ -13,7 +13,8 @@ use mateval_scene::reference::{MaterialIndex, SourceTexture};
 
 use super::house::{House, HouseMaterial};
 use super::model::{Library, is_folder_name};
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
+use mateval_scene::findings::shortened;
 
 /// What stands for a colour that cannot be read: linear mid-grey.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];

@@ -8,7 +8,6 @@ use super::house::{DesignerCamera, House};
 use super::house_reader::designer_camera;
 use super::limits::Limits;
 use crate::source::SourceError;
-use crate::source::folder::SourceFolder;
 use crate::source::log::Log;
 
 /// All cameras of a house.
@@ -23,7 +22,7 @@ pub(super) struct Cameras {
 pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut Log) -> Result<Cameras, SourceError> {
     let Some(beside) = &files.cameras else { return Ok(Cameras { all: house.cameras.clone(), hash: None }) };
     let path = files.root.join(beside);
-    let (folder, _, bytes) = SourceFolder::open(&path, limits.json_bytes, limits.json_bytes)?;
+    let (folder, _, bytes) = crate::source::open(&path, limits.json_bytes, limits.json_bytes)?;
     let invalid = |what: String| SourceError::Invalid { path: path.clone(), what };
     let tree = document::parse(&bytes, limits).map_err(invalid)?;
     let all = of_house(&tree, &house.uid);

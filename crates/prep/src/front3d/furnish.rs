@@ -11,9 +11,9 @@ use super::house::{DesignerCamera, House};
 use super::limits::Limits;
 use super::model::Library;
 use super::{cameras, document, house_reader};
-use crate::source::folder::{LookedFor, SourceFolder};
 use crate::source::log::Log;
 use crate::source::{InstanceOrigin, SourceError};
+use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
 /// Where the files of a house are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -126,7 +126,7 @@ pub fn read_house(path: &Path, limits: &Limits) -> Result<(House, Vec<Finding>),
 }
 
 fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, SourceFolder), SourceError> {
-    let (folder, _, bytes) = SourceFolder::open(path, limits.json_bytes, limits.json_bytes)?;
+    let (folder, _, bytes) = crate::source::open(path, limits.json_bytes, limits.json_bytes)?;
     let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let tree = document::parse(&bytes, limits).map_err(invalid)?;

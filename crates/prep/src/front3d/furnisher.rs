@@ -15,8 +15,9 @@ use super::model::{self, Library, Model, is_folder_name};
 use super::model_info::ModelInfo;
 use crate::parts::parts_of_labels;
 use crate::source::InstanceOrigin;
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
 use crate::source::surface_mesh::{Repairs, to_world};
+use mateval_scene::findings::shortened;
 
 /// Below this a scale makes a piece a speck (ATISS drops such rooms).
 const SMALLEST_SCALE: f64 = 1e-5;

@@ -12,7 +12,8 @@ use super::house::{
 };
 use super::house_mesh;
 use super::limits::Limits;
-use crate::source::log::{Log, shortened};
+use crate::source::log::Log;
+use mateval_scene::findings::shortened;
 
 /// Reads the whole tree. Fails, in words, where it has more rooms or children than `limits` allow.
 pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, String> {

@@ -5,10 +5,11 @@ use mateval_scene::{Severity, TriangleMesh};
 
 use super::limits::Limits;
 use crate::parts::labelled_parts;
-use crate::source::folder::{LookedFor, SourceFolder};
-use crate::source::log::{Log, shortened};
-use crate::source::obj::{self, ObjLimits, ObjMesh};
+use crate::source::log::Log;
 use crate::source::surface_mesh::{has_area, to_world};
+use mateval_scene::findings::shortened;
+use mateval_scene::obj::{self, Materials, ObjLimits, ObjMesh};
+use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
 /// A larger model is in centimetres: no furniture is ten metres long.
 const LARGEST_M: f32 = 10.0;
@@ -56,7 +57,7 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         }
     };
     let limit = ObjLimits { triangles: limits.triangles, corners: 3 * limits.triangles };
-    let read = match obj::read(&bytes, limit) {
+    let read = match obj::read(&bytes, limit, Materials::Ignored) {
         Ok(read) => read,
         Err(fault) => {
             let place = if fault.line > 0 { format!("line {}", fault.line) } else { String::new() };
@@ -84,7 +85,8 @@ fn missing_model(code: &'static str) -> &'static str {
 fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, Vec<usize>) {
     let ObjMesh { mut mesh, groups, .. } = read;
     let (mut triangles, mut kept, mut first) = (Vec::new(), Vec::new(), 0);
-    for (at, (name, count)) in groups.iter().enumerate() {
+    for (at, group) in groups.iter().enumerate() {
+        let (name, count) = (&group.name, group.triangles);
         let own = &mesh.triangles[first..first + count];
         first += count;
         if name.to_lowercase().contains("shadow") {
@@ -92,7 +94,7 @@ fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, V
             log.push(Severity::Note, "shadow_group", file, &place, "a painted shadow", "left it out");
         } else {
             triangles.extend_from_slice(own);
-            kept.extend(std::iter::repeat_n(at, *count));
+            kept.extend(std::iter::repeat_n(at, count));
         }
     }
     mesh.triangles = triangles;

@@ -71,12 +71,6 @@ impl Log {
     }
 }
 
-/// At most 80 characters of a stranger's text, without control characters.
-pub(crate) fn shortened(text: &str) -> String {
-    let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
-    if text.chars().nth(80).is_some() { format!("{short}...") } else { short }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,11 +83,5 @@ mod tests {
         }
         let codes: Vec<_> = log.into_findings().into_iter().map(|f| f.code).collect();
         assert_eq!(codes, ["a", "b", "too_many_findings"]);
-    }
-
-    #[test]
-    fn long_texts_are_cut() {
-        assert_eq!(shortened("a\nb"), "a\\nb");
-        assert_eq!(shortened(&"x".repeat(100)).len(), 83);
     }
 }

@@ -1,15 +1,16 @@
-//! What readers of all kinds of source share: findings, files of strangers, OBJ, and the scene that comes of it.
+//! What readers of all kinds of source share: findings, files of strangers, and the scene that comes of it.
 
 pub(crate) mod below;
 mod error;
-pub(crate) mod folder;
 pub(crate) mod log;
 pub(crate) mod npy;
-pub(crate) mod obj;
 pub(crate) mod surface_mesh;
+
+use std::path::Path;
 
 pub use error::SourceError;
 use mateval_scene::reference::ReferenceScene;
+use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::{Camera, Finding};
 
 /// A licence that must travel with the scene.
@@ -55,4 +56,24 @@ pub struct SourceScene {
     pub files: Vec<(String, String)>,
     /// Every file that was looked for and was not there; sorted.
     pub absent: Vec<String>,
+}
+
+/// The folder of the file at `path`, that file's name and its bytes; it may have at most `most_bytes`, others of the
+/// folder `file_bytes`.
+pub(crate) fn open(
+    path: &Path,
+    most_bytes: u64,
+    file_bytes: u64,
+) -> Result<(SourceFolder, String, Vec<u8>), SourceError> {
+    let io = |source| SourceError::Io { path: path.to_owned(), source };
+    let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
+    let size = std::fs::metadata(path).map_err(io)?.len();
+    if size > most_bytes {
+        return Err(invalid(format!("expected at most {most_bytes} bytes, found {size}")));
+    }
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = name.ok_or_else(|| invalid("expected the path of a file".to_owned()))?;
+    let mut folder = SourceFolder::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
+    let bytes = folder.read(&name).map_err(|fault| invalid(fault.message))?;
+    Ok((folder, name, bytes))
 }

@@ -3,8 +3,8 @@
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
 use super::*;
-use crate::source::folder::SourceFolder;
 use crate::source::log::Log;
+use mateval_scene::source_folder::SourceFolder;
 
 /// The linear map that takes one list of points to another, by least squares about their middles.
 fn linear_map(from: &[Vec3], to: &[Vec3]) -> DMat3 {

@@ -1,38 +1,83 @@
 //! OBJ files through tobj, behind a check of every index and count: tobj trusts the file's indices, and one that
 //! overflows would end the program.
 
-use glam::{Vec2, Vec3};
-use mateval_scene::TriangleMesh;
+use std::collections::BTreeSet;
 
-use super::log::shortened;
+use glam::{Vec2, Vec3};
+
+use crate::TriangleMesh;
+use crate::findings::shortened;
 
 /// What is read of a file at most.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ObjLimits {
+pub struct ObjLimits {
     /// Triangles after polygons are split.
-    pub(crate) triangles: usize,
+    pub triangles: usize,
     /// Corners of faces, so at least as many as vertices can come of it.
-    pub(crate) corners: usize,
+    pub corners: usize,
 }
 
 /// Why an OBJ was refused: the line, from 1 (0 where none is to blame), and what is wrong.
 #[derive(Debug, PartialEq)]
-pub(crate) struct ObjFault {
-    pub(crate) line: usize,
-    pub(crate) what: String,
+pub struct ObjFault {
+    /// From 1; 0 where none is to blame.
+    pub line: usize,
+    /// What was expected and what was found.
+    pub what: String,
     /// Whether it is sound but too large.
-    pub(crate) limit: bool,
+    pub limit: bool,
+}
+
+/// A run of triangles of one object or group.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObjGroup {
+    /// Its name.
+    pub name: String,
+    /// What `usemtl` says; none where nothing is said, or where materials are not asked for.
+    pub material: Option<String>,
+    /// How many triangles it has.
+    pub triangles: usize,
 }
 
 /// A mesh in the file's own space, and what had to be left out of it.
 #[derive(Debug)]
-pub(crate) struct ObjMesh {
-    pub(crate) mesh: TriangleMesh,
-    /// Its objects and groups in their order, and how many triangles each has.
-    pub(crate) groups: Vec<(String, usize)>,
+pub struct ObjMesh {
+    /// All groups, one behind the other.
+    pub mesh: TriangleMesh,
+    /// Its objects and groups in their order.
+    pub groups: Vec<ObjGroup>,
     /// Some faces have texture coordinates (normals) and some have none: then nobody keeps them.
-    pub(crate) mixed_uvs: bool,
-    pub(crate) mixed_normals: bool,
+    pub mixed_uvs: bool,
+    /// The same of normals.
+    pub mixed_normals: bool,
+}
+
+/// A material of an MTL file, as far as anybody here reads it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjMaterial {
+    /// As `usemtl` calls it.
+    pub name: String,
+    /// `Kd`, linear.
+    pub diffuse: Option<[f32; 3]>,
+    /// `map_Kd`: a file name.
+    pub diffuse_map: Option<String>,
+    /// `Pr`.
+    pub roughness: Option<f32>,
+    /// `map_Pr`: a file name.
+    pub roughness_map: Option<String>,
+    /// `Pm`.
+    pub metallic: Option<f32>,
+    /// `map_Pm`: a file name.
+    pub metallic_map: Option<String>,
+}
+
+/// Whether groups are split where their material changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Materials {
+    /// They are one, and name no material.
+    Ignored,
+    /// A group has one material.
+    Told,
 }
 
 /// What a file's faces refer to.
@@ -48,13 +93,16 @@ struct Census {
 }
 
 /// Reads an OBJ: positions, texture coordinates, normals and faces of all its groups as one mesh; polygons as fans.
-pub(crate) fn read(bytes: &[u8], limits: ObjLimits) -> Result<ObjMesh, ObjFault> {
+pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<ObjMesh, ObjFault> {
     let text = std::str::from_utf8(bytes).map_or_else(|_| String::from_utf8_lossy(bytes), std::borrow::Cow::Borrowed);
     let census = check(&text, limits)?;
     let mixed = |some: usize| some != 0 && some != census.corners;
     let (mixed_uvs, mixed_normals) = (mixed(census.corners_with_uv), mixed(census.corners_with_normal));
-    let (mesh, groups) =
-        if mixed_uvs || mixed_normals { load(&without_mixed(&text, mixed_uvs, mixed_normals))? } else { load(&text)? };
+    let (mesh, groups) = if mixed_uvs || mixed_normals {
+        load(&without_mixed(&text, mixed_uvs, mixed_normals), materials)?
+    } else {
+        load(&text, materials)?
+    };
     Ok(ObjMesh { mesh, groups, mixed_uvs, mixed_normals })
 }
 
@@ -143,11 +191,52 @@ fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
     out
 }
 
-fn load(text: &str) -> Result<(TriangleMesh, Vec<(String, usize)>), ObjFault> {
+/// The names of the material files that it wants.
+pub fn material_files(bytes: &[u8]) -> Vec<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let names = text.lines().filter_map(|line| line.trim().strip_prefix("mtllib "));
+    names.map(|name| name.trim().to_owned()).collect()
+}
+
+/// Reads an MTL file. Numbers may be anything that is finite.
+pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjFault> {
+    let whole_file = |what: String| ObjFault { line: 0, what, limit: false };
+    let text = String::from_utf8_lossy(bytes);
+    let (materials, _) =
+        tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|error| whole_file(format!("no sound MTL: {error}")))?;
+    let number = |material: &tobj::Material, key: &str| {
+        let Some(word) = material.unknown_param.get(key) else { return Ok(None) };
+        let value = word.trim().parse::<f32>().ok().filter(|value| value.is_finite());
+        let refused = || whole_file(format!("{key} of '{}': expected a number", shortened(&material.name)));
+        value.map(Some).ok_or_else(refused)
+    };
+    let read = |material: tobj::Material| {
+        if material.diffuse.is_some_and(|rgb| !rgb.iter().all(|v| v.is_finite())) {
+            return Err(whole_file(format!("Kd of '{}': expected finite numbers", shortened(&material.name))));
+        }
+        let (roughness, metallic) = (number(&material, "Pr")?, number(&material, "Pm")?);
+        let map = |key: &str| material.unknown_param.get(key).map(|name| name.trim().to_owned());
+        let (roughness_map, metallic_map) = (map("map_Pr"), map("map_Pm"));
+        let (name, diffuse, diffuse_map) = (material.name, material.diffuse, material.diffuse_texture);
+        Ok(ObjMaterial { name, diffuse, diffuse_map, roughness, roughness_map, metallic, metallic_map })
+    };
+    materials.into_iter().map(read).collect()
+}
+
+fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>), ObjFault> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
-    // Material libraries are never opened: Mitsuba does not use them, and their names come from a stranger.
-    let no_materials = |_: &std::path::Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).map_err(|error| ObjFault {
+    let names = match materials {
+        Materials::Ignored => Vec::new(),
+        Materials::Told => material_names(text),
+    };
+    // Material files are never opened here, their names come from a stranger. tobj keeps only names that a file defines:
+    // it is told that whatever file there is defines them all.
+    let defined = |_: &std::path::Path| {
+        let materials = names.iter().map(|name| tobj::Material { name: name.clone(), ..Default::default() }).collect();
+        Ok((materials, names.iter().enumerate().map(|(at, name)| (name.clone(), at)).collect()))
+    };
+    let text = if names.is_empty() { text.to_owned() } else { format!("mtllib any\n{text}") };
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(|error| ObjFault {
         line: 0,
         what: error.to_string(),
         limit: false,
@@ -156,12 +245,21 @@ fn load(text: &str) -> Result<(TriangleMesh, Vec<(String, usize)>), ObjFault> {
     let mut groups = Vec::new();
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
         append(&mut mesh, &model.mesh);
-        groups.push((model.name.clone(), model.mesh.indices.len() / 3));
+        // A second `mtllib` defines them again, behind the first.
+        let material = model.mesh.material_id.and_then(|at| names.get(at % names.len()).cloned());
+        groups.push(ObjGroup { name: model.name.clone(), material, triangles: model.mesh.indices.len() / 3 });
     }
     let count = mesh.positions.len();
     mesh.uvs = mesh.uvs.filter(|uvs| uvs.len() == count);
     mesh.normals = mesh.normals.filter(|normals| normals.len() == count);
     Ok((mesh, groups))
+}
+
+/// What `usemtl` names, each once, sorted.
+fn material_names(text: &str) -> Vec<String> {
+    let names: BTreeSet<&str> =
+        text.lines().filter_map(|line| line.trim().strip_prefix("usemtl ")).map(str::trim).collect();
+    names.into_iter().map(str::to_owned).collect()
 }
 
 fn append(mesh: &mut TriangleMesh, group: &tobj::Mesh) {
@@ -184,13 +282,14 @@ mod tests {
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
 
     fn read_text(faces: &str) -> Result<ObjMesh, ObjFault> {
-        read(format!("{CORNERS}{faces}").as_bytes(), LIMITS)
+        read(format!("{CORNERS}{faces}").as_bytes(), LIMITS, Materials::Ignored)
     }
 
     #[test]
     fn polygons_groups_and_negative_indices() {
         let read = read_text("g a\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl x\ng b\nf  -4/-4/-1 -3/-3/-1 -2/-2/-1\n").unwrap();
-        assert_eq!(read.groups, [("a".to_owned(), 2), ("b".to_owned(), 1)]);
+        let group = |name: &str, triangles| ObjGroup { name: name.to_owned(), material: None, triangles };
+        assert_eq!(read.groups, [group("a", 2), group("b", 1)]);
         let mesh = read.mesh;
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (3, 7));
         assert_eq!(mesh.uvs.as_ref().map(Vec::len), Some(7));
@@ -244,9 +343,31 @@ mod tests {
 
     #[test]
     fn rubbish_is_a_fault_or_nothing() {
-        assert!(read(b"v 1 2\nf 1 1 1", LIMITS).is_err());
-        assert!(read(b"v a b c", LIMITS).is_err());
-        assert!(read(b"\xff\xfe\x00 v", LIMITS).unwrap().mesh.triangles.is_empty());
-        assert!(read(b"", LIMITS).unwrap().mesh.triangles.is_empty());
+        assert!(read(b"v 1 2\nf 1 1 1", LIMITS, Materials::Ignored).is_err());
+        assert!(read(b"v a b c", LIMITS, Materials::Ignored).is_err());
+        assert!(read(b"\xff\xfe\x00 v", LIMITS, Materials::Ignored).unwrap().mesh.triangles.is_empty());
+        assert!(read(b"", LIMITS, Materials::Ignored).unwrap().mesh.triangles.is_empty());
+    }
+
+    #[test]
+    fn groups_tell_their_materials_where_asked() {
+        let text = format!("{CORNERS}g a\nusemtl x\nf 1 2 3\nusemtl y z\nf 1 3 4\nmtllib some where.mtl\nf 1 2 4\n");
+        let read = read(text.as_bytes(), LIMITS, Materials::Told).unwrap();
+        let told: Vec<_> = read.groups.iter().map(|group| (group.material.as_deref(), group.triangles)).collect();
+        assert_eq!(told, [(Some("x"), 1), (Some("y z"), 2)]);
+        assert_eq!(material_files(text.as_bytes()), ["some where.mtl"]);
+    }
+
+    #[test]
+    fn materials_are_read() {
+        let text = "newmtl x\nKd 0.1 0.2 0.3\nmap_Kd a b.png\nPr 0.4\nmap_Pm m.png\nnewmtl y\n";
+        let read = read_materials(text.as_bytes()).unwrap();
+        assert_eq!(read[0].diffuse, Some([0.1, 0.2, 0.3]));
+        assert_eq!((read[0].diffuse_map.as_deref(), read[0].metallic_map.as_deref()), (Some("a b.png"), Some("m.png")));
+        assert_eq!((read[0].roughness, read[0].metallic), (Some(0.4), None));
+        assert_eq!(read[1], ObjMaterial { name: "y".to_owned(), ..Default::default() });
+        for bad in ["newmtl x\nKd a b c", "newmtl x\nPr inf", "newmtl x\nPm -", "newmtl x\nKd nan 0 0"] {
+            assert!(read_materials(bad.as_bytes()).is_err(), "{bad}");
+        }
     }
 }

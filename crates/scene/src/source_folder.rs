@@ -1,25 +1,25 @@
-//! The scene's folder: file names from the XML made safe, files read within limits, each one's hash kept.
+//! The folder of a stranger's scene: file names that its files give made safe, files read within limits, each one's hash
+//! kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use sha2::{Digest as _, Sha256};
+use crate::findings::shortened;
+use crate::manifest::sha256_of_bytes;
 
-use super::SourceError;
-
-/// Why a file that the XML names was not read.
+/// Why a file that another names was not read.
 #[derive(Debug)]
-pub(crate) struct FileFault {
+pub struct FileFault {
     /// The finding's code.
-    pub(crate) code: &'static str,
+    pub code: &'static str,
     /// What was expected and what was found.
-    pub(crate) message: String,
+    pub message: String,
 }
 
-/// The folder of the XML. Nothing outside of it is read.
+/// A folder. Nothing outside of it is read.
 #[derive(Debug)]
-pub(crate) struct SourceFolder {
+pub struct SourceFolder {
     root: PathBuf,
     file_bytes: u64,
     hashes: BTreeMap<String, String>,
@@ -29,22 +29,22 @@ pub(crate) struct SourceFolder {
 
 /// Files that were looked for; both lists are sorted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct LookedFor {
+pub struct LookedFor {
     /// What was read, and its SHA-256.
-    pub(crate) hashes: Vec<(String, String)>,
+    pub hashes: Vec<(String, String)>,
     /// What was not there.
-    pub(crate) absent: Vec<String>,
+    pub absent: Vec<String>,
 }
 
 impl LookedFor {
     /// The same, with other names.
-    pub(crate) fn renamed(self, name: impl Fn(String) -> String) -> Self {
+    pub fn renamed(self, name: impl Fn(String) -> String) -> Self {
         let hashes = self.hashes.into_iter().map(|(file, hash)| (name(file), hash)).collect();
         Self { hashes, absent: self.absent.into_iter().map(name).collect() }
     }
 
     /// Takes in another's.
-    pub(crate) fn extend(&mut self, other: Self) {
+    pub fn extend(&mut self, other: Self) {
         self.hashes.extend(other.hashes);
         self.hashes.sort();
         self.absent.extend(other.absent);
@@ -53,37 +53,21 @@ impl LookedFor {
 }
 
 impl SourceFolder {
-    /// `root` is the folder of the XML; no file of more than `file_bytes` is read.
-    pub(crate) fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
+    /// `root` is the folder; no file of more than `file_bytes` is read.
+    pub fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
         Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new(), absent: BTreeSet::new() })
     }
 
-    /// The folder of the file at `path`, that file's name and its bytes; it may have at most `most_bytes`, others of the
-    /// folder `file_bytes`.
-    pub(crate) fn open(path: &Path, most_bytes: u64, file_bytes: u64) -> Result<(Self, String, Vec<u8>), SourceError> {
-        let io = |source| SourceError::Io { path: path.to_owned(), source };
-        let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
-        let size = std::fs::metadata(path).map_err(io)?.len();
-        if size > most_bytes {
-            return Err(invalid(format!("expected at most {most_bytes} bytes, found {size}")));
-        }
-        let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
-        let name = name.ok_or_else(|| invalid("expected the path of a file".to_owned()))?;
-        let mut folder = Self::new(path.parent().unwrap_or(Path::new("")), file_bytes).map_err(io)?;
-        let bytes = folder.read(&name).map_err(|fault| invalid(fault.message))?;
-        Ok((folder, name, bytes))
-    }
-
-    /// A file name of the XML with forward slashes and without `.` and `..`; refused where it leads out.
-    pub(crate) fn relative(name: &str) -> Result<String, FileFault> {
+    /// A file name as a file gives it, with forward slashes and without `.` and `..`; refused where it leads out.
+    pub fn relative(name: &str) -> Result<String, FileFault> {
         let forward = name.trim().replace('\\', "/");
         let escapes = || FileFault {
             code: "path_escapes",
-            message: format!("'{}' leads out of the scene's folder", crate::source::log::shortened(name)),
+            message: format!("'{}' leads out of the scene's folder", shortened(name)),
         };
         if forward.is_empty() || forward.contains('\0') || forward.len() > 1024 {
-            let message = format!("expected a file name, found '{}'", crate::source::log::shortened(name));
+            let message = format!("expected a file name, found '{}'", shortened(name));
             return Err(FileFault { code: "bad_value", message });
         }
         let drive = forward.as_bytes().get(1) == Some(&b':');
@@ -102,11 +86,11 @@ impl SourceFolder {
     }
 
     /// The bytes of the file `relative`.
-    pub(crate) fn read(&mut self, relative: &str) -> Result<Vec<u8>, FileFault> {
+    pub fn read(&mut self, relative: &str) -> Result<Vec<u8>, FileFault> {
         let path = self.path(relative)?;
         let unreadable = |error: std::io::Error| FileFault {
             code: "unreadable_file",
-            message: format!("'{}' cannot be read: {error}", crate::source::log::shortened(relative)),
+            message: format!("'{}' cannot be read: {error}", shortened(relative)),
         };
         let file = std::fs::File::open(&path).map_err(unreadable)?;
         let mut bytes = Vec::new();
@@ -114,13 +98,13 @@ impl SourceFolder {
         if bytes.len() as u64 > self.file_bytes {
             return Err(self.too_large(relative));
         }
-        self.hashes.insert(relative.to_owned(), sha256_hex(&bytes));
+        self.hashes.insert(relative.to_owned(), sha256_of_bytes(&bytes));
         Ok(bytes)
     }
 
     /// Where the file `relative` is: an ordinary file inside the folder and within the limit.
-    pub(crate) fn path(&mut self, relative: &str) -> Result<PathBuf, FileFault> {
-        let short = crate::source::log::shortened(relative);
+    pub fn path(&mut self, relative: &str) -> Result<PathBuf, FileFault> {
+        let short = shortened(relative);
         let path = match self.root.join(relative).canonicalize() {
             Ok(path) => path,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -144,28 +128,24 @@ impl SourceFolder {
     }
 
     fn too_large(&self, relative: &str) -> FileFault {
-        let message = format!("'{}' has more than {} bytes", crate::source::log::shortened(relative), self.file_bytes);
+        let message = format!("'{}' has more than {} bytes", shortened(relative), self.file_bytes);
         FileFault { code: "limit", message }
     }
 
     /// The hash of a file that was read.
-    pub(crate) fn hash(&self, relative: &str) -> Option<String> {
+    pub fn hash(&self, relative: &str) -> Option<String> {
         self.hashes.get(relative).cloned()
     }
 
     /// Where it is.
-    pub(crate) fn root(&self) -> &Path {
+    pub fn root(&self) -> &Path {
         &self.root
     }
 
     /// What was looked for in it.
-    pub(crate) fn into_files(self) -> LookedFor {
+    pub fn into_files(self) -> LookedFor {
         LookedFor { hashes: self.hashes.into_iter().collect(), absent: self.absent.into_iter().collect() }
     }
-}
-
-fn sha256_hex(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

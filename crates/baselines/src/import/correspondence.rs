@@ -1,0 +1,182 @@
+//! The place of a donor's surface that is nearest to a given one.
+
+use glam::DVec3;
+use rstar::{AABB, PointDistance, RTree, RTreeObject};
+
+use super::donor::Donor;
+
+/// Of places no further than this beyond the nearest, one that faces the same way is taken: a board's two sides may lie
+/// closer together than two meshes of it do.
+const SAME_SHEET_M: f64 = 1e-3;
+/// Most places that are compared so.
+const MOST_COMPARED: usize = 64;
+
+/// A donor's triangles by place.
+pub struct Correspondence {
+    tree: RTree<Leaf>,
+}
+
+/// A place of a donor's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corresponding {
+    /// The number of the triangle.
+    pub triangle: usize,
+    /// Barycentric weights of the place; they add to one.
+    pub weights: DVec3,
+    /// How far away it is.
+    pub distance_m: f64,
+}
+
+struct Leaf {
+    corners: [DVec3; 3],
+    normal: DVec3,
+    triangle: usize,
+}
+
+impl Leaf {
+    fn corresponding(&self, place: DVec3) -> Corresponding {
+        let weights = nearest_weights(self.corners, place);
+        let distance_m = self.place(weights).distance(place);
+        Corresponding { triangle: self.triangle, weights, distance_m }
+    }
+
+    fn place(&self, weights: DVec3) -> DVec3 {
+        let [a, b, c] = self.corners;
+        a * weights.x + b * weights.y + c * weights.z
+    }
+}
+
+impl RTreeObject for Leaf {
+    type Envelope = AABB<[f64; 3]>;
+
+    fn envelope(&self) -> Self::Envelope {
+        let [a, b, c] = self.corners;
+        AABB::from_corners(a.min(b).min(c).to_array(), a.max(b).max(c).to_array())
+    }
+}
+
+impl PointDistance for Leaf {
+    fn distance_2(&self, point: &[f64; 3]) -> f64 {
+        let place = DVec3::from(*point);
+        self.place(nearest_weights(self.corners, place)).distance_squared(place)
+    }
+}
+
+impl Correspondence {
+    /// Takes in those triangles of the donor that belong; `belongs` is asked by number.
+    pub fn new(donor: &Donor, belongs: impl Fn(usize) -> bool) -> Self {
+        let numbers = (0..donor.triangles.len()).filter(|triangle| belongs(*triangle));
+        let leaf = |triangle: usize| {
+            let corners = donor.triangles[triangle].corners.map(|corner| corner.as_dvec3());
+            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+            Leaf { corners, normal, triangle }
+        };
+        Self { tree: RTree::bulk_load(numbers.map(leaf).collect()) }
+    }
+
+    /// The nearest place; of several that are as good as equally near one that faces as `normal` does. None where the
+    /// donor is empty.
+    pub fn nearest(&self, place: DVec3, normal: DVec3) -> Option<Corresponding> {
+        let mut leaves = self.tree.nearest_neighbor_iter(&place.to_array()).take(MOST_COMPARED).peekable();
+        let nearest = leaves.peek()?.corresponding(place).distance_m;
+        let near = leaves.map(|leaf| (leaf, leaf.corresponding(place)));
+        let near = near.take_while(|(_, found)| found.distance_m <= nearest + SAME_SHEET_M);
+        let key =
+            |(leaf, found): &(&Leaf, Corresponding)| (leaf.normal.dot(normal) <= 0.0, found.distance_m, leaf.triangle);
+        let order = |a: &(bool, f64, usize), b: &(bool, f64, usize)| {
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
+        };
+        near.min_by(|a, b| order(&key(a), &key(b))).map(|(_, found)| found)
+    }
+}
+
+/// The barycentric weights of a triangle's place that is nearest to a point: the regions of Ericson, "Real-Time Collision
+/// Detection", 2005, section 5.1.5. A triangle without area counts as its edges.
+fn nearest_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec3 {
+    let (ab, ac) = (b - a, c - a);
+    let normal = ab.cross(ac);
+    let area = normal.length_squared();
+    let across = |from: DVec3, to: DVec3| (to - from).cross(point - from).dot(normal);
+    let weights = DVec3::new(across(b, c), across(c, a), across(a, b)) / area;
+    if area > 0.0 && weights.min_element() >= 0.0 {
+        return weights / weights.element_sum();
+    }
+    // Outside of it, the nearest place lies on an edge.
+    let edges = [(a, b, DVec3::X, DVec3::Y), (b, c, DVec3::Y, DVec3::Z), (c, a, DVec3::Z, DVec3::X)];
+    let on_edges = edges.map(|(from, to, first, second)| {
+        let along = to - from;
+        let share = ((point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        ((from + along * share).distance_squared(point), first.lerp(second, share))
+    });
+    let nearest = on_edges.into_iter().min_by(|x, y| x.0.total_cmp(&y.0));
+    nearest.expect("a triangle has three edges").1
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::donor::DonorTriangle;
+    use super::*;
+
+    fn donor(triangles: &[[Vec3; 3]]) -> Donor {
+        let triangle = |corners: &[Vec3; 3]| DonorTriangle {
+            corners: *corners,
+            uvs: Default::default(),
+            colors: [Vec3::ONE; 3],
+            material: 0,
+        };
+        Donor { triangles: triangles.iter().map(triangle).collect(), ..Donor::default() }
+    }
+
+    /// Numbers without order, 0 to 1.
+    fn shares() -> impl Iterator<Item = f64> {
+        (1_u64..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / f64::from(1 << 24))
+    }
+
+    fn points(shares: &mut impl Iterator<Item = f64>) -> DVec3 {
+        DVec3::from_array(std::array::from_fn(|_| shares.next().unwrap() * 2.0 - 0.5))
+    }
+
+    /// Against a fine net of the triangle's places.
+    #[test]
+    fn no_place_of_a_triangle_is_nearer() {
+        let mut shares = shares();
+        for _ in 0..50 {
+            let corners = std::array::from_fn(|_| points(&mut shares));
+            let point = points(&mut shares);
+            let at = |weights: DVec3| corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
+            let weights = nearest_weights(corners, point);
+            assert!(weights.min_element() >= 0.0 && (weights.element_sum() - 1.0).abs() < 1e-12);
+            let found = at(weights).distance(point);
+            let net = (0..=60).flat_map(|i| (0..=60 - i).map(move |j| (i, j)));
+            let best = net.map(|(i, j)| at(DVec3::new(f64::from(i), f64::from(j), f64::from(60 - i - j)) / 60.0));
+            let best = best.map(|place| place.distance(point)).fold(f64::INFINITY, f64::min);
+            assert!(found <= best + 1e-12 && found >= best - 0.05, "{found} {best}");
+        }
+    }
+
+    #[test]
+    fn triangles_without_area_have_a_nearest_place() {
+        let line = [DVec3::ZERO, DVec3::X, DVec3::X * 2.0];
+        let weights = nearest_weights(line, DVec3::new(1.5, 1.0, 0.0));
+        assert_eq!(line[1] * weights.y + line[2] * weights.z, DVec3::X * 1.5);
+        let dot = nearest_weights([DVec3::ONE; 3], DVec3::ZERO);
+        assert!((dot.element_sum() - 1.0).abs() < 1e-12 && dot.is_finite());
+    }
+
+    #[test]
+    fn of_two_sides_the_one_that_faces_the_same_way() {
+        let front = [Vec3::ZERO, Vec3::X, Vec3::Y];
+        let back = [Vec3::ZERO, Vec3::Y, Vec3::X].map(|corner| corner - Vec3::Z * 5e-4);
+        let far = [Vec3::ZERO, Vec3::Y, Vec3::X].map(|corner| corner - Vec3::Z * 5e-3);
+        let place = DVec3::new(0.2, 0.2, 0.0);
+        let tree = Correspondence::new(&donor(&[front, back]), |_| true);
+        assert_eq!(tree.nearest(place, DVec3::Z).unwrap().triangle, 0);
+        assert_eq!(tree.nearest(place, -DVec3::Z).unwrap().triangle, 1);
+        // Twin: a sheet that is not the same board.
+        let tree = Correspondence::new(&donor(&[front, far]), |_| true);
+        assert_eq!(tree.nearest(place, -DVec3::Z).unwrap().triangle, 0);
+        assert!(Correspondence::new(&donor(&[front]), |_| false).nearest(place, DVec3::Z).is_none());
+    }
+}

@@ -1,0 +1,283 @@
+//! A textured glTF as a donor: base colour, roughness and metallic of the default scene's triangles; vertex colours,
+//! `KHR_texture_transform`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use glam::{DMat4, DVec3, Mat2, Vec2, Vec3};
+use gltf::Semantic;
+use gltf::mesh::Mode;
+use mateval_image::texture_io::{Encoding, texture_of_bytes};
+use mateval_image::{Texture, Wrap};
+use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
+use mateval_scene::source_folder::SourceFolder;
+
+use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, MAX_VERTICES, Scalar};
+
+/// Reads the file `name` of the folder; what is wrong in words.
+pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
+    let bytes = folder.read(name).map_err(|fault| fault.message)?;
+    let file = parse(&bytes)?;
+    let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
+    let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
+    reader.buffers =
+        file.buffers().map(|buffer| reader.buffer(&buffer, file.blob.as_deref())).collect::<Result<_, _>>()?;
+    let mut donor = Donor::default();
+    for material in file.materials() {
+        donor.materials.push(reader.material(&material)?);
+    }
+    // What glTF says of a primitive without a material.
+    let plain = Scalar { factor: 1.0, texture: None };
+    let nothing = DonorMaterial { base_color: ([1.0; 3], None), roughness: Some(plain.clone()), metallic: Some(plain) };
+    donor.materials.push(nothing);
+    reader.walk(&file, &mut donor)?;
+    Ok(donor)
+}
+
+struct Reader<'a> {
+    folder: &'a mut SourceFolder,
+    /// The folder of the file, which its uris begin in.
+    beside: &'a str,
+    buffers: Vec<Vec<u8>>,
+    /// By image, encoding and wrap.
+    textures: BTreeMap<(usize, bool, u8), Texture>,
+    texels: usize,
+}
+
+impl Reader<'_> {
+    fn buffer(&mut self, buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>) -> Result<Vec<u8>, String> {
+        match buffer.source() {
+            gltf::buffer::Source::Bin => {
+                blob.map(<[u8]>::to_vec).ok_or_else(|| "its first buffer has no data".to_owned())
+            }
+            gltf::buffer::Source::Uri(uri) => self.file(uri),
+        }
+    }
+
+    fn file(&mut self, uri: &str) -> Result<Vec<u8>, String> {
+        if uri.starts_with("data:") {
+            return Err("data uris are not read; write a .glb, or files beside the .gltf".to_owned());
+        }
+        let name = percent_encoding::percent_decode_str(uri).decode_utf8().map_err(|error| error.to_string())?;
+        let name = if self.beside.is_empty() { name.into_owned() } else { format!("{}/{name}", self.beside) };
+        let relative = SourceFolder::relative(&name).map_err(|fault| fault.message)?;
+        self.folder.read(&relative).map_err(|fault| fault.message)
+    }
+
+    fn material(&mut self, material: &gltf::Material<'_>) -> Result<DonorMaterial, String> {
+        let pbr = material.pbr_metallic_roughness();
+        let base_color =
+            pbr.base_color_texture().map(|info| self.texture(&info.texture(), Encoding::Srgb)).transpose()?;
+        let both = pbr.metallic_roughness_texture();
+        let both = both.map(|info| self.texture(&info.texture(), Encoding::Linear)).transpose()?;
+        let [r, g, b, _] = pbr.base_color_factor();
+        let scalar = |factor, channel| Some(Scalar { factor, texture: both.clone().map(|texture| (texture, channel)) });
+        Ok(DonorMaterial {
+            base_color: ([r, g, b], base_color),
+            roughness: scalar(pbr.roughness_factor(), 1),
+            metallic: scalar(pbr.metallic_factor(), 2),
+        })
+    }
+
+    fn texture(&mut self, texture: &gltf::Texture<'_>, encoding: Encoding) -> Result<Texture, String> {
+        let image = texture.source();
+        let wrap = wrap(&texture.sampler())?;
+        let key = (image.index(), encoding == Encoding::Srgb, wrap as u8);
+        if let Some(known) = self.textures.get(&key) {
+            return Ok(known.clone());
+        }
+        let (name, bytes) = match image.source() {
+            gltf::image::Source::Uri { uri, .. } => (uri.to_owned(), self.file(uri)?),
+            gltf::image::Source::View { view, .. } => {
+                let buffer = &self.buffers[view.buffer().index()];
+                (format!("image {}", image.index()), view_bytes(&view, buffer)?.to_vec())
+            }
+        };
+        let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap).map_err(|error| error.to_string())?;
+        self.texels += read.width() * read.height();
+        if self.texels > MAX_TEXELS {
+            return Err(format!("its textures have more than {MAX_TEXELS} texels in all"));
+        }
+        self.textures.insert(key, read.clone());
+        Ok(read)
+    }
+
+    fn walk(&self, file: &gltf::Gltf, donor: &mut Donor) -> Result<(), String> {
+        let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or("it has no scene")?;
+        let mut visited = BTreeSet::new();
+        let mut open: Vec<(gltf::Node<'_>, DMat4, Vec<String>)> =
+            scene.nodes().map(|node| (node, DMat4::IDENTITY, Vec::new())).collect();
+        open.reverse();
+        while let Some((node, world_from_parent, above)) = open.pop() {
+            if !visited.insert(node.index()) {
+                return Err(format!("node {} hangs below two others", node.index()));
+            }
+            let world_from_node =
+                world_from_parent * DMat4::from_cols_array_2d(&node.transform().matrix().map(|c| c.map(f64::from)));
+            let names: Vec<String> = node.name().map(str::to_owned).into_iter().chain(above).collect();
+            let first = donor.triangles.len();
+            for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
+                let place = || format!("node {} '{}'", node.index(), names.first().map_or("", String::as_str));
+                self.primitive(&primitive, world_from_node, donor).map_err(|what| format!("{}: {what}", place()))?;
+            }
+            donor.groups.push(DonorGroup { names: names.clone(), triangles: first..donor.triangles.len() });
+            open.extend(node.children().map(|child| (child, world_from_node, names.clone())));
+        }
+        Ok(())
+    }
+
+    fn primitive(
+        &self,
+        primitive: &gltf::Primitive<'_>,
+        world_from_node: DMat4,
+        donor: &mut Donor,
+    ) -> Result<(), String> {
+        match primitive.mode() {
+            Mode::Triangles => {}
+            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
+            Mode::TriangleStrip | Mode::TriangleFan => {
+                return Err("strips and fans are not read; write triangles".to_owned());
+            }
+        }
+        let bytes = |accessor: &gltf::Accessor<'_>| {
+            let view = accessor.view().ok_or("sparse accessors are not read")?;
+            Ok::<_, String>(self.buffers[view.buffer().index()].as_slice())
+        };
+        let positions = primitive.get(&Semantic::Positions).ok_or("expected POSITION")?;
+        donor.vertices += positions.count();
+        if donor.vertices > MAX_VERTICES {
+            return Err(format!("more than {MAX_VERTICES} vertices, counted for each node that has them"));
+        }
+        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)?
+            .into_iter()
+            .map(|place| world_from_node.transform_point3(DVec3::from(place.map(f64::from))).as_vec3())
+            .collect();
+        if !positions.iter().all(|place| place.is_finite()) {
+            return Err("a place is not finite once its node's transform is applied".to_owned());
+        }
+        let numbers = match primitive.indices() {
+            Some(accessor) => indices(&accessor, bytes(&accessor)?)?,
+            None => (0..positions.len() as u32).collect(),
+        };
+        let triangles = triangles(numbers, positions.len())?;
+        let same_count = |count: usize, what: &str| match count == positions.len() {
+            true => Ok(()),
+            false => Err(format!("{count} {what}, expected as many as POSITION: {}", positions.len())),
+        };
+        let colors = match primitive.get(&Semantic::Colors(0)) {
+            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?)?,
+            None => vec![[1.0; 3]; positions.len()],
+        };
+        same_count(colors.len(), "COLOR_0")?;
+        let pbr = primitive.material().pbr_metallic_roughness();
+        let mut uvs = [vec![Vec2::ZERO; positions.len()], vec![Vec2::ZERO; positions.len()]];
+        for (uvs, info) in uvs.iter_mut().zip([pbr.base_color_texture(), pbr.metallic_roughness_texture()]) {
+            let Some(info) = info else { continue };
+            let transform = info.texture_transform();
+            let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
+            let accessor =
+                primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| format!("expected TEXCOORD_{set}"))?;
+            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?)?;
+            same_count(found.len(), "TEXCOORD")?;
+            *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
+        }
+        let material = primitive.material().index().unwrap_or(donor.materials.len() - 1);
+        let mirrored = world_from_node.determinant() < 0.0;
+        for mut corners in triangles.into_iter().map(|triangle| triangle.map(|vertex| vertex as usize)) {
+            if mirrored {
+                corners.swap(1, 2);
+            }
+            donor.push(DonorTriangle {
+                corners: corners.map(|vertex| positions[vertex]),
+                uvs: [0, 1].map(|set: usize| corners.map(|vertex| uvs[set][vertex])),
+                colors: corners.map(|vertex| Vec3::from(colors[vertex])),
+                material,
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Where a uv is looked up, v upwards: glTF counts it from the top.
+fn looked_up(uv: Vec2, transform: Option<&gltf::texture::TextureTransform<'_>>) -> Vec2 {
+    let uv = transform.map_or(uv, |transform| {
+        let (offset, scale) = (Vec2::from(transform.offset()), Vec2::from(transform.scale()));
+        // The extension's rotation is clockwise in a space whose v points down: its own matrix, column by column.
+        let (sin, cos) = (libm::sinf(transform.rotation()), libm::cosf(transform.rotation()));
+        offset + Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos)) * (scale * uv)
+    });
+    Vec2::new(uv.x, 1.0 - uv.y)
+}
+
+fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, String> {
+    use gltf::texture::WrappingMode;
+    if sampler.wrap_s() != sampler.wrap_t() {
+        return Err("a sampler that wraps u and v in different ways is not read".to_owned());
+    }
+    Ok(match sampler.wrap_s() {
+        WrappingMode::Repeat => Wrap::Repeat,
+        WrappingMode::ClampToEdge => Wrap::Clamp,
+        WrappingMode::MirroredRepeat => Wrap::Mirror,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::{TriangleMesh, glb};
+
+    use super::*;
+
+    fn read_bytes(bytes: &[u8]) -> Result<Donor, String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.glb"), bytes).unwrap();
+        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.glb")
+    }
+
+    fn sound() -> Vec<u8> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        let mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::Y]),
+            triangles: vec![[0, 1, 2]],
+            ..Default::default()
+        };
+        glb::write(&path, &[glb::GlbNode { name: "a".to_owned(), mesh }]).unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn what_says_no_material_is_what_gltf_says_of_it() {
+        let donor = read_bytes(&sound()).unwrap();
+        assert_eq!((donor.triangles.len(), donor.groups[0].names.as_slice()), (1, &["a".to_owned()][..]));
+        assert_eq!(donor.values(0, DVec3::new(1.0, 0.0, 0.0)), [1.0; 5]);
+    }
+
+    /// No panic, whatever a byte says.
+    #[test]
+    fn damage_is_an_error_or_another_mesh() {
+        let sound = sound();
+        let mut refused = 0;
+        for at in 0..sound.len() {
+            for byte in [0, b'9', 255] {
+                let mut damaged = sound.clone();
+                damaged[at] = byte;
+                refused += usize::from(read_bytes(&damaged).is_err());
+            }
+            assert!(read_bytes(&sound[..at]).is_err());
+        }
+        assert!(refused > 1000, "{refused}");
+    }
+
+    /// glTF's own words: counter-clockwise, in a space whose v points down.
+    #[test]
+    fn a_quarter_turn_goes_counter_clockwise() {
+        let text = r#"{"asset":{"version":"2.0"},"images":[{"uri":"a"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":
+            {"baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":{"rotation":1.5707963267948966}}}}}]}"#;
+        let file = parse(text.as_bytes()).unwrap();
+        let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
+        let turned = looked_up(Vec2::new(1.0, 0.0), info.texture_transform().as_ref());
+        // To the right becomes upwards: -1 in glTF's v.
+        assert!((turned - Vec2::new(0.0, 2.0)).length() < 1e-6, "{turned}");
+    }
+}

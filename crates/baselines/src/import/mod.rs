@@ -1,0 +1,243 @@
+//! Methods that do not write our atlases: their own uv, a textured glTF or OBJ, one material a part. What they say is carried
+//! over by surface: each place of an instance takes what the nearest place of their mesh says.
+//!
+//! `files` finds the files, `gltf_donor` and `obj_donor` read meshes into a `donor`, `correspondence` finds the nearest place,
+//! `rebake` fills atlases, `flat_materials` is for one material a part, `report` tells how well it went.
+
+mod correspondence;
+mod donor;
+mod files;
+mod flat_materials;
+mod gltf_donor;
+mod obj_donor;
+mod rebake;
+mod report;
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::open::Dataset;
+use mateval_scene::{PartSetId, Progress};
+
+use crate::error::BaselineError;
+use crate::estimate::Says;
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, Texel};
+use crate::maps::Maps;
+use crate::part_colors::{PartColors, parts_of};
+use crate::submission::{self, Method};
+use correspondence::Correspondence;
+use donor::Donor;
+use files::ImportFolder;
+pub use flat_materials::{FlatMaterial, FlatMaterials};
+use rebake::{Distances, rebake};
+pub use report::{IMPORT_FORMAT, ImportReport, ImportTotals, ImportedInstance, ImportedScene};
+
+/// How files are read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportOptions {
+    /// Places further away than this do not correspond.
+    pub max_distance_m: f64,
+    /// The set of parts that `<scene>.json` names; none: the source's own.
+    pub part_set: Option<PartSetId>,
+}
+
+/// Writes a submission. An instance takes the first of `<scene>/<instance>.glb|gltf|obj`, `<scene>.glb|gltf|obj`,
+/// `<scene>.json` that tells of it; one that none tells of has no maps. Fails where the folder holds nothing for any scene,
+/// or where nothing in a scene's files is near enough to anything.
+pub fn write(
+    dataset: &Dataset,
+    folder: &Path,
+    out: &Path,
+    force: bool,
+    method: &Method,
+    options: &ImportOptions,
+    progress: Progress<'_>,
+) -> Result<ImportReport, BaselineError> {
+    let files = ImportFolder::new(folder);
+    if !dataset.scenes.iter().any(|scene| has_files(&files, scene)) {
+        return Err(BaselineError::NothingToImport(folder.to_owned()));
+    }
+    let scenes = RefCell::new(Vec::new());
+    submission::write_scenes(dataset, out, force, method, |scene, out| {
+        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+        let sources = Sources::read(&files, &geometry, options)?;
+        let with_atlas: Vec<usize> =
+            (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
+        let (mut instances, mut nearest_m) = (Vec::new(), f64::INFINITY);
+        for (done, &at) in with_atlas.iter().enumerate() {
+            progress(&format!("{} import", scene.id), done, with_atlas.len());
+            let instance = &scene.instances[at];
+            let told = sources.instance(&geometry, at)?;
+            let mut report = ImportedInstance {
+                instance: instance.id.clone(),
+                file: None,
+                texels: 0,
+                texels_without: 0,
+                mean_distance_m: None,
+                max_distance_m: None,
+            };
+            if let Some(told) = told {
+                nearest_m = nearest_m.min(told.nearest_m);
+                if told.write(&out.join(instance.id.as_str()), &mut report)? {
+                    report.file = Some(told.file);
+                }
+            }
+            instances.push(report);
+        }
+        progress(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len());
+        if has_files(&files, scene) && instances.iter().all(|instance| instance.file.is_none()) {
+            let (folder, scene) = (folder.to_owned(), scene.id.to_string());
+            return Err(BaselineError::NothingNear {
+                folder,
+                scene,
+                nearest_m,
+                max_distance_m: options.max_distance_m,
+            });
+        }
+        let written = instances.iter().filter(|instance| instance.file.is_some()).count();
+        scenes.borrow_mut().push(ImportedScene { scene: scene.id.clone(), instances });
+        Ok(written)
+    })?;
+    let scenes = scenes.into_inner();
+    Ok(ImportReport { format: IMPORT_FORMAT.to_owned(), max_distance_m: options.max_distance_m, scenes })
+}
+
+fn has_files(files: &ImportFolder, scene: &SceneFile) -> bool {
+    let of_instance = || scene.instances.iter().any(|i| files.mesh_of_instance(&scene.id, &i.id).is_some());
+    files.mesh_of_scene(&scene.id).is_some() || files.materials_of_scene(&scene.id).is_some() || of_instance()
+}
+
+/// What the files say of a scene.
+struct Sources<'a> {
+    files: &'a ImportFolder,
+    options: &'a ImportOptions,
+    mesh: Option<SceneMesh>,
+    parts: Option<(String, PartColors, Says)>,
+}
+
+/// A mesh of a whole scene.
+struct SceneMesh {
+    file: String,
+    donor: Donor,
+    /// Of the instances that groups are named after, the triangles of those alone.
+    named: BTreeMap<usize, Correspondence>,
+    /// Of what is named after nobody.
+    others: Correspondence,
+}
+
+/// What is told of an instance.
+struct Told {
+    file: String,
+    atlas: PartialAtlas,
+    distances: Distances,
+    nearest_m: f64,
+    says: Says,
+}
+
+impl Told {
+    /// Writes its maps, unless nothing was found; tells whether.
+    fn write(&self, folder: &Path, report: &mut ImportedInstance) -> Result<bool, BaselineError> {
+        let texels = self.atlas.texels.pixels();
+        report.texels = texels.iter().filter(|texel| **texel != Texel::Unused).count();
+        report.texels_without = texels.iter().filter(|texel| **texel == Texel::Unseen).count();
+        if report.texels == report.texels_without {
+            return Ok(false);
+        }
+        report.mean_distance_m = Some(self.distances.sum / self.distances.count.max(1) as f64);
+        report.max_distance_m = Some(self.distances.max);
+        Maps::of_atlas(&self.atlas, self.says).write(folder)?;
+        Ok(true)
+    }
+}
+
+impl<'a> Sources<'a> {
+    fn read(
+        files: &'a ImportFolder,
+        geometry: &SceneGeometry<'_>,
+        options: &'a ImportOptions,
+    ) -> Result<Self, BaselineError> {
+        let scene = &geometry.scene.id;
+        let mesh = files.mesh_of_scene(scene).map(|file| SceneMesh::read(files, file, geometry)).transpose()?;
+        let parts = match files.materials_of_scene(scene) {
+            Some(file) => {
+                let (colors, says) = flat_materials::read(&files.path(&file), geometry, options.part_set.as_ref())?;
+                Some((file, colors, says))
+            }
+            None => None,
+        };
+        Ok(Self { files, options, mesh, parts })
+    }
+
+    /// The first that tells of the instance.
+    fn instance(&self, geometry: &SceneGeometry<'_>, at: usize) -> Result<Option<Told>, BaselineError> {
+        let instance = &geometry.scene.instances[at];
+        let Some(atlas) = &instance.atlas else { return Ok(None) };
+        let size = atlas.size as usize;
+        if let Some(file) = self.files.mesh_of_instance(&geometry.scene.id, &instance.id) {
+            let donor = self.files.read_mesh(&file)?;
+            let all = Correspondence::new(&donor, |_| true);
+            return Ok(Some(self.rebaked(geometry, at, size, file, &donor, &all)));
+        }
+        if let Some(mesh) = &self.mesh {
+            let own = mesh.named.get(&at).unwrap_or(&mesh.others);
+            let told = self.rebaked(geometry, at, size, mesh.file.clone(), &mesh.donor, own);
+            if told.distances.count > 0 || self.parts.is_none() {
+                return Ok(Some(told));
+            }
+        }
+        Ok(self.parts.as_ref().map(|(file, colors, says)| {
+            let atlas = colors.paint(geometry, at, size);
+            Told { file: file.clone(), atlas, distances: Distances::default(), nearest_m: 0.0, says: *says }
+        }))
+    }
+
+    fn rebaked(
+        &self,
+        geometry: &SceneGeometry<'_>,
+        at: usize,
+        size: usize,
+        file: String,
+        donor: &Donor,
+        correspondence: &Correspondence,
+    ) -> Told {
+        let rebaked = rebake(geometry, at, size, donor, correspondence, self.options.max_distance_m);
+        let (atlas, distances, nearest_m) = (rebaked.atlas, rebaked.distances, rebaked.nearest_m);
+        Told { file, atlas, distances, nearest_m, says: donor.says() }
+    }
+}
+
+impl SceneMesh {
+    fn read(files: &ImportFolder, file: String, geometry: &SceneGeometry<'_>) -> Result<Self, BaselineError> {
+        let donor = files.read_mesh(&file)?;
+        let owner_of_name = owners(geometry)?;
+        let mut owner_of_triangle = vec![None; donor.triangles.len()];
+        for group in &donor.groups {
+            let owner = group.names.iter().find_map(|name| owner_of_name.get(name.as_str()));
+            owner_of_triangle[group.triangles.clone()].fill(owner.copied());
+        }
+        let owners: BTreeSet<usize> = owner_of_triangle.iter().flatten().copied().collect();
+        let correspondence =
+            |owner: Option<usize>| Correspondence::new(&donor, |triangle| owner_of_triangle[triangle] == owner);
+        let named = owners.into_iter().map(|owner| (owner, correspondence(Some(owner)))).collect();
+        let others = correspondence(None);
+        Ok(Self { file, donor, named, others })
+    }
+}
+
+/// Instances by their own ids and by those of their parts, of every set.
+fn owners<'a>(geometry: &SceneGeometry<'a>) -> Result<BTreeMap<&'a str, usize>, BaselineError> {
+    let instances = geometry.scene.instances.iter().enumerate();
+    let by_id: BTreeMap<&str, usize> = instances.map(|(at, instance)| (instance.id.as_str(), at)).collect();
+    let mut all = by_id.clone();
+    for (set, _) in geometry.scene.all_part_sets() {
+        let parts = parts_of(geometry, set)?;
+        let owned = parts.iter().filter_map(|part| Some((part.id.as_str(), *by_id.get(part.instance.as_str())?)));
+        for (id, owner) in owned {
+            all.entry(id).or_insert(owner);
+        }
+    }
+    Ok(all)
+}

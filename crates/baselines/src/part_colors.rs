@@ -1,0 +1,71 @@
+//! One material a part, painted into atlases.
+
+use std::collections::HashMap;
+
+use mateval_image::Picture;
+use mateval_scene::dataset::Part;
+use mateval_scene::uv_atlas::UvAtlas;
+use mateval_scene::{PartSetId, SceneError, glb};
+
+use crate::error::BaselineError;
+use crate::estimate::Values;
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, Texel};
+
+/// A triangle's corners by their bits: the same in `instances.glb` and `parts.glb`.
+type Corners = [[u32; 3]; 3];
+
+/// What is said of each triangle of a scene.
+pub struct PartColors {
+    of_instance: Vec<HashMap<Corners, Values>>,
+}
+
+impl PartColors {
+    /// Asks for every part of the set, by its number in [`parts_of`]'s order and its instance's.
+    pub fn new(
+        geometry: &SceneGeometry<'_>,
+        set: Option<&PartSetId>,
+        mut color_of: impl FnMut(usize, usize) -> Option<Values>,
+    ) -> Result<Self, BaselineError> {
+        let parts = parts_of(geometry, set)?;
+        let instances = &geometry.scene.instances;
+        let place_of: HashMap<&str, usize> =
+            instances.iter().enumerate().map(|(at, instance)| (instance.id.as_str(), at)).collect();
+        let mut of_instance = vec![HashMap::new(); instances.len()];
+        for (number, (part, node)) in parts.iter().zip(glb::read(&geometry.folder.parts(set))?).enumerate() {
+            let Some(&at) = place_of.get(part.instance.as_str()) else { continue };
+            let Some(color) = color_of(number, at) else { continue };
+            let triangles = 0..node.mesh.triangles.len();
+            of_instance[at].extend(triangles.map(|triangle| (corners(&node.mesh, triangle), color)));
+        }
+        Ok(Self { of_instance })
+    }
+
+    /// The atlas of an instance, each texel in its part's colour; unseen where nothing is said of its part.
+    pub fn paint(&self, geometry: &SceneGeometry<'_>, instance: usize, size: usize) -> PartialAtlas {
+        let mesh = geometry.mesh(instance);
+        let atlas = UvAtlas::new(mesh, size);
+        let said = |triangle| self.of_instance[instance].get(&corners(mesh, triangle));
+        let of_triangle: Vec<Texel> = (0..mesh.triangles.len())
+            .map(|triangle| said(triangle).map_or(Texel::Unseen, |values| Texel::Seen(*values)))
+            .collect();
+        let texels = Picture::from_fn(size, size, |x, y| {
+            atlas.owner(x, y).map_or(Texel::Unused, |(triangle, _)| of_triangle[triangle])
+        });
+        PartialAtlas { atlas, texels }
+    }
+}
+
+fn corners(mesh: &mateval_scene::TriangleMesh, triangle: usize) -> Corners {
+    mesh.corners(triangle).map(|corner| corner.to_array().map(f32::to_bits))
+}
+
+/// The parts of a set; of the source's own where none is named.
+pub fn parts_of<'a>(geometry: &SceneGeometry<'a>, set: Option<&PartSetId>) -> Result<&'a [Part], BaselineError> {
+    let found = geometry.scene.all_part_sets().find(|(id, _)| *id == set).map(|(_, parts)| parts);
+    found.ok_or_else(|| {
+        let what =
+            format!("no set of parts '{}'; `part_labels` in a recipe makes one", set.map_or("", PartSetId::as_str));
+        SceneError::Unsupported { path: geometry.folder.scene_file(), what }.into()
+    })
+}
