@@ -25,6 +25,7 @@ pub mod objects;
 pub mod part_colors;
 pub mod partfield;
 pub mod seen;
+pub mod seen_cloud;
 pub mod submission;
 pub mod texgen;
 pub mod truth;

@@ -6,16 +6,20 @@
 use std::path::Path;
 
 use mateval_scene::Progress;
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
+use mateval_scene::submission::MAP_SIZES;
+use rayon::prelude::*;
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, EstimateSource, Values};
-use crate::fill::{FillRule, SeenCloud};
+use crate::fill::fill;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift};
 use crate::maps::Maps;
 use crate::median::Medians;
 use crate::seen::{SeenPixels, SeenPoint};
+use crate::seen_cloud::{FillRule, SeenCloud};
 use crate::submission::{self, Method};
 
 /// How unseen texels are found.
@@ -58,16 +62,28 @@ pub fn write(
 ) -> Result<usize, BaselineError> {
     let method = Method { name: format!("nn-{}", source.name()), description: options.description(source) };
     submission::write_scenes(dataset, out, force, &method, |scene, folder| {
-        let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        let estimate = source.read(dataset, scene)?;
-        let seen = seen_pixels(&geometry, &estimate)?;
-        lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
-            let maps = match lifted {
-                Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.says()),
-                None => Maps::constant(medians.of(&geometry, instance), estimate.says()),
-            };
-            maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
-        })
+        write_scene(dataset, scene, folder, source, options, progress)
+    })
+}
+
+/// Writes one scene's maps, a folder an instance below `folder`. Gives the number of instances.
+pub fn write_scene(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    folder: &Path,
+    source: &EstimateSource,
+    options: &NnOptions,
+    progress: Progress<'_>,
+) -> Result<usize, BaselineError> {
+    let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
+    let estimate = source.read(dataset, scene)?;
+    let seen = seen_pixels(&geometry, &estimate)?;
+    lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
+        let maps = match lifted {
+            Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.says()),
+            None => Maps::constant(medians.of(&geometry, instance), estimate.says()),
+        };
+        maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
     })
 }
 
@@ -85,15 +101,15 @@ pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<
     Ok(SeenPixels::new(geometry, size))
 }
 
-/// Lifts an estimate to every instance that has an atlas, one after the other: `each` is given its number and its whole
-/// atlas, or none where nothing of it follows from what is seen. Gives how many there were.
+/// Lifts an estimate to every instance that has an atlas, several at once: `each` is given its number and its whole atlas,
+/// or none where nothing of it follows from what is seen. Gives how many there were.
 pub fn lift_scene(
     geometry: &SceneGeometry<'_>,
     estimate: &Estimate,
     seen: &SeenPixels,
     options: &NnOptions,
     progress: Progress<'_>,
-    each: impl Fn(usize, Option<Lifted>, &Medians) -> Result<(), BaselineError>,
+    each: impl Fn(usize, Option<Lifted>, &Medians) -> Result<(), BaselineError> + Sync,
 ) -> Result<usize, BaselineError> {
     let medians = Medians::new(geometry, seen, estimate);
     let with_atlas: Vec<(usize, usize)> = geometry
@@ -106,21 +122,40 @@ pub fn lift_scene(
     let points: Vec<(SeenPoint, Values)> =
         seen.points(geometry).into_iter().map(|point| (point, estimate.at(point.pixel.0, point.pixel.1))).collect();
     let all = options.any_instance.then(|| SeenCloud::new(options.rule, points.iter().copied()));
-    let step = format!("{} lift", geometry.scene.id);
-    for (done, &(instance, size)) in with_atlas.iter().enumerate() {
-        progress(&step, done, with_atlas.len());
+    let lifted = |instance: usize, size: usize| {
         let mut whole = lift(geometry, seen, estimate, instance, size);
         let is_seen = whole.texels.pixels().iter().map(|texel| matches!(texel, Texel::Seen(_))).collect();
         let mesh = geometry.mesh(instance);
         let filled = match &all {
-            Some(all) => all.fill(&mut whole, mesh),
+            Some(all) => fill(all, &mut whole, mesh),
             None => {
                 let own = points.iter().filter(|(point, _)| point.instance == instance).copied();
-                SeenCloud::new(options.rule, own).fill(&mut whole, mesh)
+                fill(&SeenCloud::new(options.rule, own), &mut whole, mesh)
             }
         };
-        each(instance, filled.then_some(Lifted { whole, seen: is_seen }), &medians)?;
+        filled.then_some(Lifted { whole, seen: is_seen })
+    };
+    let (step, mut done) = (format!("{} lift", geometry.scene.id), 0);
+    for batch in batches(&with_atlas) {
+        progress(&step, done, with_atlas.len());
+        batch.par_iter().try_for_each(|&(instance, size)| each(instance, lifted(instance, size), &medians))?;
+        done += batch.len();
     }
-    progress(&step, with_atlas.len(), with_atlas.len());
+    progress(&step, done, with_atlas.len());
     Ok(with_atlas.len())
+}
+
+/// The instances in runs of no more texels than the largest atlas may have: what is held in memory at once.
+fn batches(with_atlas: &[(usize, usize)]) -> Vec<&[(usize, usize)]> {
+    let most = *MAP_SIZES.end() * *MAP_SIZES.end();
+    let (mut batches, mut first, mut texels) = (Vec::new(), 0, 0);
+    for (at, (_, size)) in with_atlas.iter().enumerate() {
+        if at > first && texels + size * size > most {
+            batches.push(&with_atlas[first..at]);
+            (first, texels) = (at, 0);
+        }
+        texels += size * size;
+    }
+    batches.push(&with_atlas[first..]);
+    batches
 }
