@@ -209,6 +209,26 @@ fn no_colour_goes_from_one_instance_to_another() {
 }
 
 #[test]
+fn a_method_may_say_less_than_its_adapter() {
+    let folder = tempfile::tempdir().unwrap();
+    let [estimates, out] = ["estimates", "out"].map(|name| folder.path().join(name));
+    std::fs::create_dir_all(estimates.join("room")).unwrap();
+    let picture = truth(&ROOM).map(|LinearRgb(rgb)| rgb.map(|v| (srgb_from_linear(v) * 255.0).round() as u8));
+    png_io::write_rgb_bytes(&estimates.join("room/base_color.png"), &picture).unwrap();
+    png_io::write_rgb_bytes(&estimates.join("room/metallic.png"), &picture.map(|_| [255; 3])).unwrap();
+    run(baseline("nn", &ROOM, &out).arg("--estimate").arg(&estimates)).ends_with(0);
+    let said = json(&out.join("submission.json"))["description"].as_str().unwrap().to_owned();
+    assert!(said.contains("base_color of 1 scene, roughness of none, metallic of 1 scene"), "{said}");
+    let floor = out.join("scenes/room/floor");
+    assert!(floor.join("metallic.png").is_file() && !floor.join("roughness.png").exists());
+    // Twin: base colour is not optional.
+    std::fs::remove_file(estimates.join("room/base_color.png")).unwrap();
+    run(baseline("nn", &ROOM, &folder.path().join("none")).arg("--estimate").arg(&estimates))
+        .ends_with(2)
+        .says("base_color.png");
+}
+
+#[test]
 fn what_cannot_be_lifted_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");

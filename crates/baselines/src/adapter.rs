@@ -60,6 +60,9 @@ pub struct AdaptedFile {
     /// The channel of a scalar.
     #[serde(default)]
     pub channel: Channel,
+    /// Whether a scene may do without: then nothing is said of it.
+    #[serde(default)]
+    pub optional: bool,
 }
 
 fn unit_range() -> [f32; 2] {
@@ -152,13 +155,27 @@ impl Adapter {
         Ok(adapter)
     }
 
+    /// How many of the scenes have which pictures, as in `base_color of 2 scenes, roughness of none`.
+    pub fn inventory(&self, folder: &Path, scenes: &[&str]) -> String {
+        let maps = [("base_color", &self.base_color), ("roughness", &self.roughness), ("metallic", &self.metallic)];
+        let count = |file: &AdaptedFile| scenes.iter().filter(|scene| file.path(folder, scene).is_ok()).count();
+        let words = maps.into_iter().filter_map(|(map, file)| match count(file.as_ref()?) {
+            0 => Some(format!("{map} of none")),
+            1 => Some(format!("{map} of 1 scene")),
+            many => Some(format!("{map} of {many} scenes")),
+        });
+        words.collect::<Vec<_>>().join(", ")
+    }
+
     /// Reads a scene's pictures below `folder`. Those that are there must have one size.
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
-        let base_color = self.base_color.as_ref().map(|file| file.read(folder, scene)).transpose()?;
-        let scalar = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
-            let picture = file.as_ref().map(|file| file.read(folder, scene)).transpose()?;
-            Ok(picture.map(|picture| picture.map(|LinearRgb(rgb)| rgb[0])))
+        let read = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
+            Ok(file.as_ref().map(|file| file.read(folder, scene)).transpose()?.flatten())
         };
+        let scalar = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
+            Ok(read(file)?.map(|picture| picture.map(|LinearRgb(rgb)| rgb[0])))
+        };
+        let base_color = read(&self.base_color)?;
         let estimate = Estimate { base_color, roughness: scalar(&self.roughness)?, metallic: scalar(&self.metallic)? };
         let size = estimate.size().unwrap_or_default();
         let scalars = [&estimate.roughness, &estimate.metallic].into_iter().flatten();
@@ -174,9 +191,12 @@ impl Adapter {
 }
 
 impl AdaptedFile {
-    /// The picture, linear; a scalar is the same in all channels.
-    fn read(&self, folder: &Path, scene: &str) -> Result<Picture<LinearRgb>, BaselineError> {
-        let path = self.path(folder, scene)?;
+    /// The picture, linear; a scalar is the same in all channels. None where it may be missing, and is.
+    fn read(&self, folder: &Path, scene: &str) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
+        let path = match self.path(folder, scene) {
+            Err(BaselineError::NoEstimate { .. }) if self.optional => return Ok(None),
+            path => path?,
+        };
         // Straight: the adapter says what the numbers mean, in float files too.
         let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
         let [low, high] = self.range;
@@ -184,10 +204,10 @@ impl AdaptedFile {
         let picture = Picture::from_fn(stored.width(), stored.height(), |x, y| {
             LinearRgb(self.meant(stored.texel(x, y)).map(decode))
         });
-        Ok(match self.scale {
+        Ok(Some(match self.scale {
             Scale::Absolute => picture,
             Scale::Free => scaled(&picture),
-        })
+        }))
     }
 
     fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, BaselineError> {

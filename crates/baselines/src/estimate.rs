@@ -32,12 +32,15 @@ pub enum EstimateSource {
 }
 
 impl EstimateSource {
-    /// For submission.json, as in `the truth of the input view`.
-    pub fn description(&self) -> String {
+    /// For submission.json, as in `the truth of the input view`; of a method's pictures which there are.
+    pub fn description(&self, dataset: &Dataset) -> String {
         match self {
             Self::Truth => "the truth of the input view".to_owned(),
             Self::Input => "the input picture itself".to_owned(),
-            Self::Files { adapter, .. } => format!("the pictures of {}", adapter.name),
+            Self::Files { folder, adapter } => {
+                let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
+                format!("the pictures of {} ({})", adapter.name, adapter.inventory(folder, &scenes))
+            }
         }
     }
 

@@ -27,7 +27,7 @@ pub fn write_by_instance(
     force: bool,
     source: &EstimateSource,
 ) -> Result<usize, BaselineError> {
-    let description = format!("the median of {} under each instance's mask; {UNSEEN}", source.description());
+    let description = format!("the median of {} under each instance's mask; {UNSEEN}", source.description(dataset));
     let method = Method { name: name("median", source), description };
     submission::write_scenes(dataset, out, force, &method, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
@@ -54,7 +54,7 @@ pub fn write_by_part(
     let parts = set.map_or("the source's own parts".to_owned(), |set| format!("the parts '{set}'"));
     let description = format!(
         "the median of {} under the mask of each of {parts}; a part that is not seen takes its instance's; {UNSEEN}",
-        source.description()
+        source.description(dataset)
     );
     let stem = set.map_or("median-part".to_owned(), |set| format!("median-part-{set}"));
     let method = Method { name: name(&stem, source), description };

@@ -34,7 +34,7 @@ pub struct NnOptions {
 }
 
 impl NnOptions {
-    fn description(&self, source: &EstimateSource) -> String {
+    fn description(&self, estimate: &str) -> String {
         let count = self.rule.neighbours;
         let mean = if count.get() == 1 { "the nearest seen point" } else { "an inverse-square mean of the nearest" };
         let near = if count.get() == 1 { String::new() } else { format!(" {count}") };
@@ -46,7 +46,7 @@ impl NnOptions {
         format!(
             "{} lifted to the atlases; unseen texels: {mean}{near} of {whose}{normals}; instances that are not seen: the \
              median of their category in the picture, else base colour 0.5 (linear), roughness 0.5, metallic 0",
-            source.description()
+            estimate
         )
     }
 }
@@ -60,7 +60,10 @@ pub fn write(
     options: &NnOptions,
     progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
-    let method = Method { name: format!("nn-{}", source.name()), description: options.description(source) };
+    let method = Method {
+        name: format!("nn-{}", source.name()),
+        description: options.description(&source.description(dataset)),
+    };
     submission::write_scenes(dataset, out, force, &method, |scene, folder| {
         write_scene(dataset, scene, folder, source, options, progress)
     })

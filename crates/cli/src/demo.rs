@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
+use mateval_baselines::estimate::EstimateSource;
+use mateval_baselines::nn::NnOptions;
 use mateval_scene::open::Dataset;
 
+use crate::bars::Bars;
 use crate::outcome::{Outcome, print, say};
 use crate::{eval, prep};
 
@@ -53,7 +56,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         scenes: Vec::new(),
         force: args.force,
     })?;
-    say("4/5 baselines: gt and grey");
+    say("4/5 baselines: gt, nn, median and grey");
     let opened = Dataset::open(&dataset)?;
     let submissions = make_baselines(&opened, out, args.force)?;
     say("5/5 eval score");
@@ -70,12 +73,18 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 }
 
 fn make_baselines(dataset: &Dataset, out: &Path, force: bool) -> anyhow::Result<Vec<PathBuf>> {
-    let [gt, grey] = ["gt", "grey"].map(|name| out.join("submissions").join(name));
+    let [gt, nn, median, grey] = ["gt", "nn", "median", "grey"].map(|name| out.join("submissions").join(name));
     let folder = out.join("submissions");
     std::fs::create_dir_all(&folder).with_context(|| format!("cannot make '{}'", folder.display()))?;
     mateval_baselines::truth::write(dataset, &gt, force)?;
+    let bars = Bars::new();
+    let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
+    let (source, options) = (EstimateSource::Truth, NnOptions::default());
+    mateval_baselines::nn::write(dataset, &nn, force, &source, &options, &progress)?;
+    drop(bars);
+    mateval_baselines::homogeneous::write_by_instance(dataset, &median, force, &EstimateSource::Input)?;
     mateval_baselines::grey::write(dataset, &grey, force)?;
-    Ok(vec![gt, grey])
+    Ok(vec![gt, nn, median, grey])
 }
 
 fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {

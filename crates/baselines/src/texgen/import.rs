@@ -43,7 +43,7 @@ pub fn import(
     }
     let description = format!(
         "TEXGen's textures where the input view shows nothing, {} where it does; {textured} textures; the rest as nn",
-        source.description()
+        source.description(dataset)
     );
     let method = Method { name: format!("texgen-{}", source.name()), description };
     let instances = submission::write_scenes(dataset, out, force, &method, |scene, folder| {
