@@ -118,11 +118,25 @@ def places(*, properties: Any) -> Places:
     return Places(*spots, channels.index("roughness"), channels.index("metallicity"))
 
 
-def settings(*, words: argparse.Namespace, config: dict[str, Any], revision: str | None) -> dict[str, Any]:
+def weights_sha256(*, folder: Path) -> str:
+    """A hash of the weights of the model's network, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    for path in sorted(p for p in (folder / "unet").glob("*") if p.suffix in (".safetensors", ".bin")):
+        with path.open("rb") as file:
+            digest.update(hashlib.file_digest(file, "sha256").digest())
+    return digest.hexdigest()
+
+
+def settings(
+    *, words: argparse.Namespace, folder: Path, config: dict[str, Any], revision: str | None
+) -> dict[str, Any]:
     """All that the pictures depend on, as `run.json` has it."""
+    dataset = read_json(path=words.dataset / "dataset.json", what="which every dataset has")
     asked = {
+        "dataset_manifest_sha256": dataset.get("manifest_sha256"),
         "model": Path(words.model).resolve().name if Path(words.model).is_dir() else words.model,
         "revision": revision,
+        "weights_sha256": weights_sha256(folder=folder),
         "target_properties": config.get("target_properties"),
         "steps": words.steps or config.get("default_denoising_steps"),
         "ensemble": words.ensemble,
@@ -239,7 +253,7 @@ def run(*, words: argparse.Namespace) -> None:
     folder, revision = model_folder(model=words.model, half=words.half)
     config = read_json(path=folder / "model_index.json", what="which every model of diffusers has")
     where = places(properties=config.get("target_properties"))
-    asked = settings(words=words, config=config, revision=revision)
+    asked = settings(words=words, folder=folder, config=config, revision=revision)
     check_out(out=words.out, asked=asked, scenes=list(found), force=words.force)
     todo = {scene: path for scene, path in found.items() if words.force or not (words.out / scene).is_dir()}
     print(f"{len(found) - len(todo)} of {len(found)} scenes are there already and skipped", file=sys.stderr)
@@ -253,7 +267,7 @@ def run(*, words: argparse.Namespace) -> None:
         try:
             seed = scene_seed(seed=words.seed, scene=scene)
             prediction = predict(pipe=pipe, picture=path, seed=seed, asked=asked)
-        except (OSError, ValueError) as problem:
+        except (OSError, ValueError, RuntimeError) as problem:  # torch's own, as for want of memory, is a RuntimeError
             raise RunError(f"cannot run the model on '{path}': {first_line(problem)}") from problem
         albedo, material = pictures(prediction=prediction, where=where)
         write_scene(folder=words.out / scene, albedo=albedo, material=material)

@@ -245,7 +245,8 @@ def write_tiny_dataset(*, folder: Path) -> None:
     """As much of a dataset as the tool reads: a list of scenes, a picture of each."""
     from PIL import Image
 
-    write_json(path=folder / "dataset.json", value={"format": "mateval/1", "scenes": list(SIZES)})
+    value = {"format": "mateval/1", "scenes": list(SIZES), "manifest_sha256": "d" * 64}
+    write_json(path=folder / "dataset.json", value=value)
     for scene, (width, height) in SIZES.items():
         path = folder / "scenes" / scene / "views/input/rgb.png"
         path.parent.mkdir(parents=True)
@@ -324,7 +325,12 @@ class Pipeline(unittest.TestCase):
         expected = {"model": "model", "revision": None, "target_properties": APPEARANCE, "seed": 0, "steps": 2}
         expected |= {"ensemble": 1, "resolution": 32, "device": "cpu", "half": False}
         self.assertEqual({key: run[key] for key in expected}, expected)
-        self.assertEqual(set(run) - set(expected), set(tool.NEEDED))
+        self.assertEqual(run["dataset_manifest_sha256"], "d" * 64)
+        # Two networks of one name are told apart.
+        self.assertEqual(run["weights_sha256"], tool.weights_sha256(folder=self.root / "model"))
+        self.assertNotEqual(run["weights_sha256"], tool.weights_sha256(folder=self.root / "dataset"))
+        hashes = {"dataset_manifest_sha256", "weights_sha256"}
+        self.assertEqual(set(run) - set(expected), set(tool.NEEDED) | hashes)
 
     def test_the_same_seed_gives_the_same_bytes_alone_too(self) -> None:
         whole, out = content(folder=self.first), self.fresh("alone")

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{Picture, Wrap, png_io};
+use mateval_scene::uv_atlas::UvAtlas;
 use mateval_scene::{TriangleMesh, glb};
 use serde_json::{Value, json};
 
@@ -99,7 +100,8 @@ fn the_truth_in_other_uv_scores_as_the_truth() {
     }
 }
 
-/// A `.gltf` of the boxes beside its `.bin` and a picture whose left half is black: below a node that shifts and mirrors,
+/// A `.gltf` of the boxes beside its `.bin` and a picture whose left half is black: below a node that shifts and
+/// mirrors,
 /// `red` looks its right half up by a transform of its uv, `green` has colours at its vertices.
 fn write_gltf(dataset: &Path, files: &Path, names: [&str; 2]) {
     let mut bytes = Vec::new();
@@ -166,6 +168,48 @@ fn srgb(bytes: [u8; 3]) -> [f32; 3] {
     bytes.map(mateval_image::transfer::linear_from_srgb_byte)
 }
 
+/// Slivers of a few texels' width, under a texture four times as fine as the atlas: each texel finds its place.
+#[test]
+fn no_texel_is_lost_under_a_finer_texture() {
+    let folder = tempfile::tempdir().unwrap();
+    let [gt, files, out] = ["gt", "files", "out"].map(|name| folder.path().join(name));
+    run(&mut baseline("gt", &ROOM, &gt)).ends_with(0);
+    std::fs::create_dir_all(files.join("room")).unwrap();
+    let own = |name: &str| files.join("room").join(name);
+    let ids = ["lamp_stand", "mirror_frame", "bowl"];
+    for id in ids {
+        let atlas = gt.join("scenes/room").join(id).join("base_color.png");
+        let atlas = read_texture(&atlas, Encoding::Linear, Wrap::Clamp).unwrap();
+        let size = 4 * atlas.width();
+        let picture = Picture::from_fn(size, size, |x, y| atlas.texel(x / 4, y / 4).map(byte_from_unit));
+        png_io::write_rgb_bytes(&own(&format!("{id}.png")), &picture).unwrap();
+        std::fs::write(own(&format!("{id}.mtl")), format!("newmtl it\nmap_Kd {id}.png\n")).unwrap();
+        let text = obj(&mesh_of(&ROOM, id), [0.0; 3], |uv| uv).replace("it.mtl", &format!("{id}.mtl"));
+        std::fs::write(own(&format!("{id}.obj")), text).unwrap();
+    }
+    let done = import(&ROOM, &files, &out, &["--format", "json"]).ends_with(0);
+    let report: Value = serde_json::from_str(&done.stdout).unwrap();
+    for id in ids {
+        let instances = report["scenes"][0]["instances"].as_array().unwrap();
+        let told = instances.iter().find(|instance| instance["instance"] == id).unwrap();
+        assert!(told["texels"].as_u64().unwrap() > 1000 && told["texels_without"] == 0, "{told}");
+        let read = |root: &Path| {
+            let path = root.join("scenes/room").join(id).join("base_color.png");
+            read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap()
+        };
+        let (ours, truth, mesh) = (read(&out), read(&gt), mesh_of(&ROOM, id));
+        let atlas = UvAtlas::new(&mesh, truth.width());
+        let places = (0..truth.width()).flat_map(|x| (0..truth.width()).map(move |y| (x, y)));
+        let owned: Vec<(usize, usize)> = places.filter(|&(x, y)| atlas.owner(x, y).is_some()).collect();
+        let apart = |&&(x, y): &&(usize, usize)| {
+            let (a, b) = (ours.texel(x, y), truth.texel(x, y));
+            (0..3).any(|c| (a[c] - b[c]).abs() > 16.0 / 255.0)
+        };
+        let share = owned.iter().filter(apart).count() as f64 / owned.len() as f64;
+        assert!(share < 0.02, "{id}: {share}");
+    }
+}
+
 #[test]
 fn a_textured_gltf_is_rebaked_node_by_node() {
     let (folder, dataset) = boxes();
@@ -190,7 +234,9 @@ fn a_textured_gltf_is_rebaked_node_by_node() {
     // Twin: without names the faces that touch cannot be told apart.
     write_gltf(&dataset, &files, ["Cube.001", "Cube.002"]);
     let unnamed = folder.path().join("unnamed");
-    import(&dataset, &files, &unnamed, &[]).ends_with(0).prints("mirror: nothing tells of it");
+    import(&dataset, &files, &unnamed, &[])
+        .ends_with(0)
+        .prints("mirror: nothing in room.gltf is near enough, the nearest 116.978 mm away");
     assert!(
         !is_all(&dataset, &unnamed, "red", srgb([188, 10, 99]))
             || !is_all(&dataset, &unnamed, "green", [0.0, 128.0 / 255.0, 1.0])
@@ -245,6 +291,9 @@ fn one_material_a_part() {
     let by_part = folder.path().join("by_part");
     import(&dataset, &files, &by_part, &[]).ends_with(0);
     assert!(is_all(&dataset, &by_part, "red", [0.7, 0.2, 0.3]));
+    // A file that names nothing.
+    write(json!({}));
+    import(&dataset, &files, &folder.path().join("empty"), &[]).ends_with(2).says("name no part or instance");
     // All that is wrong at once.
     write(json!({ "no-such": { "base_color": [0, 0, 0] }, "red": { "base_color": [0, 0, 2] } }));
     let bad = import(&dataset, &files, &folder.path().join("bad"), &[]).ends_with(2);

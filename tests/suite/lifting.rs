@@ -1,4 +1,5 @@
-//! `baseline nn`, `median`, `median-part`: what is lifted is what is seen, no colour goes where it does not belong, and the
+//! `baseline nn`, `median`, `median-part`: what is lifted is what is seen, no colour goes where it does not belong, and
+//! the
 //! encodings of estimates mean what they say.
 
 use std::path::{Path, PathBuf};
@@ -228,6 +229,41 @@ fn a_method_may_say_less_than_its_adapter() {
         .says("base_color.png");
 }
 
+/// Columns: the truth and two submissions; rows: five views, and the scale beneath the errors.
+#[test]
+fn pictures_lie_side_by_side() {
+    let folder = tempfile::tempdir().unwrap();
+    let [gt, grey, out] = ["gt", "grey", "out"].map(|name| folder.path().join(name));
+    run(&mut baseline("gt", &ROOM, &gt)).ends_with(0);
+    run(&mut baseline("grey", &ROOM, &grey)).ends_with(0);
+    let mut command = mateval();
+    command.args(["eval", "pictures"]).args([&gt, &grey]).arg("--dataset").arg(&*ROOM).arg("--out").arg(&out);
+    run(&mut command).ends_with(0).prints("room-albedo-error.png");
+    let read = |name: &str| png_io::read_rgb_bytes(&out.join(name)).unwrap();
+    let (albedo, error) = (read("room-albedo.png"), read("room-albedo-error.png"));
+    assert_eq!((albedo.width(), albedo.height()), (3 * 160 + 2 * 4, 5 * 120 + 4 * 4));
+    assert_eq!((error.width(), error.height()), (2 * 160 + 4, 5 * 120 + 5 * 4 + 12));
+    // The truth's own submission is nearly black where errors are, the grey one is not.
+    let brightness = |left: usize| -> u64 {
+        let places = (left..left + 160).flat_map(|x| (0..120).map(move |y| (x, y)));
+        places.map(|(x, y)| error.get(x, y).iter().map(|v| u64::from(*v)).sum::<u64>()).sum()
+    };
+    assert!(brightness(0) * 20 < brightness(164), "{} {}", brightness(0), brightness(164));
+    run(&mut command).ends_with(2).says("--force");
+    run(command.arg("--force")).ends_with(0);
+}
+
+/// Twice as wide as the view is.
+#[test]
+fn other_proportions_are_refused() {
+    let picture = truth(&ROOM);
+    let wide = Picture::from_fn(2 * picture.width(), picture.height(), |x, y| picture.get(x / 2, y));
+    let estimate = estimate("linear", &wide);
+    let out = estimate.path().join("out");
+    run(baseline("nn", &ROOM, &out).args(lifted_words(&estimate))).ends_with(2).says("expected the same proportions");
+    assert!(!out.exists());
+}
+
 #[test]
 fn what_cannot_be_lifted_is_said() {
     let folder = tempfile::tempdir().unwrap();
@@ -236,6 +272,10 @@ fn what_cannot_be_lifted_is_said() {
     nn(&["--estimate", "no-such-folder"]).says("expected gt, input or a folder");
     nn(&["--estimate", "input"]).says("run `mateval prep render`");
     nn(&["--estimate", "gt", "--adapter", "rgbx"]).says("give --estimate FOLDER");
+    nn(&["--normal-weight", "1e300"]).says("expected 0 to 100 m");
+    let inside = ROOM.join("scenes/room/mine");
+    run(&mut baseline("grey", &ROOM, &inside)).ends_with(2).says("lies in the dataset");
+    assert!(!inside.exists());
     let here = folder.path().to_string_lossy().into_owned();
     nn(&["--estimate", &here, "--adapter", "marigold"]).says("albedo.png");
     nn(&["--estimate", &here, "--adapter", "no-such"]).says("colorful-shading");
@@ -253,7 +293,8 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
     command.args(["baseline", "texgen-export", "--dataset"]).arg(&*ROOM).arg("--out").arg(&objects);
     run(&mut command).ends_with(0);
 
-    // The stand-in copies the partial atlas, and paints what is not seen: red at the lower edge, green at the upper one.
+    // The stand-in copies the partial atlas, and paints what is not seen: red at the lower edge, green at the upper
+    // one.
     std::fs::create_dir(&results).unwrap();
     let list = std::fs::read_to_string(objects.join("objects.jsonl")).unwrap();
     let ids: Vec<String> = list
@@ -275,7 +316,13 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
     }
     let [imported, nn] = ["imported", "nn"].map(|name| folder.path().join(name));
     let mut command = mateval();
-    command.args(["baseline", "texgen-import"]).arg(&results).arg("--dataset").arg(&*ROOM).arg("--out").arg(&imported);
+    command
+        .args(["baseline", "texgen-import", "--estimate", "gt"])
+        .arg(&results)
+        .arg("--dataset")
+        .arg(&*ROOM)
+        .arg("--out")
+        .arg(&imported);
     run(&mut command).ends_with(0);
     run(&mut baseline("nn", &ROOM, &nn)).ends_with(0);
     let (mut kept, mut painted) = (0, [0; 2]);
@@ -289,7 +336,8 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
             }
         }
     }
-    // Everything is one of the two, but for the seams of the two colours and for texels that 1024 a side did not resolve.
+    // Everything is one of the two, but for the seams of the two colours and for texels that 1024 a side did not
+    // resolve.
     let all: usize = base_colors(&nn).iter().map(|(_, picture)| picture.pixels().len()).sum();
     assert!(kept * 10 > all && painted.iter().all(|half| half * 20 > all), "{kept} {painted:?} of {all}");
     assert!((kept + painted[0] + painted[1]) * 100 > all * 97, "{kept} {painted:?} of {all}");
@@ -297,7 +345,13 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
     std::fs::remove_dir_all(&results).unwrap();
     std::fs::create_dir(&results).unwrap();
     let mut command = mateval();
-    command.args(["baseline", "texgen-import"]).arg(&results).arg("--dataset").arg(&*ROOM).arg("--out").arg(&imported);
+    command
+        .args(["baseline", "texgen-import", "--estimate", "gt"])
+        .arg(&results)
+        .arg("--dataset")
+        .arg(&*ROOM)
+        .arg("--out")
+        .arg(&imported);
     run(command.arg("--force")).ends_with(2).says("living-00012.png");
 }
 

@@ -57,9 +57,9 @@ pub struct AdaptedFile {
     /// `free`: known only up to a factor.
     #[serde(default)]
     pub scale: Scale,
-    /// The channel of a scalar.
+    /// The channel of a scalar; the first if absent. Colours have none.
     #[serde(default)]
-    pub channel: Channel,
+    pub channel: Option<Channel>,
     /// Whether a scene may do without: then nothing is said of it.
     #[serde(default)]
     pub optional: bool,
@@ -105,11 +105,10 @@ pub enum Scale {
 }
 
 /// A channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
     /// The first.
-    #[default]
     R,
     /// The second.
     G,
@@ -144,6 +143,11 @@ impl Adapter {
         if maps.iter().all(|map| map.is_none()) {
             return Err(invalid("it names no file; expected base_color, roughness or metallic".to_owned()));
         }
+        if adapter.base_color.as_ref().is_some_and(|file| file.channel.is_some()) {
+            return Err(invalid(
+                "base_color has a `channel`; expected one for roughness and metallic alone".to_owned(),
+            ));
+        }
         for map in maps.into_iter().flatten() {
             if map.files.is_empty() {
                 return Err(invalid("`files` is empty; expected a path or several".to_owned()));
@@ -170,29 +174,27 @@ impl Adapter {
     /// Reads a scene's pictures below `folder`. Those that are there must have one size.
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
         let read = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
-            Ok(file.as_ref().map(|file| file.read(folder, scene)).transpose()?.flatten())
+            Ok(file.as_ref().map(|file| file.read(folder, scene, None)).transpose()?.flatten())
         };
         let scalar = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
-            Ok(read(file)?.map(|picture| picture.map(|LinearRgb(rgb)| rgb[0])))
+            let channel = |file: &AdaptedFile| Some(file.channel.unwrap_or(Channel::R));
+            let picture = file.as_ref().map(|file| file.read(folder, scene, channel(file))).transpose()?.flatten();
+            Ok(picture.map(|picture| picture.map(|LinearRgb(rgb)| rgb[0])))
         };
         let base_color = read(&self.base_color)?;
-        let estimate = Estimate { base_color, roughness: scalar(&self.roughness)?, metallic: scalar(&self.metallic)? };
-        let size = estimate.size().unwrap_or_default();
-        let scalars = [&estimate.roughness, &estimate.metallic].into_iter().flatten();
-        let sizes: Vec<(usize, usize)> = scalars.map(|picture| (picture.width(), picture.height())).collect();
-        match sizes.into_iter().find(|other| *other != size) {
-            None => Ok(estimate),
-            Some(other) => {
-                let (folder, scene) = (folder.to_owned(), scene.to_owned());
-                Err(BaselineError::Sizes { folder, scene, sizes: [size, other] })
-            }
-        }
+        Estimate { base_color, roughness: scalar(&self.roughness)?, metallic: scalar(&self.metallic)? }
+            .of_one_size(folder, scene)
     }
 }
 
 impl AdaptedFile {
-    /// The picture, linear; a scalar is the same in all channels. None where it may be missing, and is.
-    fn read(&self, folder: &Path, scene: &str) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
+    /// The picture, linear; of a scalar its channel, in all three. None where it may be missing, and is.
+    fn read(
+        &self,
+        folder: &Path,
+        scene: &str,
+        channel: Option<Channel>,
+    ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
         let path = match self.path(folder, scene) {
             Err(BaselineError::NoEstimate { .. }) if self.optional => return Ok(None),
             path => path?,
@@ -202,12 +204,19 @@ impl AdaptedFile {
         let [low, high] = self.range;
         let decode = |v: f32| self.encoding.decode((v - low) / (high - low));
         let picture = Picture::from_fn(stored.width(), stored.height(), |x, y| {
-            LinearRgb(self.meant(stored.texel(x, y)).map(decode))
+            LinearRgb(meant(channel, stored.texel(x, y)).map(decode))
         });
-        Ok(Some(match self.scale {
+        let picture = match self.scale {
             Scale::Absolute => picture,
             Scale::Free => scaled(&picture),
-        }))
+        };
+        match picture.pixels().iter().position(|LinearRgb(rgb)| !rgb.iter().all(|v| v.is_finite())) {
+            None => Ok(Some(picture)),
+            Some(at) => {
+                let pixel = (at % picture.width(), at / picture.width());
+                Err(BaselineError::NotFinite { path, pixel })
+            }
+        }
     }
 
     fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, BaselineError> {
@@ -215,14 +224,15 @@ impl AdaptedFile {
         let found = paths.iter().find(|path| path.is_file()).cloned();
         found.ok_or(BaselineError::NoEstimate { paths })
     }
+}
 
-    /// For a scalar the one channel that counts; colours say no channel and keep all.
-    fn meant(&self, rgb: [f32; 3]) -> [f32; 3] {
-        match self.channel {
-            Channel::R => rgb,
-            Channel::G => [rgb[1]; 3],
-            Channel::B => [rgb[2]; 3],
-        }
+/// The channel that counts, in all three; all of a colour.
+fn meant(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
+    match channel {
+        None => rgb,
+        Some(Channel::R) => [rgb[0]; 3],
+        Some(Channel::G) => [rgb[1]; 3],
+        Some(Channel::B) => [rgb[2]; 3],
     }
 }
 
@@ -258,7 +268,30 @@ mod tests {
         let range = "name = \"x\"\n[metallic]\nfiles = [\"a\"]\nencoding = \"linear\"\nrange = [1.0, 0.0]";
         assert!(refused(range).contains("range [1.0, 0.0]"));
         assert!(refused("name = \"x\"\n[base_color]\nfiles = [\"a\"]\nencoding = \"log\"").contains("gamma22"));
+        let channel = "name = \"x\"\n[base_color]\nfiles = [\"a\"]\nencoding = \"srgb\"\nchannel = \"g\"";
+        assert!(refused(channel).contains("a `channel`"));
         assert!(Adapter::find("no-such").unwrap_err().to_string().contains("marigold"));
+    }
+
+    /// Roughness in red must not be scaled by what green holds; numbers that a power makes infinite are refused.
+    #[test]
+    fn a_scalar_is_its_channel_and_everything_is_finite() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, value: [f32; 3]| {
+            let picture = Picture::filled(4, 4, LinearRgb(value));
+            let path = folder.path().join(name);
+            mateval_image::exr_io::write_linear(&path, &picture, mateval_image::exr_io::Precision::Float).unwrap();
+        };
+        write("a.exr", [0.25, 1.0, 0.5]);
+        write("b.exr", [1e30; 3]);
+        let read = |file: &str, encoding: &str| {
+            let text =
+                format!("name = \"x\"\n[roughness]\nfiles = [\"{file}\"]\nencoding = \"{encoding}\"\nscale = \"free\"");
+            Adapter::parse(&text, Path::new("x")).unwrap().read(folder.path(), "s")
+        };
+        assert_eq!(read("a.exr", "linear").unwrap().roughness.unwrap().get(0, 0), 1.0);
+        assert!(read("b.exr", "linear").is_ok());
+        assert!(read("b.exr", "gamma22").unwrap_err().to_string().contains("pixel (0, 0)"));
     }
 
     #[test]

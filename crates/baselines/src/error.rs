@@ -18,6 +18,12 @@ pub enum BaselineError {
     /// The output is in the way.
     #[error("'{}' is already there; choose another --out, or add --force to replace it", .0.display())]
     Exists(PathBuf),
+    /// The same, of what is never replaced.
+    #[error("'{}' is already there; choose another --out", .0.display())]
+    InTheWay(PathBuf),
+    /// The output would be a part of the dataset.
+    #[error("'{}' lies in the dataset, which must hold nothing else; choose another --out", .0.display())]
+    InDataset(PathBuf),
     /// `--force` would remove something that is no submission.
     #[error("'{}' is there and holds no submission.json: it is not replaced; choose another --out", .0.display())]
     NotASubmission(PathBuf),
@@ -52,6 +58,27 @@ pub enum BaselineError {
     /// An adapter that gives nothing.
     #[error("the estimate of scene '{0}' holds no picture")]
     EmptyEstimate(String),
+    /// A number that is infinite or none once it is decoded.
+    #[error("'{}': pixel {pixel:?} is not finite once it is decoded; fix the adapter's `encoding` or `range`, or the picture", path.display())]
+    NotFinite {
+        /// The picture.
+        path: PathBuf,
+        /// Column and row.
+        pixel: (usize, usize),
+    },
+    /// A picture of other proportions than the view.
+    #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions", size.0, size.1, view.0, view.1)]
+    Proportions {
+        /// The scene's id.
+        scene: String,
+        /// Columns and rows.
+        size: (usize, usize),
+        /// Those of the view.
+        view: (usize, usize),
+    },
+    /// A bridge that paints colours was given none.
+    #[error("the estimate of scene '{0}' has no base_color; TEXGen paints nothing else: give an estimate that has it")]
+    NoColor(String),
     /// Pictures of one estimate differ in size.
     #[error("the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size", folder.display(), sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
     Sizes {
@@ -91,6 +118,14 @@ pub enum BaselineError {
         path: PathBuf,
         /// What is wrong.
         what: String,
+    },
+    /// Files that say nothing.
+    #[error("'{}': the files for scene '{scene}' hold no triangles and name no part or instance; expected meshes, or the ids of scene.json", folder.display())]
+    NothingNamed {
+        /// The folder of imports.
+        folder: PathBuf,
+        /// The scene's id.
+        scene: String,
     },
     /// Files that lie elsewhere than the scene.
     #[error("'{}': nothing for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb", folder.display())]

@@ -1,6 +1,6 @@
 //! What a method says of the input view: pictures of base colour, roughness and metallic, any of them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use mateval_image::exr_io::{read_linear, read_scalar};
 use mateval_image::{LinearRgb, Picture};
@@ -57,7 +57,7 @@ impl EstimateSource {
     pub fn read(&self, dataset: &Dataset, scene: &SceneFile) -> Result<Estimate, BaselineError> {
         let folder = dataset.folder(&scene.id);
         match self {
-            Self::Truth => truth(&folder, input_view(&folder, scene)?),
+            Self::Truth => truth(&folder, input_view(&folder, scene)?)?.of_one_size(folder.path(), scene.id.as_str()),
             Self::Input => photo(&folder, input_view(&folder, scene)?, scene.exposure as f32),
             Self::Files { folder, adapter } => adapter.read(folder, scene.id.as_str()),
         }
@@ -102,6 +102,20 @@ impl Estimate {
         let scalar =
             |picture: &Option<Picture<f32>>| picture.as_ref().map(|picture| (picture.width(), picture.height()));
         color.or(scalar(&self.roughness)).or(scalar(&self.metallic))
+    }
+
+    /// Itself, where all its pictures have one size; `folder` and `scene` are for the error.
+    pub(crate) fn of_one_size(self, folder: &Path, scene: &str) -> Result<Self, BaselineError> {
+        let size = self.size().unwrap_or_default();
+        let scalars = [&self.roughness, &self.metallic].into_iter().flatten();
+        let sizes: Vec<(usize, usize)> = scalars.map(|picture| (picture.width(), picture.height())).collect();
+        match sizes.into_iter().find(|other| *other != size) {
+            None => Ok(self),
+            Some(other) => {
+                let (folder, scene) = (folder.to_owned(), scene.to_owned());
+                Err(BaselineError::Sizes { folder, scene, sizes: [size, other] })
+            }
+        }
     }
 
     /// What it says at a pixel; 0 for what it does not say.

@@ -8,7 +8,8 @@ use crate::estimate::Values;
 use crate::lift::{PartialAtlas, Texel, place_of};
 use crate::seen_cloud::SeenCloud;
 
-/// Gives every unseen texel what the points nearest to it say; false where nothing is seen. Seen texels stay as they are.
+/// Gives every unseen texel what the points nearest to it say; false where nothing is seen. Seen texels stay as they
+/// are.
 pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) -> bool {
     if cloud.is_empty() {
         return false;

@@ -9,6 +9,7 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{SceneFolder, part_picture};
 use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::{PartSetId, SceneError, TriangleMesh, glb};
 use mateval_tracer::World;
 
@@ -36,6 +37,12 @@ impl<'a> SceneGeometry<'a> {
     pub fn read(folder: SceneFolder, scene: &'a SceneFile) -> Result<Self, BaselineError> {
         let view = input_view(&folder, scene)?;
         let shown = folder.view(&view.id);
+        let sizes =
+            scene.instances.iter().filter_map(|instance| Some((instance, instance.atlas.as_ref()?.size as usize)));
+        if let Some((instance, size)) = { sizes }.find(|(_, size)| !MAP_SIZES.contains(size)) {
+            let what = format!("instance '{}' has an atlas of {size} texels; run `mateval prep verify`", instance.id);
+            return Err(SceneError::Unsupported { path: folder.scene_file(), what }.into());
+        }
         let world = world(&folder.instances(), scene)?;
         let valid = png_io::read_mask(&shown.join("valid.png"))?;
         let instances = png_io::read_ids(&shown.join("instance.png"))?;
@@ -55,7 +62,13 @@ impl<'a> SceneGeometry<'a> {
 
     /// The input view's picture of a set of parts.
     pub fn part_picture(&self, set: Option<&PartSetId>) -> Result<Picture<u16>, BaselineError> {
-        Ok(png_io::read_ids(&self.folder.view(&self.view.id).join(part_picture(set)))?)
+        let path = self.folder.view(&self.view.id).join(part_picture(set));
+        let picture = png_io::read_ids(&path)?;
+        if picture.same_size(&self.valid) {
+            return Ok(picture);
+        }
+        let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
+        Err(SceneError::Unsupported { path, what }.into())
     }
 }
 

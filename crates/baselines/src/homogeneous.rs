@@ -1,7 +1,7 @@
 //! One colour an instance, or a part: the median of an estimate under its mask.
 //!
-//! By instance this is how IM2CAD (Izadinia et al., CVPR 2017) colours furniture; by part it is the floor that procedural
-//! methods fall back to.
+//! By instance this is how IM2CAD (Izadinia et al., CVPR 2017) colours furniture; by part it is the floor that
+//! procedural methods fall back to.
 
 use std::path::Path;
 
@@ -42,8 +42,8 @@ pub fn write_by_instance(
     })
 }
 
-/// Writes a submission of one colour a part of the set. A part that is not seen takes its instance's median. Gives the number
-/// of instances.
+/// Writes a submission of one colour a part of the set. A part that is not seen takes its instance's median. Gives the
+/// number of instances.
 pub fn write_by_part(
     dataset: &Dataset,
     out: &Path,

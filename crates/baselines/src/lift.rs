@@ -66,8 +66,7 @@ pub fn lift(
 
 /// The place of a texel's centre on the surface: its triangle's nearest point for a texel beside it.
 pub fn place_of(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize, place: DVec2) -> DVec3 {
-    let weights = atlas.barycentrics(triangle, place).max(DVec3::ZERO);
-    let weights = weights / weights.element_sum();
+    let weights = atlas.nearest_barycentrics(triangle, place);
     let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
     a * weights.x + b * weights.y + c * weights.z
 }
@@ -79,23 +78,21 @@ pub fn texel_size_m(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize) -> f6
     (area / atlas.texel_area(triangle).max(1e-12)).sqrt()
 }
 
-/// `a_side` times `a_side` places of an owned texel's square, those of its triangle alone; of one beside its triangle the
-/// triangle's nearest. None for a texel that nobody owns.
-pub fn places_of<'a>(
-    atlas: &'a UvAtlas,
-    mesh: &'a TriangleMesh,
-    (x, y): (usize, usize),
-    a_side: usize,
-) -> impl Iterator<Item = DVec3> + 'a {
+/// `a_side` times `a_side` places of an owned texel's square, those of its triangle alone, or the centre where that has
+/// none
+/// of them; of a texel beside its triangle the triangle's nearest. None for a texel that nobody owns.
+pub fn places_of(atlas: &UvAtlas, mesh: &TriangleMesh, (x, y): (usize, usize), a_side: usize) -> Vec<DVec3> {
+    let Some((triangle, inside)) = atlas.owner(x, y) else { return Vec::new() };
     let corner = DVec2::new(x as f64, y as f64);
-    let within = move |at: usize| DVec2::new((at % a_side) as f64, (at / a_side) as f64);
-    let owner = atlas.owner(x, y).into_iter();
-    owner.flat_map(move |(triangle, inside)| {
-        let squares = (0..a_side * a_side).map(move |at| corner + (within(at) + 0.5) / a_side as f64);
-        // Another triangle has what lies beside; a texel beside its triangle has no place inside.
-        let own = squares.filter(move |&place| !inside || atlas.barycentrics(triangle, place).min_element() >= -1e-9);
-        own.map(move |place| place_of(atlas, mesh, triangle, place))
-    })
+    let within = |at: usize| DVec2::new((at % a_side) as f64 + 0.5, (at / a_side) as f64 + 0.5) / a_side as f64;
+    let squares = (0..a_side * a_side).map(|at| corner + within(at));
+    // Another triangle has what lies beside; a texel beside its triangle has no place inside.
+    let is_own = |place: &DVec2| !inside || atlas.barycentrics(triangle, *place).min_element() >= -1e-9;
+    let mut own: Vec<DVec2> = squares.filter(is_own).collect();
+    if own.is_empty() {
+        own.push(corner + 0.5);
+    }
+    own.into_iter().map(|place| place_of(atlas, mesh, triangle, place)).collect()
 }
 
 /// The mean of each number; none of nothing.
@@ -122,7 +119,7 @@ impl Lifter<'_> {
         let Some((triangle, _)) = self.atlas.owner(x, y) else { return Texel::Unused };
         let centre = DVec2::new(x as f64, y as f64) + 0.5;
         let places = places_of(self.atlas, self.mesh, (x, y), self.places_a_side(triangle, centre));
-        let said: Vec<Values> = places.filter_map(|place| self.look(place)).collect();
+        let said: Vec<Values> = places.into_iter().filter_map(|place| self.look(place)).collect();
         mean(&said).map_or(Texel::Unseen, Texel::Seen)
     }
 

@@ -19,7 +19,7 @@ pub(crate) fn srgb_bytes(linear: [f32; 3]) -> [u8; 3] {
 
 /// Base colour as sRGB bytes; roughness and metallic as linear bytes, where anything is said of them.
 pub struct Maps {
-    base_color: Picture<[u8; 3]>,
+    base_color: Option<Picture<[u8; 3]>>,
     roughness: Option<Picture<u8>>,
     metallic: Option<Picture<u8>>,
 }
@@ -32,7 +32,9 @@ impl Maps {
             Texel::Unused | Texel::Unseen => DEFAULT,
         });
         let mut maps = Self::of_values(&picture, says);
-        known.atlas.fill_gutters(&mut maps.base_color);
+        if let Some(map) = &mut maps.base_color {
+            known.atlas.fill_gutters(map);
+        }
         for map in [&mut maps.roughness, &mut maps.metallic].into_iter().flatten() {
             known.atlas.fill_gutters(map);
         }
@@ -46,19 +48,22 @@ impl Maps {
     }
 
     fn of_values(values: &Picture<Values>, says: Says) -> Self {
-        let color = |[r, g, b, ..]: Values| {
-            let rgb = if says.base_color { [r, g, b] } else { [DEFAULT[0], DEFAULT[1], DEFAULT[2]] };
-            srgb_bytes(rgb)
-        };
+        let color = || values.map(|[r, g, b, ..]| srgb_bytes([r, g, b]));
         let scalar = |said: bool, channel: usize| said.then(|| values.map(|values| byte_from_unit(values[channel])));
-        Self { base_color: values.map(color), roughness: scalar(says.roughness, 3), metallic: scalar(says.metallic, 4) }
+        Self {
+            base_color: says.base_color.then(color),
+            roughness: scalar(says.roughness, 3),
+            metallic: scalar(says.metallic, 4),
+        }
     }
 
     /// Writes them into the instance's folder, which is made.
     pub fn write(&self, folder: &Path) -> Result<(), BaselineError> {
         std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
         let path = |map: Map| folder.join(map.stem()).with_extension("png");
-        png_io::write_rgb_bytes(&path(Map::BaseColor), &self.base_color)?;
+        if let Some(picture) = &self.base_color {
+            png_io::write_rgb_bytes(&path(Map::BaseColor), picture)?;
+        }
         for (map, picture) in [(Map::Roughness, &self.roughness), (Map::Metallic, &self.metallic)] {
             if let Some(picture) = picture {
                 png_io::write_grey_bytes(&path(map), picture)?;

@@ -1,7 +1,7 @@
 //! Lifting by nearest neighbours: an estimate of the input view becomes a whole atlas (the paper's strongest family).
 //!
-//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance; an
-//! instance that is not seen at all takes the median of its category in the picture, or is grey.
+//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance;
+//! an instance that is not seen at all takes the median of its category in the picture, or is grey.
 
 use std::path::Path;
 
@@ -21,6 +21,9 @@ use crate::median::Medians;
 use crate::seen::{SeenPixels, SeenPoint};
 use crate::seen_cloud::{FillRule, SeenCloud};
 use crate::submission::{self, Method};
+
+/// By this share the proportions of an estimate may be off: methods round sizes to multiples of 8 or 16.
+const PROPORTIONS: f64 = 0.05;
 
 /// How unseen texels are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,10 +46,13 @@ impl NnOptions {
             weight if weight > 0.0 => format!(", opposite normals counting as {weight} m"),
             _ => String::new(),
         };
+        let texels = format!("{estimate} lifted to the atlases; unseen texels: {mean}{near} of {whose}{normals}");
+        if self.any_instance {
+            return texels;
+        }
         format!(
-            "{} lifted to the atlases; unseen texels: {mean}{near} of {whose}{normals}; instances that are not seen: the \
-             median of their category in the picture, else base colour 0.5 (linear), roughness 0.5, metallic 0",
-            estimate
+            "{texels}; instances that are not seen: the median of their category in the picture, else base colour 0.5 \
+             (linear), roughness 0.5, metallic 0"
         )
     }
 }
@@ -100,12 +106,18 @@ pub struct Lifted {
 
 /// Which instance each pixel of the estimate shows.
 pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<SeenPixels, BaselineError> {
-    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(geometry.scene.id.to_string()))?;
+    let scene = || geometry.scene.id.to_string();
+    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(scene()))?;
+    let view = (geometry.valid.width(), geometry.valid.height());
+    let stretch = (size.0 * view.1) as f64 / (size.1 * view.0) as f64;
+    if !(1.0 - PROPORTIONS..=1.0 + PROPORTIONS).contains(&stretch) {
+        return Err(BaselineError::Proportions { scene: scene(), size, view });
+    }
     Ok(SeenPixels::new(geometry, size))
 }
 
-/// Lifts an estimate to every instance that has an atlas, several at once: `each` is given its number and its whole atlas,
-/// or none where nothing of it follows from what is seen. Gives how many there were.
+/// Lifts an estimate to every instance that has an atlas, several at once: `each` is given its number and its whole
+/// atlas, or none where nothing of it follows from what is seen. Gives how many there were.
 pub fn lift_scene(
     geometry: &SceneGeometry<'_>,
     estimate: &Estimate,

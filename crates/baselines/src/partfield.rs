@@ -1,8 +1,8 @@
-//! The bridge to PartField (Liu and others, "PartField: Learning 3D Feature Fields for Part Segmentation and Beyond", 2025),
-//! which splits one mesh at a time into parts.
+//! The bridge to PartField (Liu and others, "PartField: Learning 3D Feature Fields for Part Segmentation and Beyond",
+//! 2025), which splits one mesh at a time into parts.
 //!
-//! [`export`] writes the meshes, [`import`] names the labels that it made as a recipe's `part_labels` wants them: built anew
-//! with these, the dataset has a second set of parts.
+//! [`export`] writes the meshes, [`import`] names the labels that it made as a recipe's `part_labels` wants them: built
+//! anew with these, the dataset has a second set of parts.
 
 use std::path::{Path, PathBuf};
 
@@ -15,15 +15,14 @@ use mateval_scene::{SceneError, SceneId};
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
 use crate::objects::{obj_text, object_id};
+use crate::submission::check_new_place;
 
 /// Largest file of labels that is read.
 const MAX_LABEL_BYTES: u64 = 1 << 28;
 
 /// Writes `<id>.obj` for every instance that has an atlas. Gives how many there are.
 pub fn export(dataset: &Dataset, out: &Path) -> Result<usize, BaselineError> {
-    if out.exists() {
-        return Err(BaselineError::Exists(out.to_owned()));
-    }
+    check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
     let mut count = 0;
     for scene in &dataset.scenes {
@@ -39,12 +38,11 @@ pub fn export(dataset: &Dataset, out: &Path) -> Result<usize, BaselineError> {
 }
 
 /// Copies the labels of `parts` parts an instance, `<id>_0_<parts>.npy` in `clusters` as PartField names them, to
-/// `<scene>/<instance>.npy`. Where an instance has fewer triangles than that PartField writes no such file: the one of the
+/// `<scene>/<instance>.npy`. Where an instance has fewer triangles than that PartField writes no such file: the one of
+/// the
 /// most parts below is taken. Instances without any keep their own parts. Gives how many have labels.
 pub fn import(dataset: &Dataset, clusters: &Path, parts: u8, out: &Path) -> Result<usize, BaselineError> {
-    if out.exists() {
-        return Err(BaselineError::Exists(out.to_owned()));
-    }
+    check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
     let mut count = 0;
     for scene in &dataset.scenes {

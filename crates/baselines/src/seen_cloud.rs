@@ -1,7 +1,7 @@
 //! What the pixels of an estimate show, as points in space (the paper's partial point cloud), to be found by place.
 //!
-//! By an R*-tree, not a k-d tree: what a view shows of a room is flat pieces, and from a place above such a piece a k-d tree,
-//! which knows planes and no boxes, looks through all that lies as near sideways (`benches/lifting.rs`).
+//! By an R*-tree, not a k-d tree: what a view shows of a room is flat pieces, and from a place above such a piece a k-d
+//! tree, which knows planes and no boxes, looks through all that lies as near sideways (`benches/lifting.rs`).
 
 use std::num::NonZero;
 
@@ -18,8 +18,7 @@ pub struct FillRule {
     /// 1: the nearest (the paper); more: their mean, weighted by the inverse square of the distance (Point-UV Diffusion
     /// takes 3).
     pub neighbours: NonZero<usize>,
-    /// Metres that opposite normals count as, half of which is that of normals at right angles, roughly; 0: normals do not
-    /// count.
+    /// Metres that opposite normals count as (normals at right angles 0.71 of it); 0: normals do not count.
     pub normal_weight_m: f64,
 }
 

@@ -26,8 +26,8 @@ impl Method {
     }
 }
 
-/// Makes a submission at `out`: `write_instance` is called for every instance that has an atlas, with the folder that its
-/// maps belong in. `force` replaces an earlier submission there. Gives the number of instances.
+/// Makes a submission at `out`: `write_instance` is called for every instance that has an atlas, with the folder that
+/// its maps belong in. `force` replaces an earlier submission there. Gives the number of instances.
 pub fn write(
     dataset: &Dataset,
     out: &Path,
@@ -47,8 +47,8 @@ pub fn write(
     })
 }
 
-/// The same, scene by scene: `write_scene` is given the folder that its instances' folders belong in, and tells how many
-/// it wrote.
+/// The same, scene by scene: `write_scene` is given the folder that its instances' folders belong in, and tells how
+/// many it wrote.
 pub fn write_scenes(
     dataset: &Dataset,
     out: &Path,
@@ -56,10 +56,13 @@ pub fn write_scenes(
     method: &Method,
     write_scene: impl Fn(&SceneFile, &Path) -> Result<usize, BaselineError>,
 ) -> Result<usize, BaselineError> {
+    check_outside(dataset, out)?;
     check_place(out, force)?;
     let work = WorkFolder::start(out)?;
     let mut instances = 0;
     for scene in &dataset.scenes {
+        // A submission names the dataset that it was made for: what it is made of must be what that says.
+        dataset.check_files(&scene.id, |path| !path.contains("/renders/"))?;
         let folder = scene_folder(work.path(), &scene.id);
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
         instances += write_scene(scene, &folder)?;
@@ -73,6 +76,24 @@ pub fn write_scenes(
     json::write(&work.path().join(SUBMISSION), &file)?;
     work.finish()?;
     Ok(instances)
+}
+
+/// A place of its own for what bridges write: nothing is there yet, and it is not in the dataset.
+pub(crate) fn check_new_place(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
+    check_outside(dataset, out)?;
+    if out.exists() { Err(BaselineError::InTheWay(out.to_owned())) } else { Ok(()) }
+}
+
+/// What lies in a dataset's folder is a fault of the dataset.
+fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
+    let found = |path: &Path| path.canonicalize().ok();
+    let Some(root) = found(&dataset.root) else { return Ok(()) };
+    let there = std::path::absolute(out).ok();
+    let above = there.iter().flat_map(|path| path.ancestors()).find_map(found);
+    match above {
+        Some(above) if above.starts_with(&root) => Err(BaselineError::InDataset(out.to_owned())),
+        _ => Ok(()),
+    }
 }
 
 fn check_place(out: &Path, force: bool) -> Result<(), BaselineError> {

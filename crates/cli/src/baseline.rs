@@ -60,10 +60,13 @@ pub struct Places {
 /// Where an estimate comes from.
 #[derive(clap::Args)]
 pub struct EstimateArgs {
-    /// `gt` (the truth of the input view), `input` (the input picture itself), or a folder of a method's pictures.
+    /// `gt` (the truth of the input view; what nn and texgen-export take if absent), `input` (the input picture itself;
+    /// what
+    /// median and median-part take), or a folder of a method's pictures.
     #[arg(long, value_name = "gt|input|FOLDER")]
     estimate: Option<PathBuf>,
-    /// What the folder's files are: colorful-shading, intrinsic, marigold, plain, rgbx, or a TOML file like those.
+    /// What the folder's files are: colorful-shading, intrinsic, marigold, plain (if absent), rgbx, or a TOML file like
+    /// those.
     #[arg(long, value_name = "NAME|FILE.toml")]
     adapter: Option<String>,
 }
@@ -98,12 +101,12 @@ pub struct NnArgs {
     places: Places,
     #[command(flatten)]
     estimate: EstimateArgs,
-    /// Seen points that an unseen texel follows from: 1 as the paper, 3 as Point-UV (weighted by the inverse square of the
-    /// distance).
+    /// Seen points that an unseen texel follows from: 1 as the paper, 3 as Point-UV (weighted by the inverse square of
+    /// the distance).
     #[arg(long, default_value_t = NonZero::<u8>::MIN)]
     neighbours: NonZero<u8>,
     /// Metres that opposite normals count as, so that the back of a board does not take its front's colour.
-    #[arg(long, default_value_t = 0.0, value_name = "METRES")]
+    #[arg(long, default_value_t = 0.0, value_name = "METRES", allow_negative_numbers = true)]
     normal_weight: f64,
     /// Take the nearest seen point of any instance, not only of the same.
     #[arg(long)]
@@ -193,8 +196,8 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Nn(args) => {
             let places = &args.places;
             let source = args.estimate.source(EstimateSource::Truth)?;
-            if !(args.normal_weight.is_finite() && args.normal_weight >= 0.0) {
-                bail!("--normal-weight {}; expected 0 m or more", args.normal_weight);
+            if !(0.0..=100.0).contains(&args.normal_weight) {
+                bail!("--normal-weight {}; expected 0 to 100 m", args.normal_weight);
             }
             let rule = FillRule { neighbours: args.neighbours.into(), normal_weight_m: args.normal_weight };
             let options = NnOptions { rule, any_instance: args.any_instance, atlas_size: args.atlas_size };
@@ -225,6 +228,9 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             Ok(Outcome::Good)
         }
         Command::TexgenImport(args) => {
+            if args.estimate.estimate.is_none() {
+                bail!("texgen-import needs the --estimate that texgen-export was given: seen texels are taken from it");
+            }
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Truth)?);
             let bars = Bars::new();
             let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);

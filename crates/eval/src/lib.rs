@@ -4,7 +4,8 @@
 //! tables of several.
 //!
 //! Between: [`protocol`] holds every constant, [`prediction`] reads the submission's maps, [`albedo`] makes pictures of
-//! them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares, [`score`] goes through the dataset, [`tables`] shows.
+//! them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares,
+//! [`score`] goes through the dataset, [`tables`] shows.
 
 pub mod albedo;
 pub mod alignment;
@@ -16,6 +17,7 @@ pub mod prediction;
 pub mod protocol;
 pub mod result;
 pub mod score;
+pub mod strips;
 pub mod tables;
 
 pub use error::EvalError;

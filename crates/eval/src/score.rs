@@ -73,7 +73,7 @@ struct Entry {
 
 /// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
-    let scenes = chosen_scenes(plan)?;
+    let scenes = chosen_scenes(plan.dataset, &plan.scenes)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
     for scene in &scenes {
@@ -82,10 +82,10 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
 }
 
-fn chosen_scenes<'a>(plan: &ScorePlan<'a>) -> Result<Vec<&'a SceneFile>, EvalError> {
-    let all = &plan.dataset.scenes;
-    let unknown: Vec<String> = plan
-        .scenes
+/// The scenes of these ids, all where there are none; in the dataset's order.
+pub(crate) fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
+    let all = &dataset.scenes;
+    let unknown: Vec<String> = scenes
         .iter()
         .filter(|id| !all.iter().any(|scene| scene.id == **id))
         .map(|id| format!("the dataset has no scene '{id}'"))
@@ -94,7 +94,7 @@ fn chosen_scenes<'a>(plan: &ScorePlan<'a>) -> Result<Vec<&'a SceneFile>, EvalErr
         let known: Vec<&str> = all.iter().map(|scene| scene.id.as_str()).collect();
         return Err(EvalError::Invalid(format!("{}; it has: {}", unknown.join("; "), known.join(", "))));
     }
-    Ok(all.iter().filter(|scene| plan.scenes.is_empty() || plan.scenes.contains(&scene.id)).collect())
+    Ok(all.iter().filter(|scene| scenes.is_empty() || scenes.contains(&scene.id)).collect())
 }
 
 fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
@@ -119,6 +119,34 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     Ok(Entry { file, findings, files, pictures: vec![Vec::new(); plan.protocols.len()] })
 }
 
+/// The truth and every submission's albedo of one view, linear.
+pub(crate) struct SceneAlbedo {
+    pub(crate) truth: Picture<LinearRgb>,
+    /// In the plan's order.
+    pub(crate) predicted: Vec<Picture<LinearRgb>>,
+    pub(crate) valid: Mask,
+    /// None for the input view.
+    pub(crate) unobserved: Option<Mask>,
+}
+
+/// The views of a scene that are scored, in the scene's order.
+pub(crate) fn scene_albedo(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    submissions: &[&Path],
+) -> Result<Vec<SceneAlbedo>, EvalError> {
+    let folder = dataset.folder(&scene.id);
+    let world = World::new(Arc::new(reference_io::read(&folder)?))?;
+    let atlases = read_atlases(&folder, scene, &world)?;
+    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let view = |view: &View| {
+        let predicted = albedo_pictures(&world, &atlases, &view.camera, &predictions);
+        let Truth { albedo: truth, valid, unobserved } = Truth::read(&folder, view)?;
+        Ok(SceneAlbedo { truth, predicted, valid, unobserved })
+    };
+    scored_views(dataset, scene)?.into_iter().map(view).collect()
+}
+
 fn score_scene(
     plan: &ScorePlan<'_>,
     scene: &SceneFile,
@@ -131,7 +159,7 @@ fn score_scene(
     let world = World::new(Arc::new(reference_io::read(&folder)?))?;
     let atlases = read_atlases(&folder, scene, &world)?;
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
-    let views = scored_views(plan, scene)?;
+    let views = scored_views(plan.dataset, scene)?;
     for (at, view) in views.iter().enumerate() {
         progress(&format!("scene {}", scene.id), at, views.len());
         let pictures = albedo_pictures(&world, &atlases, &view.camera, &predictions);
@@ -150,8 +178,8 @@ fn score_scene(
 }
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
-fn scored_views<'a>(plan: &ScorePlan<'_>, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
-    let targets = &plan.dataset.targets.targets;
+fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+    let targets = &dataset.targets.targets;
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
     if views.is_empty() {

@@ -194,8 +194,8 @@ fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
 /// The names of the material files that it wants.
 pub fn material_files(bytes: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(bytes);
-    let names = text.lines().filter_map(|line| line.trim().strip_prefix("mtllib "));
-    names.map(|name| name.trim().to_owned()).collect()
+    let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("mtllib", line)).collect();
+    names.into_iter().map(str::to_owned).collect()
 }
 
 /// Reads an MTL file. Numbers may be anything that is finite.
@@ -229,13 +229,14 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
         Materials::Ignored => Vec::new(),
         Materials::Told => material_names(text),
     };
-    // Material files are never opened here, their names come from a stranger. tobj keeps only names that a file defines:
-    // it is told that whatever file there is defines them all.
+    // Material files are never opened here, their names come from a stranger. tobj keeps only names that a file
+    // defines: it is told of one file that defines them all.
     let defined = |_: &std::path::Path| {
         let materials = names.iter().map(|name| tobj::Material { name: name.clone(), ..Default::default() }).collect();
         Ok((materials, names.iter().enumerate().map(|(at, name)| (name.clone(), at)).collect()))
     };
-    let text = if names.is_empty() { text.to_owned() } else { format!("mtllib any\n{text}") };
+    let told = (!names.is_empty()).then(|| format!("mtllib any\n{}", without_material_files(text)));
+    let text = told.as_deref().unwrap_or(text);
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(|error| ObjFault {
         line: 0,
         what: error.to_string(),
@@ -245,8 +246,7 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
     let mut groups = Vec::new();
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
         append(&mut mesh, &model.mesh);
-        // A second `mtllib` defines them again, behind the first.
-        let material = model.mesh.material_id.and_then(|at| names.get(at % names.len()).cloned());
+        let material = model.mesh.material_id.and_then(|at| names.get(at).cloned());
         groups.push(ObjGroup { name: model.name.clone(), material, triangles: model.mesh.indices.len() / 3 });
     }
     let count = mesh.positions.len();
@@ -255,10 +255,24 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
     Ok((mesh, groups))
 }
 
+fn without_material_files(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    for line in text.lines().filter(|line| named_after("mtllib", line).is_none()) {
+        kept.push_str(line);
+        kept.push('\n');
+    }
+    kept
+}
+
+/// What stands behind a line's first word, if that is `word`.
+fn named_after<'a>(word: &str, line: &'a str) -> Option<&'a str> {
+    let rest = line.trim().strip_prefix(word)?;
+    rest.starts_with(char::is_whitespace).then(|| rest.trim())
+}
+
 /// What `usemtl` names, each once, sorted.
 fn material_names(text: &str) -> Vec<String> {
-    let names: BTreeSet<&str> =
-        text.lines().filter_map(|line| line.trim().strip_prefix("usemtl ")).map(str::trim).collect();
+    let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("usemtl", line)).collect();
     names.into_iter().map(str::to_owned).collect()
 }
 

@@ -29,8 +29,8 @@ enum Owner {
 }
 
 impl UvAtlas {
-    /// Rasters the mesh's uv into `size` times `size` texels. Of two triangles that claim a texel the first has it (their
-    /// common edge). A mesh without uv owns nothing.
+    /// Rasters the mesh's uv into `size` times `size` texels. Of two triangles that claim a texel the first has it
+    /// (their common edge). A mesh without uv owns nothing.
     pub fn new(mesh: &TriangleMesh, size: usize) -> Self {
         let corners = texel_corners(mesh, size);
         let mut atlas = Self { size, corners, owners: Picture::filled(size, size, Owner::Nobody) };
@@ -53,10 +53,18 @@ impl UvAtlas {
         }
     }
 
-    /// Barycentric weights of a place (in texels from the top left) with respect to a triangle; they add to one and go on
-    /// linearly outside. The middle of a triangle without area.
+    /// Barycentric weights of a place (in texels from the top left) with respect to a triangle; they add to one and go
+    /// on linearly outside. The middle of a triangle without area.
     pub fn barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
         barycentrics(self.corners[triangle], place)
+    }
+
+    /// The weights of a triangle's place that is nearest to a place in texels: its own where it lies inside.
+    pub fn nearest_barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
+        let corners = self.corners[triangle];
+        // Rounding may leave a place of an edge a hair outside.
+        let weights = barycentrics(corners, nearest_in_triangle(corners, place)).max(DVec3::ZERO);
+        weights / weights.element_sum()
     }
 
     /// The area of a triangle in texels.
@@ -169,17 +177,24 @@ fn barycentrics([a, b, c]: [DVec2; 3], place: DVec2) -> DVec3 {
 
 /// Zero inside.
 fn distance_to_triangle(corners: [DVec2; 3], place: DVec2) -> f64 {
+    nearest_in_triangle(corners, place).distance(place)
+}
+
+/// The place itself where it lies inside.
+fn nearest_in_triangle(corners: [DVec2; 3], place: DVec2) -> DVec2 {
     let [a, b, c] = corners;
     if (b - a).perp_dot(c - a) != 0.0 && barycentrics(corners, place).min_element() >= 0.0 {
-        return 0.0;
+        return place;
     }
-    let to_edge = |from: DVec2, to: DVec2| {
+    let on_edge = |from: DVec2, to: DVec2| {
         let along = to - from;
         let length2 = along.length_squared();
         let t = if length2 > 0.0 { ((place - from).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        (from + along * t - place).length()
+        from + along * t
     };
-    to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
+    let on_edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    let apart = |candidate: &DVec2| candidate.distance_squared(place);
+    on_edges.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("a triangle has three edges")
 }
 
 #[cfg(test)]
@@ -215,6 +230,18 @@ mod tests {
         let atlas = UvAtlas::new(&square(), 8);
         assert_eq!(atlas.barycentrics(0, DVec2::new(2.0, 6.0)), DVec3::X);
         assert!((atlas.barycentrics(0, DVec2::new(0.0, 6.0)) - DVec3::new(1.5, -0.5, 0.0)).length() < 1e-12);
+    }
+
+    /// Weights that are only clipped would put this a third of the sliver's length away.
+    #[test]
+    fn beside_a_sliver_its_nearest_place() {
+        let uvs = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.995]].map(Vec2::from);
+        let mesh = TriangleMesh { uvs: Some(uvs.into()), triangles: vec![[0, 1, 2]], ..square() };
+        let atlas = UvAtlas::new(&mesh, 100);
+        let weights = atlas.nearest_barycentrics(0, DVec2::new(50.0, -1.0));
+        assert!((weights - DVec3::new(0.5, 0.5, 0.0)).length() < 1e-6, "{weights}");
+        let inside = DVec2::new(10.0, 0.1);
+        assert!((atlas.nearest_barycentrics(0, inside) - atlas.barycentrics(0, inside)).length() < 1e-9);
     }
 
     #[test]

@@ -90,8 +90,8 @@ impl Correspondence {
     }
 }
 
-/// The barycentric weights of a triangle's place that is nearest to a point: the regions of Ericson, "Real-Time Collision
-/// Detection", 2005, section 5.1.5. A triangle without area counts as its edges.
+/// The barycentric weights of a triangle's place that is nearest to a point: the regions of Ericson, "Real-Time
+/// Collision Detection", 2005, section 5.1.5. A triangle without area counts as its edges.
 fn nearest_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec3 {
     let (ab, ac) = (b - a, c - a);
     let normal = ab.cross(ac);

@@ -36,7 +36,9 @@ pub const MAX_TRIANGLES: usize = 5_000_000;
 pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
 /// Most texels of all textures of a file.
 pub const MAX_TEXELS: usize = 1 << 28;
-/// Largest file, in bytes.
+/// Most nodes of a glTF that hang below each other.
+pub const MAX_DEPTH: usize = 64;
+/// Largest file, and most of all buffers of a file, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 31;
 
 /// A triangle of a donor.

@@ -41,20 +41,21 @@ impl ImportFolder {
         endings.iter().map(|ending| format!("{stem}.{ending}")).find(|name| self.path.join(name).is_file())
     }
 
-    /// Where a file is.
-    pub fn path(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+    /// Where a file is; an error where it leads out of the folder.
+    pub fn checked_path(&self, name: &str) -> Result<PathBuf, BaselineError> {
+        let invalid = |what| BaselineError::BadImport { path: self.path.join(name), what };
+        self.folder()?.path(name).map_err(|fault| invalid(fault.message))
     }
 
     /// Reads a mesh and its textures; nothing outside the folder.
     pub fn read_mesh(&self, name: &str) -> Result<Donor, BaselineError> {
-        let path = self.path(name);
-        let mut folder = SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(|source| BaselineError::Io {
-            action: "open",
-            path: self.path.clone(),
-            source,
-        })?;
         let read = if name.ends_with(".obj") { obj_donor::read } else { gltf_donor::read };
-        read(&mut folder, name).map_err(|what| BaselineError::BadImport { path, what })
+        let invalid = |what| BaselineError::BadImport { path: self.path.join(name), what };
+        read(&mut self.folder()?, name).map_err(invalid)
+    }
+
+    fn folder(&self) -> Result<SourceFolder, BaselineError> {
+        let io = |source| BaselineError::Io { action: "open", path: self.path.clone(), source };
+        SourceFolder::new(&self.path, MAX_FILE_BYTES).map_err(io)
     }
 }

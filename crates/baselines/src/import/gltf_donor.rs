@@ -12,7 +12,10 @@ use mateval_image::{Texture, Wrap};
 use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
 use mateval_scene::source_folder::SourceFolder;
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, MAX_VERTICES, Scalar};
+use super::donor::{
+    Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES,
+    MAX_VERTICES, Scalar,
+};
 
 /// Reads the file `name` of the folder; what is wrong in words.
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
@@ -20,8 +23,15 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     let file = parse(&bytes)?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
-    reader.buffers =
-        file.buffers().map(|buffer| reader.buffer(&buffer, file.blob.as_deref())).collect::<Result<_, _>>()?;
+    let mut bytes = 0;
+    for buffer in file.buffers() {
+        let read = reader.buffer(&buffer, file.blob.as_deref())?;
+        bytes += read.len() as u64;
+        if bytes > MAX_FILE_BYTES {
+            return Err(format!("its buffers have more than {MAX_FILE_BYTES} bytes in all"));
+        }
+        reader.buffers.push(read);
+    }
     let mut donor = Donor::default();
     for material in file.materials() {
         donor.materials.push(reader.material(&material)?);
@@ -112,9 +122,13 @@ impl Reader<'_> {
             if !visited.insert(node.index()) {
                 return Err(format!("node {} hangs below two others", node.index()));
             }
+            if above.len() >= MAX_DEPTH {
+                return Err(format!("node {} hangs more than {MAX_DEPTH} deep", node.index()));
+            }
             let world_from_node =
                 world_from_parent * DMat4::from_cols_array_2d(&node.transform().matrix().map(|c| c.map(f64::from)));
-            let names: Vec<String> = node.name().map(str::to_owned).into_iter().chain(above).collect();
+            let own = node.name().unwrap_or_default().to_owned();
+            let names: Vec<String> = std::iter::once(own).chain(above).collect();
             let first = donor.triangles.len();
             for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
                 let place = || format!("node {} '{}'", node.index(), names.first().map_or("", String::as_str));
@@ -156,6 +170,9 @@ impl Reader<'_> {
             return Err("a place is not finite once its node's transform is applied".to_owned());
         }
         let numbers = match primitive.indices() {
+            Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
+                return Err(format!("more than {MAX_TRIANGLES} triangles"));
+            }
             Some(accessor) => indices(&accessor, bytes(&accessor)?)?,
             None => (0..positions.len() as u32).collect(),
         };
@@ -202,7 +219,7 @@ impl Reader<'_> {
 fn looked_up(uv: Vec2, transform: Option<&gltf::texture::TextureTransform<'_>>) -> Vec2 {
     let uv = transform.map_or(uv, |transform| {
         let (offset, scale) = (Vec2::from(transform.offset()), Vec2::from(transform.scale()));
-        // The extension's rotation is clockwise in a space whose v points down: its own matrix, column by column.
+        // Counter-clockwise in a space whose v points down: the extension's own matrix, column by column.
         let (sin, cos) = (libm::sinf(transform.rotation()), libm::cosf(transform.rotation()));
         offset + Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos)) * (scale * uv)
     });

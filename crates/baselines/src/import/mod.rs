@@ -1,7 +1,8 @@
-//! Methods that do not write our atlases: their own uv, a textured glTF or OBJ, one material a part. What they say is carried
-//! over by surface: each place of an instance takes what the nearest place of their mesh says.
+//! Methods that do not write our atlases: their own uv, a textured glTF or OBJ, one material a part. What they say is
+//! carried over by surface: each place of an instance takes what the nearest place of their mesh says.
 //!
-//! `files` finds the files, `gltf_donor` and `obj_donor` read meshes into a `donor`, `correspondence` finds the nearest place,
+//! `files` finds the files, `gltf_donor` and `obj_donor` read meshes into a `donor`, `correspondence` finds the nearest
+//! place,
 //! `rebake` fills atlases, `flat_materials` is for one material a part, `report` tells how well it went.
 
 mod correspondence;
@@ -19,7 +20,7 @@ use std::path::Path;
 
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
-use mateval_scene::{PartSetId, Progress};
+use mateval_scene::{InstanceId, PartSetId, Progress};
 
 use crate::error::BaselineError;
 use crate::estimate::Says;
@@ -45,7 +46,8 @@ pub struct ImportOptions {
 }
 
 /// Writes a submission. An instance takes the first of `<scene>/<instance>.glb|gltf|obj`, `<scene>.glb|gltf|obj`,
-/// `<scene>.json` that tells of it; one that none tells of has no maps. Fails where the folder holds nothing for any scene,
+/// `<scene>.json` that tells of it; one that none tells of has no maps. Fails where the folder holds nothing for any
+/// scene,
 /// or where nothing in a scene's files is near enough to anything.
 pub fn write(
     dataset: &Dataset,
@@ -66,43 +68,47 @@ pub fn write(
         let sources = Sources::read(&files, &geometry, options)?;
         let with_atlas: Vec<usize> =
             (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
-        let (mut instances, mut nearest_m) = (Vec::new(), f64::INFINITY);
+        let mut instances = Vec::new();
         for (done, &at) in with_atlas.iter().enumerate() {
             progress(&format!("{} import", scene.id), done, with_atlas.len());
-            let instance = &scene.instances[at];
+            let id = &scene.instances[at].id;
             let told = sources.instance(&geometry, at)?;
-            let mut report = ImportedInstance {
-                instance: instance.id.clone(),
-                file: None,
-                texels: 0,
-                texels_without: 0,
-                mean_distance_m: None,
-                max_distance_m: None,
-            };
-            if let Some(told) = told {
-                nearest_m = nearest_m.min(told.nearest_m);
-                if told.write(&out.join(instance.id.as_str()), &mut report)? {
-                    report.file = Some(told.file);
-                }
-            }
-            instances.push(report);
-        }
-        progress(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len());
-        if has_files(&files, scene) && instances.iter().all(|instance| instance.file.is_none()) {
-            let (folder, scene) = (folder.to_owned(), scene.id.to_string());
-            return Err(BaselineError::NothingNear {
-                folder,
-                scene,
-                nearest_m,
-                max_distance_m: options.max_distance_m,
+            instances.push(match told {
+                Some(told) => told.write(id, &out.join(id.as_str()))?,
+                None => nothing_told(id),
             });
         }
-        let written = instances.iter().filter(|instance| instance.file.is_some()).count();
+        progress(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len());
+        let written = instances.iter().filter(|instance| instance.has_maps()).count();
+        if has_files(&files, scene) && written == 0 {
+            let nearest_m = instances.iter().filter_map(|instance| instance.nearest_m).reduce(f64::min);
+            return Err(nothing_near(folder, scene, nearest_m, options.max_distance_m));
+        }
         scenes.borrow_mut().push(ImportedScene { scene: scene.id.clone(), instances });
         Ok(written)
     })?;
     let scenes = scenes.into_inner();
     Ok(ImportReport { format: IMPORT_FORMAT.to_owned(), max_distance_m: options.max_distance_m, scenes })
+}
+
+fn nothing_told(instance: &InstanceId) -> ImportedInstance {
+    ImportedInstance {
+        instance: instance.clone(),
+        file: None,
+        texels: 0,
+        texels_without: 0,
+        nearest_m: None,
+        mean_distance_m: None,
+        max_distance_m: None,
+    }
+}
+
+fn nothing_near(folder: &Path, scene: &SceneFile, nearest_m: Option<f64>, max_distance_m: f64) -> BaselineError {
+    let (folder, scene) = (folder.to_owned(), scene.id.to_string());
+    match nearest_m {
+        Some(nearest_m) => BaselineError::NothingNear { folder, scene, nearest_m, max_distance_m },
+        None => BaselineError::NothingNamed { folder, scene },
+    }
 }
 
 fn has_files(files: &ImportFolder, scene: &SceneFile) -> bool {
@@ -133,23 +139,30 @@ struct Told {
     file: String,
     atlas: PartialAtlas,
     distances: Distances,
-    nearest_m: f64,
+    /// None without a mesh.
+    nearest_m: Option<f64>,
     says: Says,
 }
 
 impl Told {
-    /// Writes its maps, unless nothing was found; tells whether.
-    fn write(&self, folder: &Path, report: &mut ImportedInstance) -> Result<bool, BaselineError> {
+    /// Writes its maps, unless nothing was found.
+    fn write(self, instance: &InstanceId, folder: &Path) -> Result<ImportedInstance, BaselineError> {
         let texels = self.atlas.texels.pixels();
-        report.texels = texels.iter().filter(|texel| **texel != Texel::Unused).count();
-        report.texels_without = texels.iter().filter(|texel| **texel == Texel::Unseen).count();
-        if report.texels == report.texels_without {
-            return Ok(false);
+        let mean_m = self.distances.sum / self.distances.count.max(1) as f64;
+        let found = self.distances.count > 0;
+        let report = ImportedInstance {
+            file: Some(self.file),
+            texels: texels.iter().filter(|texel| **texel != Texel::Unused).count(),
+            texels_without: texels.iter().filter(|texel| **texel == Texel::Unseen).count(),
+            nearest_m: self.nearest_m,
+            mean_distance_m: found.then_some(mean_m),
+            max_distance_m: found.then_some(self.distances.max),
+            ..nothing_told(instance)
+        };
+        if report.has_maps() {
+            Maps::of_atlas(&self.atlas, self.says).write(folder)?;
         }
-        report.mean_distance_m = Some(self.distances.sum / self.distances.count.max(1) as f64);
-        report.max_distance_m = Some(self.distances.max);
-        Maps::of_atlas(&self.atlas, self.says).write(folder)?;
-        Ok(true)
+        Ok(report)
     }
 }
 
@@ -163,7 +176,8 @@ impl<'a> Sources<'a> {
         let mesh = files.mesh_of_scene(scene).map(|file| SceneMesh::read(files, file, geometry)).transpose()?;
         let parts = match files.materials_of_scene(scene) {
             Some(file) => {
-                let (colors, says) = flat_materials::read(&files.path(&file), geometry, options.part_set.as_ref())?;
+                let (colors, says) =
+                    flat_materials::read(&files.checked_path(&file)?, geometry, options.part_set.as_ref())?;
                 Some((file, colors, says))
             }
             None => None,
@@ -184,13 +198,19 @@ impl<'a> Sources<'a> {
         if let Some(mesh) = &self.mesh {
             let own = mesh.named.get(&at).unwrap_or(&mesh.others);
             let told = self.rebaked(geometry, at, size, mesh.file.clone(), &mesh.donor, own);
-            if told.distances.count > 0 || self.parts.is_none() {
+            // A mesh of the scene need not have everything.
+            if told.distances.count > 0 {
                 return Ok(Some(told));
             }
+            if self.parts.is_none() {
+                return Ok(told.nearest_m.is_some().then_some(told));
+            }
         }
-        Ok(self.parts.as_ref().map(|(file, colors, says)| {
+        Ok(self.parts.as_ref().and_then(|(file, colors, says)| {
             let atlas = colors.paint(geometry, at, size);
-            Told { file: file.clone(), atlas, distances: Distances::default(), nearest_m: 0.0, says: *says }
+            let is_told = atlas.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_)));
+            let (file, distances) = (file.clone(), Distances::default());
+            is_told.then_some(Told { file, atlas, distances, nearest_m: None, says: *says })
         }))
     }
 

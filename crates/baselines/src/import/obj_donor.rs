@@ -20,11 +20,13 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     if read.mixed_uvs {
         return Err("some faces have texture coordinates and some have none".to_owned());
     }
+    if read.mesh.uvs.iter().flatten().any(|uv| !uv.is_finite()) {
+        return Err("a texture coordinate is not finite".to_owned());
+    }
     let mut reader = Reader { folder, beside: name.rsplit_once('/').map_or("", |(beside, _)| beside), texels: 0 };
     let mut known = BTreeMap::new();
     for file in obj::material_files(&bytes) {
-        let relative = reader.relative(&file)?;
-        let bytes = reader.folder.read(&relative).map_err(|fault| fault.message)?;
+        let bytes = reader.material_file(&file)?;
         let materials = obj::read_materials(&bytes).map_err(|fault| in_words(&file, &fault))?;
         known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
     }
@@ -82,10 +84,28 @@ impl Reader<'_> {
         SourceFolder::relative(&name).map_err(|fault| fault.message)
     }
 
+    /// A name may hold blanks, or be several.
+    fn material_file(&mut self, name: &str) -> Result<Vec<u8>, String> {
+        let whole = self.relative(name)?;
+        if name.contains(char::is_whitespace) && self.folder.path(&whole).is_err() {
+            let mut all = Vec::new();
+            for word in name.split_whitespace() {
+                let relative = self.relative(word)?;
+                all.extend(self.folder.read(&relative).map_err(|fault| fault.message)?);
+                all.push(b'\n');
+            }
+            return Ok(all);
+        }
+        self.folder.read(&whole).map_err(|fault| fault.message)
+    }
+
     fn material(&mut self, material: &ObjMaterial) -> Result<DonorMaterial, String> {
         let base_color = match &material.diffuse_map {
             Some(name) => ([1.0; 3], Some(self.texture(name, Encoding::Srgb)?)),
-            None => (material.diffuse.unwrap_or([1.0; 3]), None),
+            None => {
+                let missing = || format!("material '{}' has neither map_Kd nor Kd", shortened(&material.name));
+                (material.diffuse.ok_or_else(missing)?, None)
+            }
         };
         let mut scalar = |factor: Option<f32>, map: &Option<String>| match map {
             Some(name) => {

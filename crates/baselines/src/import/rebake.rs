@@ -22,8 +22,8 @@ pub struct Rebaked {
     pub atlas: PartialAtlas,
     /// Of all places that were found, in metres.
     pub distances: Distances,
-    /// The nearest that the donor comes to any texel.
-    pub nearest_m: f64,
+    /// The nearest that the donor comes to any texel; none where it has no triangles.
+    pub nearest_m: Option<f64>,
 }
 
 /// Distances, gathered.
@@ -61,12 +61,12 @@ pub fn rebake(
         let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
         let normal = (b - a).cross(c - a).normalize_or_zero();
         // One place where the donor is no finer than the atlas: more would only blur it.
-        let centre = places_of(&atlas, mesh, (x, y), 1).next();
-        let found = centre.and_then(|place| correspondence.nearest(place, normal));
+        let centre = places_of(&atlas, mesh, (x, y), 1)[0];
+        let found = correspondence.nearest(centre, normal);
         let finer =
             found.map_or(1.0, |found| texel_size_m(&atlas, mesh, triangle) / donor.texel_size_m(found.triangle));
         let a_side = (finer - A_LITTLE).ceil().clamp(1.0, MAX_PLACES) as usize;
-        texel(donor, correspondence, places_of(&atlas, mesh, (x, y), a_side), normal, max_distance_m)
+        texel(donor, correspondence, &places_of(&atlas, mesh, (x, y), a_side), normal, max_distance_m)
     };
     let all: Vec<RebakedTexel> = (0..size * size).into_par_iter().map(look).collect();
     let (mut distances, mut nearest_m) = (Distances::default(), f64::INFINITY);
@@ -76,6 +76,7 @@ pub fn rebake(
         distances.max = distances.max.max(one.distances.max);
         nearest_m = nearest_m.min(one.nearest_m);
     }
+    let nearest_m = nearest_m.is_finite().then_some(nearest_m);
     let texels = all.into_iter().map(|one| one.texel).collect();
     let texels = Picture::new(size, size, texels).expect("a texel for every place");
     Rebaked { atlas: PartialAtlas { atlas, texels }, distances, nearest_m }
@@ -84,12 +85,12 @@ pub fn rebake(
 fn texel(
     donor: &Donor,
     correspondence: &Correspondence,
-    places: impl Iterator<Item = DVec3>,
+    places: &[DVec3],
     normal: DVec3,
     max_distance_m: f64,
 ) -> RebakedTexel {
     let (mut said, mut distances, mut nearest_m) = (Vec::<Values>::new(), Distances::default(), f64::INFINITY);
-    for found in places.filter_map(|place| correspondence.nearest(place, normal)) {
+    for found in places.iter().filter_map(|place| correspondence.nearest(*place, normal)) {
         nearest_m = nearest_m.min(found.distance_m);
         if found.distance_m <= max_distance_m {
             distances.count += 1;

@@ -35,23 +35,33 @@ pub struct ImportedScene {
 pub struct ImportedInstance {
     /// Its id.
     pub instance: InstanceId,
-    /// The file that its maps come from, relative to the folder; null: none tells of it, and it has no maps.
+    /// The file that tells of it, relative to the folder; null: none does. Where all texels found nothing it has no
+    /// maps.
     pub file: Option<String>,
     /// Texels that the surface looks up.
     pub texels: usize,
     /// Those of them that found nothing; they hold the format's defaults.
     pub texels_without: usize,
+    /// How near the file's mesh comes to it, in metres; null without a mesh.
+    pub nearest_m: Option<f64>,
     /// Of the places that were found, in metres; null without any.
     pub mean_distance_m: Option<f64>,
     /// The furthest of them.
     pub max_distance_m: Option<f64>,
 }
 
+impl ImportedInstance {
+    /// Whether anything was found.
+    pub fn has_maps(&self) -> bool {
+        self.texels > self.texels_without
+    }
+}
+
 impl ImportedScene {
-    /// Sums over its instances: how many have maps; texels of those, and those without; the mean of their mean distances by
-    /// texels, and the largest of all.
+    /// Sums over its instances: how many have maps; texels of those, and those without; the mean of their mean
+    /// distances by texels, and the largest of all.
     pub fn totals(&self) -> ImportTotals {
-        let with_maps = || self.instances.iter().filter(|instance| instance.file.is_some());
+        let with_maps = || self.instances.iter().filter(|instance| instance.has_maps());
         let found = |instance: &ImportedInstance| instance.texels - instance.texels_without;
         let texels = with_maps().map(|instance| instance.texels).sum();
         let all_found: usize = with_maps().map(found).sum();

@@ -21,27 +21,30 @@ use crate::maps::srgb_bytes;
 use crate::nn::seen_pixels;
 use crate::objects::{obj_text, object_id};
 use crate::seen::SeenPixels;
+use crate::submission::check_new_place;
 
 /// Pixels a side of the picture that TEXGen is conditioned on.
 const PICTURE: usize = 512;
 
-/// Writes `objects.jsonl` and a folder an instance that is seen: `model.obj`, `model.png` (the partial atlas, black where
-/// nothing is seen), `mask.png` (texels of the surface), `mask_partial.png` (those that are seen), `position.exr` (in
-/// TEXGen's own space) and `picture.png` (what the estimate shows of the instance, else white). Gives how many there are.
+/// Writes `objects.jsonl` and a folder an instance that is seen: `model.obj`, `model.png` (the partial atlas, black
+/// where nothing is seen), `mask.png` (texels of the surface), `mask_partial.png` (those that are seen), `position.exr`
+/// (in TEXGen's own space) and `picture.png` (what the estimate shows of the instance, else white). Gives how many
+/// there are.
 pub fn export(
     dataset: &Dataset,
     out: &Path,
     source: &EstimateSource,
     progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
-    if out.exists() {
-        return Err(BaselineError::Exists(out.to_owned()));
-    }
+    check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
     let (mut lines, mut count) = (String::new(), 0);
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
+        if estimate.base_color.is_none() {
+            return Err(BaselineError::NoColor(scene.id.to_string()));
+        }
         let seen = seen_pixels(&geometry, &estimate)?;
         for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
             progress(&format!("{} export", scene.id), at, scene.instances.len());

@@ -25,9 +25,9 @@ pub struct Imported {
     pub textured: usize,
 }
 
-/// Writes a submission: seen texels hold the estimate, all others what `results/<id>.png` (sRGB, any square size) says at
-/// their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with its defaults makes
-/// them from the same estimate. Fails where no file at all is there.
+/// Writes a submission: seen texels hold the estimate, all others what `results/<id>.png` (sRGB, any square size) says
+/// at their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with its defaults
+/// makes them from the same estimate. Fails where no file at all is there.
 pub fn import(
     dataset: &Dataset,
     results: &Path,
@@ -49,6 +49,9 @@ pub fn import(
     let instances = submission::write_scenes(dataset, out, force, &method, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
+        if estimate.base_color.is_none() {
+            return Err(BaselineError::NoColor(scene.id.to_string()));
+        }
         let (seen, options) = (nn::seen_pixels(&geometry, &estimate)?, NnOptions::default());
         nn::lift_scene(&geometry, &estimate, &seen, &options, progress, |at, known, medians| {
             let instance = &geometry.scene.instances[at];

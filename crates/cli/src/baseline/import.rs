@@ -16,7 +16,8 @@ use crate::prep::Format;
 /// What it is given.
 #[derive(clap::Args)]
 pub struct ImportArgs {
-    /// Folder with `<scene>/<instance>.glb`, or `<scene>.glb` (or .gltf, .obj), or `<scene>.json` with one material a part.
+    /// Folder with `<scene>/<instance>.glb`, or `<scene>.glb` (or .gltf, .obj), or `<scene>.json` with one material a
+    /// part.
     folder: PathBuf,
     #[command(flatten)]
     places: Places,
@@ -73,14 +74,20 @@ fn text(report: &ImportReport) -> String {
             mm(totals.mean_distance_m),
             mm(totals.max_distance_m),
         );
-        for instance in scene.instances.iter().filter(|instance| instance.texels_without > 0 || instance.file.is_none())
-        {
+        for instance in scene.instances.iter().filter(|instance| instance.texels_without > 0 || !instance.has_maps()) {
             let _ = match &instance.file {
                 None => writeln!(
                     text,
                     "  {}: nothing tells of it; it has no maps and will score as grey",
                     instance.instance
                 ),
+                Some(file) if !instance.has_maps() => {
+                    let (nearest, instance) = (mm(instance.nearest_m), &instance.instance);
+                    writeln!(
+                        text,
+                        "  {instance}: nothing in {file} is near enough, the nearest {nearest} away; no maps"
+                    )
+                }
                 Some(file) => {
                     let share = 100.0 * instance.texels_without as f64 / instance.texels as f64;
                     writeln!(
