@@ -265,6 +265,15 @@ fn distances_and_what_finds_nothing_are_told() {
     // MTL says no metallic: no map.
     assert!(!folder.path().join("moved/scenes/room/red/metallic.png").exists());
     // Two of six sides lie further away than a millimetre.
+    std::fs::write(files.join("room/rde.obj"), "").unwrap();
+    for folder in ["rom", "textures"] {
+        std::fs::create_dir(files.join(folder)).unwrap();
+    }
+    std::fs::write(files.join("rom/red.obj"), "").unwrap();
+    std::fs::write(files.join("textures/red.png"), "").unwrap();
+    let misspelt = import(&dataset, &files, &folder.path().join("misspelt"), &[]).ends_with(0);
+    let misspelt = misspelt.says("'room/rde.obj' is for no scene").says("'rom/' is for no scene");
+    assert!(!misspelt.stderr.contains("textures"), "{}", misspelt.stderr);
     let strict = told("strict", &["--max-distance", "0.001"]);
     let share = strict["texels_without"].as_f64().unwrap() / strict["texels"].as_f64().unwrap();
     assert!((0.28..0.4).contains(&share), "{strict}");

@@ -88,7 +88,8 @@ pub fn write(
         Ok(written)
     })?;
     let scenes = scenes.into_inner();
-    Ok(ImportReport { format: IMPORT_FORMAT.to_owned(), max_distance_m: options.max_distance_m, scenes })
+    let (format, max_distance_m) = (IMPORT_FORMAT.to_owned(), options.max_distance_m);
+    Ok(ImportReport { format, max_distance_m, unused: files.unused(&dataset.scenes), scenes })
 }
 
 fn nothing_told(instance: &InstanceId) -> ImportedInstance {

@@ -15,6 +15,8 @@ pub struct ImportReport {
     pub format: String,
     /// Places further away than this do not correspond.
     pub max_distance_m: f64,
+    /// Meshes, JSON and folders that are for no scene or instance, by their paths below the folder; sorted.
+    pub unused: Vec<String>,
     /// In the dataset's order.
     pub scenes: Vec<ImportedScene>,
 }

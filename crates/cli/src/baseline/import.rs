@@ -10,7 +10,7 @@ use mateval_scene::{PartSetId, json};
 
 use super::{Places, open};
 use crate::bars::Bars;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, print, say};
 use crate::prep::Format;
 
 /// What it is given.
@@ -51,6 +51,9 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Outcome> {
     let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
     let report = import::write(&open(places)?, &args.folder, &places.out, places.force, &method, &options, &progress)?;
     drop(bars);
+    for file in &report.unused {
+        say(&format!("warning: '{file}' is for no scene or instance of the dataset; it was not read"));
+    }
     match args.format {
         Format::Json => print(&json::to_text(&report))?,
         Format::Text => print(&text(&report))?,
