@@ -62,10 +62,8 @@ impl ImportFolder {
             let of = |scene: &&SceneFile| scene.id.as_str() == if is_folder { &name } else { stem(&name) };
             match scenes.iter().find(of) {
                 // A folder of textures is none of them.
-                None if is_folder => {
-                    if names(&self.path.join(&name)).iter().any(|file| is_ours(file)) {
-                        unused.push(format!("{name}/"));
-                    }
+                None if is_folder && names(&self.path.join(&name)).iter().any(|file| is_ours(file)) => {
+                    unused.push(format!("{name}/"));
                 }
                 None if is_ours(&name) => unused.push(name),
                 Some(scene) if is_folder => {
