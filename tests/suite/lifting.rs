@@ -315,15 +315,12 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
         assert_eq!(png_io::read_rgb_bytes(&object.join("picture.png")).unwrap().width(), 512);
     }
     let [imported, nn] = ["imported", "nn"].map(|name| folder.path().join(name));
-    let mut command = mateval();
-    command
-        .args(["baseline", "texgen-import", "--estimate", "gt"])
-        .arg(&results)
-        .arg("--dataset")
-        .arg(&*ROOM)
-        .arg("--out")
-        .arg(&imported);
-    run(&mut command).ends_with(0);
+    let import = || {
+        let mut command = baseline("texgen-import", &ROOM, &imported);
+        command.args(["--estimate", "gt"]).arg(&results);
+        command
+    };
+    run(&mut import()).ends_with(0);
     run(&mut baseline("nn", &ROOM, &nn)).ends_with(0);
     let (mut kept, mut painted) = (0, [0; 2]);
     for ((name, ours), (_, theirs)) in base_colors(&nn).iter().zip(&base_colors(&imported)) {
@@ -344,15 +341,7 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
 
     std::fs::remove_dir_all(&results).unwrap();
     std::fs::create_dir(&results).unwrap();
-    let mut command = mateval();
-    command
-        .args(["baseline", "texgen-import", "--estimate", "gt"])
-        .arg(&results)
-        .arg("--dataset")
-        .arg(&*ROOM)
-        .arg("--out")
-        .arg(&imported);
-    run(command.arg("--force")).ends_with(2).says("living-00012.png");
+    run(import().arg("--force")).ends_with(2).says("living-00012.png");
 }
 
 /// The header of a NumPy file of whole numbers of 64 bits, and the numbers.

@@ -1,7 +1,8 @@
 //! Where the time of `baseline nn` goes, and its search for nearest points against scipy's cKDTree.
+//!
 //! `cargo bench -p mateval-baselines --bench lifting -- DATASET [PYTHON]`: every scene at 1024 texels a side, from the
-//! truth's
-//! estimate; seconds of the wall clock. With a Python that has scipy, the largest step of all is done by both, in turn.
+//! truth's estimate; seconds of the wall clock. With a Python that has scipy, the largest step of all is done by both, in
+//! turn.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 use std::io::Write as _;

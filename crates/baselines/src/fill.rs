@@ -20,9 +20,7 @@ pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) ->
         let unseen = |at: usize| match (known.texels.pixels()[at], known.atlas.owner(at % size, at / size)) {
             (Texel::Unseen, Some((triangle, _))) => {
                 let centre = DVec2::new((at % size) as f64 + 0.5, (at / size) as f64 + 0.5);
-                let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
-                let normal = (b - a).cross(c - a).normalize_or_zero();
-                cloud.values_at(place_of(&known.atlas, mesh, triangle, centre), normal)
+                cloud.values_at(place_of(&known.atlas, mesh, triangle, centre), mesh.geometric_normal(triangle))
             }
             _ => None,
         };

@@ -79,8 +79,7 @@ pub fn texel_size_m(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize) -> f6
 }
 
 /// `a_side` times `a_side` places of an owned texel's square, those of its triangle alone, or the centre where that has
-/// none
-/// of them; of a texel beside its triangle the triangle's nearest. None for a texel that nobody owns.
+/// none of them; of a texel beside its triangle the triangle's nearest. None for a texel that nobody owns.
 pub fn places_of(atlas: &UvAtlas, mesh: &TriangleMesh, (x, y): (usize, usize), a_side: usize) -> Vec<DVec3> {
     let Some((triangle, inside)) = atlas.owner(x, y) else { return Vec::new() };
     let corner = DVec2::new(x as f64, y as f64);

@@ -39,8 +39,7 @@ pub fn export(dataset: &Dataset, out: &Path) -> Result<usize, BaselineError> {
 
 /// Copies the labels of `parts` parts an instance, `<id>_0_<parts>.npy` in `clusters` as PartField names them, to
 /// `<scene>/<instance>.npy`. Where an instance has fewer triangles than that PartField writes no such file: the one of
-/// the
-/// most parts below is taken. Instances without any keep their own parts. Gives how many have labels.
+/// the most parts below is taken. Instances without any keep their own parts. Gives how many have labels.
 pub fn import(dataset: &Dataset, clusters: &Path, parts: u8, out: &Path) -> Result<usize, BaselineError> {
     check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;

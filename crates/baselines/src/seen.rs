@@ -77,7 +77,7 @@ impl SeenPixels {
             let corners = geometry.mesh(instance).corners(hit.triangle).map(|corner| corner.as_dvec3());
             let weights = hit.barycentrics.as_dvec3();
             let place = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
-            let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+            let normal = geometry.mesh(instance).geometric_normal(hit.triangle);
             Some(SeenPoint { instance, pixel: (x, y), place, normal })
         };
         telling.into_par_iter().filter_map(point).collect()

@@ -61,8 +61,7 @@ pub struct Places {
 #[derive(clap::Args)]
 pub struct EstimateArgs {
     /// `gt` (the truth of the input view; what nn and texgen-export take if absent), `input` (the input picture itself;
-    /// what
-    /// median and median-part take), or a folder of a method's pictures.
+    /// what median and median-part take), or a folder of a method's pictures.
     #[arg(long, value_name = "gt|input|FOLDER")]
     estimate: Option<PathBuf>,
     /// What the folder's files are: colorful-shading, intrinsic, marigold, plain (if absent), rgbx, or a TOML file like

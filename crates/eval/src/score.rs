@@ -119,6 +119,27 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     Ok(Entry { file, findings, files, pictures: vec![Vec::new(); plan.protocols.len()] })
 }
 
+/// A scene, ready to be looked at with what submissions say of it.
+struct OpenScene {
+    folder: SceneFolder,
+    world: World,
+    atlases: Vec<TriangleMesh>,
+    /// In the submissions' order.
+    predictions: Vec<PredictedScene>,
+}
+
+impl OpenScene {
+    fn read(dataset: &Dataset, scene: &SceneFile, submissions: &[&Path]) -> Result<Self, EvalError> {
+        // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
+        dataset.check_files(&scene.id, |path| !path.contains("/renders/") && !path.contains("/materials/"))?;
+        let folder = dataset.folder(&scene.id);
+        let world = World::new(Arc::new(reference_io::read(&folder)?))?;
+        let atlases = read_atlases(&folder, scene, &world)?;
+        let predictions = submissions.iter().map(|path| read_scene(path, scene)).collect();
+        Ok(Self { folder, world, atlases, predictions })
+    }
+}
+
 /// The truth and every submission's albedo of one view, linear.
 pub(crate) struct SceneAlbedo {
     pub(crate) truth: Picture<LinearRgb>,
@@ -135,10 +156,7 @@ pub(crate) fn scene_albedo(
     scene: &SceneFile,
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
-    let folder = dataset.folder(&scene.id);
-    let world = World::new(Arc::new(reference_io::read(&folder)?))?;
-    let atlases = read_atlases(&folder, scene, &world)?;
-    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let OpenScene { folder, world, atlases, predictions } = OpenScene::read(dataset, scene, submissions)?;
     let view = |view: &View| {
         let predicted = albedo_pictures(&world, &atlases, &view.camera, &predictions);
         let Truth { albedo: truth, valid, unobserved } = Truth::read(&folder, view)?;
@@ -153,12 +171,7 @@ fn score_scene(
     entries: &mut [Entry],
     progress: Progress<'_>,
 ) -> Result<(), EvalError> {
-    // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
-    plan.dataset.check_files(&scene.id, |path| !path.contains("/renders/") && !path.contains("/materials/"))?;
-    let folder = plan.dataset.folder(&scene.id);
-    let world = World::new(Arc::new(reference_io::read(&folder)?))?;
-    let atlases = read_atlases(&folder, scene, &world)?;
-    let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let OpenScene { folder, world, atlases, predictions } = OpenScene::read(plan.dataset, scene, &plan.submissions)?;
     let views = scored_views(plan.dataset, scene)?;
     for (at, view) in views.iter().enumerate() {
         progress(&format!("scene {}", scene.id), at, views.len());
@@ -221,11 +234,20 @@ impl Truth {
         let shown = folder.view(&view.id);
         let is_input = view.id.as_str() == INPUT;
         let unobserved = (!is_input).then(|| png_io::read_mask(&shown.join("unobserved.png"))).transpose()?;
-        Ok(Self {
+        let truth = Self {
             albedo: exr_io::read_linear(&folder.truth_view(&view.id).join("albedo.exr"))?,
             valid: png_io::read_mask(&shown.join("valid.png"))?,
             unobserved,
-        })
+        };
+        let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
+        let masks = std::iter::once(&truth.valid).chain(&truth.unobserved);
+        let sizes =
+            masks.map(|mask| (mask.width(), mask.height())).chain([(truth.albedo.width(), truth.albedo.height())]);
+        if { sizes }.all(|found| found == size) {
+            return Ok(truth);
+        }
+        let what = format!("'{}': the truth's pictures are not of the camera's size", shown.display());
+        Err(EvalError::Invalid(format!("{what}; run `mateval prep verify`")))
     }
 }
 
@@ -239,11 +261,6 @@ fn picture_values(
     truth: &Truth,
 ) -> Result<Vec<PictureValue>, EvalError> {
     let failed = |source| EvalError::Metric { what: format!("scene '{}', view '{}'", scene.id, view.id), source };
-    if !predicted.same_size(&truth.albedo) || !predicted.same_size(&truth.valid) {
-        let what =
-            format!("scene '{}', view '{}': the truth's pictures are not of the camera's size", scene.id, view.id);
-        return Err(EvalError::Invalid(format!("{what}; run `mateval prep verify`")));
-    }
     let aligned = scaled(predicted, channel_scales(predicted, &truth.albedo, &truth.valid));
     let regions = std::iter::once((Region::Valid, &truth.valid))
         .chain(truth.unobserved.iter().map(|mask| (Region::Unobserved, mask)));

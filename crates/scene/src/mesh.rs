@@ -1,6 +1,6 @@
 //! Triangle meshes in world space.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// Triangles in world space (metres, +Y up). Vertex arrays, where present, have one entry a position.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -19,6 +19,12 @@ impl TriangleMesh {
     /// The corners of triangle `index`; panics where there is no such triangle.
     pub fn corners(&self, index: usize) -> [Vec3; 3] {
         self.triangles[index].map(|vertex| self.positions[vertex as usize])
+    }
+
+    /// The unit vector across triangle `index`, towards who sees it counter-clockwise; zero where it has no area.
+    pub fn geometric_normal(&self, index: usize) -> DVec3 {
+        let [a, b, c] = self.corners(index).map(|corner| corner.as_dvec3());
+        (b - a).cross(c - a).normalize_or_zero()
     }
 
     /// Puts another mesh behind this one. Uvs that one of them lacks are zero; normals are kept where both have them.

@@ -2,8 +2,7 @@
 //! carried over by surface: each place of an instance takes what the nearest place of their mesh says.
 //!
 //! `files` finds the files, `gltf_donor` and `obj_donor` read meshes into a `donor`, `correspondence` finds the nearest
-//! place,
-//! `rebake` fills atlases, `flat_materials` is for one material a part, `report` tells how well it went.
+//! place, `rebake` fills atlases, `flat_materials` is for one material a part, `report` tells how well it went.
 
 mod correspondence;
 mod donor;
@@ -47,8 +46,7 @@ pub struct ImportOptions {
 
 /// Writes a submission. An instance takes the first of `<scene>/<instance>.glb|gltf|obj`, `<scene>.glb|gltf|obj`,
 /// `<scene>.json` that tells of it; one that none tells of has no maps. Fails where the folder holds nothing for any
-/// scene,
-/// or where nothing in a scene's files is near enough to anything.
+/// scene, or where nothing in a scene's files is near enough to anything.
 pub fn write(
     dataset: &Dataset,
     folder: &Path,

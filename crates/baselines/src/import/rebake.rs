@@ -58,8 +58,7 @@ pub fn rebake(
         let (x, y) = (at % size, at / size);
         let unused = RebakedTexel { texel: Texel::Unused, distances: Distances::default(), nearest_m: f64::INFINITY };
         let Some((triangle, _)) = atlas.owner(x, y) else { return unused };
-        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
-        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let normal = mesh.geometric_normal(triangle);
         // One place where the donor is no finer than the atlas: more would only blur it.
         let centre = places_of(&atlas, mesh, (x, y), 1)[0];
         let found = correspondence.nearest(centre, normal);
