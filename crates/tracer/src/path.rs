@@ -3,14 +3,15 @@
 //! At every surface one emitter is sampled (next-event estimation) and one direction of the surface's own; the two ways of
 //! finding light are weighed against each other by the power heuristic (Veach 1997, section 9.2). Nothing is clamped.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use mateval_scene::reference::LightIndex;
 
 use crate::accel::Hit;
-use crate::bsdf::Bsdf;
+use crate::bsdf::{Bsdf, Shown};
 use crate::emitter::Emitted;
 use crate::ray::Ray;
 use crate::render::{LightSampling, RenderSettings};
+use crate::repaint::Repaint;
 use crate::sampler::Sampler;
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
@@ -33,54 +34,68 @@ struct Scattered {
     delta: bool,
 }
 
-/// A path under way.
+/// Predictions that paths look at in place of the world's own materials.
 #[derive(Clone, Copy)]
-struct Path {
+pub(crate) struct Painted<'w> {
+    pub(crate) repaint: &'w Repaint,
+    /// Of the `K` predictions that are followed.
+    pub(crate) first: usize,
+}
+
+/// A path under way, for `K` base colours.
+#[derive(Clone, Copy)]
+struct Path<const K: usize> {
     /// Its place among the starts.
     which: usize,
     sampler: Sampler,
-    throughput: Vec3,
+    throughputs: [Vec3; K],
     /// None on the camera's ray.
     scattered: Option<Scattered>,
 }
 
 /// A path that has met a surface, which is not a lamp alone, and may scatter there.
-struct Arrival {
-    path: Path,
+struct Arrival<const K: usize> {
+    path: Path<K>,
     place: SurfaceHit,
+    /// In the atlas; of no meaning without predictions.
+    uv: Vec2,
     /// Towards where the path came from.
     wo: Vec3,
 }
 
 /// Light of a path that counts unless its shadow ray is stopped.
-struct Offer {
+struct Offer<const K: usize> {
     which: usize,
     sampler: Sampler,
     light: LightIndex,
-    value: Vec3,
+    values: [Vec3; K],
 }
 
 /// Follows paths, all those of a batch by one scattering at a time: each step asks early for the memory of the next, which
 /// a path alone would have to wait for. Keeps its room from one batch to the next.
-pub(crate) struct PathTracer<'w> {
+///
+/// With predictions `K` of them are followed by the same paths, each with the numbers that it would have alone.
+pub(crate) struct PathTracer<'w, const K: usize = 1> {
     world: &'w World,
+    painted: Option<Painted<'w>>,
     settings: &'w RenderSettings,
     pub(crate) counts: PathCounts,
-    paths: Vec<Path>,
+    paths: Vec<Path<K>>,
     /// Of `paths`, one each.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
-    arrivals: Vec<Arrival>,
-    offers: Vec<Offer>,
+    arrivals: Vec<Arrival<K>>,
+    offers: Vec<Offer<K>>,
     /// Of `offers`, one each.
     shadow_rays: Vec<Ray>,
     stopped: Vec<bool>,
 }
 
-impl<'w> PathTracer<'w> {
-    pub(crate) fn new(world: &'w World, settings: &'w RenderSettings) -> Self {
+impl<'w, const K: usize> PathTracer<'w, K> {
+    pub(crate) fn new(world: &'w World, painted: Option<Painted<'w>>, settings: &'w RenderSettings) -> Self {
         Self {
             world,
+            painted,
             settings,
             counts: PathCounts::default(),
             paths: Vec::new(),
@@ -98,12 +113,12 @@ impl<'w> PathTracer<'w> {
     pub(crate) fn trace(
         &mut self,
         starts: impl IntoIterator<Item = (Sampler, Ray)>,
-        mut add: impl FnMut(usize, LightIndex, Vec3),
+        mut add: impl FnMut(usize, LightIndex, [Vec3; K]),
     ) {
         self.paths.clear();
         self.rays.clear();
         for (which, (sampler, ray)) in starts.into_iter().enumerate() {
-            self.paths.push(Path { which, sampler, throughput: Vec3::ONE, scattered: None });
+            self.paths.push(Path { which, sampler, throughputs: [Vec3::ONE; K], scattered: None });
             self.rays.push(ray);
         }
         let mut scatterings = 0;
@@ -116,10 +131,13 @@ impl<'w> PathTracer<'w> {
     }
 
     /// Follows all rays to their ends and adds what they find there.
-    fn arrive(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, Vec3)) {
+    fn arrive(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, [Vec3; K])) {
         self.counts.rays += self.rays.len() as u64;
         let paths = &self.paths;
         self.world.closest_many(&self.rays, |which| paths[which].sampler.salt(2 * scatterings), &mut self.hits);
+        if let Some(Painted { repaint, .. }) = self.painted {
+            self.hits.iter().flatten().for_each(|hit| repaint.prefetch(hit));
+        }
         self.arrivals.clear();
         let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
         for ((path, ray), hit) in self.paths.drain(..).zip(&self.rays).zip(&self.hits) {
@@ -134,11 +152,21 @@ impl<'w> PathTracer<'w> {
             }
             if scatterings > self.settings.max_bounces {
                 found.counts.capped += 1;
-                found.counts.capped_throughput += f64::from(path.throughput.element_sum() / 3.0);
+                found.counts.capped_throughput += f64::from(path.throughputs[0].element_sum() / 3.0);
                 continue;
             }
-            self.world.prefetch_texels(&place);
-            self.arrivals.push(Arrival { path, place, wo: -ray.direction() });
+            let uv = match self.painted {
+                Some(Painted { repaint, first }) => {
+                    let uv = repaint.uv(hit);
+                    repaint.prefetch_texels::<K>(first, place.surface.0, uv);
+                    uv
+                }
+                None => {
+                    self.world.prefetch_texels(&place);
+                    Vec2::ZERO
+                }
+            };
+            self.arrivals.push(Arrival { path, place, uv, wo: -ray.direction() });
         }
     }
 
@@ -147,8 +175,13 @@ impl<'w> PathTracer<'w> {
         self.rays.clear();
         self.offers.clear();
         self.shadow_rays.clear();
-        for Arrival { path, place, wo } in self.arrivals.drain(..) {
-            let bsdf = Bsdf::new(self.world, &place, wo);
+        for Arrival { path, place, uv, wo } in self.arrivals.drain(..) {
+            let painted = self.painted;
+            let paint = painted.and_then(|painted| painted.repaint.at::<K>(painted.first, place.surface.0, uv));
+            let bsdf = match &paint {
+                Some(paint) => Bsdf::repainted(paint, &place, wo),
+                None => Bsdf::own(self.world, &place, wo),
+            };
             if bsdf.is_black() {
                 continue;
             }
@@ -167,33 +200,34 @@ impl<'w> PathTracer<'w> {
     }
 
     /// Adds the light on offer that nothing is in the way of.
-    fn take_offers(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, Vec3)) {
+    fn take_offers(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, [Vec3; K])) {
         let offers = &self.offers;
         let salt = |which: usize| offers[which].sampler.salt(2 * scatterings + 1);
         self.world.occluded_many(&self.shadow_rays, salt, &mut self.stopped);
         let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
         for (offer, _) in self.offers.iter().zip(&self.stopped).filter(|(_, stopped)| !**stopped) {
-            found.contribute(offer.which, offer.light, offer.value);
+            found.contribute(offer.which, offer.light, offer.values);
         }
     }
 }
 
 /// Samples an emitter: the ray that asks whether anything is in between, and what its light would add.
-fn offered(
+fn offered<const K: usize>(
     world: &World,
     settings: &RenderSettings,
-    path: &Path,
-    bsdf: &Bsdf,
+    path: &Path<K>,
+    bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
     scatterings: u32,
-) -> Option<(Ray, Offer)> {
+) -> Option<(Ray, Offer<K>)> {
     if bsdf.is_delta() {
         return None;
     }
     let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
     let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
-    let (value, density) = bsdf.evaluate(light.direction);
-    if value == Vec3::ZERO {
+    let shown = if light.on_stage { Shown::Stage } else { Shown::All };
+    let (values, density) = bsdf.evaluate_all(light.direction, shown);
+    if values == [Vec3::ZERO; K] {
         return None;
     }
     let shadow = match &light.place {
@@ -202,31 +236,34 @@ fn offered(
     };
     let weight = match settings.light_sampling {
         LightSampling::Emitters => 1.0,
+        // No ray meets the lights of a stage: this is the only way to find them.
+        _ if light.on_stage => 1.0,
         _ => power_heuristic(light.density, density),
     };
-    let value = path.throughput * value * light.radiance * (weight / light.density);
-    Some((shadow, Offer { which: path.which, sampler: path.sampler, light: light.light, value }))
+    let brought = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
+    let values = std::array::from_fn(brought);
+    Some((shadow, Offer { which: path.which, sampler: path.sampler, light: light.light, values }))
 }
 
 /// The path and the ray that it goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
 /// length of paths follows from geometry alone.
-fn scattered(
+fn scattered<const K: usize>(
     settings: &RenderSettings,
-    mut path: Path,
-    bsdf: &Bsdf,
+    mut path: Path<K>,
+    bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
     scatterings: u32,
-) -> Option<(Path, Ray)> {
+) -> Option<(Path<K>, Ray)> {
     let [a, b, c, roulette] = path.sampler.set(2 + 2 * scatterings);
     if scatterings >= settings.roulette_start {
         if roulette >= settings.roulette_survival {
             return None;
         }
-        path.throughput /= settings.roulette_survival;
+        path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
     let sample = bsdf.sample([a, b, c])?;
-    path.throughput *= sample.weight;
-    if path.throughput == Vec3::ZERO {
+    path.throughputs.iter_mut().zip(sample.weights).for_each(|(throughput, weight)| *throughput *= weight);
+    if path.throughputs == [Vec3::ZERO; K] {
         return None;
     }
     path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
@@ -234,17 +271,17 @@ fn scattered(
 }
 
 /// Where what paths find goes.
-struct Found<'a, F: FnMut(usize, LightIndex, Vec3)> {
+struct Found<'a, const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> {
     world: &'a World,
     settings: &'a RenderSettings,
     counts: &'a mut PathCounts,
     add: &'a mut F,
 }
 
-impl<F: FnMut(usize, LightIndex, Vec3)> Found<'_, F> {
+impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     /// Adds what the surface itself sends back along `ray`. True if the surface is nothing but a lamp to this ray: an
     /// emitter hidden from the camera shows the camera its material and every other ray its light alone.
-    fn add_emitted(&mut self, path: &Path, place: &SurfaceHit, ray: &Ray) -> bool {
+    fn add_emitted(&mut self, path: &Path<K>, place: &SurfaceHit, ray: &Ray) -> bool {
         let emitters = self.world.emitters();
         let Some(light) = emitters.light_of(place.surface) else { return false };
         let hidden = !emitters.is_camera_visible(light);
@@ -258,7 +295,7 @@ impl<F: FnMut(usize, LightIndex, Vec3)> Found<'_, F> {
         hidden
     }
 
-    fn add_outside(&mut self, path: &Path, direction: Vec3) {
+    fn add_outside(&mut self, path: &Path<K>, direction: Vec3) {
         let emitters = self.world.emitters();
         for emitted in emitters.from_outside(direction) {
             if path.scattered.is_some() || emitters.is_camera_visible(emitted.light) {
@@ -268,21 +305,21 @@ impl<F: FnMut(usize, LightIndex, Vec3)> Found<'_, F> {
     }
 
     /// Adds light that the surface's own sampling found.
-    fn add_met(&mut self, path: &Path, emitted: &Emitted) {
+    fn add_met(&mut self, path: &Path<K>, emitted: &Emitted) {
         let weight = match (path.scattered, self.settings.light_sampling) {
             (None | Some(Scattered { delta: true, .. }), _) | (_, LightSampling::Bsdf) => 1.0,
             (_, LightSampling::Emitters) => 0.0,
             (Some(Scattered { density, .. }), LightSampling::Both) => power_heuristic(density, emitted.density),
         };
-        self.contribute(path.which, emitted.light, path.throughput * emitted.radiance * weight);
+        let values = path.throughputs.map(|throughput| throughput * emitted.radiance * weight);
+        self.contribute(path.which, emitted.light, values);
     }
 
-    fn contribute(&mut self, which: usize, light: LightIndex, value: Vec3) {
-        if value.is_finite() {
-            (self.add)(which, light, value);
-        } else {
-            self.counts.not_finite += 1;
-        }
+    fn contribute(&mut self, which: usize, light: LightIndex, values: [Vec3; K]) {
+        // One prediction's accident is not the others'.
+        let finite = values.map(|value| if value.is_finite() { value } else { Vec3::ZERO });
+        self.counts.not_finite += values.iter().filter(|value| !value.is_finite()).count() as u64;
+        (self.add)(which, light, finite);
     }
 }
 

@@ -117,7 +117,7 @@ pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
 
 /// The means of the pixels' samples. Each batch of paths holds one a pixel.
 fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile: &Tile) -> (Vec<[f64; 3]>, PathCounts) {
-    let mut tracer = PathTracer::new(world, settings);
+    let mut tracer = PathTracer::<1>::new(world, None, settings);
     let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
     for index in 0..settings.samples {
         let starts = tile.pixels().map(|[x, y]| {
@@ -126,7 +126,7 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
             let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
             (sampler, Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
         });
-        tracer.trace(starts, |pixel, _, value| {
+        tracer.trace(starts, |pixel, _, [value]| {
             for (channel, value) in sums[pixel].iter_mut().zip(value.to_array()) {
                 *channel += f64::from(value);
             }

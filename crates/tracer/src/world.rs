@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::MaterialTables;
-use crate::emitter::Emitters;
+use crate::emitter::{Emitters, StageLight};
 use crate::error::TracerError;
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
@@ -25,13 +25,13 @@ pub struct World {
     textures: Vec<Texture>,
     accel: Arc<Accel>,
     emitters: Emitters,
-    tables: MaterialTables,
+    tables: Arc<MaterialTables>,
     /// Whether any material has an opacity.
     masked: bool,
     /// Of all triangles, surface by surface.
-    records: Vec<TriangleRecord>,
+    records: Arc<Vec<TriangleRecord>>,
     /// For each material what it looks up in textures.
-    lookups: Vec<Vec<Lookup>>,
+    lookups: Arc<Vec<Vec<Lookup>>>,
 }
 
 /// Bytes of texels below which huge pages would save little and cost more.
@@ -75,14 +75,31 @@ impl World {
             })
             .collect();
         Ok(Self {
-            records: on_huge_pages(records),
-            lookups: scene.materials.iter().map(Material::lookups).collect(),
+            records: Arc::new(on_huge_pages(records)),
+            lookups: Arc::new(scene.materials.iter().map(Material::lookups).collect()),
             emitters: Emitters::new(&scene, &textures, size)?,
-            tables: MaterialTables::new(&scene, &textures)?,
+            tables: Arc::new(MaterialTables::new(&scene, &textures)?),
             masked: scene.materials.iter().any(|material| material.opacity.is_some()),
             textures,
             scene,
             accel,
+        })
+    }
+
+    /// The same surfaces and materials, lit by a stage and by nothing else: the scene's own lamps are surfaces like any
+    /// other. Light group k is `stage[k]`. Fails where a light has no triangles or holds numbers that are not finite.
+    pub fn on_stage(&self, stage: &[StageLight]) -> Result<Self, TracerError> {
+        let [low, high] = self.accel.bounds();
+        let size = low.abs().max(high.abs()).max_element();
+        Ok(Self {
+            scene: self.scene.clone(),
+            textures: self.textures.clone(),
+            accel: self.accel.clone(),
+            emitters: Emitters::on_stage(stage, self.scene.surfaces.len(), size)?,
+            tables: self.tables.clone(),
+            masked: self.masked,
+            records: self.records.clone(),
+            lookups: self.lookups.clone(),
         })
     }
 

@@ -13,6 +13,8 @@ mod estimators;
 mod light_basis;
 #[path = "suite/mapped_lamps.rs"]
 mod mapped_lamps;
+#[path = "suite/repaint.rs"]
+mod repaint;
 #[path = "suite/same_bytes.rs"]
 mod same_bytes;
 #[path = "suite/scenes.rs"]

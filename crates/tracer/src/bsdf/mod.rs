@@ -22,32 +22,36 @@ mod tests;
 use glam::Vec3;
 
 use crate::frame::Frame;
+use crate::repaint::PaintAt;
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 use lobe::Lobe;
-use principled::PrincipledView;
+pub(crate) use principled::{Principled, eta_from_specular};
+use principled::{PrincipledView, Tint};
+pub(crate) use principled_tables::BlenderTables;
 pub(crate) use tables::MaterialTables;
 
-/// A surface's scattering at one place.
+/// A surface's scattering at one place, for `K` base colours at once: of the world's own material for one, of predictions
+/// for more ([`crate::Repaint`]).
 #[derive(Clone, Copy, Debug)]
-pub struct Bsdf<'w> {
+pub struct Bsdf<'w, const K: usize = 1> {
     frame: Frame,
     /// The triangle's normal on the side of the frame's.
     geometric: Vec3,
     /// Towards the viewer, in the frame.
     wo: Vec3,
     lobe: Lobe<'w>,
-    /// For principled materials, which most are: what follows from `wo` already.
-    principled: Option<PrincipledView>,
+    /// For principled materials, which most are: what follows from `wo` already, and from the colours.
+    principled: Option<(PrincipledView, [Tint; K])>,
 }
 
 /// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BsdfSample {
+pub struct BsdfSample<const K: usize = 1> {
     /// Where the light comes from.
     pub wi: Vec3,
-    /// The value of [`Bsdf::evaluate`] over `density`.
-    pub weight: Vec3,
+    /// The value of [`Bsdf::evaluate`] over `density`, by base colour.
+    pub weights: [Vec3; K],
     /// Per solid angle; for a single direction (`delta`), its probability.
     pub density: f32,
     /// Whether this is a single direction, that of a mirror or of clear glass, which sampling lights cannot find.
@@ -57,24 +61,66 @@ pub struct BsdfSample {
 /// The cosine to which a shading normal is turned back that points away from a viewer who sees the front.
 const GRAZING: f32 = 1e-3;
 
+/// Facets smoother than this roughness do not show the lights of a stage ([`crate::StageLight`]).
+pub const STAGE_ROUGHNESS: f32 = 0.2;
+
 impl<'w> Bsdf<'w> {
-    /// The scattering at `hit`, seen from `wo`.
+    /// The scattering of the world's own material at `hit`, seen from `wo`.
     ///
     /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer who
     /// sees that side of the triangle is turned until it does not.
     pub fn new(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
+        Self::own(world, hit, wo)
+    }
+
+    /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
+    /// single directions left out. See [`Self::evaluate_all`].
+    pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
+        let ([value], density) = self.evaluate_all(wi, Shown::All);
+        (value, density)
+    }
+}
+
+/// What of a surface light is evaluated on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shown {
+    /// All of it.
+    All,
+    /// What shows the lights of a stage: facets below [`STAGE_ROUGHNESS`] do not.
+    Stage,
+}
+
+impl<'w, const K: usize> Bsdf<'w, K> {
+    /// As [`Bsdf::new`], the same for all colours.
+    pub(crate) fn own(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
         let material = world.material_of(hit.surface);
         let table = world.tables().of(world.scene().surfaces[hit.surface.0].material.0);
-        let mut lobe = Lobe::at(material, table, world.textures(), hit.uv);
-        let mut normal = match &material.bump {
+        let lobe = Lobe::at(material, table, world.textures(), hit.uv);
+        let normal = match &material.bump {
             Some(bump) => bump::bumped_normal(bump, world.textures(), world.mesh(hit.surface), hit),
             None => hit.shading_normal,
         };
+        Self::at(hit, normal, wo, lobe, material.two_sided, None)
+    }
+
+    /// The scattering of predictions at `hit`: two-sided, without bumps.
+    pub(crate) fn repainted(paint: &PaintAt<'w, K>, hit: &SurfaceHit, wo: Vec3) -> Self {
+        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(paint.principled), true, Some(&paint.base_colors))
+    }
+
+    fn at(
+        hit: &SurfaceHit,
+        mut normal: Vec3,
+        wo: Vec3,
+        mut lobe: Lobe<'w>,
+        two_sided: bool,
+        colors: Option<&[Vec3; K]>,
+    ) -> Self {
         let mut geometric = hit.geometric_normal;
         let front = hit.is_front(wo);
         if !front && !lobe.transmits() {
             (normal, geometric) = (-normal, -geometric);
-            if !material.two_sided {
+            if !two_sided {
                 lobe = Lobe::Black;
             }
         }
@@ -83,42 +129,57 @@ impl<'w> Bsdf<'w> {
         let frame = Frame::around(normal);
         let wo = frame.local_from_world(wo);
         let principled = match &lobe {
-            Lobe::Principled(principled) if wo.z > 0.0 => Some(principled.seen_from(wo)),
+            Lobe::Principled(principled) if wo.z > 0.0 => {
+                let view = principled.seen_from(wo);
+                let tints = match colors {
+                    Some(colors) => colors.map(|color| view.tint(color)),
+                    None => [view.tint(principled.base_color); K],
+                };
+                Some((view, tints))
+            }
             _ => None,
         };
         Self { frame, geometric, wo, lobe, principled }
     }
 
-    /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
-    /// single directions left out.
+    /// Value times the cosine of `wi`, by base colour and channel, and the density with which [`Self::sample`] finds `wi`,
+    /// per solid angle; single directions left out.
     ///
     /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's or the reverse: such light
     /// would come through the surface.
-    pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
+    pub(crate) fn evaluate_all(&self, wi: Vec3, shown: Shown) -> ([Vec3; K], f32) {
         let local = self.frame.local_from_world(wi);
         if self.geometric.dot(wi) * local.z <= 0.0 {
-            return (Vec3::ZERO, 0.0);
+            return ([Vec3::ZERO; K], 0.0);
         }
         match &self.principled {
-            Some(_) if local.z <= 0.0 => (Vec3::ZERO, 0.0),
-            Some(principled) => principled.evaluate(local),
-            None => (self.lobe.eval(self.wo, local), self.lobe.density(self.wo, local)),
+            Some(_) if local.z <= 0.0 => ([Vec3::ZERO; K], 0.0),
+            Some((view, tints)) => {
+                let mut response = view.response(local);
+                if shown == Shown::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
+                    response = response.of_base_alone();
+                }
+                (tints.map(|tint| tint.value(&response)), response.density)
+            }
+            None => ([self.lobe.eval(self.wo, local); K], self.lobe.density(self.wo, local)),
         }
     }
 
-    /// A direction for `wo`, from three numbers in [0, 1); none where the draw sends light nowhere.
-    pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample> {
-        let sample = match &self.principled {
-            Some(principled) => principled.sample(u)?,
-            None => self.lobe.sample(self.wo, u)?,
+    /// A direction for `wo`, from three numbers in [0, 1); none where the draw sends light nowhere. Does not depend on the
+    /// base colours.
+    pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
+        let (local, weights, density, delta) = match &self.principled {
+            Some((view, tints)) => {
+                let (wi, response) = view.sample(u)?;
+                (wi, tints.map(|tint| tint.value(&response) / response.density), response.density, false)
+            }
+            None => {
+                let sample = self.lobe.sample(self.wo, u)?;
+                (sample.wi, [sample.weight; K], sample.density, sample.delta)
+            }
         };
-        let wi = self.frame.world_from_local(sample.wi).normalize();
-        (self.geometric.dot(wi) * sample.wi.z > 0.0).then_some(BsdfSample {
-            wi,
-            weight: sample.weight,
-            density: sample.density,
-            delta: sample.delta,
-        })
+        let wi = self.frame.world_from_local(local).normalize();
+        (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
     /// Whether all light goes to single directions, so that sampling lights finds nothing.

@@ -39,7 +39,8 @@ pub(crate) enum Style<'w> {
     Blender(&'w BlenderTables),
 }
 
-/// The material at one place, seen from one direction: all that does not depend on the light's is worked out.
+/// The material at one place but for its base colour, seen from one direction: all that does not depend on the light's is
+/// worked out.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PrincipledView {
     wo: Vec3,
@@ -49,10 +50,12 @@ pub(crate) struct PrincipledView {
     eta: f32,
     /// Weight of the dielectric Fresnel term.
     dielectric: f32,
-    /// Of Schlick's term: the value head on, and how far it rises towards grazing.
-    metal: Vec3,
-    metal_rise: Vec3,
+    metallic: f32,
+    /// Blender's: what facets do with light from the viewer.
+    kept: Option<Kept>,
     base: Base,
+    /// What the base colour is multiplied by for the diffuse part.
+    base_weight: f32,
     /// The probability with which the facets are sampled.
     facet_share: f32,
     /// The shares' densities: the first over half the facets' own, the second over the cosine.
@@ -60,13 +63,39 @@ pub(crate) struct PrincipledView {
     base_density: f32,
 }
 
-/// The diffuse part's value over the cosine, and the masking of the facets above it.
+/// What a base colour makes of a [`PrincipledView`]: the only part that depends on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tint {
+    /// Of Schlick's term: the value head on, and how far it rises towards grazing.
+    metal: Vec3,
+    metal_rise: Vec3,
+    /// The diffuse part's value over the cosine, but for [`Response::base`].
+    base: Vec3,
+}
+
+/// A [`PrincipledView`] towards one light: what tints are multiplied by.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Response {
+    /// What the facets send there, with the cosine, for a Fresnel term of 1.
+    bounce: f32,
+    /// Schlick's weight between viewer and light.
+    schlick: f32,
+    /// The dielectric Fresnel term.
+    dielectric: f32,
+    /// The diffuse part over its colour and the cosine.
+    base: f32,
+    cos: f32,
+    /// The density with which [`PrincipledView::sample`] finds it.
+    pub(crate) density: f32,
+}
+
+/// The diffuse part's shape, and the masking of the facets above it.
 #[derive(Clone, Copy, Debug)]
 enum Base {
     /// Blender's: Lambert's, masking with heights.
-    Lambert(Vec3),
+    Lambert,
     /// Mitsuba's: Disney's, separable masking. `fresnel` is Schlick's weight for the viewer.
-    Disney { color: Vec3, roughness: f32, fresnel: f32 },
+    Disney { roughness: f32, fresnel: f32 },
 }
 
 /// Keeps the peak of a mirror finite: Mitsuba's and Disney's limit, and what f32 can hold.
@@ -89,24 +118,24 @@ impl<'w> Principled<'w> {
         }
     }
 
-    /// The value with the cosine, a channel; and the density with which [`Self::sample`] finds `wi`.
-    pub(crate) fn evaluate(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
-        self.seen_from(wo).evaluate(wi)
-    }
-
+    /// The value with the cosine, a channel.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        self.evaluate(wo, wi).0
+        let view = self.seen_from(wo);
+        view.tint(self.base_color).value(&view.response(wi))
     }
 
+    /// The density with which [`Self::sample`] finds `wi`.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
-        self.evaluate(wo, wi).1
+        self.seen_from(wo).response(wi).density
     }
 
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
-        self.seen_from(wo).sample(u)
+        let view = self.seen_from(wo);
+        let (wi, response) = view.sample(u)?;
+        Some(LocalSample::spread(wi, view.tint(self.base_color).value(&response), response.density))
     }
 
-    /// What can be said before the light's direction is known.
+    /// What can be said before the light's direction and the base colour are known.
     pub(crate) fn seen_from(&self, wo: Vec3) -> PrincipledView {
         match self.style {
             Style::Mitsuba => self.mitsuba(wo),
@@ -124,13 +153,10 @@ impl<'w> Principled<'w> {
             slope,
             eta: self.eta,
             dielectric: matt,
-            metal: self.base_color * self.metallic,
-            metal_rise: (Vec3::ONE - self.base_color) * self.metallic,
-            base: Base::Disney {
-                color: self.base_color * (matt * FRAC_1_PI),
-                roughness: self.roughness,
-                fresnel: fresnel::schlick_weight(wo.z),
-            },
+            metallic: self.metallic,
+            kept: None,
+            base: Base::Disney { roughness: self.roughness, fresnel: fresnel::schlick_weight(wo.z) },
+            base_weight: matt * FRAC_1_PI,
             facet_share,
             facet_density: facet_share / (wo.z + slope),
             base_density: (1.0 - facet_share) * FRAC_1_PI,
@@ -145,7 +171,6 @@ impl<'w> Principled<'w> {
         let gain = kept.gain(tables.mean_fresnel());
         let reflected = kept.share * gain * (tables.f0() + (1.0 - tables.f0()) * tables.rise(self.roughness, wo.z));
         let passed = matt * (1.0 - reflected).max(0.0);
-        let (metal, metal_rise) = self.blender_metal(&kept);
         // Facets of metal count by what they keep, whatever their colour.
         let facets = self.metallic * kept.share + matt * reflected;
         let facet_share = (facets / (facets + TYPICAL_BASE * passed)).max(LEAST_FACET_SHARE);
@@ -156,31 +181,37 @@ impl<'w> Principled<'w> {
             slope,
             eta: self.eta,
             dielectric: matt * gain,
-            metal,
-            metal_rise,
-            base: Base::Lambert(self.base_color * (passed * FRAC_1_PI)),
+            metallic: self.metallic,
+            kept: Some(kept),
+            base: Base::Lambert,
+            base_weight: passed * FRAC_1_PI,
             facet_share,
             facet_density: facet_share / (wo.z + slope),
             base_density: (1.0 - facet_share) * FRAC_1_PI,
         }
     }
-
-    /// Schlick's value head on and its rise, both with what further bounces bring. Its mean over all directions is
-    /// F0 + (1 - F0) / 21. Blender's tint at 82 degrees (Kutz et al. 2021) is white by default: this, exactly.
-    fn blender_metal(&self, kept: &Kept) -> (Vec3, Vec3) {
-        if self.metallic == 0.0 {
-            return (Vec3::ZERO, Vec3::ZERO);
-        }
-        let f0 = self.base_color.clamp(Vec3::ZERO, Vec3::ONE);
-        let gain = Vec3::from_array(f0.to_array().map(|f0| self.metallic * kept.gain(f0 + (1.0 - f0) / 21.0)));
-        (gain * f0, gain * (Vec3::ONE - f0))
-    }
 }
 
 impl PrincipledView {
-    /// The value with the cosine, a channel; and the density with which [`Self::sample`] finds `wi`. Both directions lie
-    /// above the surface.
-    pub(crate) fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
+    pub(crate) fn tint(&self, base_color: Vec3) -> Tint {
+        let (metal, metal_rise) = match &self.kept {
+            _ if self.metallic == 0.0 => (Vec3::ZERO, Vec3::ZERO),
+            Some(kept) => self.blender_metal(kept, base_color),
+            None => (base_color * self.metallic, (Vec3::ONE - base_color) * self.metallic),
+        };
+        Tint { metal, metal_rise, base: base_color * self.base_weight }
+    }
+
+    /// Schlick's value head on and its rise, both with what further bounces bring. Its mean over all directions is
+    /// F0 + (1 - F0) / 21. Blender's tint at 82 degrees (Kutz et al. 2021) is white by default: this, exactly.
+    fn blender_metal(&self, kept: &Kept, base_color: Vec3) -> (Vec3, Vec3) {
+        let f0 = base_color.clamp(Vec3::ZERO, Vec3::ONE);
+        let gain = Vec3::from_array(f0.to_array().map(|f0| self.metallic * kept.gain(f0 + (1.0 - f0) / 21.0)));
+        (gain * f0, gain * (Vec3::ONE - f0))
+    }
+
+    /// What light from `wi` meets. Both directions lie above the surface.
+    pub(crate) fn response(&self, wi: Vec3) -> Response {
         let half = self.wo + wi;
         let length2 = half.length_squared();
         let cos = 0.5 * length2.sqrt();
@@ -188,10 +219,24 @@ impl PrincipledView {
         // Walter et al. 2007, equation 33, for half / |half|.
         let stretched = length2 / (half.x * half.x + half.y * half.y + alpha2 * (half.z * half.z));
         let facets = 0.5 * FRAC_1_PI * alpha2 * stretched * stretched;
+        let dielectric = self.dielectric > 0.0;
+        Response {
+            bounce: facets * wi.z * self.unmasked(wi.z, alpha2),
+            schlick: fresnel::schlick_weight(cos),
+            dielectric: if dielectric {
+                self.dielectric * fresnel::dielectric_from_thinner(cos, self.eta)
+            } else {
+                0.0
+            },
+            base: self.base(wi.z, cos),
+            cos: wi.z,
+            density: facets * self.facet_density + self.base_density * wi.z,
+        }
+    }
 
-        let density = facets * self.facet_density + self.base_density * wi.z;
-        let bounce = facets * wi.z * self.unmasked(wi.z, alpha2);
-        (self.fresnel(cos) * bounce + self.base(wi.z, cos) * wi.z, density)
+    /// Whether the facets are as smooth as `roughness` or smoother.
+    pub(crate) fn is_smoother_than(&self, roughness: f32) -> bool {
+        self.alpha < roughness * roughness
     }
 
     /// Smith's masking and shadowing over twice the product of the cosines, by [`slope`] instead of Lambda: with heights
@@ -199,33 +244,25 @@ impl PrincipledView {
     fn unmasked(&self, cos_i: f32, alpha2: f32) -> f32 {
         let (cos_o, slope_o, slope_i) = (self.wo.z, self.slope, slope(cos_i, alpha2));
         match self.base {
-            Base::Lambert(_) => 1.0 / (cos_i * slope_o + cos_o * slope_i),
+            Base::Lambert => 1.0 / (cos_i * slope_o + cos_o * slope_i),
             Base::Disney { .. } => 2.0 / ((cos_o + slope_o) * (cos_i + slope_i)),
         }
     }
 
-    fn fresnel(&self, cos: f32) -> Vec3 {
-        let mut sum = self.metal + self.metal_rise * fresnel::schlick_weight(cos);
-        if self.dielectric > 0.0 {
-            sum += self.dielectric * fresnel::dielectric_from_thinner(cos, self.eta);
-        }
-        sum
-    }
-
-    /// The base's value over the cosine: Lambert's, or Burley 2015, equation 4, without subsurface.
-    fn base(&self, cos_i: f32, cos_difference: f32) -> Vec3 {
+    /// The base's shape: Lambert's, or Burley 2015, equation 4, without subsurface.
+    fn base(&self, cos_i: f32, cos_difference: f32) -> f32 {
         match self.base {
-            Base::Lambert(value) => value,
-            Base::Disney { color, roughness, fresnel: fo } => {
+            Base::Lambert => 1.0,
+            Base::Disney { roughness, fresnel: fo } => {
                 let fi = fresnel::schlick_weight(cos_i);
                 let retro = 2.0 * roughness * cos_difference * cos_difference;
-                color * ((1.0 - 0.5 * fo) * (1.0 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1.0)))
+                (1.0 - 0.5 * fo) * (1.0 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1.0))
             }
         }
     }
 
-    /// A direction above the surface; none where the facets send the draw below it.
-    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<LocalSample> {
+    /// A direction above the surface and what light from there meets; none where the facets send the draw below it.
+    pub(crate) fn sample(&self, u: [f32; 3]) -> Option<(Vec3, Response)> {
         let wi = if u[0] < self.facet_share {
             reflect(self.wo, Facets::new(Distribution::Ggx, self.alpha).sample(self.wo, [u[1], u[2]]))
         } else {
@@ -234,8 +271,24 @@ impl PrincipledView {
         if wi.z <= 0.0 {
             return None;
         }
-        let (value, density) = self.evaluate(wi);
-        (density > 0.0).then(|| LocalSample::spread(wi, value, density))
+        let response = self.response(wi);
+        (response.density > 0.0).then_some((wi, response))
+    }
+}
+
+impl Response {
+    /// Without the facets' part.
+    pub(crate) fn of_base_alone(self) -> Self {
+        Self { bounce: 0.0, ..self }
+    }
+}
+
+impl Tint {
+    /// The value with the cosine, a channel.
+    #[inline]
+    pub(crate) fn value(&self, response: &Response) -> Vec3 {
+        let fresnel = self.metal + self.metal_rise * response.schlick + response.dielectric;
+        fresnel * response.bounce + self.base * response.base * response.cos
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) struct Glow {
 pub(crate) struct AreaEmitter {
     pub(crate) light: LightIndex,
     glow: Glow,
+    /// None for a light of a stage.
     surfaces: Vec<SurfaceIndex>,
     /// For each of `surfaces` the number of triangles before it.
     starts: Vec<usize>,
@@ -35,6 +36,9 @@ pub(crate) struct AreaEmitter {
     records: Vec<TriangleRecord>,
     outline: Outline,
 }
+
+/// The surface that places on lights of a stage name: none of the scene's.
+const STAGE: SurfaceIndex = SurfaceIndex(usize::MAX);
 
 /// Enough of an emitter to say roughly how much of the view it takes up.
 #[derive(Clone, Copy, Debug)]
@@ -124,8 +128,23 @@ impl AreaEmitter {
         scene_size: f32,
     ) -> Self {
         let meshes: Vec<&TriangleMesh> = surfaces.iter().map(|surface| &scene.surfaces[surface.0].mesh).collect();
+        Self::of_meshes(&meshes, light, glow, surfaces, scene_size)
+    }
+
+    /// A light of a stage, which is no surface of the scene.
+    pub(crate) fn on_stage(light: LightIndex, glow: Glow, mesh: &TriangleMesh, scene_size: f32) -> Self {
+        Self::of_meshes(&[mesh], light, glow, Vec::new(), scene_size)
+    }
+
+    fn of_meshes(
+        meshes: &[&TriangleMesh],
+        light: LightIndex,
+        glow: Glow,
+        surfaces: Vec<SurfaceIndex>,
+        scene_size: f32,
+    ) -> Self {
         let mut starts = vec![0];
-        for mesh in &meshes {
+        for mesh in meshes {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
         let areas = meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| area(mesh, t)));
@@ -133,7 +152,7 @@ impl AreaEmitter {
             .iter()
             .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| TriangleRecord::new(mesh, TriangleIndex(t), scene_size)))
             .collect();
-        let (centre, radius2) = bounding_sphere(&meshes);
+        let (centre, radius2) = bounding_sphere(meshes);
         let triangles = Distribution::new(areas);
         let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !glow.two_sided));
         Self {
@@ -163,7 +182,13 @@ impl AreaEmitter {
         let (triangle, _) = self.triangles.sample(choice);
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
         let index = TriangleIndex(triangle - self.starts[which]);
-        SurfaceHit::new(self.surfaces[which], index, &self.records[triangle], warp::triangle(u))
+        let surface = self.surfaces.get(which).copied().unwrap_or(STAGE);
+        SurfaceHit::new(surface, index, &self.records[triangle], warp::triangle(u))
+    }
+
+    /// Whether it is a light of a stage, which is no surface of the scene.
+    pub(crate) fn is_on_stage(&self) -> bool {
+        self.surfaces.is_empty()
     }
 
     /// Whether the side of `hit` towards `direction` glows.

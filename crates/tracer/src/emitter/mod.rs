@@ -11,6 +11,7 @@ mod radiance_map;
 
 use glam::Vec3;
 use mateval_image::Texture;
+use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 
 use crate::error::TracerError;
@@ -58,6 +59,18 @@ pub struct EmitterSample {
     pub density: f32,
     /// The place on the emitter; none for one far outside.
     pub place: Option<SurfaceHit>,
+    /// Whether it is a light of a stage, which no ray meets.
+    pub on_stage: bool,
+}
+
+/// A light that is added to a scene to light it as a photo is lit: it never hides anything, and neither the camera nor
+/// facets below [`crate::bsdf::STAGE_ROUGHNESS`] see it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageLight {
+    /// World space, metres; glows on its front.
+    pub mesh: TriangleMesh,
+    /// Linear Rec. 709.
+    pub radiance: [f32; 3],
 }
 
 /// Radiance found without sampling, by a ray that happened to go there.
@@ -99,6 +112,35 @@ impl Emitters {
         }
         emitters.outlines = Outlines::new(&emitters.areas);
         Ok(emitters)
+    }
+
+    /// The lights of a stage, a group each, and none else, in a scene of `surfaces` surfaces.
+    pub(crate) fn on_stage(stage: &[StageLight], surfaces: usize, scene_size: f32) -> Result<Self, TracerError> {
+        let mut emitters = Self {
+            areas: Vec::new(),
+            outlines: Outlines::default(),
+            area_of: vec![None; surfaces],
+            distant: Vec::new(),
+            camera_visible: vec![false; stage.len()],
+            scene_size,
+        };
+        for (index, light) in stage.iter().enumerate() {
+            let fault = |what: String| TracerError::Invalid(format!("stage light {index}: {what}"));
+            check_radiance(&light.radiance).map_err(fault)?;
+            let finite = light.mesh.positions.iter().all(|place| place.is_finite());
+            if light.mesh.triangles.is_empty() || !finite {
+                return Err(fault("no triangles, or corners that are not finite".to_owned()));
+            }
+            let glow = Glow { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
+            emitters.areas.push(AreaEmitter::on_stage(LightIndex(index), glow, &light.mesh, scene_size));
+        }
+        emitters.outlines = Outlines::new(&emitters.areas);
+        Ok(emitters)
+    }
+
+    /// How many light groups there are.
+    pub fn groups(&self) -> usize {
+        self.camera_visible.len()
     }
 
     fn add(
@@ -194,8 +236,10 @@ impl Emitters {
         if !area.glows(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;
         }
-        let radiance = area.radiance(&place) * opacity(&place).clamp(0.0, 1.0);
-        Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place) })
+        let on_stage = area.is_on_stage();
+        let cover = if on_stage { 1.0 } else { opacity(&place).clamp(0.0, 1.0) };
+        let radiance = area.radiance(&place) * cover;
+        Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place), on_stage })
     }
 
     fn sample_distant(&self, choice: f32, u: [f32; 2], share: f32) -> Option<EmitterSample> {
@@ -212,6 +256,7 @@ impl Emitters {
             radiance: emitter.radiance(direction),
             density,
             place: None,
+            on_stage: false,
         })
     }
 

@@ -10,17 +10,21 @@ mod cell_points;
 mod plane;
 mod splat;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_image::Picture;
 use mateval_scene::Camera;
+use mateval_scene::reference::LightIndex;
 
 use crate::error::TracerError;
 use crate::light_basis::{LightBasis, LightGroups};
-use crate::path::PathCounts;
+use crate::path::{Painted, PathCounts};
 use crate::render::{self, RenderSettings, RenderStats};
+use crate::repaint::Repaint;
 use crate::world::World;
 use plane::Plane;
+use splat::Subject;
 
 /// Views of one world.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,22 +68,142 @@ pub fn render_views(
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
-    render::check(settings)?;
-    check(world, groups, seeds)?;
-    let planes = planes(cameras, settings.samples);
-    let total = seeds.len() * planes.iter().map(|plane| plane.tiles().len()).sum::<usize>();
-    let finished = AtomicUsize::new(0);
-    let done = || progress(finished.fetch_add(1, Ordering::Relaxed) + 1, total);
-    let mut views = vec![ViewLight { halves: Vec::with_capacity(seeds.len()) }; cameras.len()];
-    let mut counts = Vec::new();
-    for &seed in seeds {
-        let settings = RenderSettings { seed, ..*settings };
-        let halves = planes.iter().flat_map(|plane| splat::expose(world, plane, groups, &settings, &mut counts, &done));
-        for (view, half) in views.iter_mut().zip(halves) {
-            view.halves.push(half);
+    let lighting = Lighting { groups, weights: None };
+    let order = Order { subject: Subject { world, painted: None, lighting }, cameras, settings, seeds };
+    let planes = order.planes()?;
+    let bar = Bar { finished: AtomicUsize::new(0), total: order.tiles(&planes), progress };
+    let [render] = order.render(&planes, &bar);
+    Ok(render)
+}
+
+/// By what light views are made.
+#[derive(Clone, Copy, Debug)]
+pub struct Lighting<'a> {
+    /// Which lights share a picture.
+    pub groups: &'a LightGroups,
+    /// For each prediction and each light what its radiance is multiplied by, a channel, not negative; none: the scene's own
+    /// radiances for all.
+    pub weights: Option<&'a [Vec<[f64; 3]>]>,
+}
+
+impl Lighting<'_> {
+    /// For predictions beyond the last one the last one's.
+    fn weight(&self, prediction: usize, light: LightIndex) -> [f64; 3] {
+        self.weights.map_or([1.0; 3], |weights| weights[prediction.min(weights.len() - 1)][light.0])
+    }
+}
+
+/// [`render_views`] with predictions in place of the world's own materials; one a prediction of the range `which`.
+///
+/// Up to eight predictions are followed by the same paths. Each gets the same bytes as it gets alone. Fails also where
+/// `which` names predictions that `repaint` does not hold, or weights do not fit predictions and lights.
+#[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
+pub fn render_repainted(
+    world: &World,
+    repaint: &Repaint,
+    which: Range<usize>,
+    cameras: &[Camera],
+    lighting: Lighting<'_>,
+    settings: &RenderSettings,
+    seeds: &[u64],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<ViewsRender>, TracerError> {
+    check_predictions(world, repaint, &which, &lighting)?;
+    let subject = |first| Subject { world, painted: Some(Painted { repaint, first }), lighting };
+    let order = |first| Order { subject: subject(first), cameras, settings, seeds };
+    let planes = order(0).planes()?;
+    let rounds = rounds(which);
+    let total = order(0).tiles(&planes) * rounds.len();
+    let bar = Bar { finished: AtomicUsize::new(0), total, progress };
+    let mut renders = Vec::new();
+    for round in rounds {
+        let order = order(round.start);
+        match round.len() {
+            1 => renders.extend(order.render::<1>(&planes, &bar)),
+            2 => renders.extend(order.render::<2>(&planes, &bar)),
+            3 | 4 => renders.extend(order.render::<4>(&planes, &bar).into_iter().take(round.len())),
+            _ => renders.extend(order.render::<8>(&planes, &bar).into_iter().take(round.len())),
         }
     }
-    Ok(ViewsRender { views, passes: planes.len(), stats: stats(&counts) })
+    Ok(renders)
+}
+
+/// Predictions that the same paths are followed for.
+const TOGETHER: usize = 8;
+
+fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
+    let end = which.end;
+    which.step_by(TOGETHER).map(|start| start..end.min(start + TOGETHER)).collect()
+}
+
+fn check_predictions(
+    world: &World,
+    repaint: &Repaint,
+    which: &Range<usize>,
+    lighting: &Lighting<'_>,
+) -> Result<(), TracerError> {
+    let predictions = repaint.predictions();
+    if repaint.surfaces() != world.scene().surfaces.len() {
+        return Err(TracerError::Invalid("the predictions were made for another world".into()));
+    }
+    if which.end > predictions {
+        return Err(TracerError::Invalid(format!("predictions {which:?} of {predictions}")));
+    }
+    let lights = world.emitters().groups();
+    let Some(weights) = lighting.weights else { return Ok(()) };
+    let fit = weights.len() == predictions && weights.iter().all(|weights| weights.len() == lights);
+    let sound = weights.iter().flatten().flatten().all(|weight| weight.is_finite() && *weight >= 0.0);
+    if fit && sound {
+        return Ok(());
+    }
+    let what = format!("weights that do not fit {predictions} predictions and {lights} lights, or are negative");
+    Err(TracerError::Invalid(what))
+}
+
+/// Pictures to be made.
+struct Order<'a> {
+    subject: Subject<'a>,
+    cameras: &'a [Camera],
+    settings: &'a RenderSettings,
+    seeds: &'a [u64],
+}
+
+/// How far all tiles are.
+struct Bar<'a> {
+    finished: AtomicUsize,
+    total: usize,
+    progress: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+impl Order<'_> {
+    fn planes(&self) -> Result<Vec<Plane>, TracerError> {
+        render::check(self.settings)?;
+        check(self.subject.world, self.subject.lighting.groups, self.seeds)?;
+        Ok(planes(self.cameras, self.settings.samples))
+    }
+
+    fn tiles(&self, planes: &[Plane]) -> usize {
+        self.seeds.len() * planes.iter().map(|plane| plane.tiles().len()).sum::<usize>()
+    }
+
+    fn render<const K: usize>(&self, planes: &[Plane], bar: &Bar<'_>) -> [ViewsRender; K] {
+        let done = || (bar.progress)(bar.finished.fetch_add(1, Ordering::Relaxed) + 1, bar.total);
+        let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
+        let mut views: [Vec<ViewLight>; K] = std::array::from_fn(|_| vec![blank.clone(); self.cameras.len()]);
+        let mut counts = Vec::new();
+        for &seed in self.seeds {
+            let settings = RenderSettings { seed, ..*self.settings };
+            let halves =
+                planes.iter().flat_map(|plane| splat::expose::<K>(self.subject, plane, &settings, &mut counts, &done));
+            for (view, halves) in halves.enumerate() {
+                for (views, half) in views.iter_mut().zip(halves) {
+                    views[view].halves.push(half);
+                }
+            }
+        }
+        let stats = stats(&counts);
+        views.map(|views| ViewsRender { views, passes: planes.len(), stats })
+    }
 }
 
 /// Whether views from these cameras can come from one set of paths: all stand in one place, to the rounding of rays'
@@ -97,7 +221,7 @@ fn planes(cameras: &[Camera], samples: u32) -> Vec<Plane> {
 }
 
 fn check(world: &World, groups: &LightGroups, seeds: &[u64]) -> Result<(), TracerError> {
-    let lights = world.scene().lights.len();
+    let lights = world.emitters().groups();
     if groups.lights() != lights {
         let found = groups.lights();
         return Err(TracerError::Invalid(format!("groups of {found} lights for a scene of {lights}")));

@@ -1,13 +1,17 @@
 //! Paths of a plane, put into every view that sees their direction.
 
+use std::array::from_fn;
+
+use glam::Vec3;
 use mateval_image::Picture;
+use mateval_scene::reference::LightIndex;
 use rayon::prelude::*;
 
-use super::HalfLight;
 use super::cell_points::{Numbering, cell_points};
 use super::plane::{Plane, Window};
-use crate::light_basis::{LightBasis, LightGroups};
-use crate::path::{PathCounts, PathTracer};
+use super::{HalfLight, Lighting};
+use crate::light_basis::LightBasis;
+use crate::path::{Painted, PathCounts, PathTracer};
 use crate::ray::Ray;
 use crate::render::RenderSettings;
 use crate::sampler::Sampler;
@@ -23,20 +27,27 @@ pub(super) struct TileCounts {
 /// Tiles in the making, for each thread: more leave threads less idle at the end of a batch and take more memory.
 const TILES_A_THREAD: usize = 4;
 
-/// All views of `plane` with the seed of `settings`. What happened in each tile is added to `counts`.
-pub(super) fn expose(
-    world: &World,
+/// What is exposed: a world, with `K` predictions in place of its materials or with none.
+#[derive(Clone, Copy)]
+pub(super) struct Subject<'a> {
+    pub(super) world: &'a World,
+    pub(super) painted: Option<Painted<'a>>,
+    pub(super) lighting: Lighting<'a>,
+}
+
+/// All views of `plane` with the seed of `settings`, by prediction. What happened in each tile is added to `counts`.
+pub(super) fn expose<const K: usize>(
+    subject: Subject<'_>,
     plane: &Plane,
-    groups: &LightGroups,
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
     done: &(impl Fn() + Sync),
-) -> Vec<HalfLight> {
-    let exposure = Exposure { world, plane, groups, settings, numbering: Numbering::new(plane.most_paths()) };
-    let mut films = exposure.blank_films();
+) -> Vec<[HalfLight; K]> {
+    let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
+    let mut films = exposure.blank_films::<K>();
     // Tiles are merged in their order whichever is done first; batches bound how many wait.
     for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
-        let exposed: Vec<ExposedTile> = batch
+        let exposed: Vec<ExposedTile<K>> = batch
             .par_iter()
             .map(|tile| {
                 let exposed = exposure.tile(tile);
@@ -55,23 +66,22 @@ pub(super) fn expose(
 }
 
 struct Exposure<'a> {
-    world: &'a World,
+    subject: Subject<'a>,
     plane: &'a Plane,
-    groups: &'a LightGroups,
     settings: &'a RenderSettings,
     numbering: Numbering,
 }
 
 /// A tile's share of every view that sees any of it.
-struct ExposedTile {
-    parts: Vec<Option<Part>>,
+struct ExposedTile<const K: usize> {
+    parts: Vec<Option<Part<K>>>,
     counts: TileCounts,
 }
 
-/// A piece of one view: sums of all groups, pixel by pixel.
-struct Part {
+/// A piece of one view: sums of all groups, pixel by pixel, by prediction.
+struct Part<const K: usize> {
     window: Window,
-    sums: Vec<[f64; 3]>,
+    sums: Vec<[[f64; 3]; K]>,
     counts: Vec<u32>,
 }
 
@@ -88,41 +98,45 @@ struct PlanePath {
     count: usize,
 }
 
-/// What a path has got from one light.
-struct Share {
+/// What a path has got from one light, by prediction.
+struct Share<const K: usize> {
     path: usize,
-    group: usize,
-    value: [f32; 3],
+    light: LightIndex,
+    values: [Vec3; K],
 }
 
 /// Where a tile's paths wait, are followed and put into views.
-struct Darkroom<'a> {
+struct Darkroom<'a, const K: usize> {
     exposure: &'a Exposure<'a>,
-    tracer: PathTracer<'a>,
+    tracer: PathTracer<'a, K>,
     paths: Vec<PlanePath>,
-    shares: Vec<Share>,
-    found: Found,
+    shares: Vec<Share<K>>,
+    found: Found<K>,
 }
 
-/// What one path found, by group.
-struct Found {
-    sums: Vec<[f64; 3]>,
+/// What one path found, by group and prediction.
+struct Found<const K: usize> {
+    sums: Vec<[[f64; 3]; K]>,
     /// The groups that have got something, in the order of their first.
     touched: Vec<usize>,
 }
 
 impl Exposure<'_> {
-    fn blank_films(&self) -> Vec<HalfLight> {
+    fn groups(&self) -> usize {
+        self.subject.lighting.groups.groups().len()
+    }
+
+    fn blank_films<const K: usize>(&self) -> Vec<[HalfLight; K]> {
         let blank = |(width, height): (usize, usize)| HalfLight {
-            basis: LightBasis::black(width, height, self.groups.groups().len()),
+            basis: LightBasis::black(width, height, self.groups()),
             counts: Picture::filled(width, height, 0),
         };
         let size = |view: &super::plane::PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
-        self.plane.views().iter().map(size).map(blank).collect()
+        self.plane.views().iter().map(size).map(|size| from_fn(|_| blank(size))).collect()
     }
 
-    fn tile(&self, tile: &Window) -> ExposedTile {
-        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.groups.groups().len()));
+    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K> {
+        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.groups()));
         let parts = (0..self.plane.views().len()).map(part).collect();
         let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
         let mut darkroom = Darkroom::new(self);
@@ -149,7 +163,7 @@ impl Exposure<'_> {
     }
 
     /// Adds what a path found to the views that see it.
-    fn splat(&self, path: &PlanePath, found: &Found, parts: &mut [Option<Part>]) {
+    fn splat<const K: usize>(&self, path: &PlanePath, found: &Found<K>, parts: &mut [Option<Part<K>>]) {
         let at = self.plane.ray_place(path.cell, path.point);
         for (view, part) in self.plane.views().iter().zip(parts) {
             let Some(part) = part else { continue };
@@ -161,32 +175,32 @@ impl Exposure<'_> {
     }
 }
 
-impl<'a> Darkroom<'a> {
+impl<'a, const K: usize> Darkroom<'a, K> {
     fn new(exposure: &'a Exposure<'a>) -> Self {
-        let groups = exposure.groups.groups().len();
+        let Subject { world, painted, .. } = exposure.subject;
         Self {
             exposure,
-            tracer: PathTracer::new(exposure.world, exposure.settings),
+            tracer: PathTracer::new(world, painted, exposure.settings),
             paths: Vec::new(),
             shares: Vec::new(),
-            found: Found { sums: vec![[0.0; 3]; groups], touched: Vec::new() },
+            found: Found { sums: vec![[[0.0; 3]; K]; exposure.groups()], touched: Vec::new() },
         }
     }
 
     /// Follows the paths that wait and puts what they find into the tile's views, path by path.
-    fn develop(&mut self, exposed: &mut ExposedTile) {
+    fn develop(&mut self, exposed: &mut ExposedTile<K>) {
         let Self { exposure, tracer, paths, shares, found } = self;
         let starts = paths.iter().map(|path| exposure.start(path));
-        tracer.trace(starts, |path, light, value| {
-            shares.push(Share { path, group: exposure.groups.of(light), value: value.to_array() });
-        });
+        tracer.trace(starts, |path, light, values| shares.push(Share { path, light, values }));
+        let lighting = &exposure.subject.lighting;
+        let first = exposure.subject.painted.map_or(0, |painted| painted.first);
         // Paths were followed side by side; each one's own shares stay in their order.
         shares.sort_by_key(|share| share.path);
         let mut rest = shares.as_slice();
         for (which, path) in paths.iter().enumerate() {
             let (own, others) = rest.split_at(rest.partition_point(|share| share.path == which));
             rest = others;
-            own.iter().for_each(|share| found.add(share.group, share.value));
+            own.iter().for_each(|share| found.add(lighting, first, share));
             exposure.splat(path, found, &mut exposed.parts);
             found.clear();
         }
@@ -196,25 +210,30 @@ impl<'a> Darkroom<'a> {
     }
 }
 
-impl Found {
-    fn add(&mut self, group: usize, value: [f32; 3]) {
+impl<const K: usize> Found<K> {
+    fn add(&mut self, lighting: &Lighting<'_>, first: usize, share: &Share<K>) {
+        let group = lighting.groups.of(share.light);
         if !self.touched.contains(&group) {
             self.touched.push(group);
         }
-        add(&mut self.sums[group], value.map(f64::from), 1.0);
+        for (k, (sum, value)) in self.sums[group].iter_mut().zip(share.values).enumerate() {
+            let value = value.to_array().map(f64::from);
+            let weight = lighting.weight(first + k, share.light);
+            add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
+        }
     }
 
     fn clear(&mut self) {
         for group in self.touched.drain(..) {
-            self.sums[group] = [0.0; 3];
+            self.sums[group] = [[0.0; 3]; K];
         }
     }
 }
 
-impl Part {
+impl<const K: usize> Part<K> {
     fn new(window: Window, groups: usize) -> Self {
         let area = window.area();
-        Self { window, sums: vec![[0.0; 3]; area * groups], counts: vec![0; area] }
+        Self { window, sums: vec![[[0.0; 3]; K]; area * groups], counts: vec![0; area] }
     }
 
     /// The place in the piece of the pixel that holds (x, y); none outside.
@@ -226,25 +245,28 @@ impl Part {
             .then(|| (y as i32 - rows.start) as usize * self.window.width() + (x as i32 - columns.start) as usize)
     }
 
-    fn add(&mut self, pixel: usize, found: &Found, weight: f64) {
+    fn add(&mut self, pixel: usize, found: &Found<K>, weight: f64) {
         self.counts[pixel] += 1;
         let first = pixel * found.sums.len();
         for &group in &found.touched {
-            add(&mut self.sums[first + group], found.sums[group], weight);
+            let pairs = self.sums[first + group].iter_mut().zip(found.sums[group]);
+            pairs.for_each(|(sum, value)| add(sum, value, weight));
         }
     }
 
     /// Adds the piece to its view. A pixel gets few pieces, always in the order of the tiles.
-    fn merge_into(self, film: &mut HalfLight) {
-        let groups = film.basis.pictures().len();
-        for (place, [x, y]) in self.window.cells().enumerate() {
-            let (x, y) = (x as usize, y as usize);
-            film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
-            for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
-                let mut pixel = picture.get(x, y);
-                let sum = self.sums[place * groups + group];
-                pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
-                picture.set(x, y, pixel);
+    fn merge_into(&self, films: &mut [HalfLight; K]) {
+        for (k, film) in films.iter_mut().enumerate() {
+            let groups = film.basis.pictures().len();
+            for (place, [x, y]) in self.window.cells().enumerate() {
+                let (x, y) = (x as usize, y as usize);
+                film.counts.set(x, y, film.counts.get(x, y) + self.counts[place]);
+                for (group, picture) in film.basis.pictures_mut().iter_mut().enumerate() {
+                    let mut pixel = picture.get(x, y);
+                    let sum = self.sums[place * groups + group][k];
+                    pixel.0.iter_mut().zip(sum).for_each(|(pixel, sum)| *pixel += sum as f32);
+                    picture.set(x, y, pixel);
+                }
             }
         }
     }

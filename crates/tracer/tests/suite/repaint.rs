@@ -1,0 +1,213 @@
+//! Predictions in place of a world's own materials, and the lights of a stage.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use mateval_image::{Texels, Texture, Wrap};
+use mateval_scene::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
+use mateval_scene::reference::{Emission, ReferenceScene};
+use mateval_scene::{Camera, TriangleMesh};
+use mateval_tracer::{Coat, LightGroups, Lighting, Render, RenderSettings, Repaint, StageLight, World};
+use mateval_tracer::{ViewsRender, render, render_repainted, render_views};
+
+use super::light_basis::{lit_room, view};
+use super::scenes::{Builder, camera, grey, material, quad};
+
+const COLORS: [[f32; 3]; 3] = [[0.6, 0.5, 0.4], [0.0, 0.9, 0.1], [1.0, 1.0, 1.0]];
+
+fn flat(value: [f32; 3]) -> Texture {
+    Texture::new(1, 1, Texels::Linear(vec![value]), Wrap::Clamp).unwrap()
+}
+
+/// One coat of these colours on all walls and lamps; the metal ball keeps its own material.
+fn coats(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<Coat>> {
+    let coat = |mesh: &TriangleMesh| {
+        mesh.uvs.as_ref().map(|_| Coat {
+            base_colors: colors.iter().map(|color| flat(*color)).collect(),
+            roughness: flat([roughness; 3]),
+            metallic: flat([metallic; 3]),
+        })
+    };
+    scene.surfaces.iter().map(|surface| coat(&surface.mesh)).collect()
+}
+
+fn atlases(scene: &ReferenceScene) -> Vec<TriangleMesh> {
+    scene.surfaces.iter().map(|surface| surface.mesh.clone()).collect()
+}
+
+/// The room of the light basis; where its meshes have uv, of the prediction's own material.
+fn principled_room(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> ReferenceScene {
+    let mut scene = lit_room([[1.0; 3]; 4]);
+    for surface in scene.surfaces.iter().filter(|surface| surface.mesh.uvs.is_some()) {
+        scene.materials[surface.material.0] = material(MaterialModel::Principled {
+            base_color: ColorInput::Constant(color),
+            roughness: ScalarInput::Constant(roughness),
+            metallic: ScalarInput::Constant(metallic),
+            specular: 0.5,
+            flavour,
+        });
+    }
+    scene
+}
+
+fn repainted(world: &World, repaint: &Repaint, which: std::ops::Range<usize>) -> Vec<ViewsRender> {
+    let groups = LightGroups::apart(world.emitters().groups());
+    let lighting = Lighting { groups: &groups, weights: None };
+    let settings = RenderSettings { samples: 4, ..Default::default() };
+    render_repainted(world, repaint, which, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap()
+}
+
+/// Painting a room is the same as building it of that material, bit for bit; so is following a prediction beside others.
+#[test]
+fn paint_is_the_material_itself_and_company_changes_nothing() {
+    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
+    let world = World::new(scene.clone()).unwrap();
+    for (flavour, roughness, metallic) in
+        [(PrincipledFlavour::Blender, 0.4, 0.5), (PrincipledFlavour::Mitsuba, 0.7, 0.0)]
+    {
+        let repaint = Repaint::new(&world, &atlases(&scene), coats(&scene, &COLORS, roughness, metallic), flavour);
+        let repaint = repaint.unwrap();
+        let together = repainted(&world, &repaint, 0..3);
+        for (index, color) in COLORS.into_iter().enumerate() {
+            let built = World::new(Arc::new(principled_room(color, roughness, metallic, flavour))).unwrap();
+            let settings = RenderSettings { samples: 4, ..Default::default() };
+            let groups = LightGroups::apart(4);
+            let own = render_views(&built, &[view(24)], &groups, &settings, &[3, 4], &|_, _| ()).unwrap();
+            assert_eq!(together[index].views, own.views, "{flavour:?} {color:?}");
+            assert_eq!(together[index].views, repainted(&world, &repaint, index..index + 1)[0].views);
+        }
+        assert_ne!(together[0].views, together[1].views, "the twin passes");
+    }
+}
+
+/// Weights of one group are the weighted basis.
+#[test]
+fn weights_are_those_of_the_basis() {
+    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
+    let world = World::new(scene.clone()).unwrap();
+    let coats = coats(&scene, &COLORS[..2], 0.5, 0.0);
+    let repaint = Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap();
+    let weights: Vec<Vec<[f64; 3]>> =
+        vec![vec![[0.5, 1.0, 2.0]; 4], vec![[0.0, 1.0, 0.0], [2.0; 3], [0.1; 3], [1.0, 0.0, 3.0]]];
+    let groups = LightGroups::together(4);
+    let lighting = Lighting { groups: &groups, weights: Some(&weights) };
+    let settings = RenderSettings { samples: 4, ..Default::default() };
+    let mixed =
+        render_repainted(&world, &repaint, 0..2, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap();
+    for (k, apart) in repainted(&world, &repaint, 0..2).iter().enumerate() {
+        let expected = apart.views[0].halves[1].basis.weighted(&weights[k]).unwrap();
+        let found = mixed[k].views[0].halves[1].basis.sum();
+        let pairs = expected.pixels().iter().zip(found.pixels());
+        for (a, b) in pairs.flat_map(|(a, b)| a.0.into_iter().zip(b.0)) {
+            assert!((a - b).abs() <= 1e-5 * a.max(0.1), "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
+    let world = World::new(scene.clone()).unwrap();
+    let new = |atlases: &[TriangleMesh], coats| {
+        Repaint::new(&world, atlases, coats, PrincipledFlavour::Blender).map(|_| ()).unwrap_err().to_string()
+    };
+    let atlases = atlases(&scene);
+    let good = coats(&scene, &COLORS, 0.5, 0.0);
+    assert!(new(&atlases[1..], good.clone()).contains("not of the world's triangles"));
+    let mut uneven = good.clone();
+    uneven[0].as_mut().unwrap().base_colors.pop();
+    assert!(new(&atlases, uneven).contains("2 base colours on one surface, 3 on another"));
+    let mut unmapped = atlases.clone();
+    unmapped[0].uvs = None;
+    assert!(new(&unmapped, good.clone()).contains("surface 0"));
+    let repaint = Repaint::new(&world, &atlases, good, PrincipledFlavour::Blender).unwrap();
+    let groups = LightGroups::together(4);
+    let fails = |which, weights: Option<&[Vec<[f64; 3]>]>| {
+        let lighting = Lighting { groups: &groups, weights };
+        let settings = RenderSettings::default();
+        render_repainted(&world, &repaint, which, &[view(8)], lighting, &settings, &[1], &|_, _| ()).is_err()
+    };
+    assert!(fails(0..4, None));
+    assert!(fails(0..1, Some(&[vec![[1.0; 3]; 4]])));
+    assert!(fails(0..1, Some(&vec![vec![[-1.0; 3]; 4]; 3])));
+}
+
+/// A square above a floor, seen from straight above through the square.
+fn floor_and_stage() -> (World, Vec<StageLight>, Camera) {
+    let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
+    let lamp = quad(Vec3::new(3.0, 3.0, 3.0), Vec3::X * 0.5, Vec3::Z * 0.5);
+    // The scene's own lamp must be dark on the stage.
+    let world = Builder::default().surface(floor, grey(0.5)).surface(lamp, grey(0.5)).glowing([100.0; 3]).world();
+    let mesh = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::X, Vec3::Z);
+    let stage = vec![StageLight { mesh, radiance: [2.0, 1.0, 0.0] }];
+    (world, stage, camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5))
+}
+
+fn seen(world: &World, camera: &Camera) -> [f64; 3] {
+    let settings = RenderSettings { samples: 256, ..Default::default() };
+    let Render { picture, .. } = render(world, camera, &settings, &|_, _| ()).unwrap();
+    let count = picture.pixels().len() as f64;
+    [0, 1, 2].map(|c| picture.pixels().iter().map(|pixel| f64::from(pixel.0[c])).sum::<f64>() / count)
+}
+
+/// The floor under the middle of a square of side 1 at height 1 gets E = 4 L F, F the form factor of a corner: Siegel and
+/// Howell, "Thermal Radiation Heat Transfer", configuration 11 (parallel rectangle over a corner), with a = b = 1/2.
+/// Neither the square itself, which is in the way, nor the scene's own lamp is seen.
+#[test]
+fn a_stage_lights_the_floor_and_hides_nothing() {
+    let (world, stage, camera) = floor_and_stage();
+    let half: f64 = 0.5;
+    let root = (1.0 + half * half).sqrt();
+    let corner = 2.0 * half / root * libm::atan(half / root) / (2.0 * std::f64::consts::PI);
+    let expected = 0.5 * 4.0 * corner;
+    let [red, green, blue] = seen(&world.on_stage(&stage).unwrap(), &camera);
+    assert!((red / (2.0 * expected) - 1.0).abs() < 3e-3, "{red} {expected}");
+    assert!((green / expected - 1.0).abs() < 3e-3 && blue == 0.0);
+    let own = seen(&world, &camera)[1];
+    assert!(own > 0.0 && (own / expected - 1.0).abs() > 0.1, "the twin passes: {own}");
+    let mut turned = stage;
+    turned[0].mesh = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::Z, Vec3::X);
+    // It glows on its front alone; the lamp's underside sends a trace of that back.
+    assert!(seen(&world.on_stage(&turned).unwrap(), &camera)[0] < 1e-5 * expected);
+}
+
+/// Smooth facets do not show a stage: a black floor of smooth plastic shows nothing of the square above it, a rough one
+/// does; and the same square as a surface of the scene is mirrored.
+#[test]
+fn smooth_facets_do_not_show_a_stage() {
+    let shine = |roughness: f32, staged: bool| {
+        let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
+        let model = MaterialModel::Principled {
+            base_color: ColorInput::Constant([0.0; 3]),
+            roughness: ScalarInput::Constant(roughness),
+            metallic: ScalarInput::Constant(0.0),
+            specular: 0.5,
+            flavour: PrincipledFlavour::Blender,
+        };
+        let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
+        let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
+        let builder = Builder::default().surface(floor, material(model));
+        if staged {
+            let stage = [StageLight { mesh: lamp, radiance: [1.0; 3] }];
+            seen(&builder.world().on_stage(&stage).unwrap(), &camera)[0]
+        } else {
+            seen(&builder.surface(lamp, grey(0.0)).glowing([1.0; 3]).world(), &camera)[0]
+        }
+    };
+    assert_eq!(shine(0.1, true), 0.0);
+    assert!((shine(0.1, false) - 0.04).abs() < 2e-3);
+    let (stage, scene) = (shine(0.4, true), shine(0.4, false));
+    assert!(scene > 0.01 && (stage / scene - 1.0).abs() < 0.02, "{stage} {scene}");
+}
+
+/// A stage needs lights that are there.
+#[test]
+fn unsound_stages_are_refused() {
+    let (world, stage, _) = floor_and_stage();
+    let fault = |light: StageLight| world.on_stage(&[light]).map(|_| ()).unwrap_err().to_string();
+    let empty = StageLight { mesh: TriangleMesh::default(), ..stage[0].clone() };
+    assert!(fault(empty).contains("stage light 0"));
+    assert!(fault(StageLight { radiance: [f32::NAN, 1.0, 1.0], ..stage[0].clone() }).contains("radiance"));
+    assert_eq!(world.on_stage(&[]).unwrap().emitters().groups(), 0);
+    assert!(matches!(world.scene().lights[0].emission, Emission::Area { .. }));
+}
