@@ -38,6 +38,6 @@ pub use ray::Ray;
 pub use render::{LightSampling, Render, RenderSettings, RenderStats, render};
 pub use repaint::{Coat, Repaint};
 pub use sampler::Sampler;
-pub use shared_centre::{HalfLight, Lighting, ViewLight, ViewsRender, render_repainted, render_views};
+pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_repainted, render_views};
 pub use surface_hit::SurfaceHit;
 pub use world::World;

@@ -204,7 +204,7 @@ impl BlenderScene<'_> {
             noise: RenderNoise::of([&a.rgb, &b.rgb], Some(&pictures.denoised.rgb)),
             approximations: result.approximations.clone(),
         };
-        let render = ViewRender { halves: [&a.rgb, &b.rgb], rgb: &pictures.denoised.rgb, passes: Some(pictures) };
+        let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };
         store::write(&folder.render(&renderer(), &view.id), &render, scene.exposure, &file)
     }
 

@@ -6,10 +6,11 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
-use mateval_tracer::{RenderSettings, RenderStats, World};
+use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
 use super::store::{self, ViewRender};
 use super::{BUILTIN, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
+use crate::blender::LightPictures;
 use crate::error::PrepError;
 
 pub(super) fn render_scenes(
@@ -45,31 +46,29 @@ fn render_scene(
             none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
         };
         let step = format!("{id} {}", view.id);
-        let half = |half: usize| {
-            let shown = |done: usize, all: usize| progress(&step, half * all + done, 2 * all);
-            let settings = RenderSettings {
-                samples: order.samples,
-                seed: seeds[half],
-                max_bounces: MAX_BOUNCES,
-                ..Default::default()
-            };
-            mateval_tracer::render(world, &view.camera, &settings, &shown)
-        };
-        let (a, b) = (half(0)?, half(1)?);
-        report.remarks.extend(remark(&step, &a.stats).into_iter().chain(remark(&step, &b.stats)));
+        let shown = |done: usize, all: usize| progress(&step, done, all);
+        let settings = RenderSettings { samples: order.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
+        let groups = LightGroups::apart(world.emitters().groups());
+        let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
+        let [a, b]: [LightPictures; 2] =
+            std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
+        report.remarks.extend(remark(&step, &render.stats));
         let file = RenderFile {
             renderer: BUILTIN.to_owned(),
             renderer_version: None,
             samples_each_half: order.samples,
             seeds: seed_texts(seeds),
             max_bounces: MAX_BOUNCES,
-            capped_throughput: Some((a.stats.capped_throughput + b.stats.capped_throughput) / 2.0),
+            capped_throughput: Some(render.stats.capped_throughput),
             denoiser: None,
-            noise: RenderNoise::of([&a.picture, &b.picture], None),
+            noise: RenderNoise::of([&a.rgb, &b.rgb], None),
             approximations: Vec::new(),
         };
-        let rgb = mean(&a.picture, &b.picture);
-        let render = ViewRender { halves: [&a.picture, &b.picture], rgb: &rgb, passes: None };
+        let shown = LightPictures {
+            rgb: mean(&a.rgb, &b.rgb),
+            groups: a.groups.iter().zip(&b.groups).map(|(a, b)| mean(a, b)).collect(),
+        };
+        let render = ViewRender { halves: [&a, &b], shown: &shown, passes: None };
         store::write(&folder.render(&renderer, &view.id), &render, scene.exposure, &file)?;
         report.rendered += 1;
     }
@@ -78,6 +77,10 @@ fn render_scene(
 
 fn remark(step: &str, stats: &RenderStats) -> Option<String> {
     (stats.not_finite > 0).then(|| format!("{step}: {} samples were not finite and left out: a bug", stats.not_finite))
+}
+
+fn light_pictures(basis: LightBasis) -> LightPictures {
+    LightPictures { rgb: basis.sum(), groups: basis.pictures().to_vec() }
 }
 
 /// The mean of two pictures of one size.

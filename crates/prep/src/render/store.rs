@@ -8,7 +8,7 @@ use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::{RendererId, ViewId, json};
 
 use super::RenderFile;
-use crate::blender::BlenderView;
+use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
 
 /// The file that says that a view's pictures are whole, and how they were made.
@@ -16,9 +16,9 @@ pub(super) const MARK: &str = "render.json";
 
 /// What is kept of a view.
 pub(super) struct ViewRender<'a> {
-    pub(super) halves: [&'a Picture<LinearRgb>; 2],
+    pub(super) halves: [&'a LightPictures; 2],
     /// What people see: denoised, or the halves' mean.
-    pub(super) rgb: &'a Picture<LinearRgb>,
+    pub(super) shown: &'a LightPictures,
     /// What else Blender gives.
     pub(super) passes: Option<&'a BlenderView>,
 }
@@ -34,10 +34,16 @@ pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: 
     let light = |name: &str, picture: &Picture<LinearRgb>| {
         exr_io::write_linear(&place.join(format!("{name}.exr")), picture, Precision::Float)
     };
-    light("rgb_a", render.halves[0])?;
-    light("rgb_b", render.halves[1])?;
-    light("rgb", render.rgb)?;
-    let exposed = render.rgb.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
+    let [a, b] = render.halves;
+    light("rgb_a", &a.rgb)?;
+    light("rgb_b", &b.rgb)?;
+    light("rgb", &render.shown.rgb)?;
+    for (at, ((a, b), shown)) in a.groups.iter().zip(&b.groups).zip(&render.shown.groups).enumerate() {
+        light(&format!("group_{at:02}_a"), a)?;
+        light(&format!("group_{at:02}_b"), b)?;
+        light(&format!("group_{at:02}"), shown)?;
+    }
+    let exposed = render.shown.rgb.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
     png_io::write_srgb(&place.join("rgb.png"), &exposed.to_srgb())?;
     if let Some(view) = render.passes {
         write_passes(place, view)?;
@@ -46,15 +52,7 @@ pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: 
 }
 
 fn write_passes(place: &Path, view: &BlenderView) -> Result<(), PrepError> {
-    let light =
-        |name: String, picture: &Picture<LinearRgb>| exr_io::write_linear(&place.join(name), picture, Precision::Float);
-    let [a, b] = &view.halves;
-    for (at, ((a, b), denoised)) in a.groups.iter().zip(&b.groups).zip(&view.denoised.groups).enumerate() {
-        light(format!("group_{at:02}_a.exr"), a)?;
-        light(format!("group_{at:02}_b.exr"), b)?;
-        light(format!("group_{at:02}.exr"), denoised)?;
-    }
-    light("base_color.exr".to_owned(), &view.base_color)?;
+    exr_io::write_linear(&place.join("base_color.exr"), &view.base_color, Precision::Float)?;
     exr_io::write_scalar(&place.join("depth.exr"), &view.depth, Precision::Float)?;
     exr_io::write_normal(&place.join("normal.exr"), &view.normal, Precision::Half)?;
     png_io::write_ids(&place.join("instance.png"), &view.instance)?;

@@ -15,7 +15,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_image::Picture;
 use mateval_scene::Camera;
-use mateval_scene::reference::LightIndex;
 
 use crate::error::TracerError;
 use crate::light_basis::{LightBasis, LightGroups};
@@ -68,7 +67,7 @@ pub fn render_views(
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
-    let lighting = Lighting { groups, weights: None };
+    let lighting = Lighting::Apart(groups);
     let order = Order { subject: Subject { world, painted: None, lighting }, cameras, settings, seeds };
     let planes = order.planes()?;
     let bar = Bar { finished: AtomicUsize::new(0), total: order.tiles(&planes), progress };
@@ -76,27 +75,52 @@ pub fn render_views(
     Ok(render)
 }
 
-/// By what light views are made.
+/// Which pictures are made of a view's light.
 #[derive(Clone, Copy, Debug)]
-pub struct Lighting<'a> {
-    /// Which lights share a picture.
-    pub groups: &'a LightGroups,
-    /// For each prediction and each light what its radiance is multiplied by, a channel, not negative; none: the scene's own
-    /// radiances for all.
-    pub weights: Option<&'a [Vec<[f64; 3]>]>,
+pub enum Lighting<'a> {
+    /// One a group of lights, of the scene's own radiances.
+    Apart(&'a LightGroups),
+    /// For each prediction the same number of mixes, a picture each.
+    Mixed(&'a [Vec<LightMix>]),
 }
 
+/// For each light what its radiance is multiplied by, a channel, not negative.
+pub type LightMix = Vec<[f64; 3]>;
+
 impl Lighting<'_> {
-    /// For predictions beyond the last one the last one's.
-    fn weight(&self, prediction: usize, light: LightIndex) -> [f64; 3] {
-        self.weights.map_or([1.0; 3], |weights| weights[prediction.min(weights.len() - 1)][light.0])
+    /// How many pictures there are of a view.
+    fn pictures(&self) -> usize {
+        match self {
+            Self::Apart(groups) => groups.groups().len(),
+            Self::Mixed(mixes) => mixes.first().map_or(0, Vec::len),
+        }
+    }
+
+    /// Fails where the lights are not `lights`, predictions not `predictions`, or weights make no sense.
+    fn check(&self, lights: usize, predictions: usize) -> Result<(), TracerError> {
+        let mixes = match self {
+            Self::Apart(groups) if groups.lights() == lights => return Ok(()),
+            Self::Apart(groups) => {
+                let found = groups.lights();
+                return Err(TracerError::Invalid(format!("groups of {found} lights for a scene of {lights}")));
+            }
+            Self::Mixed(mixes) => *mixes,
+        };
+        let fit = mixes.len() == predictions
+            && mixes.iter().all(|of| of.len() == self.pictures() && of.iter().all(|mix| mix.len() == lights));
+        let weights = mixes.iter().flatten().flatten().flatten();
+        if fit && { weights }.all(|weight| weight.is_finite() && *weight >= 0.0) {
+            return Ok(());
+        }
+        let what = format!("mixes that do not fit {predictions} predictions and {lights} lights, or are negative");
+        Err(TracerError::Invalid(what))
     }
 }
 
 /// [`render_views`] with predictions in place of the world's own materials; one a prediction of the range `which`.
 ///
 /// Up to eight predictions are followed by the same paths. Each gets the same bytes as it gets alone. Fails also where
-/// `which` names predictions that `repaint` does not hold, or weights do not fit predictions and lights.
+/// `which` names predictions that `repaint` does not hold, or mixes do not fit predictions and lights.
 #[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
 pub fn render_repainted(
     world: &World,
@@ -108,7 +132,7 @@ pub fn render_repainted(
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ViewsRender>, TracerError> {
-    check_predictions(world, repaint, &which, &lighting)?;
+    check_predictions(world, repaint, &which)?;
     let subject = |first| Subject { world, painted: Some(Painted { repaint, first }), lighting };
     let order = |first| Order { subject: subject(first), cameras, settings, seeds };
     let planes = order(0).planes()?;
@@ -136,12 +160,7 @@ fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
     which.step_by(TOGETHER).map(|start| start..end.min(start + TOGETHER)).collect()
 }
 
-fn check_predictions(
-    world: &World,
-    repaint: &Repaint,
-    which: &Range<usize>,
-    lighting: &Lighting<'_>,
-) -> Result<(), TracerError> {
+fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), TracerError> {
     let predictions = repaint.predictions();
     if repaint.surfaces() != world.scene().surfaces.len() {
         return Err(TracerError::Invalid("the predictions were made for another world".into()));
@@ -149,15 +168,7 @@ fn check_predictions(
     if which.end > predictions {
         return Err(TracerError::Invalid(format!("predictions {which:?} of {predictions}")));
     }
-    let lights = world.emitters().groups();
-    let Some(weights) = lighting.weights else { return Ok(()) };
-    let fit = weights.len() == predictions && weights.iter().all(|weights| weights.len() == lights);
-    let sound = weights.iter().flatten().flatten().all(|weight| weight.is_finite() && *weight >= 0.0);
-    if fit && sound {
-        return Ok(());
-    }
-    let what = format!("weights that do not fit {predictions} predictions and {lights} lights, or are negative");
-    Err(TracerError::Invalid(what))
+    Ok(())
 }
 
 /// Pictures to be made.
@@ -178,7 +189,10 @@ struct Bar<'a> {
 impl Order<'_> {
     fn planes(&self) -> Result<Vec<Plane>, TracerError> {
         render::check(self.settings)?;
-        check(self.subject.world, self.subject.lighting.groups, self.seeds)?;
+        let Subject { world, painted, lighting } = &self.subject;
+        let predictions = painted.map_or(1, |painted| painted.repaint.predictions());
+        lighting.check(world.emitters().groups(), predictions)?;
+        check(self.seeds)?;
         Ok(planes(self.cameras, self.settings.samples))
     }
 
@@ -220,12 +234,7 @@ fn planes(cameras: &[Camera], samples: u32) -> Vec<Plane> {
     }
 }
 
-fn check(world: &World, groups: &LightGroups, seeds: &[u64]) -> Result<(), TracerError> {
-    let lights = world.emitters().groups();
-    if groups.lights() != lights {
-        let found = groups.lights();
-        return Err(TracerError::Invalid(format!("groups of {found} lights for a scene of {lights}")));
-    }
+fn check(seeds: &[u64]) -> Result<(), TracerError> {
     let twice = seeds.iter().enumerate().find(|(place, seed)| seeds[..*place].contains(seed));
     match twice {
         Some((_, seed)) => Err(TracerError::Invalid(format!("seed {seed} occurs twice, expected one a half"))),

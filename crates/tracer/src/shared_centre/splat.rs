@@ -78,7 +78,7 @@ struct ExposedTile<const K: usize> {
     counts: TileCounts,
 }
 
-/// A piece of one view: sums of all groups, pixel by pixel, by prediction.
+/// A piece of one view: sums of all its pictures, pixel by pixel, by prediction.
 struct Part<const K: usize> {
     window: Window,
     sums: Vec<[[f64; 3]; K]>,
@@ -114,21 +114,21 @@ struct Darkroom<'a, const K: usize> {
     found: Found<K>,
 }
 
-/// What one path found, by group and prediction.
+/// What one path found, by picture and prediction.
 struct Found<const K: usize> {
     sums: Vec<[[f64; 3]; K]>,
-    /// The groups that have got something, in the order of their first.
+    /// The pictures that have got something, in the order of their first.
     touched: Vec<usize>,
 }
 
 impl Exposure<'_> {
-    fn groups(&self) -> usize {
-        self.subject.lighting.groups.groups().len()
+    fn pictures(&self) -> usize {
+        self.subject.lighting.pictures()
     }
 
     fn blank_films<const K: usize>(&self) -> Vec<[HalfLight; K]> {
         let blank = |(width, height): (usize, usize)| HalfLight {
-            basis: LightBasis::black(width, height, self.groups()),
+            basis: LightBasis::black(width, height, self.pictures()),
             counts: Picture::filled(width, height, 0),
         };
         let size = |view: &super::plane::PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
@@ -136,7 +136,7 @@ impl Exposure<'_> {
     }
 
     fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K> {
-        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.groups()));
+        let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
         let parts = (0..self.plane.views().len()).map(part).collect();
         let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
         let mut darkroom = Darkroom::new(self);
@@ -183,7 +183,7 @@ impl<'a, const K: usize> Darkroom<'a, K> {
             tracer: PathTracer::new(world, painted, exposure.settings),
             paths: Vec::new(),
             shares: Vec::new(),
-            found: Found { sums: vec![[[0.0; 3]; K]; exposure.groups()], touched: Vec::new() },
+            found: Found { sums: vec![[[0.0; 3]; K]; exposure.pictures()], touched: Vec::new() },
         }
     }
 
@@ -212,14 +212,29 @@ impl<'a, const K: usize> Darkroom<'a, K> {
 
 impl<const K: usize> Found<K> {
     fn add(&mut self, lighting: &Lighting<'_>, first: usize, share: &Share<K>) {
-        let group = lighting.groups.of(share.light);
-        if !self.touched.contains(&group) {
-            self.touched.push(group);
+        let values = share.values.map(|value| value.to_array().map(f64::from));
+        match lighting {
+            Lighting::Apart(groups) => {
+                let group = groups.of(share.light);
+                self.touch(group);
+                self.sums[group].iter_mut().zip(values).for_each(|(sum, value)| add(sum, value, 1.0));
+            }
+            Lighting::Mixed(mixes) => {
+                for picture in 0..self.sums.len() {
+                    self.touch(picture);
+                    for (k, (sum, value)) in self.sums[picture].iter_mut().zip(values).enumerate() {
+                        // Beyond the last prediction: see `Repaint::at`.
+                        let weight = mixes[(first + k).min(mixes.len() - 1)][picture][share.light.0];
+                        add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
+                    }
+                }
+            }
         }
-        for (k, (sum, value)) in self.sums[group].iter_mut().zip(share.values).enumerate() {
-            let value = value.to_array().map(f64::from);
-            let weight = lighting.weight(first + k, share.light);
-            add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
+    }
+
+    fn touch(&mut self, picture: usize) {
+        if !self.touched.contains(&picture) {
+            self.touched.push(picture);
         }
     }
 

@@ -52,7 +52,7 @@ fn principled_room(color: [f32; 3], roughness: f32, metallic: f32, flavour: Prin
 
 fn repainted(world: &World, repaint: &Repaint, which: std::ops::Range<usize>) -> Vec<ViewsRender> {
     let groups = LightGroups::apart(world.emitters().groups());
-    let lighting = Lighting { groups: &groups, weights: None };
+    let lighting = Lighting::Apart(&groups);
     let settings = RenderSettings { samples: 4, ..Default::default() };
     render_repainted(world, repaint, which, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap()
 }
@@ -80,26 +80,27 @@ fn paint_is_the_material_itself_and_company_changes_nothing() {
     }
 }
 
-/// Weights of one group are the weighted basis.
+/// Mixes are weighted sums of the basis.
 #[test]
-fn weights_are_those_of_the_basis() {
+fn mixes_are_those_of_the_basis() {
     let scene = Arc::new(lit_room([[1.0; 3]; 4]));
     let world = World::new(scene.clone()).unwrap();
     let coats = coats(&scene, &COLORS[..2], 0.5, 0.0);
     let repaint = Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap();
-    let weights: Vec<Vec<[f64; 3]>> =
-        vec![vec![[0.5, 1.0, 2.0]; 4], vec![[0.0, 1.0, 0.0], [2.0; 3], [0.1; 3], [1.0, 0.0, 3.0]]];
-    let groups = LightGroups::together(4);
-    let lighting = Lighting { groups: &groups, weights: Some(&weights) };
+    let odd = vec![[0.0, 1.0, 0.0], [2.0; 3], [0.1; 3], [1.0, 0.0, 3.0]];
+    let mixes = [vec![vec![[0.5, 1.0, 2.0]; 4], vec![[1.0; 3]; 4]], vec![odd, vec![[0.3; 3]; 4]]];
+    let lighting = Lighting::Mixed(&mixes);
     let settings = RenderSettings { samples: 4, ..Default::default() };
     let mixed =
         render_repainted(&world, &repaint, 0..2, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap();
     for (k, apart) in repainted(&world, &repaint, 0..2).iter().enumerate() {
-        let expected = apart.views[0].halves[1].basis.weighted(&weights[k]).unwrap();
-        let found = mixed[k].views[0].halves[1].basis.sum();
-        let pairs = expected.pixels().iter().zip(found.pixels());
-        for (a, b) in pairs.flat_map(|(a, b)| a.0.into_iter().zip(b.0)) {
-            assert!((a - b).abs() <= 1e-5 * a.max(0.1), "{a} {b}");
+        for (picture, mix) in mixes[k].iter().enumerate() {
+            let expected = apart.views[0].halves[1].basis.weighted(mix).unwrap();
+            let found = &mixed[k].views[0].halves[1].basis.pictures()[picture];
+            let pairs = expected.pixels().iter().zip(found.pixels());
+            for (a, b) in pairs.flat_map(|(a, b)| a.0.into_iter().zip(b.0)) {
+                assert!((a - b).abs() <= 1e-5 * a.max(0.1), "{a} {b}");
+            }
         }
     }
 }
@@ -122,14 +123,15 @@ fn what_does_not_fit_is_refused() {
     assert!(new(&unmapped, good.clone()).contains("surface 0"));
     let repaint = Repaint::new(&world, &atlases, good, PrincipledFlavour::Blender).unwrap();
     let groups = LightGroups::together(4);
-    let fails = |which, weights: Option<&[Vec<[f64; 3]>]>| {
-        let lighting = Lighting { groups: &groups, weights };
+    let fails = |which, lighting: Lighting<'_>| {
         let settings = RenderSettings::default();
         render_repainted(&world, &repaint, which, &[view(8)], lighting, &settings, &[1], &|_, _| ()).is_err()
     };
-    assert!(fails(0..4, None));
-    assert!(fails(0..1, Some(&[vec![[1.0; 3]; 4]])));
-    assert!(fails(0..1, Some(&vec![vec![[-1.0; 3]; 4]; 3])));
+    assert!(fails(0..4, Lighting::Apart(&groups)));
+    assert!(fails(0..1, Lighting::Apart(&LightGroups::together(3))));
+    assert!(fails(0..1, Lighting::Mixed(&[vec![vec![[1.0; 3]; 4]]])));
+    assert!(fails(0..1, Lighting::Mixed(&vec![vec![vec![[-1.0; 3]; 4]]; 3])));
+    assert!(!fails(0..1, Lighting::Mixed(&vec![vec![vec![[1.0; 3]; 4]]; 3])));
 }
 
 /// A square above a floor, seen from straight above through the square.
