@@ -16,7 +16,7 @@ pub enum MetricError {
     SizesDiffer {
         /// The prediction's size.
         prediction: Size,
-        /// `reference` or `mask`.
+        /// `reference`, `mask` or another of the inputs.
         what: &'static str,
         /// Its size.
         found: Size,
@@ -36,7 +36,7 @@ pub enum MetricError {
     /// A value that would count is NaN or infinite.
     #[error("the {picture} has the value {value} at pixel ({x}, {y}), channel {channel}; expected finite values")]
     NotFinite {
-        /// `prediction`, `reference` or `picture`.
+        /// `prediction`, `reference`, `picture` or a half of one.
         picture: &'static str,
         /// Column, from the left.
         x: usize,

@@ -8,20 +8,29 @@
 //! trained networks see (Zhang et al. 2018). What happens outside the mask is a rule of its own for the last two, since
 //! their windows look across its edge; [`mask`] has the two fillings they are built on.
 //!
+//! Renders are noisy, and noise is taken for error; [`mod@noise_free`] measures without it, from independent halves
+//! ([`mod@encoding_bias`]: what clipping and sRGB-encoding the halves does to that).
+//!
 //! Means are summed in `f64` in a fixed order; the thread count changes no bit. A value that is NaN or infinite and
 //! would count is an error; one that would not is never looked at.
 
+pub mod encoding_bias;
 pub mod error;
 pub mod lpips;
 pub mod mask;
 pub mod mse;
+pub mod noise_free;
 pub mod pixel;
 pub mod psnr;
 pub mod ssim;
+#[cfg(test)]
+mod synthetic_noise;
 
+pub use encoding_bias::{EncodingBias, encoding_bias};
 pub use error::MetricError;
 pub use lpips::{Features, Lpips, Net};
 pub use mse::mse;
+pub use noise_free::{BlockNoise, Halves, NoiseFreeMse, NoiseFreePsnr, NoisePsnr, noise_free_mse, psnr_mean_error};
 pub use pixel::Pixel;
 pub use psnr::Psnr;
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};

@@ -52,7 +52,8 @@ pub(crate) fn check_sizes<P: Pixel>(
     mask.map_or(Ok(()), |mask| check_size(size_of(prediction), "mask", size_of(mask)))
 }
 
-fn check_size(prediction: Size, what: &'static str, found: Size) -> Result<(), MetricError> {
+/// `what` must be of the prediction's size.
+pub(crate) fn check_size(prediction: Size, what: &'static str, found: Size) -> Result<(), MetricError> {
     if prediction == found { Ok(()) } else { Err(MetricError::SizesDiffer { prediction, what, found }) }
 }
 

@@ -1,0 +1,96 @@
+//! Renders whose expectation is known, for tests of what is free of noise.
+
+use mateval_image::{LinearRgb, Picture};
+
+/// How single samples scatter about their mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scatter {
+    /// The sum of four uniform values.
+    GaussianLike,
+    /// As in path tracing: nine in ten find nothing, the tenth finds ten times the mean.
+    HeavyTailed,
+}
+
+pub const SCATTERS: [Scatter; 2] = [Scatter::GaussianLike, Scatter::HeavyTailed];
+
+/// How a picture is rendered.
+#[derive(Clone, Copy, Debug)]
+pub struct Render<'a> {
+    pub scatter: Scatter,
+    /// The share of each sample that scatters.
+    pub strength: f64,
+    pub samples: u32,
+    /// Where given, three of four samples are shared by all pixels of a block, in whatever view.
+    pub blocks: Option<&'a Picture<u32>>,
+    /// Two views have different noise outside shared samples.
+    pub view: u64,
+}
+
+impl Render<'_> {
+    /// A noisy picture whose expectation is `truth`.
+    pub fn picture(&self, truth: &Picture<LinearRgb>, seed: u64) -> Picture<LinearRgb> {
+        Picture::from_fn(truth.width(), truth.height(), |x, y| {
+            let own = 1 + (self.view << 40 | (y as u64) << 20 | x as u64);
+            let block = self.blocks.map_or(own, |blocks| u64::from(blocks.get(x, y)) << 44);
+            let factor = |channel: u64| {
+                let place = |sample: u32| if sample % 4 < 3 { block } else { own };
+                let value = |sample| self.sample(hash(hash(seed, place(sample)), u64::from(sample) << 2 | channel));
+                (0..self.samples).map(value).sum::<f64>() / f64::from(self.samples)
+            };
+            let LinearRgb(rgb) = truth.get(x, y);
+            LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * factor(c as u64)) as f32))
+        })
+    }
+
+    /// One sample's factor, of mean 1.
+    fn sample(&self, random: u64) -> f64 {
+        let unit = |shift: u32| (f64::from((random >> shift) as u16) + 0.5) / 65536.0;
+        let factor = match self.scatter {
+            // The variance of the sum is 1/3.
+            Scatter::GaussianLike => 1.0 + 3.0_f64.sqrt() * (unit(0) + unit(16) + unit(32) + unit(48) - 2.0),
+            Scatter::HeavyTailed => f64::from(u8::from(random.is_multiple_of(10))) * 10.0,
+        };
+        1.0 + self.strength * (factor - 1.0)
+    }
+}
+
+/// The finaliser of SplitMix64 over both.
+fn hash(state: u64, word: u64) -> u64 {
+    let mut h = state ^ word.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    h = (h ^ (h >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    h = (h ^ (h >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    h ^ (h >> 31)
+}
+
+/// The mean of two halves.
+pub fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    Picture::from_fn(a.width(), a.height(), |x, y| {
+        let (a, b) = (a.get(x, y).0, b.get(x, y).0);
+        LinearRgb(std::array::from_fn(|c| 0.5 * (a[c] + b[c])))
+    })
+}
+
+/// A picture with gradients and waves, `side` pixels square, values of 0.05 to 0.95.
+pub fn waves(side: usize) -> Picture<LinearRgb> {
+    Picture::from_fn(side, side, |x, y| {
+        let (u, v) = ((x as f32 + 0.5) / side as f32, (y as f32 + 0.5) / side as f32);
+        LinearRgb([0.05 + 0.9 * u, 0.05 + 0.5 * v, 0.3 + 0.25 * (0.7 * x as f32).sin() * (0.5 * y as f32).cos()])
+    })
+}
+
+/// Squares of four pixels, each a block; `first` is the first's id.
+pub fn squares(side: usize, first: u32) -> Picture<u32> {
+    Picture::from_fn(side, side, |x, y| first + (y / 4 * side.div_ceil(4) + x / 4) as u32)
+}
+
+/// Every pixel a block of its own.
+pub fn single_pixels(side: usize) -> Picture<u32> {
+    Picture::from_fn(side, side, |x, y| (y * side + x) as u32)
+}
+
+/// Mean and standard deviation.
+pub fn mean_and_deviation(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
+}
