@@ -8,8 +8,9 @@
 //! trained networks see (Zhang et al. 2018). What happens outside the mask is a rule of its own for the last two, since
 //! their windows look across its edge; [`mask`] has the two fillings they are built on.
 //!
-//! Renders are noisy, and noise is taken for error; [`mod@noise_free`] measures without it, from independent halves
-//! ([`mod@encoding_bias`]: what clipping and sRGB-encoding the halves does to that).
+//! Renders are noisy, and noise is taken for error. Where a prediction comes in two independent halves, there are
+//! metrics of what it would be without noise: [`mod@noise_free`] (and [`mod@encoding_bias`], what clipping and
+//! sRGB-encoding the halves does to it), [`mod@ssim_halves`], and the extrapolated distances of [`Lpips`].
 //!
 //! Means are summed in `f64` in a fixed order; the thread count changes no bit. A value that is NaN or infinite and
 //! would count is an error; one that would not is never looked at.
@@ -23,6 +24,7 @@ pub mod noise_free;
 pub mod pixel;
 pub mod psnr;
 pub mod ssim;
+pub mod ssim_halves;
 #[cfg(test)]
 mod synthetic_noise;
 
@@ -34,3 +36,4 @@ pub use noise_free::{BlockNoise, Halves, NoiseFreeMse, NoiseFreePsnr, NoisePsnr,
 pub use pixel::Pixel;
 pub use psnr::Psnr;
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};
+pub use ssim_halves::{ssim_halves, ssim_halves_black_fill, ssim_halves_valid_windows};

@@ -11,6 +11,7 @@ use mateval_image::{Mask, Picture};
 use rayon::prelude::*;
 
 use crate::MetricError;
+use crate::error::Size;
 use crate::mask::{black_filled, pixel_count};
 use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
 
@@ -18,9 +19,9 @@ use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
 const RADIUS: usize = 5;
 /// Width and height of the window; pictures must be at least as large.
 pub const WINDOW: usize = 2 * RADIUS + 1;
-const SIGMA: f64 = 1.5;
-const C1: f64 = 0.01 * 0.01;
-const C2: f64 = 0.03 * 0.03;
+pub(crate) const SIGMA: f64 = 1.5;
+pub(crate) const C1: f64 = 0.01 * 0.01;
+pub(crate) const C2: f64 = 0.03 * 0.03;
 
 /// SSIM over the windows that lie wholly inside a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,8 +36,12 @@ pub struct MaskedSsim {
 ///
 /// Fails if sizes differ, a side is below 11 pixels or a value is not finite.
 pub fn ssim<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<f64, MetricError> {
-    let map = ssim_map(prediction, reference)?;
-    Ok(map.pixels().iter().sum::<f64>() / map.pixels().len() as f64)
+    Ok(mean(&ssim_map(prediction, reference)?))
+}
+
+/// The mean over all windows.
+pub(crate) fn mean(map: &Picture<f64>) -> f64 {
+    map.pixels().iter().sum::<f64>() / map.pixels().len() as f64
 }
 
 /// [`ssim`] of both pictures with black outside the mask, averaged over the whole picture (protocol `paper`): the
@@ -62,30 +67,36 @@ pub fn ssim_valid_windows<P: Pixel>(
     check_pair(prediction, reference, Some(mask))?;
     // Valid windows do not see the filling; it keeps what must not be looked at out of the map.
     let map = ssim_map(&black_filled(prediction, mask)?, &black_filled(reference, mask)?)?;
-    let valid = valid_windows(mask);
+    Ok(mean_of_valid(&map, mask))
+}
+
+/// The mean over the map's windows that lie wholly inside the mask.
+pub(crate) fn mean_of_valid(map: &Picture<f64>, mask: &Mask) -> Option<MaskedSsim> {
     let (mut sum, mut windows) = (0.0, 0);
-    for (value, _) in map.pixels().iter().zip(valid).filter(|&(_, valid)| valid) {
+    for (value, _) in map.pixels().iter().zip(valid_windows(mask)).filter(|&(_, valid)| valid) {
         sum += value;
         windows += 1;
     }
-    Ok((windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows }))
+    (windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows })
 }
 
 /// The index of every window, mean over channels. The map is 10 pixels narrower and lower than the pictures; its pixel
 /// (x, y) belongs to the window around (x + 5, y + 5). Fails as [`ssim`] does.
 pub fn ssim_map<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<Picture<f64>, MetricError> {
     check_sizes(prediction, reference, None)?;
-    let (width, height) = size_of(prediction);
-    if width < WINDOW || height < WINDOW {
-        return Err(MetricError::TooSmall { metric: "ssim", least: WINDOW, found: (width, height) });
-    }
+    check_window_fits(size_of(prediction))?;
     check_finite("prediction", prediction, None)?;
     check_finite("reference", reference, None)?;
     Ok(map_with(prediction, reference, &gaussian(SIGMA)))
 }
 
+pub(crate) fn check_window_fits(found: Size) -> Result<(), MetricError> {
+    let fits = found.0 >= WINDOW && found.1 >= WINDOW;
+    if fits { Ok(()) } else { Err(MetricError::TooSmall { metric: "ssim", least: WINDOW, found }) }
+}
+
 /// The window's weights along one axis; their sum is 1.
-fn gaussian(sigma: f64) -> [f64; WINDOW] {
+pub(crate) fn gaussian(sigma: f64) -> [f64; WINDOW] {
     let weights: [f64; WINDOW] = std::array::from_fn(|i| {
         let distance = i as f64 - RADIUS as f64;
         libm::exp(-0.5 * distance * distance / (sigma * sigma))
@@ -94,62 +105,69 @@ fn gaussian(sigma: f64) -> [f64; WINDOW] {
     weights.map(|weight| weight / sum)
 }
 
+/// The map of two pictures by this window.
 fn map_with<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW]) -> Picture<f64> {
-    let (width, height) = (prediction.width() - 2 * RADIUS, prediction.height() - 2 * RADIUS);
-    let rows: Vec<Vec<f64>> = (0..height).into_par_iter().map(|y| map_row(prediction, reference, window, y)).collect();
-    Picture::new(width, height, rows.concat()).expect("one row of the map for each row of windows")
+    let channels = P::default().channels().len();
+    let terms = |pixel: usize, channel: usize| {
+        let [p, r] = [prediction, reference].map(|picture| f64::from(picture.pixels()[pixel].channels()[channel]));
+        [p, r, p * p, r * r, p * r]
+    };
+    windows_map(size_of(prediction), channels, window, terms, index)
 }
 
-/// Row `y` of the map: mean over channels.
-fn map_row<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW], y: usize) -> Vec<f64> {
-    let channels = prediction.pixels()[0].channels().len();
-    let mut row = vec![0.0; prediction.width() - 2 * RADIUS];
-    for channel in 0..channels {
-        let moments = column_moments(prediction, reference, window, y, channel);
-        for (x, value) in row.iter_mut().enumerate() {
-            *value += index(&window_moments(&moments[x..x + WINDOW], window));
+/// For each window inside a picture of this size, the mean over channels of the index of its moments: the weighted
+/// means of `terms(pixel, channel)`, a pixel being given by its place in [`Picture::pixels`].
+pub(crate) fn windows_map<const TERMS: usize>(
+    (width, height): Size,
+    channels: usize,
+    window: &[f64; WINDOW],
+    terms: impl Fn(usize, usize) -> [f64; TERMS] + Sync,
+    index: impl Fn(&[f64; TERMS]) -> f64 + Sync,
+) -> Picture<f64> {
+    let row = |y: usize| {
+        let mut row = vec![0.0; width - 2 * RADIUS];
+        for channel in 0..channels {
+            let columns = column_moments(width, y, window, |pixel| terms(pixel, channel));
+            for (x, value) in row.iter_mut().enumerate() {
+                *value += index(&window_moments(&columns[x..x + WINDOW], window));
+            }
         }
-    }
-    row.iter_mut().for_each(|value| *value /= channels as f64);
-    row
+        row.iter_mut().for_each(|value| *value /= channels as f64);
+        row
+    };
+    let rows: Vec<Vec<f64>> = (0..height - 2 * RADIUS).into_par_iter().map(row).collect();
+    let map = Picture::new(width - 2 * RADIUS, height - 2 * RADIUS, rows.concat());
+    map.expect("one row of the map for each row of windows")
 }
-
-/// Weighted means of p, r, p², r², pr.
-type Moments = [f64; 5];
 
 /// The moments of each column of 11 pixels below row `y`.
-fn column_moments<P: Pixel>(
-    prediction: &Picture<P>,
-    reference: &Picture<P>,
-    window: &[f64; WINDOW],
+fn column_moments<const TERMS: usize>(
+    width: usize,
     y: usize,
-    channel: usize,
-) -> Vec<Moments> {
-    let width = prediction.width();
-    let mut moments = vec![[0.0; 5]; width];
+    window: &[f64; WINDOW],
+    terms: impl Fn(usize) -> [f64; TERMS],
+) -> Vec<[f64; TERMS]> {
+    let mut moments = vec![[0.0; TERMS]; width];
     for (dy, weight) in window.iter().enumerate() {
-        let row = (y + dy) * width..(y + dy + 1) * width;
-        let pairs = prediction.pixels()[row.clone()].iter().zip(&reference.pixels()[row]);
-        for (sums, (p, r)) in moments.iter_mut().zip(pairs) {
-            let (p, r) = (f64::from(p.channels()[channel]), f64::from(r.channels()[channel]));
-            let terms = [p, r, p * p, r * r, p * r];
-            (0..5).for_each(|i| sums[i] += weight * terms[i]);
+        for (x, sums) in moments.iter_mut().enumerate() {
+            let terms = terms((y + dy) * width + x);
+            (0..TERMS).for_each(|i| sums[i] += weight * terms[i]);
         }
     }
     moments
 }
 
 /// The moments of a window from those of its columns.
-fn window_moments(columns: &[Moments], window: &[f64; WINDOW]) -> Moments {
-    let mut sums = [0.0; 5];
+fn window_moments<const TERMS: usize>(columns: &[[f64; TERMS]], window: &[f64; WINDOW]) -> [f64; TERMS] {
+    let mut sums = [0.0; TERMS];
     for (column, weight) in columns.iter().zip(window) {
-        (0..5).for_each(|i| sums[i] += weight * column[i]);
+        (0..TERMS).for_each(|i| sums[i] += weight * column[i]);
     }
     sums
 }
 
-/// The index of one window: equation 13 of Wang et al. 2004.
-fn index(&[p, r, pp, rr, pr]: &Moments) -> f64 {
+/// The index of one window, from its means of p, r, p², r², pr: equation 13 of Wang et al. 2004.
+fn index(&[p, r, pp, rr, pr]: &[f64; 5]) -> f64 {
     let (variance_p, variance_r, covariance) = (pp - p * p, rr - r * r, pr - p * r);
     let numerator = (2.0 * p * r + C1) * (2.0 * covariance + C2);
     numerator / ((p * p + r * r + C1) * (variance_p + variance_r + C2))
