@@ -30,7 +30,7 @@ mod synthetic_noise;
 
 pub use encoding_bias::{EncodingBias, encoding_bias};
 pub use error::MetricError;
-pub use lpips::{Features, Lpips, Net};
+pub use lpips::{ExtrapolatedLpips, Features, Lpips, MeanAndHalves, Net};
 pub use mse::mse;
 pub use noise_free::{BlockNoise, Halves, NoiseFreeMse, NoiseFreePsnr, NoisePsnr, noise_free_mse, psnr_mean_error};
 pub use pixel::Pixel;

@@ -4,11 +4,14 @@
 //! cache folder. Where either is missing, a line on stderr says what was skipped and how to mend it.
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; skipped tests must say so
 
+mod weights;
+
 use std::path::{Path, PathBuf};
 
 use mateval_image::{Mask, Picture, SrgbRgb};
-use mateval_metrics::{Lpips, Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
+use mateval_metrics::{Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
 use serde::Deserialize;
+use weights::load_lpips;
 
 const CASES: usize = 12;
 const MASKED_CASES: usize = 10;
@@ -92,22 +95,6 @@ fn read_png<T: Copy>(path: &Path, pixel: impl Fn(&[f32]) -> T) -> Picture<T> {
     let values: Vec<f32> = bytes.iter().map(|&byte| f32::from(byte) / 255.0).collect();
     let pixels = values.chunks(info.color_type.samples()).map(pixel).collect();
     Picture::new(info.width as usize, info.height as usize, pixels).unwrap()
-}
-
-/// The network; `None`, said on stderr, where its weights are absent.
-fn load_lpips(net: Net) -> Option<Lpips> {
-    let set = |name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let folder = set("MATEVAL_CACHE")
-        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
-        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))?;
-    let path = folder.join(net.file_name());
-    if !path.is_file() {
-        eprintln!("SKIPPED: no '{}'; run: python3 tools/fetch_lpips_weights.py", path.display());
-        return None;
-    }
-    let lpips = Lpips::load(net, &path).unwrap();
-    assert_eq!((lpips.net(), lpips.sha256()), (net, net.expected_sha256()));
-    Some(lpips)
 }
 
 /// Compares, and keeps the largest deviation and the number of values seen.

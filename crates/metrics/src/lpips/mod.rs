@@ -11,6 +11,7 @@
 
 mod convolution;
 mod distance;
+mod extrapolated;
 mod features;
 mod multiply;
 mod net;
@@ -22,6 +23,7 @@ use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 
+pub use extrapolated::{ExtrapolatedLpips, MeanAndHalves};
 pub use features::Features;
 pub use net::{ALEX_FILE_NAME, ALEX_SHA256, Net, VGG_FILE_NAME, VGG_SHA256};
 
