@@ -66,6 +66,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         out: results,
         scenes: Vec::new(),
         protocols: vec!["mateval-1".to_owned()],
+        jobs: 1,
+        cache: None,
         force: args.force,
     })?;
     print_closing(&opened, out, &files)?;

@@ -78,6 +78,13 @@ pub struct ScoreArgs {
     /// The rules; may be given several times.
     #[arg(long = "protocol", default_values = ["mateval-1"])]
     pub protocols: Vec<String>,
+    /// Scenes that are scored at once; more take more memory and leave threads less idle.
+    #[arg(long, default_value_t = 1)]
+    pub jobs: usize,
+    /// Keep every scene's scores in this folder, by hashes of all they depend on, for later runs too. By default they are
+    /// kept beside the result until it is whole, so that a killed run goes on.
+    #[arg(long)]
+    pub cache: Option<PathBuf>,
     /// Replace result files that are there.
     #[arg(long)]
     pub force: bool,
@@ -202,6 +209,8 @@ pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
     let protocols = args.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
     let outs = result_paths(args)?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let cache = args.cache.clone().unwrap_or_else(|| beside(&args.out));
+    std::fs::create_dir_all(&cache).with_context(|| format!("cannot make '{}'", cache.display()))?;
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: args.submissions.iter().map(PathBuf::as_path).collect(),
@@ -209,6 +218,8 @@ pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
         scenes: args.scenes.clone(),
         lpips: weights::load(Net::Alex),
         tool: TOOL.to_owned(),
+        jobs: args.jobs,
+        cache: Some(&cache),
     };
     let bars = Bars::new();
     let results = score(&plan, &|step, done, all| bars.step(step, done, all)).context("cannot score")?;
@@ -218,7 +229,17 @@ pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
         say_findings(&result.method, &result.findings);
         print(&format!("{}\n", out.display()))?;
     }
+    if args.cache.is_none() {
+        std::fs::remove_dir_all(&cache).with_context(|| format!("cannot remove '{}'", cache.display()))?;
+    }
     Ok(outs)
+}
+
+/// The folder that scores are kept in until `out` is whole.
+fn beside(out: &Path) -> PathBuf {
+    let mut name = out.as_os_str().to_owned();
+    name.push(".scenes");
+    PathBuf::from(name)
 }
 
 /// Where each submission's result goes: `--out`, or a file named after the submission's folder in it.

@@ -7,17 +7,30 @@
 //! them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares,
 //! [`score`] goes through the dataset, [`tables`] shows.
 
-pub mod albedo;
 pub mod alignment;
+mod coverage;
 pub mod error;
+mod instance_errors;
 pub mod light_fit;
+pub mod light_rules;
+pub mod light_stage;
+pub mod material_pictures;
 pub mod measure;
+pub mod noise_blocks;
 pub mod pair;
+pub mod predicted_light;
 pub mod prediction;
 pub mod protocol;
+pub mod relit;
 pub mod result;
+pub mod rgb;
+mod scene_score;
 pub mod score;
 pub mod strips;
 pub mod tables;
+pub mod texel_map;
+pub mod texture_space;
+pub mod truth;
+pub mod truth_material;
 
 pub use error::EvalError;

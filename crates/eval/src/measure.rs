@@ -1,7 +1,9 @@
 //! The metrics of one picture under one protocol.
 
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::{Lpips, MetricError, Psnr, mse, ssim_black_fill, ssim_valid_windows};
+use mateval_metrics::{Lpips, MetricError, Pixel, Psnr, mse, ssim_black_fill, ssim_valid_windows};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::protocol::{AlbedoSpace, MaskRule, Protocol};
 
@@ -14,8 +16,27 @@ pub struct Measured {
     pub value: Option<f64>,
     /// For PSNR: there was no error at all.
     pub exact: bool,
+    /// For MSE and PSNR of light.
+    pub noise: Option<ValueNoise>,
     /// Pixels or windows that it is a mean over.
     pub count: usize,
+}
+
+/// How uncertain render noise makes a value.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ValueNoise {
+    /// Standard error, in the value's own unit; of PSNR to first order, at most the cap.
+    pub standard_error: f64,
+    /// Of an MSE: what clipping and encoding noisy pixels adds to it, as estimated; the value is left as it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias: Option<f64>,
+    /// What that is at most, up or down.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bias_bound: Option<f64>,
+    /// Of a PSNR: the error may be no more than noise; the value is what PSNR is at least, with 95 %.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub lower_bound: bool,
 }
 
 /// MSE, PSNR, SSIM and (where its weights are there) LPIPS of an albedo picture over the mask; linear pictures.
@@ -32,18 +53,8 @@ pub fn albedo_metrics(
         AlbedoSpace::Linear => mse(prediction, reference, Some(mask))?,
         AlbedoSpace::Srgb => mse(&encoded, &reference_encoded, Some(mask))?,
     };
-    let psnr = error.map(Psnr::from_mse).transpose()?;
-    let mut measured = vec![
-        plain("mse", error, pixels),
-        Measured { exact: psnr.is_some_and(|psnr| psnr.exact), ..plain("psnr", psnr.map(|psnr| psnr.db), pixels) },
-    ];
-    measured.push(match protocol.mask_rule {
-        MaskRule::BlackFill => plain("ssim", ssim_black_fill(&encoded, &reference_encoded, mask)?, pixels),
-        MaskRule::Inside => {
-            let inside = ssim_valid_windows(&encoded, &reference_encoded, mask)?;
-            plain("ssim", inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
-        }
-    });
+    let mut measured = error_metrics(error, pixels)?;
+    measured.push(ssim_metric(protocol.mask_rule, &encoded, &reference_encoded, mask, pixels)?);
     if let Some(lpips) = lpips {
         let distance = match protocol.mask_rule {
             MaskRule::BlackFill => lpips.black_fill(&encoded, &reference_encoded, mask),
@@ -54,15 +65,62 @@ pub fn albedo_metrics(
             Err(MetricError::TooSmall { .. }) => None,
             other => other?,
         };
-        let steps = 10_f64.powi(protocol.lpips_decimals as i32);
-        let rounded = distance.map(|distance| (distance * steps).round() / steps);
-        measured.push(plain(&format!("lpips_{}", protocol.lpips_net), rounded, pixels));
+        measured.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(measured)
 }
 
-fn plain(metric: &str, value: Option<f64>, count: usize) -> Measured {
-    Measured { metric: metric.to_owned(), value, exact: false, count }
+/// MSE, PSNR and SSIM of a picture of roughness or metallic over the mask, all of the values as they are: they are no light
+/// and have no sRGB. No LPIPS: its networks and its weights were trained on colour photographs, and people were asked about
+/// those; of a parameter's picture its distance would say nothing.
+pub fn scalar_metrics(
+    protocol: &Protocol,
+    prediction: &Picture<f32>,
+    reference: &Picture<f32>,
+    mask: &Mask,
+) -> Result<Vec<Measured>, MetricError> {
+    let pixels = mateval_metrics::mask::pixel_count(mask);
+    let mut measured = error_metrics(mse(prediction, reference, Some(mask))?, pixels)?;
+    measured.push(ssim_metric(protocol.mask_rule, prediction, reference, mask, pixels)?);
+    Ok(measured)
+}
+
+/// An MSE, and its PSNR.
+fn error_metrics(error: Option<f64>, pixels: usize) -> Result<Vec<Measured>, MetricError> {
+    let psnr = error.map(Psnr::from_mse).transpose()?;
+    let exact = psnr.is_some_and(|psnr| psnr.exact);
+    let psnr = Measured { exact, ..Measured::plain("psnr", psnr.map(|psnr| psnr.db), pixels) };
+    Ok(vec![Measured::plain("mse", error, pixels), psnr])
+}
+
+fn ssim_metric<P: Pixel>(
+    rule: MaskRule,
+    prediction: &Picture<P>,
+    reference: &Picture<P>,
+    mask: &Mask,
+    pixels: usize,
+) -> Result<Measured, MetricError> {
+    Ok(match rule {
+        MaskRule::BlackFill => Measured::plain("ssim", ssim_black_fill(prediction, reference, mask)?, pixels),
+        MaskRule::Inside => {
+            let inside = ssim_valid_windows(prediction, reference, mask)?;
+            Measured::plain("ssim", inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
+        }
+    })
+}
+
+/// LPIPS as it is stored: its last bits depend on the processor.
+pub(crate) fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) -> Measured {
+    let steps = 10_f64.powi(protocol.lpips_decimals as i32);
+    let rounded = distance.map(|distance| (distance * steps).round() / steps);
+    Measured::plain(&format!("lpips_{}", protocol.lpips_net), rounded, pixels)
+}
+
+impl Measured {
+    /// A value and no more.
+    pub(crate) fn plain(metric: &str, value: Option<f64>, count: usize) -> Self {
+        Self { metric: metric.to_owned(), value, exact: false, noise: None, count }
+    }
 }
 
 #[cfg(test)]
@@ -100,5 +158,27 @@ mod tests {
         for measured in albedo_metrics(&protocol, None, &reference, &reference, &nothing).unwrap() {
             assert_eq!(measured.value, None, "{}", measured.metric);
         }
+    }
+
+    #[test]
+    fn scalars_are_compared_as_they_are() {
+        let reference = Picture::from_fn(40, 30, |x, y| (x as f32 + y as f32) / 100.0);
+        let prediction = reference.map(|v| v + 0.1);
+        let mask = Picture::from_fn(40, 30, |x, _| x >= 20);
+        let [ours, paper] = ["mateval-1", "paper"].map(|name| {
+            let measured = scalar_metrics(&Protocol::named(name).unwrap(), &prediction, &reference, &mask).unwrap();
+            let keys: Vec<&str> = measured.iter().map(|m| m.metric.as_str()).collect();
+            assert_eq!(keys, ["mse", "psnr", "ssim"]);
+            measured
+        });
+        // 0.1 off everywhere, by hand; no curve lies between, whatever the protocol does to albedo.
+        for measured in [&ours, &paper] {
+            assert!((value(measured, "mse") - 0.01).abs() < 1e-8 && (value(measured, "psnr") - 20.0).abs() < 1e-5);
+        }
+        // Twenty columns of thirty; whole windows have their centres 5 pixels inside of that.
+        assert_eq!((ours[0].count, ours[2].count, paper[2].count), (600, 10 * 20, 600));
+        assert!(value(&paper, "ssim") > value(&ours, "ssim"));
+        let same = scalar_metrics(&Protocol::named("paper").unwrap(), &reference, &reference, &mask).unwrap();
+        assert!(same[1].exact && value(&same, "ssim") == 1.0 && value(&same, "mse") == 0.0);
     }
 }

@@ -1,22 +1,47 @@
-//! A submission's maps, read for one scene; what is missing or unsound is a finding and scores as the default.
+//! A submission's maps, read for one scene; what is missing or unsound scores as the default, and is a finding unless the
+//! format lets it be left out.
 
 use std::path::{Path, PathBuf};
 
 use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::{Texels, Texture, Wrap};
+use mateval_image::{Texels, Texture, Wrap, exr_io};
 use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::manifest::sha256_of_file;
+use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::submission::{GREY, MAP_SIZES, Map, instance_folder};
 use mateval_scene::{Finding, Severity};
 
 /// What a base colour may be, linear; a stray value must not swamp the mean over all pixels.
 pub const BASE_COLOR_RANGE: std::ops::RangeInclusive<f32> = -1.0..=16.0;
 
-/// One instance's maps.
+/// What a roughness and a metallic may be.
+pub const SCALAR_RANGE: std::ops::RangeInclusive<f32> = 0.0..=1.0;
+
+/// What a missing roughness scores as; perceptual.
+pub const MISSING_ROUGHNESS: f32 = 0.5;
+
+/// What a missing metallic scores as.
+pub const MISSING_METALLIC: f32 = 0.0;
+
+/// One instance's maps. A map that is the same everywhere is one texel.
 #[derive(Clone, Debug)]
 pub struct PredictedMaterial {
     /// Linear at lookup.
     pub base_color: Texture,
+    /// Perceptual, 0 to 1; all three channels the same.
+    pub roughness: Texture,
+    /// 0 to 1; all three channels the same.
+    pub metallic: Texture,
+}
+
+impl PredictedMaterial {
+    /// A map's texture.
+    pub fn texture(&self, map: Map) -> &Texture {
+        match map {
+            Map::BaseColor => &self.base_color,
+            Map::Roughness => &self.roughness,
+            Map::Metallic => &self.metallic,
+        }
+    }
 }
 
 /// One scene's maps, in the order of the scene's instances.
@@ -24,6 +49,9 @@ pub struct PredictedMaterial {
 pub struct PredictedScene {
     /// None for instances without an atlas.
     pub materials: Vec<Option<PredictedMaterial>>,
+    /// SHA-256, hex, over all texels of roughness and metallic as they were decoded. Submissions of equal keys have the same
+    /// roughness and metallic at every place of the scene, whatever files say so; those of others may.
+    pub scattering_key: String,
     /// What was wrong and what is scored instead.
     pub findings: Vec<Finding>,
     /// Path in the submission and SHA-256 of every map that is there.
@@ -32,52 +60,68 @@ pub struct PredictedScene {
 
 /// Reads the maps of one scene.
 pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
-    let mut read = PredictedScene { materials: Vec::new(), findings: Vec::new(), files: Vec::new() };
-    for instance in &scene.instances {
-        let material = instance.atlas.is_some().then(|| {
-            let base_color = read_base_color(submission, scene, instance, &mut read);
-            note_files(submission, scene, instance, &mut read);
-            let grey = Texels::Grey(vec![GREY]);
-            let default = || Texture::new(1, 1, grey, Wrap::Clamp).expect("one texel is what one pixel needs");
-            PredictedMaterial { base_color: base_color.unwrap_or_else(default) }
-        });
-        read.materials.push(material);
-    }
-    read
+    let (mut findings, mut files) = (Vec::new(), Vec::new());
+    let materials: Vec<Option<PredictedMaterial>> = scene
+        .instances
+        .iter()
+        .map(|instance| {
+            instance.atlas.as_ref()?;
+            let mut map = |map| read_map(submission, scene, instance, map, &mut findings);
+            let [base_color, roughness, metallic] = Map::ALL.map(&mut map);
+            files.extend(files_there(submission, scene, instance));
+            Some(PredictedMaterial { base_color, roughness, metallic })
+        })
+        .collect();
+    PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files }
 }
 
-fn read_base_color(
+/// One map, or its default.
+fn read_map(
     submission: &Path,
     scene: &SceneFile,
     instance: &Instance,
-    read: &mut PredictedScene,
-) -> Option<Texture> {
-    let candidates = candidates(submission, scene, instance, Map::BaseColor);
-    let file = relative(submission, &candidates[0]);
+    map: Map,
+    findings: &mut Vec<Finding>,
+) -> Texture {
+    let candidates = candidates(submission, scene, instance, map);
     let present: Vec<&PathBuf> = candidates.iter().filter(|path| path.is_file()).collect();
-    let found = match present.as_slice() {
-        [path] => read_sound(path),
+    let fault = match present.as_slice() {
+        [path] => match read_sound(path, map) {
+            Ok(texture) => return texture,
+            Err(message) => replaced("unsound_map", &relative(submission, path), map, &message),
+        },
+        // The format lets the others be left out.
+        [] if map != Map::BaseColor => return default_of(map),
         [] => {
-            read.findings.push(replaced("missing_map", &file, "expected a PNG or an EXR, found none"));
-            return None;
+            let message = "expected a PNG or an EXR, found none";
+            replaced("missing_map", &relative(submission, &candidates[0]), map, message)
         }
         _ => {
             let message = "found both a PNG and an EXR; expected one of them";
-            read.findings.push(replaced("ambiguous_map", &file, message));
-            return None;
+            replaced("ambiguous_map", &relative(submission, &candidates[0]), map, message)
         }
     };
-    let unsound = |message: String| replaced("unsound_map", &relative(submission, present[0]), &message);
-    found.map_err(|message| read.findings.push(unsound(message))).ok()
+    findings.push(fault);
+    default_of(map)
 }
 
-/// Notes every map that is there with its hash: what a result was made of, whatever was made of it.
-fn note_files(submission: &Path, scene: &SceneFile, instance: &Instance, read: &mut PredictedScene) {
-    for path in Map::ALL.into_iter().flat_map(|map| candidates(submission, scene, instance, map)) {
-        if let Ok(hash) = sha256_of_file(&path) {
-            read.files.push((relative(submission, &path), hash));
-        }
-    }
+/// What scores where a map is missing or unsound.
+fn default_of(map: Map) -> Texture {
+    one_texel(match map {
+        Map::BaseColor => GREY,
+        Map::Roughness => MISSING_ROUGHNESS,
+        Map::Metallic => MISSING_METALLIC,
+    })
+}
+
+fn one_texel(value: f32) -> Texture {
+    Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
+}
+
+/// Every map that is there with its hash: what a result was made of, whatever was made of it.
+fn files_there(submission: &Path, scene: &SceneFile, instance: &Instance) -> Vec<(String, String)> {
+    let paths = Map::ALL.into_iter().flat_map(|map| candidates(submission, scene, instance, map));
+    paths.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
 }
 
 /// Where a map may lie.
@@ -91,29 +135,249 @@ fn relative(submission: &Path, path: &Path) -> String {
 }
 
 /// The texture, or what is wrong with it.
-fn read_sound(path: &Path) -> Result<Texture, String> {
-    let texture = read_texture(path, Encoding::Srgb, Wrap::Clamp).map_err(|error| error.to_string())?;
+fn read_sound(path: &Path, map: Map) -> Result<Texture, String> {
+    let texture = if map == Map::BaseColor {
+        read_texture(path, Encoding::Srgb, Wrap::Clamp).map_err(|error| error.to_string())?
+    } else {
+        read_scalar(path)?
+    };
     let (width, height) = (texture.width(), texture.height());
     if width != height || !MAP_SIZES.contains(&width) {
         let (least, most) = (MAP_SIZES.start(), MAP_SIZES.end());
         return Err(format!("{width}x{height} texels; expected a square of {least} to {most} a side"));
     }
-    if let Texels::Linear(values) = texture.texels()
-        && let Some(value) = values.iter().flatten().find(|value| !BASE_COLOR_RANGE.contains(value))
-    {
-        let (least, most) = (BASE_COLOR_RANGE.start(), BASE_COLOR_RANGE.end());
-        return Err(format!("a base colour of {value}; expected {least} to {most}"));
+    let (name, range) = match map {
+        Map::BaseColor => ("base colour", BASE_COLOR_RANGE),
+        Map::Roughness => ("roughness", SCALAR_RANGE),
+        Map::Metallic => ("metallic", SCALAR_RANGE),
+    };
+    let stray = match texture.texels() {
+        Texels::Linear(values) => values.as_flattened().iter().find(|value| !range.contains(value)),
+        Texels::Grey(values) => values.iter().find(|value| !range.contains(value)),
+        _ => None,
+    };
+    if let Some(value) = stray {
+        return Err(format!("a {name} of {value}; expected {} to {}", range.start(), range.end()));
     }
-    Ok(texture.collapsed())
+    Ok(if map == Map::BaseColor { texture.collapsed() } else { as_scalars(&texture) })
 }
 
-fn replaced(code: &str, file: &str, message: &str) -> Finding {
+/// A texture of scalars: channel `V` (or `Y`) of an EXR, the first channel of anything else.
+fn read_scalar(path: &Path) -> Result<Texture, String> {
+    if path.extension().is_none_or(|ending| ending != "exr") {
+        return read_texture(path, Encoding::Linear, Wrap::Clamp).map_err(|error| error.to_string());
+    }
+    let picture = exr_io::read_scalar(path).map_err(|error| error.to_string())?;
+    let (width, height) = (picture.width(), picture.height());
+    let texels = Texels::Grey(picture.into_pixels());
+    Texture::new(width, height, texels, Wrap::Clamp).map_err(|error| error.to_string())
+}
+
+/// The first channel alone, in as little memory as holds it. Equal values everywhere become one float, whatever they were
+/// stored as.
+fn as_scalars(texture: &Texture) -> Texture {
+    let (width, height) = (texture.width(), texture.height());
+    let texels = match texture.texels() {
+        Texels::Grey8(bytes) => Texels::Grey8(bytes.clone()),
+        Texels::Linear8(bytes) => Texels::Grey8(bytes.iter().map(|byte| byte[0]).collect()),
+        _ => Texels::Grey((0..width * height).map(|at| texture.texel(at % width, at / width)[0]).collect()),
+    };
+    let scalars =
+        Texture::new(width, height, texels, Wrap::Clamp).expect("there is a scalar for every texel").collapsed();
+    if scalars.width() == 1 { one_texel(scalars.texel(0, 0)[0]) } else { scalars }
+}
+
+fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
+    let mut text = String::new();
+    for material in materials {
+        for texture in material.iter().flat_map(|material| [&material.roughness, &material.metallic]) {
+            let kind = if matches!(texture.texels(), Texels::Grey8(_)) { "bytes" } else { "floats" };
+            text.push_str(&format!("{kind} {} {}\n", texture.width(), sha256_of_bytes(texture.bytes())));
+        }
+    }
+    sha256_of_bytes(text.as_bytes())
+}
+
+fn replaced(code: &str, file: &str, map: Map, message: &str) -> Finding {
+    let scored = match map {
+        Map::BaseColor => format!("base colour {GREY} (linear)"),
+        Map::Roughness => format!("roughness {MISSING_ROUGHNESS}"),
+        Map::Metallic => format!("metallic {MISSING_METALLIC}"),
+    };
     Finding {
         severity: Severity::Warning,
         code: code.to_owned(),
         file: file.to_owned(),
         place: String::new(),
         message: message.to_owned(),
-        action: format!("scored as base colour {GREY} (linear)"),
+        action: format!("scored as {scored}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::exr_io::Precision;
+    use mateval_image::{LinearRgb, Picture, png_io};
+    use serde_json::json;
+
+    use super::*;
+
+    /// A scene of an instance `a` with an atlas, a pane without, and `b`.
+    fn scene() -> SceneFile {
+        let instance = |id: &str, index: usize, atlas: bool| {
+            let atlas =
+                atlas.then(|| json!({"size": 64, "charts": 1, "coverage": 1.0, "texel_m": 0.1, "half_pixel_m": null}));
+            json!({"id": id, "index": index, "name": id, "category": null, "super_category": null, "triangles": 2,
+                   "atlas": atlas})
+        };
+        serde_json::from_value(json!({
+            "format": "mateval/1", "id": "s", "source": {"kind": "test", "house": "s", "files": []}, "exposure": 1.0,
+            "views": [], "instances": [instance("a", 1, true), instance("pane", 2, false), instance("b", 3, true)],
+            "parts": [], "part_sets": [], "findings": [],
+        }))
+        .unwrap()
+    }
+
+    /// A submission with sound maps.
+    fn sound() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for instance in ["a", "b"] {
+            std::fs::create_dir_all(folder.path().join("scenes/s").join(instance)).unwrap();
+            let colors = Picture::from_fn(64, 64, |x, y| [x as u8, y as u8, 200]);
+            png_io::write_rgb_bytes(&file(&folder, instance, "base_color.png"), &colors).unwrap();
+            for name in ["roughness.png", "metallic.png"] {
+                let greys = Picture::from_fn(64, 64, |x, y| (x + y) as u8);
+                png_io::write_grey_bytes(&file(&folder, instance, name), &greys).unwrap();
+            }
+        }
+        folder
+    }
+
+    fn file(folder: &tempfile::TempDir, instance: &str, name: &str) -> PathBuf {
+        folder.path().join("scenes/s").join(instance).join(name)
+    }
+
+    fn read(folder: &tempfile::TempDir) -> PredictedScene {
+        read_scene(folder.path(), &scene())
+    }
+
+    fn constant(texture: &Texture) -> Option<f32> {
+        (texture.width() == 1).then(|| texture.texel(0, 0)[0])
+    }
+
+    #[test]
+    fn scalars_are_linear_and_read_from_every_kind_of_file() {
+        let folder = sound();
+        png_io::write_rgb_bytes(
+            &file(&folder, "b", "roughness.png"),
+            &Picture::from_fn(64, 64, |x, _| [x as u8, 9, 9]),
+        )
+        .unwrap();
+        std::fs::remove_file(file(&folder, "b", "metallic.png")).unwrap();
+        let values = Picture::from_fn(128, 128, |x, _| x as f32 / 128.0);
+        exr_io::write_scalar(&file(&folder, "b", "metallic.exr"), &values, Precision::Float).unwrap();
+        png_io::write_ids(&file(&folder, "a", "metallic.png"), &Picture::from_fn(64, 64, |x, _| 1000 * x as u16))
+            .unwrap();
+        let read = read(&folder);
+        assert_eq!(read.findings, Vec::new());
+        let [Some(a), None, Some(b)] = read.materials.as_slice() else { panic!("{:?}", read.materials.len()) };
+        assert_eq!(a.roughness.texel(20, 31), [51.0 / 255.0; 3]);
+        assert_eq!(a.metallic.texel(20, 31), [20_000.0 / 65_535.0; 3]);
+        assert_eq!(b.roughness.texel(20, 31), [20.0 / 255.0; 3]);
+        assert_eq!((b.metallic.width(), b.metallic.texel(96, 5)), (128, [0.75; 3]));
+    }
+
+    #[test]
+    fn what_may_be_left_out_has_a_default_and_no_finding() {
+        let folder = sound();
+        for name in ["roughness.png", "metallic.png"] {
+            std::fs::remove_file(file(&folder, "a", name)).unwrap();
+        }
+        let read = read(&folder);
+        let a = read.materials[0].as_ref().unwrap();
+        assert_eq!((constant(&a.roughness), constant(&a.metallic)), (Some(0.5), Some(0.0)));
+        assert_eq!(read.findings, Vec::new());
+        // Three of b, one of a; the twin: with all of them there are six.
+        assert_eq!((read.files.len(), super::read_scene(sound().path(), &scene()).files.len()), (4, 6));
+    }
+
+    /// A map, the finding's code, a word of its action, and the fault.
+    type Fault = (Map, &'static str, &'static str, fn(&Path));
+
+    const FAULTS: [Fault; 10] = [
+        (Map::BaseColor, "missing_map", "base colour 0.5", |png| std::fs::remove_file(png).unwrap()),
+        (Map::BaseColor, "ambiguous_map", "base colour 0.5", |png| {
+            let grey = Picture::filled(64, 64, LinearRgb([0.1; 3]));
+            exr_io::write_linear(&png.with_extension("exr"), &grey, Precision::Half).unwrap();
+        }),
+        (Map::Roughness, "ambiguous_map", "roughness 0.5", |png| write_exr(png, 64, 0.1)),
+        (Map::Metallic, "ambiguous_map", "metallic 0", |png| write_exr(png, 64, 0.1)),
+        (Map::Roughness, "unsound_map", "roughness 0.5", |png| write_exr_alone(png, 64, 1.01)),
+        (Map::Metallic, "unsound_map", "metallic 0", |png| write_exr_alone(png, 64, -0.01)),
+        (Map::Metallic, "unsound_map", "metallic 0", |png| write_exr_alone(png, 64, f32::NAN)),
+        (Map::Roughness, "unsound_map", "roughness 0.5", |png| write_exr_alone(png, 32, 0.1)),
+        (Map::Roughness, "unsound_map", "roughness 0.5", |png| {
+            png_io::write_grey_bytes(png, &Picture::filled(128, 64, 9)).unwrap();
+        }),
+        (Map::Metallic, "unsound_map", "metallic 0", |png| std::fs::write(png, b"not a picture").unwrap()),
+    ];
+
+    fn write_exr(png: &Path, size: usize, value: f32) {
+        let picture = Picture::filled(size, size, value);
+        exr_io::write_scalar(&png.with_extension("exr"), &picture, Precision::Float).unwrap();
+    }
+
+    fn write_exr_alone(png: &Path, size: usize, value: f32) {
+        std::fs::remove_file(png).unwrap();
+        write_exr(png, size, value);
+    }
+
+    #[test]
+    fn every_fault_is_one_finding_that_says_what_is_scored() {
+        for (at, (map, code, scored, damage)) in FAULTS.into_iter().enumerate() {
+            let folder = sound();
+            damage(&file(&folder, "a", &format!("{}.png", map.stem())));
+            let read = read(&folder);
+            let [finding] = read.findings.as_slice() else { panic!("{at}: {:?}", read.findings) };
+            assert_eq!((finding.code.as_str(), finding.action.as_str().contains(scored)), (code, true), "{finding}");
+            assert!(finding.file.starts_with(&format!("scenes/s/a/{}.", map.stem())), "{finding}");
+            let damaged = read.materials[0].as_ref().unwrap();
+            for other in Map::ALL {
+                let expected = (other == map).then(|| constant(&default_of(map)).unwrap());
+                assert_eq!(constant(damaged.texture(other)), expected, "{at}");
+            }
+            assert!(constant(&read.materials[2].as_ref().unwrap().roughness).is_none());
+        }
+    }
+
+    /// The key is of values: how they are stored does not enter, base colours do not, every scalar does.
+    #[test]
+    fn keys_are_equal_for_equal_scattering_only() {
+        let key = |change: fn(&tempfile::TempDir)| {
+            let folder = sound();
+            change(&folder);
+            read(&folder).scattering_key
+        };
+        let plain = key(|_| {});
+        assert_eq!(plain, key(|folder| std::fs::remove_file(file(folder, "a", "base_color.png")).unwrap()));
+        let as_rgb = |folder: &tempfile::TempDir| {
+            let greys = Picture::from_fn(64, 64, |x, y| [(x + y) as u8; 3]);
+            png_io::write_rgb_bytes(&file(folder, "a", "roughness.png"), &greys).unwrap();
+        };
+        assert_eq!(plain, key(as_rgb));
+        let one_texel = |folder: &tempfile::TempDir| {
+            let greys = Picture::from_fn(64, 64, |x, y| (x + y) as u8 + u8::from((x, y) == (63, 63)));
+            png_io::write_grey_bytes(&file(folder, "b", "metallic.png"), &greys).unwrap();
+        };
+        let no_roughness =
+            |folder: &tempfile::TempDir| std::fs::remove_file(file(folder, "a", "roughness.png")).unwrap();
+        let no_metal = |folder: &tempfile::TempDir| std::fs::remove_file(file(folder, "a", "metallic.png")).unwrap();
+        let black = |folder: &tempfile::TempDir| {
+            png_io::write_grey_bytes(&file(folder, "a", "metallic.png"), &Picture::filled(128, 128, 0)).unwrap();
+        };
+        let others = [key(one_texel), key(no_roughness), key(no_metal)];
+        assert!(others.iter().all(|other| *other != plain) && others[1] != others[2]);
+        // No metallic is the default, 0; so says a file of zeros, of whatever size.
+        assert_eq!(key(no_metal), key(black));
     }
 }

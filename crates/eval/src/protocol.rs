@@ -1,10 +1,12 @@
 //! Protocols: every rule that a number depends on, as data with a fingerprint.
 
 use mateval_scene::SceneId;
+use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
+use crate::light_rules::{LightRules, Track};
 
 /// What is done outside a mask by the metrics whose windows look across its edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -43,14 +45,22 @@ pub struct Protocol {
     pub lpips_decimals: u32,
     /// Places, in a regular square, at which a pixel of the truth and of the prediction is looked at.
     pub subpixels: usize,
+    /// What PSNR is capped at, in dB.
+    pub psnr_cap_db: f64,
     /// What a missing or unsound base colour scores as, linear.
     pub missing_base_color: f32,
+    /// What a missing or unsound roughness scores as.
+    pub missing_roughness: f32,
+    /// What a missing or unsound metallic scores as.
+    pub missing_metallic: f32,
+    /// By what light predictions are looked at.
+    pub light: LightRules,
     /// [`SCORER_VERSION`].
     pub scorer_version: u32,
 }
 
 /// Raised whenever a number could change for the same inputs.
-pub const SCORER_VERSION: u32 = 1;
+pub const SCORER_VERSION: u32 = 2;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.
@@ -58,9 +68,15 @@ impl Protocol {
 
     /// A protocol by name.
     pub fn named(name: &str) -> Result<Self, EvalError> {
-        let (mask_rule, albedo_space) = match name {
-            "mateval-1" => (MaskRule::Inside, AlbedoSpace::Linear),
-            "paper" => (MaskRule::BlackFill, AlbedoSpace::Srgb),
+        let (mask_rule, albedo_space, light) = match name {
+            "mateval-1" => {
+                let tracks = vec![Track::Fitted, Track::True, Track::Relit];
+                (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
+            }
+            "paper" => {
+                let light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
+                (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
+            }
             _ => {
                 let known = Self::NAMES.join("', '");
                 return Err(EvalError::Invalid(format!("there is no protocol '{name}'; known are '{known}'")));
@@ -73,7 +89,11 @@ impl Protocol {
             lpips_net: "alex".to_owned(),
             lpips_decimals: 6,
             subpixels: mateval_tracer::aov::SUBPIXELS,
+            psnr_cap_db: mateval_metrics::Psnr::CAP_DB,
             missing_base_color: mateval_scene::submission::GREY,
+            missing_roughness: crate::prediction::MISSING_ROUGHNESS,
+            missing_metallic: crate::prediction::MISSING_METALLIC,
+            light,
             scorer_version: SCORER_VERSION,
         })
     }

@@ -2,20 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::{Finding, SceneId, ViewId};
+use mateval_metrics::Psnr;
+use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::measure::ValueNoise;
+use crate::predicted_light::FittedRadiances;
 use crate::protocol::Protocol;
 
 /// The word for this version of a result.
-pub const RESULT_FORMAT: &str = "mateval-result/1";
+pub const RESULT_FORMAT: &str = "mateval-result/2";
 
 /// A submission's scores on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultFile {
-    /// Always `mateval-result/1`.
+    /// Always `mateval-result/2`.
     pub format: String,
     /// What made it, as in `mateval 0.1.0`.
     pub tool: String,
@@ -73,8 +76,98 @@ pub struct ProtocolResult {
     pub summary: BTreeMap<String, f64>,
     /// Mean over pictures of each scene, by the same keys.
     pub scenes: BTreeMap<SceneId, BTreeMap<String, f64>>,
+    /// Standard errors of the means of PSNR in `summary` that render noise makes, in dB.
+    pub summary_noise: BTreeMap<String, f64>,
+    /// How sure the means of PSNR of each scene are that render noise touches, by the same keys.
+    pub noise: BTreeMap<SceneId, BTreeMap<String, PsnrNoise>>,
+    /// The radiances that were fitted, by scene.
+    pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// Every single value.
     pub pictures: Vec<PictureValue>,
+    /// What each instance's texels are off by.
+    pub texels: Vec<InstanceTexelErrors>,
+    /// What each instance's pixels are off by.
+    pub instances: Vec<InstancePixelErrors>,
+}
+
+/// How sure a scene's mean PSNR is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PsnrNoise {
+    /// Standard error by all noise, in dB; null where the error is no more than noise, so that PSNR is a lower bound.
+    pub standard_error_db: Option<f64>,
+    /// By our own renders' noise.
+    pub own_db: Option<f64>,
+    /// By the truth's noise.
+    pub truth_db: Option<f64>,
+    /// Samples a pixel of each of our halves.
+    pub samples: u32,
+    /// How it ended.
+    pub state: NoiseState,
+}
+
+/// How a scene's samples were enough, or not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseState {
+    /// Our own noise is under the protocol's bound, and the truth's too.
+    Certified,
+    /// The truth's noise is above the bound, and ours under the protocol's share of it.
+    LimitedByTruth,
+    /// The most samples were taken, and our noise is above the bound.
+    SampleCap,
+    /// The pilot thought that fewer samples were enough; they were not quite.
+    AboveTarget,
+}
+
+/// The squared errors of one instance's texels, in means over area.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InstanceTexelErrors {
+    /// Its scene.
+    pub scene: SceneId,
+    /// The instance.
+    pub instance: InstanceId,
+    /// What the input view sees of it.
+    pub observed: TexelErrors,
+    /// What it does not see.
+    pub unobserved: TexelErrors,
+}
+
+/// Means over texels by their area on the surface; null where there is no area.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TexelErrors {
+    /// Square metres.
+    pub area_m2: f64,
+    /// Linear, mean over channels.
+    pub base_color_mse: Option<f64>,
+    /// Of roughness.
+    pub roughness_mse: Option<f64>,
+    /// Of metallic.
+    pub metallic_mse: Option<f64>,
+}
+
+/// The squared error of one instance's pixels in one kind of picture.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InstancePixelErrors {
+    /// Its scene.
+    pub scene: SceneId,
+    /// The instance.
+    pub instance: InstanceId,
+    /// The source's category; of architecture what piece of it it is, as in `WallInner`; else null.
+    pub category: Option<String>,
+    /// The source's broader category; `Architecture` for architecture; else null.
+    pub super_category: Option<String>,
+    /// `albedo`, `albedo_aligned`, `rgb_fitted`, `rgb_true`.
+    pub picture: String,
+    /// `input`, `novel`, `unobserved`.
+    pub views: String,
+    /// Valid pixels that show it, in all of these views.
+    pub pixels: usize,
+    /// Mean over those pixels, in the space of the protocol's MSE of that picture; of light free of noise.
+    pub mse: f64,
 }
 
 /// One value of one picture.
@@ -85,8 +178,12 @@ pub struct PictureValue {
     pub scene: SceneId,
     /// Its view.
     pub view: ViewId,
-    /// What was compared: `albedo`, `albedo_aligned`.
+    /// What was compared: `albedo`, `albedo_aligned`, `roughness`, `metallic`, `rgb_fitted`, `rgb_true`, `rgb_relit`; with
+    /// `_specular` behind it where only what is metal or smooth in truth counts.
     pub picture: String,
+    /// For `rgb_relit` the lighting: `dim`, `warm_cool`, `alone_1` and so on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lighting: Option<String>,
     /// Which pixels: `valid` or `unobserved`.
     pub region: Region,
     /// `mse`, `psnr`, `ssim`, `lpips_alex`.
@@ -96,6 +193,9 @@ pub struct PictureValue {
     /// For PSNR: the MSE was exactly zero, the value is the cap.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub exact: bool,
+    /// For MSE and PSNR of light: how uncertain it is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<ValueNoise>,
     /// Pixels (for SSIM inside a mask: windows) that the value is a mean over.
     pub count: usize,
 }
@@ -122,19 +222,25 @@ pub struct MissingMetric {
     pub mend: String,
 }
 
-/// Takes the means: of pictures to scenes, of scenes to the dataset. A value that is missing is left out of its mean; a
-/// scene without any value of a key is left out of that key's.
-pub fn means(pictures: &[PictureValue]) -> (BTreeMap<SceneId, BTreeMap<String, f64>>, BTreeMap<String, f64>) {
+/// Takes the means: of pictures to scenes (of texels by area), of scenes to the dataset. A value that is missing is left
+/// out of its mean; a scene without any value of a key is left out of that key's.
+pub fn means(
+    pictures: &[PictureValue],
+    texels: &[InstanceTexelErrors],
+) -> (BTreeMap<SceneId, BTreeMap<String, f64>>, BTreeMap<String, f64>) {
     let mut of_scene: BTreeMap<SceneId, BTreeMap<String, Mean>> = BTreeMap::new();
     for picture in pictures {
         if let Some(value) = picture.value {
             of_scene.entry(picture.scene.clone()).or_default().entry(key(picture)).or_default().add(value);
         }
     }
-    let scenes: BTreeMap<SceneId, BTreeMap<String, f64>> = of_scene
+    let mut scenes: BTreeMap<SceneId, BTreeMap<String, f64>> = of_scene
         .into_iter()
         .map(|(scene, keys)| (scene, keys.into_iter().map(|(key, mean)| (key, mean.value())).collect()))
         .collect();
+    for (scene, values) in texel_means(texels) {
+        scenes.entry(scene).or_default().extend(values);
+    }
     let mut of_dataset: BTreeMap<String, Mean> = BTreeMap::new();
     for (key, value) in scenes.values().flatten() {
         of_dataset.entry(key.clone()).or_default().add(*value);
@@ -144,13 +250,63 @@ pub fn means(pictures: &[PictureValue]) -> (BTreeMap<SceneId, BTreeMap<String, f
 }
 
 /// `<picture>.<views>.<metric>`.
-fn key(picture: &PictureValue) -> String {
-    let views = match picture.region {
+pub(crate) fn key(picture: &PictureValue) -> String {
+    format!("{}.{}.{}", picture.picture, views(&picture.view, picture.region), picture.metric)
+}
+
+/// `input`, `novel` or `unobserved`.
+pub(crate) fn views(view: &ViewId, region: Region) -> &'static str {
+    match region {
         Region::Unobserved => "unobserved",
-        Region::Valid if picture.view.as_str() == mateval_scene::layout::INPUT => "input",
+        Region::Valid if view.as_str() == mateval_scene::layout::INPUT => "input",
         Region::Valid => "novel",
-    };
-    format!("{}.{views}.{}", picture.picture, picture.metric)
+    }
+}
+
+/// `texture_<map>.<observed or unobserved>.<mse or psnr>` of each scene: the mean over all its texels by area, and the
+/// PSNR of that.
+fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<String, f64>> {
+    type Part = (&'static str, fn(&InstanceTexelErrors) -> &TexelErrors);
+    type Map = (&'static str, fn(&TexelErrors) -> Option<f64>);
+    let parts: [Part; 2] = [("observed", |t| &t.observed), ("unobserved", |t| &t.unobserved)];
+    let maps: [Map; 3] = [
+        ("base_color", |errors| errors.base_color_mse),
+        ("roughness", |errors| errors.roughness_mse),
+        ("metallic", |errors| errors.metallic_mse),
+    ];
+    let mut sums: BTreeMap<(SceneId, String), [f64; 2]> = BTreeMap::new();
+    for instance in texels {
+        for (part, errors) in parts.map(|(part, of)| (part, of(instance))) {
+            for (map, mse) in maps.map(|(map, of)| (map, of(errors))) {
+                let Some(mse) = mse else { continue };
+                let sums = sums.entry((instance.scene.clone(), format!("texture_{map}.{part}"))).or_default();
+                sums[0] += errors.area_m2 * mse;
+                sums[1] += errors.area_m2;
+            }
+        }
+    }
+    let mut means: BTreeMap<SceneId, BTreeMap<String, f64>> = BTreeMap::new();
+    for ((scene, key), [sum, area]) in sums {
+        let values = means.entry(scene).or_default();
+        let mse = sum / area;
+        if let Ok(psnr) = Psnr::from_mse(mse) {
+            values.insert(format!("{key}.mse"), mse);
+            values.insert(format!("{key}.psnr"), psnr.db);
+        }
+    }
+    means
+}
+
+/// The standard error of the dataset's mean of each key that all its scenes have one of: scenes are independent.
+pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<String, PsnrNoise>>) -> BTreeMap<String, f64> {
+    let mut sums: BTreeMap<&str, (usize, Option<f64>)> = BTreeMap::new();
+    for (key, of_scene) in noise.values().flatten() {
+        let (count, squares) = sums.entry(key).or_insert((0, Some(0.0)));
+        *count += 1;
+        *squares = squares.zip(of_scene.standard_error_db).map(|(sum, error)| sum + error * error);
+    }
+    let errors = sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64)));
+    errors.map(|(key, error)| (key.to_owned(), error)).collect()
 }
 
 #[derive(Default)]
@@ -181,10 +337,44 @@ mod tests {
             picture: "albedo".to_owned(),
             region,
             metric: "psnr".to_owned(),
+            lighting: None,
+            noise: None,
             value,
             exact: false,
             count: 1,
         }
+    }
+
+    /// Two instances of 1 and 3 square metres.
+    #[test]
+    fn texels_count_by_area() {
+        let texels = |name: &str, area_m2: f64, mse: f64| InstanceTexelErrors {
+            scene: SceneId::new("a").unwrap(),
+            instance: InstanceId::new(name).unwrap(),
+            observed: TexelErrors { area_m2, base_color_mse: Some(mse), ..Default::default() },
+            unobserved: TexelErrors::default(),
+        };
+        let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
+        assert!((summary["texture_base_color.observed.mse"] - 0.01).abs() < 1e-15);
+        assert!((summary["texture_base_color.observed.psnr"] - 20.0).abs() < 1e-12);
+        assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
+    }
+
+    #[test]
+    fn noise_of_scenes_is_independent() {
+        let noise = |error: Option<f64>| PsnrNoise {
+            standard_error_db: error,
+            own_db: error,
+            truth_db: None,
+            samples: 16,
+            state: NoiseState::Certified,
+        };
+        let scene = |name: &str, key: &str, error| {
+            (SceneId::new(name).unwrap(), BTreeMap::from([(key.to_owned(), noise(error))]))
+        };
+        let both = BTreeMap::from([scene("a", "k", Some(0.03)), scene("b", "k", Some(0.04))]);
+        assert!((summary_noise(&both)["k"] - 0.025).abs() < 1e-15);
+        assert!(summary_noise(&BTreeMap::from([scene("a", "k", Some(0.1)), scene("b", "k", None)])).is_empty());
     }
 
     /// Scene a has two novel views, scene b one: each scene weighs the same.
@@ -197,7 +387,7 @@ mod tests {
             value("a", "up_left", Region::Unobserved, None),
             value("a", "input", Region::Valid, Some(1.0)),
         ];
-        let (scenes, summary) = means(&all);
+        let (scenes, summary) = means(&all, &[]);
         assert_eq!(summary["albedo.novel.psnr"], 25.0);
         assert_eq!(summary["albedo.input.psnr"], 1.0);
         assert!(!summary.contains_key("albedo.unobserved.psnr"));

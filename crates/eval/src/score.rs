@@ -1,28 +1,32 @@
 //! Submissions scored on a dataset.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
-use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_image::{LinearRgb, Picture};
 use mateval_metrics::Lpips;
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::layout::SceneFolder;
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_scene::{Finding, Progress, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io};
+use mateval_scene::{
+    Finding, Progress, RendererId, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io,
+};
 use mateval_tracer::World;
 
-use crate::albedo::albedo_pictures;
-use crate::alignment::{channel_scales, scaled};
 use crate::error::EvalError;
-use crate::measure::albedo_metrics;
+use crate::light_rules::Track;
+use crate::material_pictures::material_pictures;
 use crate::prediction::{PredictedScene, read_scene};
 use crate::protocol::Protocol;
 use crate::result::{
-    DatasetId, MissingMetric, PictureValue, ProtocolResult, RESULT_FORMAT, Region, ResultFile, SubmissionId, means,
+    DatasetId, MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
 };
+use crate::scene_score::{SceneOrder, SceneScore, score_scene};
+use crate::truth::ViewTruth;
 
 /// The network that scores use, or why it is not there.
 pub enum LpipsWeights {
@@ -60,6 +64,10 @@ pub struct ScorePlan<'a> {
     pub lpips: LpipsWeights,
     /// Name and version of the tool, for the result.
     pub tool: String,
+    /// Scenes that are scored at once; each is worked on by all threads anyway.
+    pub jobs: usize,
+    /// A folder that scores of scenes are kept in by what they depend on, so that a killed run goes on.
+    pub cache: Option<&'a Path>,
 }
 
 /// One submission on its way to a result.
@@ -67,19 +75,127 @@ struct Entry {
     file: SubmissionFile,
     findings: Vec<Finding>,
     files: Vec<(String, String)>,
-    /// By protocol.
-    pictures: Vec<Vec<PictureValue>>,
+    /// By protocol, scene by scene.
+    scores: Vec<Vec<(SceneId, SceneScore)>>,
 }
 
-/// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them.
+/// What one submission got in one scene.
+struct Outcome {
+    findings: Vec<Finding>,
+    files: Vec<(String, String)>,
+    /// By protocol.
+    scores: Vec<SceneScore>,
+}
+
+/// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them, and so
+/// are paths of light for those that agree in roughness and metallic.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
     let scenes = chosen_scenes(plan.dataset, &plan.scenes)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
-    for scene in &scenes {
-        score_scene(plan, scene, &mut entries, progress)?;
+    for (scene, outcomes) in scenes.iter().zip(score_scenes(plan, &scenes, progress)?) {
+        for (entry, outcome) in entries.iter_mut().zip(outcomes) {
+            entry.findings.extend(outcome.findings);
+            entry.files.extend(outcome.files);
+            for (scores, score) in entry.scores.iter_mut().zip(outcome.scores) {
+                scores.push((scene.id.clone(), score));
+            }
+        }
     }
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
+}
+
+/// By scene, then by submission; some scenes at a time. The first failure ends it.
+fn score_scenes(
+    plan: &ScorePlan<'_>,
+    scenes: &[&SceneFile],
+    progress: Progress<'_>,
+) -> Result<Vec<Vec<Outcome>>, EvalError> {
+    let next = AtomicUsize::new(0);
+    let done: Vec<OnceLock<Result<Vec<Outcome>, EvalError>>> = scenes.iter().map(|_| OnceLock::new()).collect();
+    let work = || {
+        while let Some((at, scene)) = { scenes.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) } {
+            let outcome = score_one(plan, scene, progress);
+            if outcome.is_err() {
+                next.store(scenes.len(), Ordering::Relaxed);
+            }
+            // Each place is filled by the one worker that drew its number.
+            let _ = done[at].set(outcome);
+        }
+    };
+    std::thread::scope(|scope| {
+        (1..plan.jobs.max(1)).for_each(|_| drop(scope.spawn(work)));
+        work();
+    });
+    // Scenes that a failure left out come after it or are as yet empty.
+    done.into_iter().filter_map(OnceLock::into_inner).collect()
+}
+
+fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
+    let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let mut scores: Vec<Option<Vec<SceneScore>>> =
+        predictions.iter().map(|prediction| plan.kept(scene, prediction)).collect();
+    let fresh: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
+    if !fresh.is_empty() {
+        let chosen: Vec<PredictedScene> = fresh.iter().map(|&at| predictions[at].clone()).collect();
+        for (&at, found) in fresh.iter().zip(plan.score_fresh(scene, &chosen, progress)?) {
+            plan.keep(scene, &predictions[at], &found)?;
+            scores[at] = Some(found);
+        }
+    }
+    let outcome = |(prediction, scores): (PredictedScene, Option<Vec<SceneScore>>)| Outcome {
+        findings: prediction.findings,
+        files: prediction.files,
+        scores: scores.expect("what was not kept is fresh"),
+    };
+    Ok(predictions.into_iter().zip(scores).map(outcome).collect())
+}
+
+impl ScorePlan<'_> {
+    fn score_fresh(
+        &self,
+        scene: &SceneFile,
+        predictions: &[PredictedScene],
+        progress: Progress<'_>,
+    ) -> Result<Vec<Vec<SceneScore>>, EvalError> {
+        let renderer = self.dataset.file.scored_renderer.as_ref();
+        let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene, renderer)?;
+        score_scene(&SceneOrder {
+            scene,
+            folder: &folder,
+            world: &world,
+            atlases: &atlases,
+            views: scored_views(self.dataset, scene)?,
+            predictions,
+            protocols: &self.protocols,
+            lpips: self.lpips.network(),
+            renderer,
+            progress,
+        })
+    }
+
+    /// Where scores of a scene under a protocol are kept: everything that they depend on is in the name.
+    fn place(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
+        let weights = self.lpips.network().map(Lpips::sha256);
+        let print = protocol.fingerprint(&self.dataset.file.manifest_sha256, &[&scene.id], weights);
+        let key = sha256_of_bytes(json::to_text(&(&self.tool, print, &prediction.files)).as_bytes());
+        Some(self.cache?.join(format!("{key}.json")))
+    }
+
+    /// The scores that an earlier run has kept, if it has all of them.
+    fn kept(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
+        // A file that is half written or of another kind is none.
+        self.protocols.iter().map(|protocol| json::read(&self.place(scene, prediction, protocol)?).ok()).collect()
+    }
+
+    fn keep(&self, scene: &SceneFile, prediction: &PredictedScene, scores: &[SceneScore]) -> Result<(), EvalError> {
+        for (protocol, score) in self.protocols.iter().zip(scores) {
+            if let Some(place) = self.place(scene, prediction, protocol) {
+                json::write(&place, score)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// The scenes of these ids, all where there are none; in the dataset's order.
@@ -116,38 +232,40 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
         });
     }
     let files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    Ok(Entry { file, findings, files, pictures: vec![Vec::new(); plan.protocols.len()] })
+    Ok(Entry { file, findings, files, scores: vec![Vec::new(); plan.protocols.len()] })
 }
 
-/// A scene, ready to be looked at with what submissions say of it.
+/// A scene, ready to be looked at.
 struct OpenScene {
     folder: SceneFolder,
     world: World,
     atlases: Vec<TriangleMesh>,
-    /// In the submissions' order.
-    predictions: Vec<PredictedScene>,
 }
 
 impl OpenScene {
-    fn read(dataset: &Dataset, scene: &SceneFile, submissions: &[&Path]) -> Result<Self, EvalError> {
+    /// `renderer` is the one whose pictures will be looked at.
+    fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
+        let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
+        let is_light = |file: &str| {
+            let name = file.rsplit('/').next().unwrap_or(file);
+            render.as_ref().is_some_and(|render| file.starts_with(render.as_str()))
+                && name.ends_with(".exr")
+                && (name.starts_with("rgb") || name.starts_with("group_"))
+        };
         // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
-        dataset.check_files(&scene.id, |path| !path.contains("/renders/") && !path.contains("/materials/"))?;
+        dataset.check_files(&scene.id, |file| !file.contains("/renders/") || is_light(file))?;
         let folder = dataset.folder(&scene.id);
         let world = World::new(Arc::new(reference_io::read(&folder)?))?;
         let atlases = read_atlases(&folder, scene, &world)?;
-        let predictions = submissions.iter().map(|path| read_scene(path, scene)).collect();
-        Ok(Self { folder, world, atlases, predictions })
+        Ok(Self { folder, world, atlases })
     }
 }
 
 /// The truth and every submission's albedo of one view, linear.
 pub(crate) struct SceneAlbedo {
-    pub(crate) truth: Picture<LinearRgb>,
+    pub(crate) truth: ViewTruth,
     /// In the plan's order.
     pub(crate) predicted: Vec<Picture<LinearRgb>>,
-    pub(crate) valid: Mask,
-    /// None for the input view.
-    pub(crate) unobserved: Option<Mask>,
 }
 
 /// The views of a scene that are scored, in the scene's order.
@@ -156,38 +274,14 @@ pub(crate) fn scene_albedo(
     scene: &SceneFile,
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
-    let OpenScene { folder, world, atlases, predictions } = OpenScene::read(dataset, scene, submissions)?;
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, None)?;
+    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
     let view = |view: &View| {
-        let predicted = albedo_pictures(&world, &atlases, &view.camera, &predictions);
-        let Truth { albedo: truth, valid, unobserved } = Truth::read(&folder, view)?;
-        Ok(SceneAlbedo { truth, predicted, valid, unobserved })
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
+        let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
+        Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
     };
     scored_views(dataset, scene)?.into_iter().map(view).collect()
-}
-
-fn score_scene(
-    plan: &ScorePlan<'_>,
-    scene: &SceneFile,
-    entries: &mut [Entry],
-    progress: Progress<'_>,
-) -> Result<(), EvalError> {
-    let OpenScene { folder, world, atlases, predictions } = OpenScene::read(plan.dataset, scene, &plan.submissions)?;
-    let views = scored_views(plan.dataset, scene)?;
-    for (at, view) in views.iter().enumerate() {
-        progress(&format!("scene {}", scene.id), at, views.len());
-        let pictures = albedo_pictures(&world, &atlases, &view.camera, &predictions);
-        let truth = Truth::read(&folder, view)?;
-        for (entry, picture) in entries.iter_mut().zip(&pictures) {
-            for (protocol, values) in plan.protocols.iter().zip(&mut entry.pictures) {
-                values.extend(picture_values(plan, protocol, scene, view, picture, &truth)?);
-            }
-        }
-    }
-    for (entry, prediction) in entries.iter_mut().zip(predictions) {
-        entry.findings.extend(prediction.findings);
-        entry.files.extend(prediction.files);
-    }
-    Ok(())
 }
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
@@ -221,85 +315,16 @@ fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Resul
     Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
 }
 
-/// What a view is compared with.
-struct Truth {
-    albedo: Picture<LinearRgb>,
-    valid: Mask,
-    /// None for the input view.
-    unobserved: Option<Mask>,
-}
-
-impl Truth {
-    fn read(folder: &SceneFolder, view: &View) -> Result<Self, EvalError> {
-        let shown = folder.view(&view.id);
-        let is_input = view.id.as_str() == INPUT;
-        let unobserved = (!is_input).then(|| png_io::read_mask(&shown.join("unobserved.png"))).transpose()?;
-        let truth = Self {
-            albedo: exr_io::read_linear(&folder.truth_view(&view.id).join("albedo.exr"))?,
-            valid: png_io::read_mask(&shown.join("valid.png"))?,
-            unobserved,
-        };
-        let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
-        let masks = std::iter::once(&truth.valid).chain(&truth.unobserved);
-        let sizes =
-            masks.map(|mask| (mask.width(), mask.height())).chain([(truth.albedo.width(), truth.albedo.height())]);
-        if { sizes }.all(|found| found == size) {
-            return Ok(truth);
-        }
-        let what = format!("'{}': the truth's pictures are not of the camera's size", shown.display());
-        Err(EvalError::Invalid(format!("{what}; run `mateval prep verify`")))
-    }
-}
-
-/// Albedo raw and aligned, over all valid pixels and over the unobserved ones (which keep their picture's scale).
-fn picture_values(
-    plan: &ScorePlan<'_>,
-    protocol: &Protocol,
-    scene: &SceneFile,
-    view: &View,
-    predicted: &Picture<LinearRgb>,
-    truth: &Truth,
-) -> Result<Vec<PictureValue>, EvalError> {
-    let failed = |source| EvalError::Metric { what: format!("scene '{}', view '{}'", scene.id, view.id), source };
-    let aligned = scaled(predicted, channel_scales(predicted, &truth.albedo, &truth.valid));
-    let regions = std::iter::once((Region::Valid, &truth.valid))
-        .chain(truth.unobserved.iter().map(|mask| (Region::Unobserved, mask)));
-    let mut values = Vec::new();
-    for (region, mask) in regions {
-        for (name, picture) in [("albedo", predicted), ("albedo_aligned", &aligned)] {
-            let measured =
-                albedo_metrics(protocol, plan.lpips.network(), picture, &truth.albedo, mask).map_err(failed)?;
-            values.extend(measured.into_iter().map(|measured| PictureValue {
-                scene: scene.id.clone(),
-                view: view.id.clone(),
-                picture: name.to_owned(),
-                region,
-                metric: measured.metric,
-                value: measured.value,
-                exact: measured.exact,
-                count: measured.count,
-            }));
-        }
-    }
-    Ok(values)
-}
-
 fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> ResultFile {
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
-    let protocols = plan.protocols.iter().zip(entry.pictures).map(|(protocol, pictures)| {
-        let (scenes, summary) = means(&pictures);
-        let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
+    let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
+    let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
         let fingerprint = protocol.fingerprint(manifest, &ids, weights);
-        (protocol.name.clone(), ProtocolResult { protocol: protocol.clone(), fingerprint, summary, scenes, pictures })
+        (protocol.name.clone(), protocol_result(protocol, fingerprint, scores))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
-    let missing = match &plan.lpips {
-        LpipsWeights::Loaded(_) => Vec::new(),
-        LpipsWeights::Missing { reason, mend } => {
-            vec![MissingMetric { metric: "lpips_alex".to_owned(), reason: reason.clone(), mend: mend.clone() }]
-        }
-    };
+    let missing = missing(plan);
     entry.findings.sort();
     let files: String = entry.files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
     ResultFile {
@@ -319,4 +344,51 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
         missing,
         findings: entry.findings,
     }
+}
+
+/// All scenes' scores in one.
+fn protocol_result(protocol: &Protocol, fingerprint: String, scores: Vec<(SceneId, SceneScore)>) -> ProtocolResult {
+    let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
+    for (scene, score) in scores {
+        pictures.extend(score.pictures);
+        texels.extend(score.texels);
+        instances.extend(score.instances);
+        if !score.noise.is_empty() {
+            noise.insert(scene.clone(), score.noise);
+        }
+        fits.extend(score.fit.map(|fit| (scene, fit)));
+    }
+    let (scenes, summary) = means(&pictures, &texels);
+    ProtocolResult {
+        protocol: protocol.clone(),
+        fingerprint,
+        summary,
+        scenes,
+        summary_noise: summary_noise(&noise),
+        noise,
+        fits,
+        pictures,
+        texels,
+        instances,
+    }
+}
+
+/// What could not be measured for want of weights or renders.
+fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
+    let mut missing = Vec::new();
+    if let LpipsWeights::Missing { reason, mend } = &plan.lpips {
+        missing.push(MissingMetric { metric: "lpips_alex".to_owned(), reason: reason.clone(), mend: mend.clone() });
+    }
+    if plan.dataset.file.scored_renderer.is_none() {
+        let mut tracks: Vec<Track> = plan.protocols.iter().flat_map(|p| p.light.tracks.clone()).collect();
+        tracks.sort_unstable();
+        tracks.dedup();
+        missing.extend(tracks.into_iter().map(|track| MissingMetric {
+            metric: track.picture().to_owned(),
+            reason: "the dataset has no renders to compare with".to_owned(),
+            mend: "mateval prep render DATASET".to_owned(),
+        }));
+    }
+    missing
 }

@@ -60,14 +60,14 @@ pub fn write(
 
 /// The truth and the predictions of one view.
 fn shown(view: &SceneAlbedo) -> Vec<Picture<[u8; 3]>> {
-    std::iter::once(&view.truth).chain(&view.predicted).map(|picture| darkened(view, picture)).collect()
+    std::iter::once(&view.truth.albedo).chain(&view.predicted).map(|picture| darkened(view, picture)).collect()
 }
 
 fn darkened(view: &SceneAlbedo, picture: &Picture<LinearRgb>) -> Picture<[u8; 3]> {
     let encoded = picture.to_srgb();
     Picture::from_fn(picture.width(), picture.height(), |x, y| {
-        let is_observed = view.unobserved.as_ref().is_some_and(|mask| !mask.get(x, y));
-        let share = match (view.valid.get(x, y), is_observed) {
+        let is_observed = view.truth.unobserved.as_ref().is_some_and(|mask| !mask.get(x, y));
+        let share = match (view.truth.valid.get(x, y), is_observed) {
             (false, _) => 0.0,
             (true, true) => OBSERVED_SHARE,
             (true, false) => 1.0,
@@ -79,10 +79,10 @@ fn darkened(view: &SceneAlbedo, picture: &Picture<LinearRgb>) -> Picture<[u8; 3]
 fn errors(view: &SceneAlbedo) -> Vec<Picture<[u8; 3]>> {
     let error = |picture: &Picture<LinearRgb>| {
         Picture::from_fn(picture.width(), picture.height(), |x, y| {
-            if !view.valid.get(x, y) {
+            if !view.truth.valid.get(x, y) {
                 return [0; 3];
             }
-            let (a, b) = (picture.get(x, y).0, view.truth.get(x, y).0);
+            let (a, b) = (picture.get(x, y).0, view.truth.albedo.get(x, y).0);
             let squares: f32 = (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum();
             glow((squares / 3.0).sqrt() / WHITE_ERROR)
         })

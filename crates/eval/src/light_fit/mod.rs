@@ -26,16 +26,22 @@ pub struct LightFit {
     pub relative_gap: f64,
 }
 
-/// Fits the basis to `target`, by the pixels in `mask` if there is one.
+/// Fits the basis to `target`, by the pixels in `mask` if there is one. The search begins with all weights at `start`
+/// (where absent, at what makes the brightness right); the weights found do not depend on it.
 ///
 /// Fails where sizes differ, where no weights are found, or where a picture holds what no light sends: not finite numbers, or negative ones in the basis.
-pub fn fit_lights(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>) -> Result<LightFit, EvalError> {
+pub fn fit_lights(
+    basis: &LightBasis,
+    target: &Picture<LinearRgb>,
+    mask: Option<&Mask>,
+    start: Option<f64>,
+) -> Result<LightFit, EvalError> {
     check(basis, target, mask)?;
     let target = pooled(target, mask);
     let columns: Vec<[Vec<f64>; 3]> = basis.pictures().iter().map(|picture| pooled(picture, mask)).collect();
     let channels = [0, 1, 2].map(|channel| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|column| column[channel].clone()).collect();
-        solve(&columns, &target[channel])
+        solve(&columns, &target[channel], start)
     });
     let gaps = [0, 1, 2].map(|channel| channels[channel].relative_gap(&target[channel]));
     let numbers = channels.iter().flat_map(|fit| &fit.weights).chain(&gaps);
@@ -111,9 +117,24 @@ mod tests {
 
     #[test]
     fn weights_of_each_channel_are_found() {
-        let fit = fit_lights(&basis(), &basis().weighted(&WEIGHTS).unwrap(), None).unwrap();
+        let fit = fit_lights(&basis(), &basis().weighted(&WEIGHTS).unwrap(), None, None).unwrap();
         assert!(error(&fit) < 1e-5, "{:?}", fit.weights);
         assert!(fit.relative_gap < 1e-6, "{}", fit.relative_gap);
+    }
+
+    /// Wherever the search begins, it ends in one place.
+    #[test]
+    fn the_start_changes_nothing() {
+        let mut target = basis().weighted(&WEIGHTS).unwrap();
+        // Such as no weights explain, so that the end is decided by the sum and not by a fit.
+        (0..30).for_each(|x| target.set(x, 3, LinearRgb([0.7, 0.1, 0.9])));
+        let fits = [None, Some(0.5), Some(4.0), Some(1e-3), Some(50.0)]
+            .map(|start| fit_lights(&basis(), &target, None, start).unwrap().weights);
+        let weights = || fits[0].iter().flatten();
+        for fit in &fits[1..] {
+            let apart = fit.iter().flatten().zip(weights()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-6, "{apart}");
+        }
     }
 
     /// A window that no light of the basis explains does not count when it is masked out, and does when it fills half.
@@ -124,8 +145,8 @@ mod tests {
         for y in 0..20 {
             (13..30).for_each(|x| target.set(x, y, LinearRgb([9.0; 3])));
         }
-        assert!(error(&fit_lights(&basis(), &target, Some(&mask)).unwrap()) < 1e-5);
-        assert!(error(&fit_lights(&basis(), &target, None).unwrap()) > 0.1, "the twin passes");
+        assert!(error(&fit_lights(&basis(), &target, Some(&mask), None).unwrap()) < 1e-5);
+        assert!(error(&fit_lights(&basis(), &target, None, None).unwrap()) > 0.1, "the twin passes");
     }
 
     #[test]
@@ -138,7 +159,7 @@ mod tests {
     #[test]
     fn what_cannot_be_fitted_is_refused() {
         let message = |basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>| {
-            fit_lights(basis, target, mask).unwrap_err().to_string()
+            fit_lights(basis, target, mask, None).unwrap_err().to_string()
         };
         let target = basis().sum();
         let small = Picture::filled(4, 4, LinearRgb([1.0; 3]));
@@ -156,10 +177,10 @@ mod tests {
     /// Black photos and no lights at all are fitted, by nothing.
     #[test]
     fn nothing_is_fitted_by_nothing() {
-        let black = fit_lights(&basis(), &Picture::filled(30, 20, LinearRgb::default()), None).unwrap();
+        let black = fit_lights(&basis(), &Picture::filled(30, 20, LinearRgb::default()), None, None).unwrap();
         assert_eq!((black.weights, black.relative_gap), (vec![[0.0; 3]; 3], 0.0));
         let none = LightBasis::new(30, 20, Vec::new()).unwrap();
-        let fit = fit_lights(&none, &basis().sum(), None).unwrap();
+        let fit = fit_lights(&none, &basis().sum(), None, None).unwrap();
         assert!(fit.weights.is_empty() && fit.relative_gap == 0.0, "{fit:?}");
     }
 }

@@ -1,0 +1,64 @@
+//! Where the squared error lies, by instance.
+
+use std::collections::BTreeMap;
+
+use mateval_image::{Mask, Picture};
+use mateval_scene::dataset::{Instance, SceneFile};
+
+use crate::result::InstancePixelErrors;
+
+/// Sums of squared errors of a scene's pixels by picture, views and instance.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct InstanceErrors(BTreeMap<(String, &'static str, u16), (f64, usize)>);
+
+impl InstanceErrors {
+    /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
+    pub(crate) fn add(
+        &mut self,
+        picture: &str,
+        views: &'static str,
+        instances: &Picture<u16>,
+        mask: &Mask,
+        error: impl Fn(usize) -> f64,
+    ) {
+        let mut sums: BTreeMap<u16, (f64, usize)> = BTreeMap::new();
+        for (pixel, instance) in instances.pixels().iter().enumerate().filter(|(pixel, _)| mask.pixels()[*pixel]) {
+            let (sum, count) = sums.entry(*instance).or_default();
+            *sum += error(pixel);
+            *count += 1;
+        }
+        for (instance, (sum, count)) in sums {
+            let all = self.0.entry((picture.to_owned(), views, instance)).or_default();
+            all.0 += sum;
+            all.1 += count;
+        }
+    }
+
+    /// The means, by picture, views and index. What shows no instance is left out.
+    pub(crate) fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
+        let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
+            let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;
+            let (category, super_category) = categories(scene, instance);
+            Some(InstancePixelErrors {
+                scene: scene.id.clone(),
+                instance: instance.id.clone(),
+                category,
+                super_category,
+                picture,
+                views: views.to_owned(),
+                pixels,
+                mse: sum / pixels as f64,
+            })
+        });
+        means.collect()
+    }
+}
+
+/// The source's categories; of 3D-FRONT's architecture its kind of mesh, the last word of its name but for a number.
+fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
+    if instance.category.is_some() || scene.source.kind != "front3d" {
+        return (instance.category.clone(), instance.super_category.clone());
+    }
+    let kind = instance.name.split(' ').rfind(|word| !word.bytes().all(|byte| byte.is_ascii_digit()));
+    (kind.map(str::to_owned), Some("Architecture".to_owned()))
+}

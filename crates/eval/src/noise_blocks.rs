@@ -1,0 +1,82 @@
+//! Which pixels of a scene's views share noise.
+
+use glam::{DVec2, DVec3};
+use mateval_image::Picture;
+use mateval_scene::Camera;
+use mateval_tracer::shared_centre::share_centre;
+
+/// For each view the block of each of its pixels: pixels of one block, whatever their view, may see the same paths.
+///
+/// Where the cameras share a centre a path is put into every view that holds its direction, so blocks are squares of
+/// `side` pixels of the first camera's image plane; else each view has blocks of its own.
+pub fn noise_blocks(cameras: &[Camera], side: u32) -> Vec<Picture<u32>> {
+    let shared = share_centre(cameras);
+    let views = cameras.iter().zip(0_u32..);
+    views
+        .map(|(camera, view)| {
+            let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+            Picture::from_fn(width, height, |x, y| {
+                let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+                if shared {
+                    shared_block(&cameras[0], camera.direction(pixel), side)
+                } else {
+                    // Eight bits of view, twelve of row and column each: pictures have at most 16384 pixels a side.
+                    (view % 256) << 24 | (y as u32 / side).min(4095) << 12 | (x as u32 / side).min(4095)
+                }
+            })
+        })
+        .collect()
+}
+
+/// Sixteen bits of row and of column each, counted from far above and left of the picture.
+fn shared_block(first: &Camera, direction: DVec3, side: u32) -> u32 {
+    let local = first.rotation().transpose() * direction;
+    let k = first.intrinsics;
+    let at = DVec2::new(k.cx - k.fx * local.x / local.z, k.cy + k.fy * local.y / local.z);
+    let step = |value: f64| ((value / f64::from(side)).floor() + 32768.0).clamp(0.0, 65535.0) as u32;
+    step(at.y) << 16 | step(at.x)
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::Intrinsics;
+
+    use super::*;
+
+    fn cameras() -> Vec<Camera> {
+        let intrinsics = Intrinsics::from_fov_x(96, 64, 1.0);
+        let input = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::new(1.0, 2.0, 3.0), intrinsics);
+        vec![input, input.turned(5.0, -5.0)]
+    }
+
+    /// What both views see, at a distance, is of one block in both; the first view's blocks are squares.
+    #[test]
+    fn one_direction_is_of_one_block() {
+        let cameras = cameras();
+        let blocks = noise_blocks(&cameras, 16);
+        assert_eq!(blocks[0].get(0, 0), blocks[0].get(15, 15));
+        assert_ne!(blocks[0].get(15, 0), blocks[0].get(16, 0));
+        let mut distinct = blocks[0].pixels().to_vec();
+        distinct.sort_unstable();
+        distinct.dedup();
+        assert_eq!(distinct.len(), 6 * 4);
+        let mut met = 0;
+        for (x, y) in [(50, 30), (70, 40), (90, 50), (40, 20)] {
+            let place = cameras[1].position() + cameras[1].direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5)) * 9.0;
+            let (pixel, _) = cameras[0].project(place).unwrap();
+            if cameras[0].holds(pixel) {
+                met += 1;
+                assert_eq!(blocks[1].get(x, y), blocks[0].get(pixel.x as usize, pixel.y as usize));
+            }
+        }
+        assert!(met >= 2, "{met}");
+    }
+
+    #[test]
+    fn views_from_elsewhere_share_nothing() {
+        let mut cameras = cameras();
+        cameras[1] = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::ZERO, cameras[1].intrinsics);
+        let blocks = noise_blocks(&cameras, 16);
+        assert!(blocks[0].pixels().iter().all(|block| !blocks[1].pixels().contains(block)));
+    }
+}

@@ -1,0 +1,450 @@
+//! What predictions look like under each light of a protocol.
+//!
+//! In: a scene with its truth, predictions, the rules. Out, prediction by prediction: two independent halves of every view
+//! under every light, and the radiances that were fitted. Between: predictions that agree in roughness and metallic are
+//! followed by the same paths; a pilot of its own samples says how many each needs; radiances are fitted on a third
+//! stream, so that they do not make the halves depend on each other. A prediction's pictures are the same, bit for bit,
+//! whatever others are looked at beside it.
+
+use std::collections::BTreeMap;
+
+use mateval_image::{LinearRgb, Picture};
+use mateval_metrics::{Halves, NoisePsnr, noise_free_mse, psnr_mean_error};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::INPUT;
+use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::{Camera, Progress, TriangleMesh};
+use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
+use mateval_tracer::{
+    Coat, LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World, render_repainted,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::EvalError;
+use crate::light_fit::{LightFit, fit_lights};
+use crate::light_rules::{LightRules, Track};
+use crate::light_stage::{self, NamedLight};
+use crate::noise_blocks::noise_blocks;
+use crate::prediction::PredictedScene;
+use crate::relit::{RelitLighting, luminance};
+use crate::rgb::encoded;
+use crate::truth::{RgbTruth, ViewTruth};
+
+/// A scene and the truth of its light.
+pub struct LitScene<'a> {
+    /// `scene.json`.
+    pub scene: &'a SceneFile,
+    /// Its true surfaces, materials and lights.
+    pub world: &'a World,
+    /// The meshes of `instances.glb`, one a surface of the world.
+    pub atlases: &'a [TriangleMesh],
+    /// The views that are scored.
+    pub views: Vec<&'a View>,
+    /// Of each view.
+    pub truths: &'a [ViewTruth],
+    /// Of each view.
+    pub light: Vec<RgbTruth>,
+    /// The input view, its light and what of it is valid: what radiances are fitted to.
+    pub input: (&'a View, RgbTruth, &'a mateval_image::Mask),
+    /// The lightings of track `relit`.
+    pub lightings: Vec<RelitLighting>,
+}
+
+/// A prediction under some of the lights.
+pub struct PredictedLight {
+    /// One a light.
+    pub pictures: Vec<LitPicture>,
+    /// Where radiances were fitted.
+    pub fit: Option<FittedRadiances>,
+    /// Samples a pixel of each half.
+    pub samples: u32,
+}
+
+/// A prediction under one light.
+pub struct LitPicture {
+    /// Which.
+    pub track: Track,
+    /// For track `relit` its name.
+    pub lighting: Option<String>,
+    /// For each view two independent halves, linear, before exposure.
+    pub views: Vec<[Picture<LinearRgb>; 2]>,
+}
+
+/// Radiances fitted to the input view, with the proof that none are better.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiances {
+    /// Whether they are of a light stage; else they multiply what the scene's own emitters send.
+    pub stage: bool,
+    /// Light by light.
+    pub lights: Vec<FittedRadiance>,
+    /// What the fit started from.
+    pub start_radiance: f64,
+    /// Mean absolute difference of the averaged pictures, linear, by channel.
+    pub mean_absolute_error: [f64; 3],
+    /// No other radiances can have less than this.
+    pub lower_bound: [f64; 3],
+}
+
+/// One light's radiance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FittedRadiance {
+    /// The light's name.
+    pub light: String,
+    /// Linear Rec. 709.
+    pub radiance: [f64; 3],
+}
+
+/// Pictures that come from one set of paths a prediction.
+struct Pass<'a> {
+    /// Goes into the seeds.
+    name: &'static str,
+    world: &'a World,
+    /// Of each light its name.
+    lights: Vec<String>,
+    on_stage: bool,
+    /// What pictures are made, and whether the pilot watches them.
+    pictures: Vec<(Track, Option<String>)>,
+}
+
+/// How a prediction's pictures of one pass are mixed, and where that came from.
+struct Mixing {
+    mixes: Vec<LightMix>,
+    fit: Option<FittedRadiances>,
+}
+
+/// Renders all predictions under the lights of `rules` and hands them on, pass by pass, with their place among
+/// `predictions`. At most [`DEFAULT_BASIS_BYTES`] of pictures are held at once, or one prediction's if that is more.
+pub fn predicted_light(
+    lit: &LitScene<'_>,
+    rules: &LightRules,
+    predictions: &[PredictedScene],
+    progress: Progress<'_>,
+    each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>,
+) -> Result<(), EvalError> {
+    let has = |track| rules.tracks.contains(&track);
+    let staged = lit.scene.source.kind != "bitterli";
+    let mut own = Vec::new();
+    if has(Track::True) {
+        own.push((Track::True, None));
+    }
+    if has(Track::Fitted) && !staged {
+        own.push((Track::Fitted, None));
+    }
+    if has(Track::Relit) {
+        own.extend(lit.lightings.iter().map(|lighting| (Track::Relit, Some(lighting.name.clone()))));
+    }
+    if !own.is_empty() {
+        let lights = lit.world.scene().lights.iter().map(|light| light.name.clone()).collect();
+        let pass = Pass { name: "own", world: lit.world, lights, on_stage: false, pictures: own };
+        Renderer { lit, rules, pass, predictions, progress }.render(each)?;
+    }
+    if has(Track::Fitted) && staged {
+        let stage = stage(lit, rules);
+        let quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
+        let world = lit.world.on_stage(&quads)?;
+        let lights = stage.into_iter().map(|named| named.name).collect();
+        let pictures = vec![(Track::Fitted, None)];
+        let pass = Pass { name: "stage", world: &world, lights, on_stage: true, pictures };
+        Renderer { lit, rules, pass, predictions, progress }.render(each)?;
+    }
+    Ok(())
+}
+
+/// The stage of a 3D-FRONT scene: its architecture is what has no category.
+fn stage(lit: &LitScene<'_>, rules: &LightRules) -> Vec<NamedLight> {
+    let instances = lit.scene.instances.iter().zip(0..);
+    let architecture: Vec<usize> =
+        instances.filter(|(instance, _)| instance.category.is_none()).map(|(_, surface)| surface).collect();
+    let cameras: Vec<Camera> = lit.scene.views.iter().map(|view| view.camera).collect();
+    light_stage::lights(&rules.stage, lit.world, &architecture, &cameras)
+}
+
+/// One pass over all predictions.
+struct Renderer<'a> {
+    lit: &'a LitScene<'a>,
+    rules: &'a LightRules,
+    pass: Pass<'a>,
+    predictions: &'a [PredictedScene],
+    progress: Progress<'a>,
+}
+
+impl Renderer<'_> {
+    fn render(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
+        let all: Vec<usize> = (0..self.predictions.len()).collect();
+        let mixings = self.mixings(&all)?;
+        let samples = self.samples(&all, &mixings)?;
+        let cameras: Vec<Camera> = self.lit.views.iter().map(|view| view.camera).collect();
+        for batch in self.batches(&all, |index| samples[index], 2 * self.pass.pictures.len()) {
+            let count = samples[batch[0]];
+            let mixes: Vec<Vec<LightMix>> = batch.iter().map(|&index| mixings[index].mixes.clone()).collect();
+            let what = format!("scene {}: {} light, {count} samples", self.lit.scene.id, self.pass.name);
+            let renders = self.trace(&batch, &cameras, Lighting::Mixed(&mixes), count, &["a", "b"], &what)?;
+            for (&index, render) in batch.iter().zip(renders) {
+                let fit = mixings[index].fit.clone();
+                each(index, PredictedLight { pictures: self.pictures(render), fit, samples: count })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sorts the halves of a render by picture.
+    fn pictures(&self, render: ViewsRender) -> Vec<LitPicture> {
+        let bases: Vec<Vec<LightBasis>> =
+            render.views.into_iter().map(|view| view.halves.into_iter().map(|half| half.basis).collect()).collect();
+        let named = self.pass.pictures.iter().enumerate();
+        named
+            .map(|(at, (track, lighting))| LitPicture {
+                track: *track,
+                lighting: lighting.clone(),
+                views: bases.iter().map(|halves| [0, 1].map(|half| halves[half].pictures()[at].clone())).collect(),
+            })
+            .collect()
+    }
+
+    /// How each prediction's pictures are mixed; fits radiances where a picture wants them.
+    fn mixings(&self, all: &[usize]) -> Result<Vec<Mixing>, EvalError> {
+        let fits = if self.pass.pictures.iter().any(|(track, _)| *track == Track::Fitted) {
+            self.fits(all)?.into_iter().map(Some).collect()
+        } else {
+            vec![None; all.len()]
+        };
+        let ones: LightMix = vec![[1.0; 3]; self.pass.lights.len()];
+        let mixing = |fit: Option<FittedRadiances>| {
+            let fitted = fit.as_ref().map(|fit| fit.lights.iter().map(|light| light.radiance).collect::<LightMix>());
+            let mix = |(track, lighting): &(Track, Option<String>)| match track {
+                Track::True => ones.clone(),
+                Track::Fitted => fitted.clone().expect("a pass with this track was fitted"),
+                Track::Relit => {
+                    let relit = self.lit.lightings.iter().find(|relit| Some(&relit.name) == lighting.as_ref());
+                    relit.expect("the pass was made of these lightings").weights.clone()
+                }
+            };
+            Mixing { mixes: self.pass.pictures.iter().map(mix).collect(), fit }
+        };
+        Ok(fits.into_iter().map(mixing).collect())
+    }
+
+    /// Radiances of each prediction, from stream `fit` of the input view.
+    fn fits(&self, all: &[usize]) -> Result<Vec<FittedRadiances>, EvalError> {
+        let (input, light, valid) = &self.lit.input;
+        let lights = self.pass.lights.len();
+        let groups = LightGroups::apart(lights);
+        let start = self.start_radiance(&groups)?;
+        let mut fits = BTreeMap::new();
+        let samples = self.rules.fit.samples;
+        for batch in self.batches(all, |_| samples, lights) {
+            let what = format!("scene {}: light basis", self.lit.scene.id);
+            let renders = self.trace(&batch, &[input.camera], Lighting::Apart(&groups), samples, &["fit"], &what)?;
+            for (&index, render) in batch.iter().zip(renders) {
+                let basis = &render.views[0].halves[0].basis;
+                let fit = fit_lights(basis, &light.shown, Some(valid), Some(start))?;
+                fits.insert(index, self.radiances(fit, start));
+            }
+        }
+        Ok(fits.into_values().collect())
+    }
+
+    fn radiances(&self, fit: LightFit, start: f64) -> FittedRadiances {
+        let lights = self.pass.lights.iter().zip(&fit.weights);
+        let rows = |channel: usize| fit.channels[channel].dual.len().max(1) as f64;
+        FittedRadiances {
+            stage: self.pass.on_stage,
+            lights: lights
+                .map(|(light, radiance)| FittedRadiance { light: light.clone(), radiance: *radiance })
+                .collect(),
+            start_radiance: start,
+            mean_absolute_error: [0, 1, 2].map(|c| fit.channels[c].sum / rows(c)),
+            lower_bound: [0, 1, 2].map(|c| fit.channels[c].bound / rows(c)),
+        }
+    }
+
+    /// The radiance whose picture of grey surfaces is nearest to the photo, by the mean square of luminance.
+    fn start_radiance(&self, groups: &LightGroups) -> Result<f64, EvalError> {
+        let (input, light, valid) = &self.lit.input;
+        let scattering = &self.rules.fit;
+        let repaint = self.grey(scattering.start_grey)?;
+        let settings = self.rules.settings(scattering.samples);
+        let seeds = [self.seed("start")];
+        let lighting = Lighting::Apart(groups);
+        let quiet = |_: usize, _: usize| ();
+        let renders =
+            render_repainted(self.pass.world, &repaint, 0..1, &[input.camera], lighting, &settings, &seeds, &quiet)?;
+        let grey = renders[0].views[0].halves[0].basis.sum();
+        let error = |radiance: f64| -> f64 {
+            let pairs = grey.pixels().iter().zip(light.shown.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
+            pairs
+                .map(|((g, t), _)| radiance * luminance(*g) - luminance(*t))
+                .map(|difference| difference * difference)
+                .sum()
+        };
+        let starts = &scattering.start_radiances;
+        let best = starts.iter().min_by(|a, b| error(**a).total_cmp(&error(**b)));
+        Ok(best.copied().unwrap_or(1.0))
+    }
+
+    /// Samples a pixel of each half that each prediction needs.
+    fn samples(&self, all: &[usize], mixings: &[Mixing]) -> Result<Vec<u32>, EvalError> {
+        let noise = &self.rules.noise;
+        let cameras: Vec<Camera> = self.lit.views.iter().map(|view| view.camera).collect();
+        // Relit pictures are sums of the same paths: they take what the others need.
+        let watched: Vec<usize> =
+            (0..self.pass.pictures.len()).filter(|&at| self.pass.pictures[at].0 != Track::Relit).collect();
+        if watched.is_empty() {
+            return Ok(vec![noise.least_samples; all.len()]);
+        }
+        let pilot = Pilot::new(self.lit, noise.block_pixels);
+        let mut samples = vec![noise.least_samples; all.len()];
+        for batch in self.batches(all, |_| noise.pilot_samples, 2 * watched.len()) {
+            let chosen = |index: usize| watched.iter().map(|&at| mixings[index].mixes[at].clone()).collect();
+            let mixes: Vec<Vec<LightMix>> = batch.iter().map(|&index| chosen(index)).collect();
+            let what = format!("scene {}: {} pilot", self.lit.scene.id, self.pass.name);
+            let streams = ["pilot_a", "pilot_b"];
+            let renders =
+                self.trace(&batch, &cameras, Lighting::Mixed(&mixes), noise.pilot_samples, &streams, &what)?;
+            for (&index, render) in batch.iter().zip(&renders) {
+                let errors = (0..watched.len()).map(|at| pilot.errors(render, at)).collect::<Result<Vec<_>, _>>()?;
+                let needed = errors.into_iter().flatten().map(|error| enough_samples(noise, error));
+                samples[index] = needed.max().unwrap_or(noise.least_samples);
+            }
+        }
+        Ok(samples)
+    }
+
+    /// Predictions that are followed together: of one roughness and metallic, of one number of samples, as many as their
+    /// pictures (`pictures` of all views each) fit in memory.
+    fn batches(&self, all: &[usize], samples: impl Fn(usize) -> u32, pictures: usize) -> Vec<Vec<usize>> {
+        let mut alike: BTreeMap<(&str, u32), Vec<usize>> = BTreeMap::new();
+        for &index in all {
+            alike.entry((&self.predictions[index].scattering_key, samples(index))).or_default().push(index);
+        }
+        let pixels = |view: &&View| u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height);
+        let pixels: u64 = self.lit.views.iter().map(pixels).sum();
+        let bytes = (size_of::<LinearRgb>() * pictures) as u64 * pixels;
+        let most = (DEFAULT_BASIS_BYTES / bytes.max(1)).max(1) as usize;
+        alike.into_values().flat_map(|alike| alike.chunks(most).map(<[usize]>::to_vec).collect::<Vec<_>>()).collect()
+    }
+
+    fn trace(
+        &self,
+        batch: &[usize],
+        cameras: &[Camera],
+        lighting: Lighting<'_>,
+        samples: u32,
+        streams: &[&str],
+        what: &str,
+    ) -> Result<Vec<ViewsRender>, EvalError> {
+        let repaint = self.repaint(batch)?;
+        let seeds: Vec<u64> = streams.iter().map(|stream| self.seed(stream)).collect();
+        let settings = self.rules.settings(samples);
+        let shown = |done: usize, all: usize| (self.progress)(what, done, all);
+        let which = 0..batch.len();
+        Ok(render_repainted(self.pass.world, &repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
+    }
+
+    fn repaint(&self, batch: &[usize]) -> Result<Repaint, EvalError> {
+        let coat = |surface: usize| {
+            let materials = batch.iter().map(|&index| self.predictions[index].materials[surface].as_ref());
+            let materials: Vec<_> = materials.collect::<Option<_>>()?;
+            Some(Coat {
+                base_colors: materials.iter().map(|material| material.base_color.clone()).collect(),
+                roughness: materials[0].roughness.clone(),
+                metallic: materials[0].metallic.clone(),
+            })
+        };
+        let coats = (0..self.lit.atlases.len()).map(coat).collect();
+        Ok(Repaint::new(self.pass.world, self.lit.atlases, coats, self.rules.flavour)?)
+    }
+
+    /// All that has an atlas in one grey.
+    fn grey(&self, grey: f32) -> Result<Repaint, EvalError> {
+        let flat = |value: f32| {
+            let texels = mateval_image::Texels::Grey(vec![value]);
+            mateval_image::Texture::new(1, 1, texels, mateval_image::Wrap::Clamp)
+                .expect("one texel is what one pixel needs")
+        };
+        let (rough, metallic) = (crate::prediction::MISSING_ROUGHNESS, crate::prediction::MISSING_METALLIC);
+        let coat = Coat { base_colors: vec![flat(grey)], roughness: flat(rough), metallic: flat(metallic) };
+        let coats = self.lit.scene.instances.iter().map(|instance| instance.atlas.as_ref().map(|_| coat.clone()));
+        Ok(Repaint::new(self.pass.world, self.lit.atlases, coats.collect(), self.rules.flavour)?)
+    }
+
+    /// The same for every prediction, so that they can share paths; another for every scene, pass and stream.
+    fn seed(&self, stream: &str) -> u64 {
+        let text = format!("mateval/{}/{}/{stream}", self.lit.scene.id, self.pass.name);
+        u64::from_str_radix(&sha256_of_bytes(text.as_bytes())[..16], 16).expect("a hash is hexadecimal")
+    }
+}
+
+/// What the pilot's pictures are held against.
+struct Pilot<'a> {
+    lit: &'a LitScene<'a>,
+    truths: Vec<[Picture<mateval_image::SrgbRgb>; 2]>,
+    blocks: Vec<Picture<u32>>,
+}
+
+impl<'a> Pilot<'a> {
+    fn new(lit: &'a LitScene<'a>, block_pixels: u32) -> Self {
+        let exposure = lit.scene.exposure;
+        let cameras: Vec<Camera> = lit.views.iter().map(|view| view.camera).collect();
+        let encode = |light: &RgbTruth| [0, 1].map(|half| encoded(&light.halves[half], exposure));
+        Self { lit, truths: lit.light.iter().map(encode).collect(), blocks: noise_blocks(&cameras, block_pixels) }
+    }
+
+    /// How sure the mean PSNR is, of the input view and of the novel ones; none where the error is nothing but noise.
+    fn errors(&self, render: &ViewsRender, picture: usize) -> Result<Vec<Option<NoisePsnr>>, EvalError> {
+        let mut kinds = [Vec::new(), Vec::new()];
+        for (at, view) in self.lit.views.iter().enumerate() {
+            let half = |half: usize| {
+                encoded(&render.views[at].halves[half].basis.pictures()[picture], self.lit.scene.exposure)
+            };
+            let ([a, b], [truth_a, truth_b]) = ([half(0), half(1)], &self.truths[at]);
+            let prediction = Halves { a: &a, b: &b };
+            let reference = Halves { a: truth_a, b: truth_b };
+            let mse = noise_free_mse(prediction, reference, &self.lit.truths[at].valid, &self.blocks[at]);
+            let what = || format!("scene '{}', view '{}'", self.lit.scene.id, view.id);
+            if let Some(mse) = mse.map_err(|source| EvalError::Metric { what: what(), source })? {
+                kinds[usize::from(view.id.as_str() != INPUT)].push(mse);
+            }
+        }
+        let kinds = kinds.iter().filter(|mses| !mses.is_empty());
+        Ok(kinds.map(|mses| psnr_mean_error(&mses.iter().collect::<Vec<_>>())).collect())
+    }
+}
+
+/// Samples that bring our own noise under its bound, by what the pilot's had: variance falls as samples rise.
+fn enough_samples(noise: &crate::light_rules::NoiseRules, pilot: Option<NoisePsnr>) -> u32 {
+    let Some(NoisePsnr { prediction, reference, .. }) = pilot else { return noise.most_samples };
+    let bound = noise.target_db.max(noise.truth_share * reference);
+    let needed = f64::from(noise.pilot_samples) * (prediction / bound) * (prediction / bound);
+    let mut samples = noise.least_samples;
+    while f64::from(samples) < needed && samples < noise.most_samples {
+        samples *= 2;
+    }
+    samples.min(noise.most_samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Protocol;
+
+    #[test]
+    fn samples_follow_the_pilot() {
+        let noise = Protocol::named("mateval-1").unwrap().light.noise;
+        let samples = |prediction: f64, reference: f64| {
+            let error = NoisePsnr { total: prediction, prediction, reference };
+            enough_samples(&noise, Some(error))
+        };
+        assert_eq!(samples(0.001, 0.0), 16);
+        // Twice the bound at 8 samples: four times as many.
+        assert_eq!(samples(0.04, 0.0), 32);
+        assert_eq!(samples(0.041, 0.0), 64);
+        assert_eq!(samples(1.0, 0.0), noise.most_samples);
+        // A truth with 0.08 dB of its own: as much will do.
+        assert_eq!((samples(0.08, 0.08), samples(0.16, 0.08)), (16, 32));
+        assert_eq!(enough_samples(&noise, None), noise.most_samples);
+    }
+}

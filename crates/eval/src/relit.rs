@@ -1,0 +1,99 @@
+//! Lightings that no method saw: the reference's own emitters under other weights.
+
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_tracer::LightMix;
+
+use crate::light_rules::RelitRules;
+
+/// One of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RelitLighting {
+    /// `dim`, `warm_cool`, `alone_1` and so on.
+    pub name: String,
+    /// Of each light group.
+    pub weights: LightMix,
+}
+
+/// The lightings of a scene, by the rule of [`RelitRules`].
+///
+/// `groups` are the truth's pictures of the input view, linear, one a light group in the scene's order; `valid` its mask.
+/// A scene whose groups light nothing there has none.
+pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<RelitLighting> {
+    let order = by_brightness(groups, valid);
+    if order.is_empty() {
+        return Vec::new();
+    }
+    let mut warm_cool = vec![[1.0; 3]; groups.len()];
+    for (place, &group) in order.iter().enumerate() {
+        warm_cool[group] = if place % 2 == 0 { rules.warm } else { rules.cool };
+    }
+    let mut lightings = vec![
+        RelitLighting { name: "dim".to_owned(), weights: vec![[rules.dim; 3]; groups.len()] },
+        RelitLighting { name: "warm_cool".to_owned(), weights: warm_cool },
+    ];
+    if order.len() > 1 {
+        lightings.extend(order.iter().take(rules.alone_at_most).enumerate().map(|(place, &alone)| {
+            let weight = |group: usize| if group == alone { [1.0; 3] } else { [0.0; 3] };
+            RelitLighting { name: format!("alone_{}", place + 1), weights: (0..groups.len()).map(weight).collect() }
+        }));
+    }
+    lightings
+}
+
+/// Groups that light anything, brightest first; of equal ones the first.
+fn by_brightness(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<usize> {
+    let luminance = |picture: &Picture<LinearRgb>| -> f64 {
+        let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
+        lit.map(|(pixel, _)| luminance(*pixel)).sum()
+    };
+    let mut order: Vec<(f64, usize)> = groups.iter().map(luminance).zip(0..).filter(|(sum, _)| *sum > 0.0).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    order.into_iter().map(|(_, group)| group).collect()
+}
+
+/// Relative luminance of linear Rec. 709.
+pub(crate) fn luminance(LinearRgb(rgb): LinearRgb) -> f64 {
+    let [r, g, b] = rgb.map(f64::from);
+    0.2126 * r + 0.7152 * g + 0.0722 * b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::Protocol;
+
+    fn flat(value: f32) -> Picture<LinearRgb> {
+        Picture::filled(2, 1, LinearRgb([value; 3]))
+    }
+
+    fn rules() -> RelitRules {
+        Protocol::named("mateval-1").unwrap().light.relit
+    }
+
+    fn names(groups: &[Picture<LinearRgb>]) -> Vec<String> {
+        lightings(&rules(), groups, &Mask::filled(2, 1, true)).into_iter().map(|lighting| lighting.name).collect()
+    }
+
+    #[test]
+    fn groups_take_turns_by_brightness() {
+        let groups = [flat(1.0), flat(4.0), flat(0.0), flat(2.0), flat(0.5)];
+        let all = lightings(&rules(), &groups, &Mask::filled(2, 1, true));
+        assert_eq!(names(&groups), ["dim", "warm_cool", "alone_1", "alone_2", "alone_3"]);
+        assert_eq!(all[0].weights, [[0.3; 3]; 5]);
+        let RelitRules { warm, cool, .. } = rules();
+        assert_eq!(all[1].weights, [warm, warm, [1.0; 3], cool, cool]);
+        assert_eq!(all[2].weights, [[0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(all[4].weights[0], [1.0; 3]);
+    }
+
+    #[test]
+    fn one_group_has_two_and_darkness_none() {
+        assert_eq!(names(&[flat(1.0)]), ["dim", "warm_cool"]);
+        assert_eq!(names(&[flat(0.0), flat(3.0)]), ["dim", "warm_cool"]);
+        assert!(names(&[flat(0.0)]).is_empty() && names(&[]).is_empty());
+        // What is not valid does not count.
+        let groups = [flat(1.0), Picture::from_fn(2, 1, |x, _| LinearRgb([[9.0, 0.5][x]; 3]))];
+        let valid = Mask::from_fn(2, 1, |x, _| x == 1);
+        assert_eq!(lightings(&rules(), &groups, &valid)[2].weights[0], [1.0; 3]);
+    }
+}

@@ -1,0 +1,388 @@
+//! Submissions compared with the truth texel by texel, on the surface itself: every place counts by its area, whether or
+//! not a view shows it.
+//!
+//! In: the baked truth of an instance, the maps of every submission. Out: an [`InstanceTexels`] for each, sums of which
+//! errors of a scene or a category can be made.
+//!
+//! Between: a [`TexelMap`] says once for all submissions where each texel of the truth's atlas lies, how large it is and
+//! whether the input camera sees it. One instance is in memory at a time.
+
+use mateval_image::Texture;
+use mateval_metrics::{MetricError, Psnr};
+use mateval_scene::dataset::{Instance, SceneFile};
+use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::reference::SurfaceIndex;
+use mateval_scene::submission::{MAP_SIZES, Map};
+use mateval_scene::{InstanceId, Progress, TriangleMesh};
+use mateval_tracer::World;
+use rayon::prelude::*;
+
+use crate::error::EvalError;
+use crate::prediction::{PredictedMaterial, PredictedScene};
+use crate::texel_map::{SurfaceTexel, TexelMap};
+use crate::truth_material::TruthMaterial;
+
+/// Weighted squares over the texels of an instance (or several) that are seen, or that are not.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TexelSums {
+    /// The sum of the weights: the texels' area on the surface, in square metres.
+    pub area_m2: f64,
+    /// Squared error of the base colour, linear, mean over its channels, times the weight.
+    pub base_color: f64,
+    /// Squared error of the perceptual roughness times the weight.
+    pub roughness: f64,
+    /// Squared error of metallic times the weight.
+    pub metallic: f64,
+}
+
+impl TexelSums {
+    /// Adds what another has seen; the order of additions decides the last bits.
+    pub fn add(&mut self, other: &Self) {
+        self.area_m2 += other.area_m2;
+        self.base_color += other.base_color;
+        self.roughness += other.roughness;
+        self.metallic += other.metallic;
+    }
+
+    /// The mean squared error over the area; none where there is none.
+    pub fn mse(&self, map: Map) -> Option<f64> {
+        let sum = match map {
+            Map::BaseColor => self.base_color,
+            Map::Roughness => self.roughness,
+            Map::Metallic => self.metallic,
+        };
+        (self.area_m2 > 0.0).then(|| sum / self.area_m2)
+    }
+
+    /// The PSNR of [`Self::mse`]. Fails where that is not finite, as an area may make it that is beyond all measure.
+    pub fn psnr(&self, map: Map) -> Result<Option<Psnr>, MetricError> {
+        self.mse(map).map(Psnr::from_mse).transpose()
+    }
+}
+
+/// What a submission says of an instance against what is true, over all texels that lie on its surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InstanceTexels {
+    /// The instance.
+    pub instance: InstanceId,
+    /// Texels that the input camera sees.
+    pub observed: TexelSums,
+    /// All others.
+    pub unobserved: TexelSums,
+}
+
+/// Compares every instance with an atlas, in the scene's order; gives a list a submission, in theirs.
+///
+/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces and the scene's instances. Fails where
+/// the truth cannot be read or `scene.json` is unsound.
+pub fn texture_space(
+    folder: &SceneFolder,
+    scene: &SceneFile,
+    world: &World,
+    atlases: &[TriangleMesh],
+    submissions: &[PredictedScene],
+    progress: Progress<'_>,
+) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
+    let input = scene.view(INPUT).ok_or_else(|| unsound(folder, "it has no input view"))?;
+    let mut compared = vec![Vec::new(); submissions.len()];
+    for (at, instance) in scene.instances.iter().enumerate() {
+        let Some(size) = atlas_size(folder, instance)? else { continue };
+        progress(&format!("texels of {}", scene.id), at, scene.instances.len());
+        let (map, truth) = rayon::join(
+            || TexelMap::new(world, SurfaceIndex(at), &atlases[at], size, &input.camera),
+            || TruthMaterial::read(folder, &instance.id, size),
+        );
+        let truth = truth?;
+        for (list, submission) in compared.iter_mut().zip(submissions) {
+            let Some(prediction) = &submission.materials[at] else { continue };
+            let [observed, unobserved] = compare(&map, prediction, &truth);
+            list.push(InstanceTexels { instance: instance.id.clone(), observed, unobserved });
+        }
+    }
+    Ok(compared)
+}
+
+fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>, EvalError> {
+    let Some(atlas) = &instance.atlas else { return Ok(None) };
+    let size = atlas.size as usize;
+    // No more memory than a submission may ask for.
+    if MAP_SIZES.contains(&size) {
+        return Ok(Some(size));
+    }
+    Err(unsound(folder, &format!("instance '{}' has an atlas of {size} texels", instance.id)))
+}
+
+fn unsound(folder: &SceneFolder, what: &str) -> EvalError {
+    let path = folder.scene_file();
+    EvalError::Invalid(format!("'{}': {what}; run `mateval prep verify`", path.display()))
+}
+
+/// The squared errors of a prediction against the truth, weighted by area: observed, then unobserved.
+///
+/// Both are looked up at the texels' places, bilinearly, whatever the prediction's size: at a centre the truth is its texel
+/// itself. Both are linear and as they are: nothing is clipped. The same sums for any number of threads.
+pub fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMaterial) -> [TexelSums; 2] {
+    let rows: Vec<[TexelSums; 2]> =
+        (0..map.size()).into_par_iter().map(|y| compare_row(map, prediction, truth, y)).collect();
+    let mut sums = [TexelSums::default(); 2];
+    for row in &rows {
+        sums.iter_mut().zip(row).for_each(|(sum, row)| sum.add(row));
+    }
+    sums
+}
+
+fn compare_row(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMaterial, y: usize) -> [TexelSums; 2] {
+    let mut sums = [TexelSums::default(); 2];
+    for texel in map.row(y) {
+        let of_channels = |prediction: &Texture, truth: &Texture| {
+            let [p, t] = [prediction, truth].map(|texture| value(map.size(), texture, &texel, y));
+            std::array::from_fn::<f64, 3, _>(|c| (f64::from(p[c]) - f64::from(t[c])).powi(2))
+        };
+        let weight = texel.area_m2;
+        let [r, g, b] = of_channels(&prediction.base_color, &truth.base_color);
+        let [roughness, ..] = of_channels(&prediction.roughness, &truth.roughness);
+        let [metallic, ..] = of_channels(&prediction.metallic, &truth.metallic);
+        sums[usize::from(!texel.observed)].add(&TexelSums {
+            area_m2: weight,
+            base_color: weight * (r + g + b) / 3.0,
+            roughness: weight * roughness,
+            metallic: weight * metallic,
+        });
+    }
+    sums
+}
+
+/// A texture's value at the place of a texel of row `y`.
+fn value(atlas_size: usize, texture: &Texture, texel: &SurfaceTexel, y: usize) -> [f32; 3] {
+    match (texture.width(), texel.off_centre) {
+        (1, _) => texture.texel(0, 0),
+        (_, Some(uv)) => texture.sample(uv),
+        // The centre of its own texel: exactly, where a uv might be rounded.
+        (size, None) if size == atlas_size => texture.texel(texel.column, y),
+        _ => texture.sample(centre_uv(texel.column, y, atlas_size)),
+    }
+}
+
+fn centre_uv(x: usize, y: usize, size: usize) -> [f32; 2] {
+    let along = |at: usize| (at as f64 + 0.5) / size as f64;
+    [along(x) as f32, (1.0 - along(y)) as f32]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use glam::{DVec3, Vec2};
+    use mateval_image::{Picture, Texels, Wrap, png_io};
+    use mateval_scene::material::{ColorInput, Material, MaterialModel};
+    use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+    use mateval_scene::{Camera, Intrinsics, SceneId};
+    use serde_json::json;
+
+    use super::*;
+    use crate::prediction::read_scene;
+
+    /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left half and
+    /// one as far in its right half.
+    fn mesh(areas: [f32; 2]) -> TriangleMesh {
+        let corners = |at: usize| {
+            let side = (2.0 * areas[at]).sqrt();
+            [Vec2::ZERO, Vec2::X, Vec2::Y].map(|p| (p * side + Vec2::X * (4.0 * at as f32 - 4.0)).extend(-8.0))
+        };
+        let uvs = |left: f32| [[0.0, 0.0], [0.4, 0.0], [0.0, 0.8]].map(|[u, v]| Vec2::new(u + left, v));
+        TriangleMesh {
+            positions: [corners(0), corners(1)].concat(),
+            normals: None,
+            uvs: Some([uvs(0.0), uvs(0.5)].concat()),
+            triangles: vec![[0, 1, 2], [3, 4, 5]],
+        }
+    }
+
+    fn world(mesh: &TriangleMesh) -> World {
+        let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
+        let material = Material { name: String::new(), model, two_sided: true, opacity: None, bump: None };
+        let surface = Surface { name: String::new(), mesh: mesh.clone(), material: MaterialIndex(0) };
+        let scene = ReferenceScene { surfaces: vec![surface], materials: vec![material], ..Default::default() };
+        World::new(Arc::new(scene)).unwrap()
+    }
+
+    fn camera() -> Camera {
+        let intrinsics = Intrinsics::from_fov_x(64, 64, std::f64::consts::FRAC_PI_2);
+        Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap()
+    }
+
+    fn map(areas: [f32; 2], size: usize) -> TexelMap {
+        TexelMap::new(&world(&mesh(areas)), SurfaceIndex(0), &mesh(areas), size, &camera())
+    }
+
+    fn greys(size: usize, value: impl Fn(usize, usize) -> f32) -> Texture {
+        let texels = Texels::Grey((0..size * size).map(|at| value(at % size, at / size)).collect());
+        Texture::new(size, size, texels, Wrap::Clamp).unwrap()
+    }
+
+    fn truth(size: usize) -> TruthMaterial {
+        let base_color = greys(size, |x, y| ((7 * x + 13 * y) % 31) as f32 / 31.0);
+        let [roughness, metallic] = [5, 11].map(|step| greys(size, |x, y| ((step * x + y) % 17) as f32 / 17.0));
+        TruthMaterial { base_color, roughness, metallic }
+    }
+
+    fn predicted(truth: &TruthMaterial) -> PredictedMaterial {
+        let TruthMaterial { base_color, roughness, metallic } = truth.clone();
+        PredictedMaterial { base_color, roughness, metallic }
+    }
+
+    /// At any size, powers of two or not; and off by one texel it is not exact.
+    #[test]
+    fn truth_is_exact() {
+        for size in [64, 100, 129] {
+            let (map, truth) = (map([1.0, 3.0], size), truth(size));
+            let [observed, unobserved] = compare(&map, &predicted(&truth), &truth);
+            assert!(observed.area_m2 > 3.0 && unobserved == TexelSums::default());
+            for property in Map::ALL {
+                let psnr = observed.psnr(property).unwrap().unwrap();
+                assert_eq!((observed.mse(property), psnr.exact, psnr.db), (Some(0.0), true, 100.0));
+            }
+            assert_eq!(unobserved.mse(Map::Roughness), None);
+            let moved = PredictedMaterial { metallic: greys(size, |x, _| x as f32), ..predicted(&truth) };
+            let [observed, _] = compare(&map, &moved, &truth);
+            assert!(observed.metallic > 0.0 && observed.roughness == 0.0);
+        }
+    }
+
+    /// The left triangle right, the right one a quarter off: half of the area, half of 1/16. At any size of the prediction.
+    #[test]
+    fn half_of_the_area_wrong() {
+        let [grey, white] = [0.5, 1.0].map(|value| greys(1, |_, _| value));
+        let truth = TruthMaterial { base_color: grey.clone(), roughness: grey, metallic: white };
+        for size in [64, 256, 320] {
+            let half_wrong = greys(size, |x, _| if x < size * 15 / 32 { 0.5 } else { 0.75 });
+            let prediction = PredictedMaterial { roughness: half_wrong, ..predicted(&truth) };
+            let [observed, _] = compare(&map([2.0, 2.0], 64), &prediction, &truth);
+            let found = observed.mse(Map::Roughness).unwrap();
+            assert!((found - 1.0 / 32.0).abs() < 1e-8, "{size}: {found}");
+            assert_eq!((observed.base_color, observed.metallic), (0.0, 0.0));
+        }
+    }
+
+    /// The right triangle has as many texels as the left one and three times its area. By hand: 3/4 of 0.2 squared, where
+    /// the mean over texels would be 1/2 of it.
+    #[test]
+    fn area_is_what_counts() {
+        let zero = greys(1, |_, _| 0.0);
+        let truth = TruthMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
+        let wrong = greys(64, |x, _| if x < 30 { 0.0 } else { 0.2 });
+        let prediction = PredictedMaterial { base_color: wrong, ..predicted(&truth) };
+        let map = map([1.0, 3.0], 64);
+        let [observed, _] = compare(&map, &prediction, &truth);
+        let square = f64::from(0.2_f32).powi(2);
+        assert!((observed.mse(Map::BaseColor).unwrap() / square - 0.75).abs() < 1e-6);
+        let texels: Vec<SurfaceTexel> = (0..64).flat_map(|y| map.row(y)).collect();
+        let wrong_texels = texels.iter().filter(|texel| texel.column >= 30).count();
+        assert_eq!(2 * wrong_texels, texels.len());
+    }
+
+    /// Red is 0.3 off, green and blue are not: a third of 0.09. Nothing is clipped.
+    #[test]
+    fn colours_are_the_mean_over_channels_and_as_they_are() {
+        let color = |rgb: [f32; 3]| Texture::new(1, 1, Texels::Linear(vec![rgb]), Wrap::Clamp).unwrap();
+        let zero = greys(1, |_, _| 0.0);
+        let truth = TruthMaterial { base_color: color([1.0, 0.5, 0.0]), roughness: zero.clone(), metallic: zero };
+        let prediction = PredictedMaterial { base_color: color([1.3, 0.5, 0.0]), ..predicted(&truth) };
+        let [observed, _] = compare(&map([1.0, 1.0], 64), &prediction, &truth);
+        assert!((observed.mse(Map::BaseColor).unwrap() - 0.03).abs() < 1e-7);
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bytes() {
+        let sums = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let wrong = truth(128);
+            pool.install(|| compare(&map([1.0, 3.0], 100), &predicted(&wrong), &truth(100)))
+        };
+        let one = sums(1);
+        assert!(one[0].base_color > 0.0 && one[0].metallic > 0.0);
+        assert_eq!(one, sums(2));
+        assert_eq!(one, sums(3));
+    }
+
+    /// Half of a strip that is a third of a texel thick: its area counts, though no centre lies in it.
+    #[test]
+    fn thin_charts_count_by_their_area() {
+        let mut thin = mesh([1.0, 3.0]);
+        for (at, uv) in thin.uvs.as_mut().unwrap().iter_mut().enumerate() {
+            let third = (1.0 / 3.0 + if at < 3 { 20.1 } else { 40.6 }) / 64.0;
+            *uv = [Vec2::new(0.1, third), Vec2::new(0.9, third), Vec2::new(0.1, third + 0.3 / 64.0)][at % 3];
+        }
+        let map = TexelMap::new(&world(&thin), SurfaceIndex(0), &thin, 64, &camera());
+        let zero = greys(1, |_, _| 0.0);
+        let truth = TruthMaterial { base_color: zero.clone(), roughness: zero.clone(), metallic: zero };
+        let wrong = greys(64, |_, y| if y >= 32 { 0.0 } else { 0.5 });
+        let [observed, _] = compare(&map, &PredictedMaterial { metallic: wrong, ..predicted(&truth) }, &truth);
+        assert!((observed.area_m2 - 4.0).abs() < 1e-5, "{}", observed.area_m2);
+        assert!((observed.mse(Map::Metallic).unwrap() - 0.75 * 0.25).abs() < 1e-6);
+    }
+
+    /// A dataset's scene of one instance of 64 texels a side, and a submission of its truth.
+    fn on_disk() -> (tempfile::TempDir, SceneFolder, SceneFile) {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = SceneFolder::of(folder.path(), &SceneId::new("s").unwrap());
+        let submitted = folder.path().join("submission/scenes/s/a");
+        let instance = InstanceId::new("a").unwrap();
+        for place in [scene.truth_material(&instance), submitted] {
+            std::fs::create_dir_all(&place).unwrap();
+            let bytes = Picture::from_fn(64, 64, |x, y| (x + 2 * y) as u8);
+            png_io::write_rgb_bytes(&place.join("base_color.png"), &bytes.map(|v| [v, 9, 255 - v])).unwrap();
+            png_io::write_grey_bytes(&place.join("roughness.png"), &bytes).unwrap();
+            png_io::write_ids(&place.join("metallic.png"), &Picture::filled(64, 64, 30_000)).unwrap();
+        }
+        let atlas = json!({"size": 64, "charts": 1, "coverage": 0.5, "texel_m": 0.1, "half_pixel_m": null});
+        let file = json!({
+            "format": "mateval/1", "id": "s", "source": {"kind": "test", "house": "s", "files": []}, "exposure": 1.0,
+            "views": [{"id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera()}],
+            "instances": [{"id": "a", "index": 1, "name": "a", "category": null, "super_category": null, "triangles": 2,
+                           "atlas": atlas}],
+            "parts": [], "part_sets": [], "findings": [],
+        });
+        (folder, scene, serde_json::from_value(file).unwrap())
+    }
+
+    fn compared(
+        folder: &SceneFolder,
+        scene: &SceneFile,
+        submission: &std::path::Path,
+    ) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
+        let mesh = mesh([1.0, 1.0]);
+        let submissions = [read_scene(submission, scene), read_scene(std::path::Path::new("nowhere"), scene)];
+        texture_space(folder, scene, &world(&mesh), &[mesh], &submissions, &|_, _, _| {})
+    }
+
+    #[test]
+    fn a_scene_from_disk() {
+        let (root, folder, scene) = on_disk();
+        let both = compared(&folder, &scene, &root.path().join("submission")).unwrap();
+        let [[same], [nothing]] = [both[0].as_slice(), both[1].as_slice()] else { panic!("{both:?}") };
+        assert_eq!(Map::ALL.map(|map| same.observed.mse(map)), [Some(0.0); 3]);
+        assert_eq!((same.observed.area_m2, same.unobserved), (nothing.observed.area_m2, TexelSums::default()));
+        // What is missing is metallic 0.
+        let metallic = (30_000.0_f64 / 65_535.0).powi(2);
+        assert!((nothing.observed.mse(Map::Metallic).unwrap() - metallic).abs() < 1e-7);
+    }
+
+    #[test]
+    fn an_unsound_truth_is_an_error_that_says_which() {
+        let (root, folder, mut scene) = on_disk();
+        let submission = root.path().join("submission");
+        let instance = scene.instances[0].id.clone();
+        let roughness = folder.truth_material(&instance).join("roughness.png");
+        png_io::write_grey_bytes(&roughness, &Picture::filled(128, 128, 9)).unwrap();
+        let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
+        assert!(text.contains("roughness.png': 128x128 texels, scene.json says 64"), "{text}");
+        std::fs::remove_file(&roughness).unwrap();
+        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("roughness.png"));
+        scene.instances[0].atlas.as_mut().unwrap().size = 1 << 20;
+        let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
+        assert!(text.contains("instance 'a' has an atlas of 1048576 texels"), "{text}");
+        scene.views.clear();
+        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("no input view"));
+    }
+}

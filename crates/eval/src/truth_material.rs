@@ -1,0 +1,44 @@
+//! The truth baked to an instance's atlas, as the dataset holds it.
+
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Texture, Wrap};
+use mateval_scene::InstanceId;
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::submission::Map;
+
+use crate::error::EvalError;
+
+/// A material's three maps as the dataset holds them: its source baked to the instance's atlas.
+#[derive(Clone, Debug)]
+pub struct TruthMaterial {
+    /// Linear at lookup.
+    pub base_color: Texture,
+    /// Perceptual, 0 to 1.
+    pub roughness: Texture,
+    /// 0 to 1.
+    pub metallic: Texture,
+}
+
+impl TruthMaterial {
+    /// Reads `ground_truth/materials/<instance>/`, each map a PNG of `size` times `size` texels.
+    ///
+    /// Fails where a file is missing, unsound or of another size.
+    pub fn read(folder: &SceneFolder, instance: &InstanceId, size: usize) -> Result<Self, EvalError> {
+        let read = |map: Map| read_truth(folder, instance, map, size);
+        let ((base_color, roughness), metallic) =
+            rayon::join(|| rayon::join(|| read(Map::BaseColor), || read(Map::Roughness)), || read(Map::Metallic));
+        Ok(Self { base_color: base_color?, roughness: roughness?, metallic: metallic? })
+    }
+}
+
+fn read_truth(folder: &SceneFolder, instance: &InstanceId, map: Map, size: usize) -> Result<Texture, EvalError> {
+    let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
+    let png = folder.truth_material(instance).join(map.stem()).with_extension("png");
+    let texture = read_texture(&png, encoding, Wrap::Clamp)?;
+    if (texture.width(), texture.height()) == (size, size) {
+        return Ok(texture.collapsed());
+    }
+    let found = format!("{}x{} texels", texture.width(), texture.height());
+    let what = format!("'{}': {found}, scene.json says {size} a side; run `mateval prep verify`", png.display());
+    Err(EvalError::Invalid(what))
+}
