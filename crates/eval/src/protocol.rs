@@ -98,6 +98,11 @@ impl Protocol {
         })
     }
 
+    /// SHA-256, hex, of the protocol alone: what `dataset_spec/PROTOCOL.md` publishes.
+    pub fn sha256(&self) -> String {
+        mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
+    }
+
     /// SHA-256, hex, over this protocol, the dataset's manifest, the scenes that are scored and the weights of LPIPS (or
     /// a word for their absence).
     pub fn fingerprint(
@@ -139,6 +144,62 @@ mod tests {
         prints.sort();
         prints.dedup();
         assert_eq!(prints.len(), 9);
+    }
+
+    /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`] if
+    /// numbers of the same protocol do.
+    #[test]
+    fn published_hashes_hold() {
+        let text = include_str!("../../../dataset_spec/PROTOCOL.md");
+        for name in Protocol::NAMES {
+            let row = format!("| `{name}` | `{}` |", Protocol::named(name).unwrap().sha256());
+            assert!(text.contains(&row), "PROTOCOL.md should say: {row}");
+        }
+    }
+
+    /// Every number and word of a protocol, changed by itself, changes its hash.
+    #[test]
+    fn every_constant_is_in_the_hash() {
+        let base = serde_json::to_value(Protocol::named("mateval-1").unwrap()).unwrap();
+        let mut hashes = vec![Protocol::named("mateval-1").unwrap().sha256()];
+        let mut pointers = Vec::new();
+        leaves(&base, String::new(), &mut pointers);
+        for pointer in &pointers {
+            let mut changed = base.clone();
+            let value = changed.pointer_mut(pointer).unwrap();
+            let next = match &*value {
+                serde_json::Value::Number(number) if number.is_u64() => (number.as_u64().unwrap() + 1).into(),
+                serde_json::Value::Number(number) => (number.as_f64().unwrap() * 1.5 + 0.25).into(),
+                serde_json::Value::String(word) => match word.as_str() {
+                    "inside" => "black_fill".into(),
+                    "linear" => "srgb".into(),
+                    "blender" => "mitsuba".into(),
+                    "fitted" | "true" => "relit".into(),
+                    "relit" => "true".into(),
+                    other => format!("{other}x").into(),
+                },
+                other => panic!("{pointer}: {other}"),
+            };
+            *value = next;
+            hashes.push(serde_json::from_value::<Protocol>(changed).unwrap().sha256());
+        }
+        let count = hashes.len();
+        assert!(count > 45, "{count}");
+        hashes.sort();
+        hashes.dedup();
+        assert_eq!(hashes.len(), count);
+    }
+
+    fn leaves(value: &serde_json::Value, at: String, found: &mut Vec<String>) {
+        match value {
+            serde_json::Value::Object(map) => {
+                map.iter().for_each(|(key, value)| leaves(value, format!("{at}/{key}"), found))
+            }
+            serde_json::Value::Array(list) => {
+                list.iter().enumerate().for_each(|(k, value)| leaves(value, format!("{at}/{k}"), found));
+            }
+            _ => found.push(at),
+        }
     }
 
     #[test]

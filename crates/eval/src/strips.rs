@@ -125,12 +125,22 @@ mod tests {
     use mateval_image::Mask;
 
     use super::*;
+    use crate::truth::ViewTruth;
 
     fn view() -> SceneAlbedo {
         let truth = Picture::filled(4, 3, LinearRgb([1.0; 3]));
         let predicted = vec![truth.clone(), Picture::filled(4, 3, LinearRgb([0.5; 3]))];
         let unobserved = Some(Mask::from_fn(4, 3, |x, _| x == 3));
-        SceneAlbedo { truth, predicted, valid: Mask::from_fn(4, 3, |_, y| y > 0), unobserved }
+        let truth = ViewTruth {
+            albedo: truth,
+            roughness: Picture::filled(4, 3, 0.5),
+            metallic: Picture::filled(4, 3, 0.0),
+            valid: Mask::from_fn(4, 3, |_, y| y > 0),
+            unobserved,
+            specular: None,
+            instances: Picture::filled(4, 3, 1),
+        };
+        SceneAlbedo { truth, predicted }
     }
 
     #[test]

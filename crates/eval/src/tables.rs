@@ -234,7 +234,12 @@ mod tests {
             fingerprint: fingerprint.to_owned(),
             summary,
             scenes: BTreeMap::new(),
+            summary_noise: BTreeMap::new(),
+            noise: BTreeMap::new(),
+            fits: BTreeMap::new(),
             pictures: Vec::new(),
+            texels: Vec::new(),
+            instances: Vec::new(),
         };
         ResultFile {
             format: RESULT_FORMAT.to_owned(),
