@@ -6,6 +6,7 @@ use anyhow::{Context as _, bail};
 
 use mateval_baselines::estimate::EstimateSource;
 use mateval_baselines::nn::NnOptions;
+use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 
 use crate::bars::Bars;
@@ -92,7 +93,7 @@ fn make_baselines(dataset: &Dataset, out: &Path, force: bool) -> anyhow::Result<
 fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
     let results = files.iter().map(|path| mateval_scene::json::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
-    print(&mateval_eval::tables::tables(&results, "mateval-1", mateval_eval::tables::TableFormat::Markdown)?)?;
+    print(&tables(&results, "mateval-1", Grouping::Dataset, TableFormat::Markdown)?)?;
     for id in &dataset.file.scenes {
         let scene = dataset.folder(id);
         print(&format!("input picture:  {}\n", scene.path().join("views/input/rgb.png").display()))?;

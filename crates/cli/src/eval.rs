@@ -7,7 +7,7 @@ use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_eval::strips;
-use mateval_eval::tables::{TableFormat, tables};
+use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_metrics::{Lpips, Net};
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, json};
@@ -26,7 +26,7 @@ pub enum Command {
     Score(ScoreArgs),
     /// Albedo of truth and submissions side by side, and where they err: two PNG a scene.
     Pictures(PicturesArgs),
-    /// Sets results side by side, as the paper's Tables III to V.
+    /// Sets results side by side, as the paper's Tables II to V, and ours in the same layout.
     Tables(TablesArgs),
 }
 
@@ -122,6 +122,17 @@ pub struct TablesArgs {
     /// How to write them.
     #[arg(long, value_enum, default_value = "markdown")]
     format: TableName,
+    /// What has rows of its own: a scene, or a category, whose errors are pooled over all its pixels. By default the whole
+    /// dataset.
+    #[arg(long, value_enum)]
+    by: Option<GroupName>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum GroupName {
+    Scene,
+    Category,
+    SuperCategory,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -281,7 +292,13 @@ fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {
         TableName::Latex => TableFormat::Latex,
         TableName::Csv => TableFormat::Csv,
     };
-    print(&tables(&results, &args.protocol, format)?)?;
+    let grouping = match args.by {
+        None => Grouping::Dataset,
+        Some(GroupName::Scene) => Grouping::Scene,
+        Some(GroupName::Category) => Grouping::Category,
+        Some(GroupName::SuperCategory) => Grouping::SuperCategory,
+    };
+    print(&tables(&results, &args.protocol, grouping, format)?)?;
     for result in results.iter().filter(|result| !result.missing.is_empty()) {
         for missing in &result.missing {
             say(&format!(

@@ -1,0 +1,33 @@
+//! Tables as comma-separated values, with all digits.
+
+use super::table::{Cell, Column, Table};
+
+/// The table; its title is the head of the methods' column. What is missing is empty.
+pub(super) fn text(table: &Table<'_>) -> String {
+    let names = table.group_head.into_iter().chain([table.title]).map(quoted);
+    let heads = table.columns.iter().flat_map(|column| {
+        let head = column.head();
+        let error =
+            column.has_errors.then(|| quoted(&format!("{} {} standard error", column.block, column.metric.title)));
+        [quoted(&head)].into_iter().chain(error)
+    });
+    let mut lines = vec![names.chain(heads).collect::<Vec<_>>().join(",")];
+    for group in &table.groups {
+        for (method, cells) in &group.rows {
+            let names = table.group_head.iter().map(|_| group.name).chain([*method]).map(quoted);
+            let cells = table.columns.iter().zip(cells).flat_map(|(column, cell)| numbers(column, cell));
+            lines.push(names.chain(cells).collect::<Vec<_>>().join(","));
+        }
+    }
+    lines.join("\n") + "\n\n"
+}
+
+fn numbers(column: &Column<'_>, cell: &Cell) -> impl Iterator<Item = String> {
+    let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
+    let error = column.has_errors.then(|| number(cell.value.and_then(|value| value.standard_error)));
+    [number(cell.value.map(|value| value.value))].into_iter().chain(error)
+}
+
+fn quoted(field: &str) -> String {
+    format!("\"{}\"", field.replace('"', "\"\""))
+}
