@@ -71,7 +71,7 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 14] = [
+    let subcommands: [&[&str]; 15] = [
         &["demo"],
         &["sample"],
         &["prep"],
@@ -86,6 +86,7 @@ fn every_subcommand_has_help() {
         &["eval", "image"],
         &["eval", "score"],
         &["eval", "tables"],
+        &["eval", "explain"],
     ];
     for words in subcommands {
         let shown = run(mateval().args(words).arg("--help")).ends_with(0);

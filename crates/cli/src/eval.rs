@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_eval::explain::{self, ExplainPlan};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{ScorePlan, score};
@@ -28,6 +29,8 @@ pub enum Command {
     Pictures(PicturesArgs),
     /// Sets results side by side, as the paper's Tables II to V, and ours in the same layout.
     Tables(TablesArgs),
+    /// Tells where one scene's albedo errs and how: brightness, tint, shading left in, misplacement, lost detail.
+    Explain(ExplainArgs),
 }
 
 /// What `eval image` is given.
@@ -128,6 +131,34 @@ pub struct TablesArgs {
     by: Option<GroupName>,
 }
 
+/// What `eval explain` is given.
+#[derive(clap::Args)]
+pub struct ExplainArgs {
+    /// The RESULT.json file.
+    result: PathBuf,
+    /// The scene.
+    #[arg(long)]
+    scene: SceneId,
+    /// The dataset's folder that was scored on.
+    #[arg(long)]
+    dataset: PathBuf,
+    /// The submission's folder that was scored.
+    #[arg(long)]
+    submission: PathBuf,
+    /// Whose scores of the result.
+    #[arg(long, default_value = "mateval-1")]
+    protocol: String,
+    /// A folder for `explain.md` and pictures of the ten worst instances.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// How to print.
+    #[arg(long, value_enum, default_value = "text")]
+    format: ImageFormat,
+    /// Replace files that are there.
+    #[arg(long)]
+    force: bool,
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum GroupName {
     Scene,
@@ -149,6 +180,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Pictures(args) => pictures(args),
         Command::Score(args) => score_submissions(args).map(|_| Outcome::Good),
         Command::Tables(args) => print_tables(args),
+        Command::Explain(args) => print_explanation(args),
     }
 }
 
@@ -307,5 +339,32 @@ fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {
             ));
         }
     }
+    Ok(Outcome::Good)
+}
+
+fn print_explanation(args: &ExplainArgs) -> anyhow::Result<Outcome> {
+    args.out.iter().try_for_each(|out| explain::check_out(out, args.force))?;
+    let result: ResultFile = json::read(&args.result)?;
+    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let plan = ExplainPlan {
+        result: &result,
+        protocol: &args.protocol,
+        dataset: &dataset,
+        submission: &args.submission,
+        scene: &args.scene,
+        tool: TOOL.to_owned(),
+    };
+    let bars = Bars::new();
+    let found = explain::explain(&plan, &|step, done, all| bars.step(step, done, all)).context("cannot explain")?;
+    drop(bars);
+    if let Some(out) = &args.out {
+        for path in found.write(out, args.force)? {
+            say(&format!("wrote '{}'", path.display()));
+        }
+    }
+    print(&match args.format {
+        ImageFormat::Json => json::to_text(&found.file),
+        ImageFormat::Text => explain::text::plain(&found.file),
+    })?;
     Ok(Outcome::Good)
 }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use mateval_baselines::import::{FlatMaterials, ImportReport};
+use mateval_eval::explain::file::ExplainFile;
 use mateval_eval::result::ResultFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
@@ -42,7 +43,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 15] {
+fn schemas() -> [(&'static str, Schema); 16] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -52,6 +53,7 @@ fn schemas() -> [(&'static str, Schema); 15] {
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
         ("result", schema_for!(ResultFile)),
+        ("explain", schema_for!(ExplainFile)),
         ("stats", schema_for!(StatsFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),

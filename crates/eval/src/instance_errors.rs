@@ -55,7 +55,7 @@ impl InstanceErrors {
 }
 
 /// The source's categories; of 3D-FRONT's architecture its kind of mesh, the last word of its name but for a number.
-fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
+pub(crate) fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
     if instance.category.is_some() || scene.source.kind != "front3d" {
         return (instance.category.clone(), instance.super_category.clone());
     }

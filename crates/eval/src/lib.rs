@@ -1,15 +1,16 @@
 //! From submissions to scores.
 //!
 //! In: a dataset with its ground truth, a submission folder, the weights of LPIPS. Out: [`result::ResultFile`], and
-//! tables of several.
+//! tables of several, and of one scene where and how its albedo errs.
 //!
-//! Between: [`protocol`] holds every constant, [`prediction`] reads the submission's maps, [`albedo`] makes pictures of
-//! them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares,
-//! [`score`] goes through the dataset, [`tables`] shows.
+//! Between: [`protocol`] holds every constant, [`prediction`] reads the submission's maps, [`material_pictures`] makes
+//! pictures of them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares,
+//! [`score`] goes through the dataset, [`tables`] and [`strips`] show, [`explain`] tells kinds of error apart.
 
 pub mod alignment;
 mod coverage;
 pub mod error;
+pub mod explain;
 mod instance_errors;
 pub mod light_fit;
 pub mod light_rules;

@@ -49,11 +49,7 @@ pub fn albedo_metrics(
 ) -> Result<Vec<Measured>, MetricError> {
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let (encoded, reference_encoded) = (prediction.to_srgb(), reference.to_srgb());
-    let error = match protocol.albedo_space {
-        AlbedoSpace::Linear => mse(prediction, reference, Some(mask))?,
-        AlbedoSpace::Srgb => mse(&encoded, &reference_encoded, Some(mask))?,
-    };
-    let mut measured = error_metrics(error, pixels)?;
+    let mut measured = error_metrics(albedo_mse(protocol, prediction, reference, mask)?, pixels)?;
     measured.push(ssim_metric(protocol.mask_rule, &encoded, &reference_encoded, mask, pixels)?);
     if let Some(lpips) = lpips {
         let distance = match protocol.mask_rule {
@@ -68,6 +64,19 @@ pub fn albedo_metrics(
         measured.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(measured)
+}
+
+/// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts. Linear pictures.
+pub(crate) fn albedo_mse(
+    protocol: &Protocol,
+    prediction: &Picture<LinearRgb>,
+    reference: &Picture<LinearRgb>,
+    mask: &Mask,
+) -> Result<Option<f64>, MetricError> {
+    match protocol.albedo_space {
+        AlbedoSpace::Linear => mse(prediction, reference, Some(mask)),
+        AlbedoSpace::Srgb => mse(&prediction.to_srgb(), &reference.to_srgb(), Some(mask)),
+    }
 }
 
 /// MSE, PSNR and SSIM of a picture of roughness or metallic over the mask, all of the values as they are: they are no light

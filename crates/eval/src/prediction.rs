@@ -124,6 +124,12 @@ fn files_there(submission: &Path, scene: &SceneFile, instance: &Instance) -> Vec
     paths.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
 }
 
+/// Path in the submission and SHA-256 of every map of the scene that is there, as [`read_scene`] tells them.
+pub(crate) fn map_files(submission: &Path, scene: &SceneFile) -> Vec<(String, String)> {
+    let recovered = scene.instances.iter().filter(|instance| instance.atlas.is_some());
+    recovered.flat_map(|instance| files_there(submission, scene, instance)).collect()
+}
+
 /// Where a map may lie.
 fn candidates(submission: &Path, scene: &SceneFile, instance: &Instance, map: Map) -> [PathBuf; 2] {
     let folder = instance_folder(submission, &scene.id, &instance.id);

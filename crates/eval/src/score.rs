@@ -285,7 +285,7 @@ pub(crate) fn scene_albedo(
 }
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
-fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+pub(crate) fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
     let targets = &dataset.targets.targets;
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
@@ -315,6 +315,12 @@ fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Resul
     Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
 }
 
+/// The hash of a submission: of `submission.json` and of the maps of the scored scenes, path and SHA-256 each, in order.
+pub(crate) fn submission_sha256(files: &[(String, String)]) -> String {
+    let lines: String = files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
+    sha256_of_bytes(lines.as_bytes())
+}
+
 fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> ResultFile {
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
@@ -326,12 +332,11 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
     let missing = missing(plan);
     entry.findings.sort();
-    let files: String = entry.files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
     ResultFile {
         format: RESULT_FORMAT.to_owned(),
         tool: plan.tool.clone(),
         method: entry.file.method,
-        submission: SubmissionId { sha256: sha256_of_bytes(files.as_bytes()), description: entry.file.description },
+        submission: SubmissionId { sha256: submission_sha256(&entry.files), description: entry.file.description },
         dataset: DatasetId {
             name: plan.dataset.file.name.clone(),
             version: plan.dataset.file.version.clone(),

@@ -16,9 +16,9 @@ const OBSERVED_SHARE: f32 = 0.4;
 pub const WHITE_ERROR: f32 = 0.5;
 /// Pixels between pictures, and their colour.
 const GAP: usize = 4;
-const GAP_COLOR: [u8; 3] = [255; 3];
+pub(crate) const GAP_COLOR: [u8; 3] = [255; 3];
 /// Rows of the scale beneath error maps.
-const SCALE_ROWS: usize = 12;
+pub(crate) const SCALE_ROWS: usize = 12;
 
 /// Writes `<scene>-albedo.png` and `<scene>-albedo-error.png` into the folder `out`. Gives their paths.
 ///
@@ -82,12 +82,16 @@ fn errors(view: &SceneAlbedo) -> Vec<Picture<[u8; 3]>> {
             if !view.truth.valid.get(x, y) {
                 return [0; 3];
             }
-            let (a, b) = (picture.get(x, y).0, view.truth.albedo.get(x, y).0);
-            let squares: f32 = (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum();
-            glow((squares / 3.0).sqrt() / WHITE_ERROR)
+            error_color(picture.get(x, y), view.truth.albedo.get(x, y))
         })
     };
     view.predicted.iter().map(error).collect()
+}
+
+/// The colour of a pixel's error.
+pub(crate) fn error_color(LinearRgb(a): LinearRgb, LinearRgb(b): LinearRgb) -> [u8; 3] {
+    let squares: f32 = (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum();
+    glow((squares / 3.0).sqrt() / WHITE_ERROR)
 }
 
 /// Black, red, yellow, white for 0 to 1: brighter is worse, in print and to the colour-blind too.
@@ -95,12 +99,13 @@ fn glow(share: f32) -> [u8; 3] {
     [0.0, 1.0, 2.0].map(|start| byte_from_unit(share.clamp(0.0, 1.0) * 3.0 - start))
 }
 
-fn scale(width: usize) -> Picture<[u8; 3]> {
+/// The colours of errors from 0 to [`WHITE_ERROR`], left to right.
+pub(crate) fn scale(width: usize) -> Picture<[u8; 3]> {
     Picture::from_fn(width, SCALE_ROWS, |x, _| glow((x as f32 + 0.5) / width as f32))
 }
 
 /// Rows of pictures with gaps between them; pictures of one row are of one height, of one column of one width.
-fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
+pub(crate) fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
     let starts = |sizes: &mut dyn Iterator<Item = usize>| {
         let mut starts = vec![0];
         sizes.for_each(|size| starts.push(starts[starts.len() - 1] + size + GAP));

@@ -41,7 +41,8 @@ pub enum Grouping {
 }
 
 /// Sets the results side by side under one protocol. Results of different fingerprints, or of different scenes, are
-/// refused. A column that no result has is left out; a value that some result lacks is shown as missing.
+/// refused. A column that no result has is left out; a value that some result lacks is shown as missing, and as a dash where
+/// no result has it of that scene or category.
 pub fn tables(
     results: &[ResultFile],
     protocol: &str,

@@ -36,6 +36,8 @@ pub(super) struct TableGroup<'a> {
 pub(super) struct Cell {
     /// Scaled; none where it is missing.
     pub(super) value: Option<Value>,
+    /// Whether another method of the group has one; if none has, there was nothing to measure.
+    pub(super) has_rivals: bool,
     pub(super) digits: usize,
     pub(super) mark: Mark,
 }
@@ -100,19 +102,20 @@ impl<'a> TableGroup<'a> {
 /// Marks the best and the second best value; equal values share a mark, and a value that is alone has none.
 fn marked(values: &[Option<Value>], metric: &Metric) -> Vec<Cell> {
     let mut distinct: Vec<f64> = values.iter().flatten().map(|value| value.value).collect();
-    let has_rivals = distinct.len() > 1;
+    let is_contest = distinct.len() > 1;
     distinct.sort_by(f64::total_cmp);
     if metric.better == Some(Better::Higher) {
         distinct.reverse();
     }
     distinct.dedup();
     let mark = |value: f64| match distinct.iter().position(|other| *other == value) {
-        Some(0) if has_rivals && metric.better.is_some() => Mark::Best,
+        Some(0) if is_contest && metric.better.is_some() => Mark::Best,
         Some(1) if metric.better.is_some() => Mark::Second,
         _ => Mark::None,
     };
     let cell = |value: &Option<Value>| Cell {
         value: *value,
+        has_rivals: values.iter().flatten().count() > usize::from(value.is_some()),
         digits: metric.digits,
         mark: value.map_or(Mark::None, |value| mark(value.value)),
     };
@@ -134,7 +137,9 @@ impl Column<'_> {
 impl Cell {
     /// The rounded value between the marks, and its standard error behind `plus_minus`.
     pub(super) fn text(&self, best: (&str, &str), second: (&str, &str), plus_minus: &str) -> String {
-        let Some(Value { value, standard_error }) = self.value else { return "missing".to_owned() };
+        let Some(Value { value, standard_error }) = self.value else {
+            return if self.has_rivals { "missing" } else { "-" }.to_owned();
+        };
         let digits = self.digits;
         let (before, after) = match self.mark {
             Mark::Best => best,

@@ -191,6 +191,22 @@ fn pooled_noise_has_no_psnr() {
     assert!(light.contains("| other | m | 10 | -0.001 |\n"), "{light}");
 }
 
+/// What some method has is missing of another; of what nobody has there was nothing to measure.
+#[test]
+fn missing_or_nothing_to_measure() {
+    let mut both = [with_instances(), with_instances()];
+    both[0].protocols.get_mut("paper").unwrap().instances.push(errors("b", None, "albedo", 10, 0.1));
+    both[1].protocols.get_mut("paper").unwrap().instances.retain(|errors| errors.category.is_some());
+    both.iter_mut().for_each(|result| {
+        let scores = result.protocols.get_mut("paper").unwrap();
+        scores
+            .instances
+            .push(InstancePixelErrors { views: "novel".to_owned(), ..errors("b", Some("Sofa"), "albedo", 1, 0.1) });
+    });
+    let markdown = shown(&both, Grouping::Category, TableFormat::Markdown);
+    assert!(markdown.contains("| other | m | missing | missing | missing | - | - | - |"), "{markdown}");
+}
+
 #[test]
 fn fingerprints_are_not_mixed() {
     let mut other = result("b", &[]);

@@ -1,0 +1,211 @@
+//! The explanation for people: numbers are rounded here, the JSON has them whole.
+
+use std::fmt::Write as _;
+
+use mateval_scene::ViewId;
+
+use super::WORST;
+use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
+use crate::strips::WHITE_ERROR;
+
+/// A picture of one of the worst instances.
+pub(super) struct Crop {
+    /// Its name beside the page.
+    pub(super) file: String,
+    /// The view that it is of.
+    pub(super) view: ViewId,
+}
+
+/// A table before it is set.
+struct Table {
+    title: String,
+    /// Columns from the left that hold words; all others hold numbers.
+    words: usize,
+    /// The first is the head.
+    rows: Vec<Vec<String>>,
+}
+
+const KINDS: &str = "\
+Shares of the squared error (linear), each of what the steps before it have left; together they are all of it.
+The steps: one scale an instance; one a channel (chroma); a smooth factor a view (shading left in); a shift of up
+to 4 pixels (misplacement); the truth's own detail (blur). The rest is none of these.";
+
+/// Tables set in columns.
+pub fn plain(file: &ExplainFile) -> String {
+    let tables = tables(file).into_iter().map(|table| format!("{}\n{}", table.title, table.plain()));
+    let mut parts = vec![format!("{}\n", title(file))];
+    parts.extend(tables);
+    parts.push(format!("{KINDS}\n"));
+    parts.extend(findings(file));
+    parts.join("\n")
+}
+
+/// A page with the tables and links to the pictures, in the order of the worst instances.
+pub(super) fn markdown(file: &ExplainFile, crops: &[Crop]) -> String {
+    let mut parts = vec![format!("# {}\n", title(file))];
+    for (at, table) in tables(file).iter().enumerate() {
+        parts.push(format!("## {}\n\n{}", table.title, table.markdown()));
+        if at == 0 {
+            parts.push(format!("{KINDS}\n"));
+        }
+    }
+    if !crops.is_empty() {
+        parts.push(format!(
+            "## The worst instances\n\nTruth, prediction, and the root of the mean squared error over channels: black 0, \
+             red {:.2}, yellow {:.2}, white {WHITE_ERROR} and above.\n",
+            WHITE_ERROR / 3.0,
+            WHITE_ERROR / 1.5
+        ));
+    }
+    for (crop, instance) in crops.iter().zip(&file.instances) {
+        let (id, share) = (&instance.instance, percent(instance.share));
+        parts.push(format!("### {id}: {share} %, view {}\n\n![{id}]({})\n", crop.view, crop.file));
+    }
+    parts.extend(findings(file));
+    parts.join("\n")
+}
+
+fn title(file: &ExplainFile) -> String {
+    format!(
+        "{}, scene {}: albedo MSE {} (1e-3, linear), PSNR {:.2} dB, over {} pixels of {} views",
+        file.method,
+        file.scene,
+        thousandths(file.mse),
+        file.psnr,
+        file.pixels,
+        file.views.len()
+    )
+}
+
+fn findings(file: &ExplainFile) -> Option<String> {
+    let lines: String = file.findings.iter().map(|finding| format!("- {finding}\n")).collect();
+    (!lines.is_empty()).then(|| format!("What the result found wrong here:\n\n{lines}"))
+}
+
+fn tables(file: &ExplainFile) -> Vec<Table> {
+    let mut tables = vec![kinds(file), details(file), alignments(&file.alignments)];
+    for (picture, title) in [("rgb_true", "true light"), ("rgb_fitted", "fitted light")] {
+        let shares: Vec<&LightShare> = file.light.iter().filter(|share| share.picture == picture).collect();
+        tables.extend((!shares.is_empty()).then(|| light(title, &shares)));
+    }
+    tables
+}
+
+fn worst(file: &ExplainFile) -> impl Iterator<Item = &InstanceExplanation> {
+    file.instances.iter().take(WORST)
+}
+
+fn kinds(file: &ExplainFile) -> Table {
+    let heads = ["Instance", "Category", "Share %", "Pixels", "MSE (1e-3)"];
+    let kinds = ["Scale %", "Chroma %", "Shading %", "Misplaced %", "Detail %", "Rest %"];
+    let mut rows = vec![heads.into_iter().chain(kinds).map(str::to_owned).collect::<Vec<_>>()];
+    let row = |names: [&str; 2], share: f64, pixels: usize, mse: f64, kinds: Option<&KindShares>| {
+        let numbers = [percent(share), pixels.to_string(), thousandths(mse)];
+        let kinds = kinds.map_or([(); 6].map(|()| "-".to_owned()), |k| {
+            [k.scale, k.chroma, k.shading, k.misplacement, k.detail, k.rest].map(percent)
+        });
+        names.into_iter().map(str::to_owned).chain(numbers).chain(kinds).collect::<Vec<_>>()
+    };
+    rows.push(row(["(whole scene)", ""], 1.0, file.pixels, file.mse, file.kinds.as_ref()));
+    rows.extend(worst(file).map(|i| {
+        let category = i.category.as_deref().unwrap_or("other");
+        row([i.instance.as_str(), category], i.share, i.pixels, i.mse, i.kinds.as_ref())
+    }));
+    let told = rows.len() - 2;
+    let title = format!("Where and how the albedo errs: {told} of {} instances, the worst first", file.instances.len());
+    Table { title, words: 2, rows }
+}
+
+fn details(file: &ExplainFile) -> Table {
+    let mut rows =
+        vec![["Instance", "Scale", "R, G, B", "Prediction moved by (x, y)", "Blur sigma"].map(str::to_owned).to_vec()];
+    rows.extend(worst(file).map(|i| {
+        let [r, g, b] = i.channel_scales;
+        let shifts: Vec<String> =
+            i.shifts.iter().map(|shift| format!("{} ({}, {})", shift.view, shift.pixels[0], shift.pixels[1])).collect();
+        vec![
+            i.instance.to_string(),
+            format!("{:.3}", i.scale),
+            format!("{r:.3}, {g:.3}, {b:.3}"),
+            if shifts.is_empty() { "-".to_owned() } else { shifts.join(", ") },
+            i.blur_sigma_pixels.map_or("-".to_owned(), |sigma| format!("{sigma} px")),
+        ]
+    }));
+    Table { title: "What each step did".to_owned(), words: 5, rows }
+}
+
+fn alignments(scores: &[AlignmentScores]) -> Table {
+    let views = ["input", "novel", "unobserved"];
+    let heads = views.iter().flat_map(|views| [format!("{views} MSE (1e-3)"), format!("{views} PSNR")]);
+    let mut rows = vec![["Scales of".to_owned()].into_iter().chain(heads).collect::<Vec<_>>()];
+    let kinds = [
+        (AlignedBy::None, "nothing: albedo"),
+        (AlignedBy::PictureAndChannel, "picture and channel: albedo_aligned"),
+        (AlignedBy::Scene, "scene"),
+        (AlignedBy::SceneAndChannel, "scene and channel"),
+        (AlignedBy::Instance, "instance"),
+        (AlignedBy::InstanceAndChannel, "instance and channel"),
+    ];
+    for (kind, name) in kinds {
+        let found = views.map(|views| scores.iter().find(|score| score.scales == kind && score.views == views));
+        let cells = found.iter().flat_map(|score| match score {
+            Some(score) => [thousandths(score.mse), format!("{:.2}", score.psnr)],
+            None => ["-".to_owned(), "-".to_owned()],
+        });
+        rows.push([name.to_owned()].into_iter().chain(cells).collect());
+    }
+    Table { title: "What scales alone would mend (in the protocol's space)".to_owned(), words: 1, rows }
+}
+
+fn light(title: &str, shares: &[&LightShare]) -> Table {
+    let mut rows = vec![["Instance", "Category", "Share %", "Pixels", "MSE (1e-3)"].map(str::to_owned).to_vec()];
+    rows.extend(shares.iter().map(|share| {
+        let category = share.category.as_deref().unwrap_or("other").to_owned();
+        let numbers = [percent(share.share), share.pixels.to_string(), thousandths(share.mse)];
+        [share.instance.to_string(), category].into_iter().chain(numbers).collect()
+    }));
+    Table { title: format!("RGB, {title}: the worst instances of the result"), words: 2, rows }
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1}", unsigned_zero(100.0 * share, 10.0))
+}
+
+fn thousandths(mse: f64) -> String {
+    format!("{:.3}", unsigned_zero(1e3 * mse, 1e3))
+}
+
+/// What rounds to zero in steps of 1 / `steps` is zero without a sign.
+fn unsigned_zero(value: f64, steps: f64) -> f64 {
+    if (value * steps).abs() < 0.5 { 0.0 } else { value }
+}
+
+impl Table {
+    fn plain(&self) -> String {
+        let columns = self.rows.first().map_or(0, Vec::len);
+        let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let mut text = String::new();
+        for row in &self.rows {
+            let cells = row.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at < self.words {
+                true => format!("{cell:<width$}"),
+                false => format!("{cell:>width$}"),
+            });
+            // Writing to a String cannot fail, here and below.
+            let _ = writeln!(text, "  {}", cells.collect::<Vec<_>>().join("  ").trim_end());
+        }
+        text
+    }
+
+    fn markdown(&self) -> String {
+        let mut text = String::new();
+        for (at, row) in self.rows.iter().enumerate() {
+            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            let _ = writeln!(text, "| {} |", cells.join(" | "));
+            if at == 0 {
+                let _ = writeln!(text, "{}{}|", "|---".repeat(self.words), "|---:".repeat(row.len() - self.words));
+            }
+        }
+        text
+    }
+}
