@@ -36,7 +36,8 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
         Stage::measure("stream C", STREAM_C_SAMPLES, || render(&[input], STREAM_C_SAMPLES, &[seed]));
     let mut stages = vec![stage];
     let photo = photo(folder);
-    let (fit, stage) = Stage::measure("fit", 0, || fit_lights(&stream_c[0].halves[0].basis, &photo, None).unwrap());
+    let (fit, stage) =
+        Stage::measure("fit", 0, || fit_lights(&stream_c[0].halves[0].basis, &photo, None, None).unwrap());
     stages.push(stage);
     let mut errors: Vec<f64> = fit.weights.iter().flatten().map(|weight| (weight - 1.0).abs()).collect();
     errors.sort_by(f64::total_cmp);

@@ -63,8 +63,8 @@ fn a_planted_tint_is_chroma() {
     let tint = [1.25, 0.95, 0.8];
     let found = explained(&discs(|_, _, t| std::array::from_fn(|c| tint[c] * t[c])));
     check(&found, 1, 0.9);
-    for c in 0..3 {
-        assert!((found.scale * found.channel_scales[c] * tint[c] - 1.0).abs() < 1e-12);
+    for (found_scale, tint) in found.channel_scales.iter().zip(tint) {
+        assert!((found.scale * found_scale * tint - 1.0).abs() < 1e-12);
     }
 }
 
