@@ -1,5 +1,5 @@
 //! What it costs to look at eight submissions together, against eight apart: submissions that differ in base colour alone
-//! are followed by the same paths.
+//! are followed by the same paths. And what five lightings more cost: track `relit` is sums over the same paths.
 //!
 //! `cargo bench -p mateval-eval --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES]`. The eight are the submission's own
 //! maps, each with its own copies of the textures, so that none finds another's in the caches. Runs alternate; tracing only.
@@ -51,11 +51,22 @@ fn main() {
         render_repainted(&world, &repaint, which, &cameras, lighting, &settings, &[1, 2], &|_, _| ()).unwrap();
         start.elapsed().as_secs_f64()
     };
-    let (mut together, mut apart) = (0.0, 0.0);
+    let lights = world.emitters().groups();
+    let mixed = |pictures: usize| {
+        let start = Instant::now();
+        let mixes = vec![vec![vec![[0.7; 3]; lights]; pictures]; SUBMISSIONS];
+        let lighting = Lighting::Mixed(&mixes);
+        render_repainted(&world, &repaint, 0..1, &cameras, lighting, &settings, &[1, 2], &|_, _| ()).unwrap();
+        start.elapsed().as_secs_f64()
+    };
+    let (mut together, mut apart, mut one, mut six) = (0.0, 0.0, 0.0, 0.0);
     for _ in 0..RUNS {
         together += trace(0..SUBMISSIONS);
         apart += (0..SUBMISSIONS).map(|one| trace(one..one + 1)).sum::<f64>();
+        one += mixed(1);
+        six += mixed(6);
     }
+    println!("one lighting {:.2} s, six {:.2} s: {:.3}", one / RUNS as f64, six / RUNS as f64, six / one);
     println!("{SUBMISSIONS} together {:.2} s, apart {:.2} s", together / RUNS as f64, apart / RUNS as f64);
     println!("together over apart: {:.3}", together / apart);
 }
