@@ -24,6 +24,7 @@ mod suite {
     mod planted;
     mod readme;
     mod real_scenes;
+    mod relit;
     mod reprojection;
     mod resume;
     mod sample;

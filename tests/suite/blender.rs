@@ -29,7 +29,7 @@ fn unrendered() -> tempfile::TempDir {
 }
 
 /// The Python that has `bpy`, and the turn: Blender takes every processor. Where there is none that is said.
-fn blender() -> Option<(PathBuf, MutexGuard<'static, ()>)> {
+pub fn blender() -> Option<(PathBuf, MutexGuard<'static, ()>)> {
     static TURN: Mutex<()> = Mutex::new(());
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let cache = set("MATEVAL_CACHE")

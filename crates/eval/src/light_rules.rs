@@ -151,9 +151,9 @@ impl LightRules {
             },
             relit: RelitRules { dim: 0.3, warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3 },
             noise: NoiseRules {
-                pilot_samples: 8,
+                pilot_samples: 4,
                 least_samples: 16,
-                most_samples: 64,
+                most_samples: 32,
                 target_db: 0.02,
                 truth_share: 1.0,
                 block_pixels: 16,

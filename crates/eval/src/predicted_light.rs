@@ -439,12 +439,12 @@ mod tests {
             enough_samples(&noise, Some(error))
         };
         assert_eq!(samples(0.001, 0.0), 16);
-        // Twice the bound at 8 samples: four times as many.
-        assert_eq!(samples(0.04, 0.0), 32);
-        assert_eq!(samples(0.041, 0.0), 64);
+        // Two and a half times the bound at 4 samples: 6.25 times as many, and the next power of two.
+        assert_eq!(samples(0.05, 0.0), 32);
+        assert_eq!(samples(0.039, 0.0), 16);
         assert_eq!(samples(1.0, 0.0), noise.most_samples);
         // A truth with 0.08 dB of its own: as much will do.
-        assert_eq!((samples(0.08, 0.08), samples(0.16, 0.08)), (16, 32));
+        assert_eq!((samples(0.08, 0.08), samples(0.2, 0.08)), (16, 32));
         assert_eq!(enough_samples(&noise, None), noise.most_samples);
     }
 }
