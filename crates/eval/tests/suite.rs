@@ -1,0 +1,16 @@
+//! What the scoring protocol promises, on rooms small enough to be scored in seconds: the truth is never beaten, noise is
+//! as large as it is said to be and moves no mean, planted light is found again, the same input gives the same bytes.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "tests unwrap; clippy exempts only functions marked as tests, not what they call"
+)]
+
+mod suite {
+    mod cache;
+    mod mask_rules;
+    mod planted_light;
+    mod relit;
+    mod same_bytes;
+    mod sample;
+}

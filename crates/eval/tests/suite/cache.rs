@@ -1,0 +1,149 @@
+//! What a run keeps is used by the next where everything is the same, and nowhere else.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
+use mateval_eval::score::ScorePlan;
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Picture, Wrap, png_io};
+use serde_json::Value;
+
+use super::sample::{hasty, kept_folder, plan, scored, text, write_truth};
+
+/// A submission, its result without any cache, and a cache that a run has filled.
+struct Kept {
+    submission: PathBuf,
+    result: String,
+    cache: PathBuf,
+}
+
+static KEPT: LazyLock<Kept> = LazyLock::new(|| {
+    let folder = kept_folder("cache");
+    let (submission, cache) = (folder.join("gt"), folder.join("cache"));
+    write_truth(&submission);
+    std::fs::create_dir(&cache).unwrap();
+    let result = text(&scored(&plan(&[&submission], &hasty(), &[]))[0]);
+    let filled = score_with(&submission, &cache, &hasty());
+    assert!(text(&filled) == result, "keeping scores changes them");
+    Kept { submission, result, cache }
+});
+
+fn score_with(submission: &Path, cache: &Path, protocol: &Protocol) -> ResultFile {
+    scored(&ScorePlan { cache: Some(cache), ..plan(&[submission], protocol, &[]) }).remove(0)
+}
+
+fn files(cache: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(cache).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+fn read(file: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+}
+
+/// A copy of the cache's entries of these scenes; there is one of each.
+fn copied(scenes: &[&str]) -> tempfile::TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    let all = files(&KEPT.cache);
+    assert_eq!(all.len(), 2);
+    let chosen = all.iter().filter(|file| scenes.iter().any(|scene| read(file)["pictures"][0]["scene"] == *scene));
+    assert_eq!(
+        chosen.map(|file| std::fs::copy(file, copy.path().join(file.file_name().unwrap())).unwrap()).count(),
+        scenes.len()
+    );
+    copy
+}
+
+/// What a poisoned entry says of its first value.
+const POISON: f64 = 12345.5;
+
+/// A cache whose entries all say something wrong, so that one sees whether they are used.
+fn poisoned(scenes: &[&str]) -> tempfile::TempDir {
+    let cache = copied(scenes);
+    for file in files(cache.path()) {
+        let mut entry = read(&file);
+        entry["pictures"][0]["value"] = Value::from(POISON);
+        std::fs::write(&file, entry.to_string()).unwrap();
+    }
+    cache
+}
+
+/// Scenes whose entry was used.
+fn poisons(result: &ResultFile) -> Vec<String> {
+    let pictures = result.protocols.values().flat_map(|protocol| &protocol.pictures);
+    pictures.filter(|picture| picture.value == Some(POISON)).map(|picture| picture.scene.to_string()).collect()
+}
+
+#[test]
+fn half_a_cache_gives_the_same_result() {
+    let cache = copied(&["room"]);
+    let result = score_with(&KEPT.submission, cache.path(), &hasty());
+    assert!(text(&result) == KEPT.result);
+    assert_eq!(files(cache.path()).len(), 2, "the other scene is kept too");
+    // The twin: what is there is used indeed.
+    let cache = poisoned(&["room"]);
+    assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &hasty())), ["room"]);
+}
+
+#[test]
+fn what_is_half_written_is_made_anew() {
+    let cache = copied(&["living", "room"]);
+    let whole = std::fs::read(&files(&KEPT.cache)[0]).unwrap();
+    let torn = &files(cache.path())[0];
+    for length in [0, 1, whole.len() / 2, whole.len() - 2] {
+        std::fs::write(torn, &whole[..length]).unwrap();
+        assert!(text(&score_with(&KEPT.submission, cache.path(), &hasty())) == KEPT.result, "{length} bytes");
+        assert!(std::fs::read(torn).unwrap() == whole, "{length} bytes: not mended");
+    }
+}
+
+#[test]
+fn another_texel_is_another_submission() {
+    let folder = tempfile::tempdir().unwrap();
+    let changed = folder.path().join("gt");
+    write_truth(&changed);
+    let scene = changed.join("scenes/room");
+    let instance = std::fs::read_dir(&scene).unwrap().map(|entry| entry.unwrap().path()).min().unwrap();
+    for map in ["base_color.png", "roughness.png"] {
+        let cache = poisoned(&["living", "room"]);
+        assert_eq!(poisons(&score_with(&changed, cache.path(), &hasty())), ["living", "room"], "the twin");
+        let path = instance.join(map);
+        let before = std::fs::read(&path).unwrap();
+        if map == "base_color.png" {
+            let texture = read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap();
+            let word = |v: f32| (v * 65535.0).round() as u16;
+            let mut texels = Picture::from_fn(texture.width(), texture.height(), |x, y| texture.texel(x, y).map(word));
+            let [r, g, b] = texels.get(0, 0);
+            texels.set(0, 0, [r ^ 1, g, b]);
+            png_io::write_rgb_words(&path, &texels).unwrap();
+        } else {
+            std::fs::remove_file(&path).unwrap();
+        }
+        assert_eq!(poisons(&score_with(&changed, cache.path(), &hasty())), ["living"], "{map}");
+        std::fs::write(&path, before).unwrap();
+    }
+}
+
+#[test]
+fn another_protocol_is_another_score() {
+    let cache = poisoned(&["living", "room"]);
+    let others: [fn(&mut Protocol); 4] = [
+        |protocol| protocol.light.fit.start_radiances = vec![1.0],
+        |protocol| protocol.light.relit.dim = 0.5,
+        |protocol| protocol.lpips_decimals = 5,
+        |protocol| protocol.scorer_version += 1,
+    ];
+    for change in others {
+        let mut other = hasty();
+        change(&mut other);
+        assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &other)), [""; 0]);
+    }
+    let tool =
+        ScorePlan { tool: "another".into(), cache: Some(cache.path()), ..plan(&[&KEPT.submission], &hasty(), &[]) };
+    assert_eq!(poisons(&scored(&tool)[0]), [""; 0]);
+    // The twin.
+    assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &hasty())), ["living", "room"]);
+}

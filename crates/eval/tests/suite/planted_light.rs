@@ -1,0 +1,157 @@
+//! Radiances that were planted on the stage are found again, wherever the search begins.
+//!
+//! Only by the basis that made the photo: at 64x48 pixels nine lights, some of a sixtieth of others' light, stand against 48
+//! averaged squares, and between two streams of samples most radiances are off by half their value or more.
+
+use std::sync::{Arc, LazyLock};
+
+use mateval_eval::light_fit::fit_lights;
+use mateval_eval::light_rules::{LightRules, Track};
+use mateval_eval::light_stage::{self, NamedLight};
+use mateval_eval::predicted_light::{FittedRadiances, LitScene, predicted_light};
+use mateval_eval::prediction::{PredictedScene, read_scene};
+use mateval_eval::truth::{RgbTruth, ViewTruth};
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::{Camera, TriangleMesh, glb, reference_io};
+use mateval_tracer::{
+    Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
+};
+
+use super::sample::{dataset, hasty, kept_folder, write_truth};
+
+/// The furnished room of the sample on its stage, with the prediction `gt`.
+struct Staged {
+    scene: &'static SceneFile,
+    world: World,
+    atlases: Vec<TriangleMesh>,
+    prediction: PredictedScene,
+    truth: ViewTruth,
+    stage: Vec<NamedLight>,
+}
+
+static STAGED: LazyLock<Staged> = LazyLock::new(|| {
+    let scene = &dataset().scenes[0];
+    let folder = dataset().folder(&scene.id);
+    let submission = kept_folder("planted").join("gt");
+    write_truth(&submission);
+    let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+    let atlases = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
+    let architecture: Vec<usize> =
+        (0..scene.instances.len()).filter(|&at| scene.instances[at].category.is_none()).collect();
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let stage = light_stage::lights(&hasty().light.stage, &world, &architecture, &cameras);
+    let truth = ViewTruth::read(&folder, &scene.views[0]).unwrap();
+    Staged { scene, world, atlases, prediction: read_scene(&submission, scene), truth, stage }
+});
+
+/// What is planted: 0.5 to 3.5, another in every channel.
+fn planted(light: usize) -> [f64; 3] {
+    [0, 1, 2].map(|c| 0.5 + 3.0 * ((light * 7 + c * 5) % 11) as f64 / 10.0)
+}
+
+impl Staged {
+    fn repaint(&self, world: &World) -> Repaint {
+        let coat = |surface: usize| {
+            self.prediction.materials[surface].as_ref().map(|material| Coat {
+                base_colors: vec![material.base_color.clone()],
+                roughness: material.roughness.clone(),
+                metallic: material.metallic.clone(),
+            })
+        };
+        let coats = (0..self.atlases.len()).map(coat).collect();
+        Repaint::new(world, &self.atlases, coats, LightRules::new(Vec::new(), flavour()).flavour).unwrap()
+    }
+
+    /// The input view by each light of the stage alone; `radiance` says what each sends.
+    fn basis(&self, radiance: impl Fn(usize) -> [f64; 3], samples: u32, seed: u64) -> LightBasis {
+        let quad = |(at, named): (usize, &NamedLight)| StageLight {
+            radiance: radiance(at).map(|v| v as f32),
+            ..named.light.clone()
+        };
+        let quads: Vec<StageLight> = self.stage.iter().enumerate().map(quad).collect();
+        let world = self.world.on_stage(&quads).unwrap();
+        let groups = LightGroups::apart(quads.len());
+        let settings = RenderSettings { samples, ..Default::default() };
+        let cameras = [self.scene.views[0].camera];
+        let (repaint, light) = (self.repaint(&world), Lighting::Apart(&groups));
+        let quiet = |_: usize, _: usize| ();
+        let done = render_repainted(&world, &repaint, 0..1, &cameras, light, &settings, &[seed], &quiet);
+        done.unwrap().remove(0).views.remove(0).halves.remove(0).basis
+    }
+
+    /// What scoring fits to `photo`.
+    fn fitted(&self, photo: &Picture<LinearRgb>, rules: &LightRules) -> FittedRadiances {
+        let light = || RgbTruth { halves: [photo.clone(), photo.clone()], shown: photo.clone() };
+        let view = &self.scene.views[0];
+        let lit = LitScene {
+            scene: self.scene,
+            world: &self.world,
+            atlases: &self.atlases,
+            views: vec![view],
+            truths: std::slice::from_ref(&self.truth),
+            light: vec![light()],
+            input: (view, light(), &self.truth.valid),
+            lightings: Vec::new(),
+        };
+        let mut fits = Vec::new();
+        let predictions = std::slice::from_ref(&self.prediction);
+        predicted_light(&lit, rules, predictions, &|_, _, _| (), &mut |_, light| {
+            fits.extend(light.fit);
+            Ok(())
+        })
+        .unwrap();
+        fits.remove(0)
+    }
+}
+
+fn flavour() -> mateval_scene::material::PrincipledFlavour {
+    hasty().light.flavour
+}
+
+fn rules() -> LightRules {
+    let mut rules = hasty().light;
+    rules.tracks = vec![Track::Fitted];
+    rules.fit.samples = 32;
+    rules
+}
+
+/// Relative errors, of all lights and channels, in order.
+fn errors(found: &LightMix) -> Vec<f64> {
+    let pairs = found.iter().enumerate().flat_map(|(light, found)| found.iter().copied().zip(planted(light)));
+    let mut errors: Vec<f64> = pairs.map(|(found, planted)| (found / planted - 1.0).abs()).collect();
+    errors.sort_by(f64::total_cmp);
+    errors
+}
+
+#[test]
+fn the_basis_that_made_the_photo_gives_its_radiances() {
+    let staged = &*STAGED;
+    let mix: LightMix = (0..staged.stage.len()).map(planted).collect();
+    let basis = staged.basis(|_| [1.0; 3], 32, 1);
+    let fit =
+        |photo: &Picture<LinearRgb>| fit_lights(&basis, photo, Some(&staged.truth.valid), Some(1.0)).unwrap().weights;
+    let found = errors(&fit(&basis.weighted(&mix).unwrap()));
+    assert!(found.len() == 27 && found[26] < 1e-3, "{found:?}");
+    // The twin: all lights alike.
+    assert!(errors(&fit(&basis.sum()))[13] > 0.1);
+}
+
+/// Of a photo with noise of its own, so that no radiances explain all of it.
+#[test]
+fn the_start_changes_nothing() {
+    let staged = &*STAGED;
+    let photo = staged.basis(planted, 16, 99).sum();
+    let from = |start: f64| {
+        let mut rules = rules();
+        rules.fit.start_radiances = vec![start];
+        let fit = staged.fitted(&photo, &rules);
+        assert_eq!(fit.start_radiance, start);
+        fit.lights.iter().flat_map(|light| light.radiance).collect::<Vec<_>>()
+    };
+    let first = from(0.5);
+    for start in [1.5, 4.0] {
+        let apart = first.iter().zip(from(start)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-6, "{apart} from {start}");
+    }
+}

@@ -1,0 +1,69 @@
+//! The same `RESULT.json`, byte for byte, on any number of threads, in any company, however many scenes at once.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_eval::score::{LpipsWeights, ScorePlan};
+use mateval_image::LinearRgb;
+
+use super::sample::{hasty, kept_folder, lpips, plan, scored, text, write_changed, write_grey, write_truth};
+
+/// `gt`, `dark` (of the same roughness) and `grey` (of another).
+static SUBMISSIONS: LazyLock<[PathBuf; 3]> = LazyLock::new(|| {
+    let places = ["gt", "dark", "grey"].map(|name| kept_folder("bytes").join(name));
+    write_truth(&places[0]);
+    write_changed(&places[1], |truth| truth.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| 0.7 * v))));
+    write_grey(&places[2]);
+    places
+});
+
+fn all() -> Vec<&'static Path> {
+    SUBMISSIONS.iter().map(PathBuf::as_path).collect()
+}
+
+fn texts(plan: &ScorePlan<'_>) -> Vec<String> {
+    scored(plan).iter().map(text).collect()
+}
+
+/// All three together, one scene after the other.
+static TOGETHER: LazyLock<Vec<String>> = LazyLock::new(|| texts(&plan(&all(), &hasty(), &[])));
+
+#[test]
+fn on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut plan = plan(&all(), &hasty(), &[]);
+        if let Some(lpips) = lpips() {
+            plan.lpips = LpipsWeights::Loaded(Box::new(lpips));
+        }
+        pool.install(|| texts(&plan))
+    };
+    assert!(on(1) == on(2), "1 and 2 threads give different results");
+}
+
+#[test]
+fn in_any_company() {
+    let together = &*TOGETHER;
+    for (at, &submission) in all().iter().enumerate() {
+        assert!(texts(&plan(&[submission], &hasty(), &[]))[0] == together[at], "{}", submission.display());
+    }
+    let [gt, dark, grey] = [0, 1, 2].map(|at| all()[at]);
+    let pair = texts(&plan(&[grey, gt], &hasty(), &[]));
+    assert!(pair[0] == together[2] && pair[1] == together[0], "beside one of another roughness");
+    let pair = texts(&plan(&[dark, gt], &hasty(), &[]));
+    assert!(pair[0] == together[1] && pair[1] == together[0], "beside one of the same roughness");
+    // The twins: methods differ, and so do numbers of samples.
+    assert!(together[0] != together[1] && together[0] != together[2]);
+    let mut other = hasty();
+    other.light.noise.most_samples = 2;
+    assert!(
+        scored(&plan(&[gt], &other, &[]))[0].protocols["mateval-1"].pictures
+            != scored(&plan(&[gt], &hasty(), &[]))[0].protocols["mateval-1"].pictures
+    );
+}
+
+#[test]
+fn however_many_scenes_at_once() {
+    let two = ScorePlan { jobs: 2, ..plan(&all(), &hasty(), &[]) };
+    assert!(texts(&two) == *TOGETHER);
+}

@@ -1,0 +1,151 @@
+//! The built-in sample as a tiny dataset with renders, and submissions for it.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_baselines::{grey, submission, truth};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::ResultFile;
+use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
+use mateval_image::{LinearRgb, Picture, Wrap, png_io};
+use mateval_metrics::{Lpips, Net};
+use mateval_prep::build::{BuildOptions, build};
+use mateval_prep::render::{RenderOptions, render};
+use mateval_scene::SceneId;
+use mateval_scene::open::Dataset;
+use mateval_scene::submission::Map;
+
+/// Both sources: `room` keeps its own emitters in every track, `living` is fitted by a light stage.
+const RECIPE: &str = r#"name = "sample"
+resolution = [64, 48]
+atlas_size = 128
+samples = 64
+
+[[scene]]
+id = "living"
+camera = { designer = 0 }
+
+[scene.front3d]
+house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json"
+room = "LivingDiningRoom-101"
+models = "house/3D-FUTURE-model"
+textures = "house/3D-FRONT-texture"
+
+[[scene]]
+id = "room"
+bitterli = "room/scene.xml"
+"#;
+
+static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
+    let folder = kept_folder("dataset");
+    let (source, out) = (folder.join("source"), folder.join("dataset"));
+    mateval_prep::sample::write(&source).unwrap();
+    std::fs::write(source.join("recipe.toml"), RECIPE).unwrap();
+    let options = BuildOptions { recipe: source.join("recipe.toml"), source: None, out: out.clone(), force: false };
+    build(&options, "test", &|_, _, _| ()).unwrap();
+    render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
+    Dataset::open(&out).unwrap()
+});
+
+/// The dataset, with renders of 64 samples a half; nobody writes to it.
+pub fn dataset() -> &'static Dataset {
+    &DATASET
+}
+
+/// A new folder that outlives this run's tests (nothing drops a static); older runs' are removed.
+pub fn kept_folder(name: &str) -> PathBuf {
+    const OLD: std::time::Duration = std::time::Duration::from_secs(3600);
+    let root = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
+        let modified = entry.metadata().and_then(|metadata| metadata.modified());
+        if modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > OLD)) {
+            // Another run may be removing it too.
+            let _ = std::fs::remove_dir_all(entry.path());
+        }
+    }
+    tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
+}
+
+/// Writes the submission `gt`.
+pub fn write_truth(out: &Path) {
+    truth::write(dataset(), out, false).unwrap();
+}
+
+/// Writes the baseline `grey`, whose roughness is the default.
+pub fn write_grey(out: &Path) {
+    grey::write(dataset(), out, false).unwrap();
+}
+
+/// Writes `gt` with the base colour of every atlas (linear) changed.
+pub fn write_changed(out: &Path, change: impl Fn(&Picture<LinearRgb>) -> Picture<LinearRgb>) {
+    let method = submission::Method::new("changed", "");
+    submission::write(dataset(), out, false, &method, |scene, instance, folder| {
+        let truth = dataset().folder(&scene.id).truth_material(&instance.id);
+        let file = |map: Map| Path::new(map.stem()).with_extension("png");
+        for map in [Map::Roughness, Map::Metallic] {
+            std::fs::copy(truth.join(file(map)), folder.join(file(map))).unwrap();
+        }
+        let texture = read_texture(&truth.join(file(Map::BaseColor)), Encoding::Srgb, Wrap::Clamp).unwrap();
+        let texel = |x: usize, y: usize| LinearRgb(texture.texel(x, y));
+        let changed = change(&Picture::from_fn(texture.width(), texture.height(), texel));
+        let bytes = changed.map(|LinearRgb(rgb)| rgb.map(|v| byte_from_unit(srgb_from_linear(v))));
+        png_io::write_rgb_bytes(&folder.join(file(Map::BaseColor)), &bytes).unwrap();
+        Ok(())
+    })
+    .unwrap();
+}
+
+/// The network of LPIPS; where its weights are absent that is said, past the test runner's capture.
+pub fn lpips() -> Option<Lpips> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let folder = set("MATEVAL_CACHE")
+        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
+        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))?;
+    let path = folder.join(Net::Alex.file_name());
+    if path.is_file() {
+        return Some(Lpips::load(Net::Alex, &path).unwrap());
+    }
+    use std::io::Write as _;
+    let thread = std::thread::current();
+    let name = thread.name().unwrap_or("a test");
+    let line =
+        format!("SKIPPED: LPIPS in {name}: no '{}'; run: python3 tools/fetch_lpips_weights.py\n", path.display());
+    std::io::stderr().write_all(line.as_bytes()).unwrap();
+    None
+}
+
+/// What is scored, all of it under `protocol`.
+pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) -> ScorePlan<'a> {
+    ScorePlan {
+        dataset: dataset(),
+        submissions: submissions.to_vec(),
+        protocols: vec![protocol.clone()],
+        scenes: scenes.iter().map(|id| SceneId::new(*id).unwrap()).collect(),
+        lpips: LpipsWeights::Missing { reason: "not asked for".to_owned(), mend: String::new() },
+        tool: "test".to_owned(),
+        jobs: 1,
+        cache: None,
+    }
+}
+
+/// `mateval-1` with as few samples as its rules can say.
+pub fn hasty() -> Protocol {
+    let mut protocol = Protocol::named("mateval-1").unwrap();
+    protocol.light.fit.samples = 4;
+    protocol.light.noise.pilot_samples = 2;
+    protocol.light.noise.least_samples = 2;
+    protocol.light.noise.most_samples = 4;
+    protocol
+}
+
+/// Scores without a word.
+pub fn scored(plan: &ScorePlan<'_>) -> Vec<ResultFile> {
+    score(plan, &|_, _, _| ()).unwrap()
+}
+
+/// `RESULT.json` as it is written.
+pub fn text(result: &ResultFile) -> String {
+    mateval_scene::json::to_text(result)
+}
