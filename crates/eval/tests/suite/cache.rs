@@ -49,11 +49,12 @@ fn copied(scenes: &[&str]) -> tempfile::TempDir {
     let copy = tempfile::tempdir().unwrap();
     let all = files(&KEPT.cache);
     assert_eq!(all.len(), 2);
-    let chosen = all.iter().filter(|file| scenes.iter().any(|scene| read(file)["pictures"][0]["scene"] == *scene));
-    assert_eq!(
-        chosen.map(|file| std::fs::copy(file, copy.path().join(file.file_name().unwrap())).unwrap()).count(),
-        scenes.len()
-    );
+    let is_wanted = |file: &&PathBuf| scenes.iter().any(|scene| read(file)["pictures"][0]["scene"] == *scene);
+    let chosen: Vec<&PathBuf> = all.iter().filter(is_wanted).collect();
+    assert_eq!(chosen.len(), scenes.len());
+    for file in chosen {
+        std::fs::copy(file, copy.path().join(file.file_name().unwrap())).unwrap();
+    }
     copy
 }
 
