@@ -3,9 +3,9 @@
 //! In: a result, the dataset and the submission it was made of. Out: an [`ExplainFile`], and pictures of the worst
 //! instances.
 //!
-//! Between: [`belongs`] makes sure that all three belong together, [`patch`] takes the pictures apart by instance, [`kinds`]
-//! takes each instance's error apart ([`scales`], [`smooth_field`], [`shift`], [`lost_detail`]), [`alignments`] says what
-//! scales alone would mend, [`light`] looks up light's worst instances, [`crops`] shows, [`text`] tells.
+//! Between: `belongs` makes sure that all three belong together, `patch` takes the pictures apart by instance, `kinds`
+//! takes each instance's error apart (`scales`, `smooth_field`, `shift`, `lost_detail`), `alignments` says what
+//! scales alone would mend, `light` looks up light's worst instances, `crops` shows, [`text`] tells.
 
 mod alignments;
 mod belongs;

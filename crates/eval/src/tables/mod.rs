@@ -1,6 +1,6 @@
 //! Tables of several results: the paper's II to V, then ours in the same layout; whole, or by scene or category.
 //!
-//! [`layouts`] says which tables there are, [`rows`] where their numbers come from, [`table`] sets them and marks the best,
+//! `layouts` says which tables there are, `rows` where their numbers come from, `table` sets them and marks the best,
 //! and a file for each format writes them.
 
 mod csv;

@@ -74,7 +74,7 @@ impl<'w> Bsdf<'w> {
     }
 
     /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
-    /// single directions left out. See [`Self::evaluate_all`].
+    /// single directions left out. See `Self::evaluate_all`.
     pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
         let ([value], density) = self.evaluate_all(wi, Shown::All);
         (value, density)
