@@ -18,6 +18,7 @@ mod suite {
     mod house;
     mod images;
     mod importing;
+    mod kept_folder;
     mod lifting;
     mod mitsuba_export;
     mod part_labels;

@@ -4,7 +4,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-have_libclang() { ldconfig -p 2>/dev/null | grep -q 'libclang[-.0-9]*\.so' || ls /usr/lib/llvm-*/lib/libclang*.so* >/dev/null 2>&1; }
+# libclang-cpp, which graphics drivers bring along, is another library.
+have_libclang() { ldconfig -p 2>/dev/null | grep -q 'libclang[-.0-9]*\.so' || ls /usr/lib/llvm-*/lib/libclang.so* /usr/lib/llvm-*/lib/libclang-[0-9]*.so* 2>/dev/null | grep -q .; }
 
 missing=""
 command -v c++ >/dev/null 2>&1 || missing="$missing g++"

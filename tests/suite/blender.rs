@@ -9,7 +9,8 @@ use std::sync::{LazyLock, Mutex, MutexGuard};
 use mateval_image::{LinearRgb, Picture, exr_io, png_io};
 
 use super::command::{Run, build, mateval, render, run, verify};
-use super::sample::{copied_dataset, files_below, json, kept_folder, manifest, say_skipped, write_source};
+use super::kept_folder::kept_folder;
+use super::sample::{copied_dataset, files_below, json, manifest, say_skipped, write_source};
 
 /// One view of the sample's room: each render takes seconds.
 const TINY: &str = "resolution = [64, 48]\natlas_size = 64\nviews = [{ id = \"left\", x_deg = 0, y_deg = 5 }]";

@@ -8,7 +8,8 @@ use std::sync::LazyLock;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, run_words, score, stats, verify};
-use super::sample::{json, kept_folder};
+use super::kept_folder::kept_folder;
+use super::sample::json;
 
 /// The sample's source and what a survey of its house gives.
 struct Surveyed {

@@ -6,7 +6,8 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use super::command::{build, render, run, verify};
-use super::sample::{SMALL, copied_dataset, dataset, kept_folder, manifest, recipe_text, write_source};
+use super::kept_folder::kept_folder;
+use super::sample::{SMALL, copied_dataset, dataset, manifest, recipe_text, write_source};
 
 /// A source whose recipe has two scenes, and the manifest of its whole dataset.
 struct Whole {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::command::{build, render, run, run_words};
+use super::kept_folder::kept_folder;
 
 /// 96x72 pixels and atlases of 128 texels: all five views are built and rendered within seconds.
 pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";
@@ -42,21 +43,6 @@ pub fn write_source(source: &Path, head: &str, ids: &[&str]) -> PathBuf {
 pub fn recipe_text(head: &str, ids: &[&str]) -> String {
     let scene = |id: &&str| format!("\n[[scene]]\nid = \"{id}\"\nbitterli = \"room/scene.xml\"\nhouse = \"sample\"\n");
     format!("name = \"sample\"\n{head}\n{}", ids.iter().map(scene).collect::<String>())
-}
-
-/// A folder that outlives the tests of this run (nothing drops a static), in the build's own folder for such things.
-/// What earlier runs left there is removed.
-pub fn kept_folder(name: &str) -> PathBuf {
-    const OLD: std::time::Duration = std::time::Duration::from_secs(3600);
-    let root = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
-        let modified = entry.metadata().and_then(|metadata| metadata.modified());
-        if modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > OLD)) {
-            // Another run may be removing it too.
-            let _ = std::fs::remove_dir_all(entry.path());
-        }
-    }
-    tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
 }
 
 /// Copies all files below `from`.

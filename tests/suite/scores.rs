@@ -9,7 +9,8 @@ use mateval_image::{exr_io, png_io};
 use serde_json::Value;
 
 use super::command::{baseline, build, mateval, run, score};
-use super::sample::{dataset, json, kept_folder, say_skipped, write_source};
+use super::kept_folder::kept_folder;
+use super::sample::{dataset, json, say_skipped, write_source};
 
 /// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen by the
 /// tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.

@@ -1,5 +1,7 @@
 //! `mateval eval`.
 
+mod pictures;
+
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
@@ -7,12 +9,12 @@ use mateval_eval::explain::{self, ExplainPlan};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{ScorePlan, score};
-use mateval_eval::strips;
 use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_metrics::{Lpips, Net};
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, json};
 
+use self::pictures::PicturesArgs;
 use crate::TOOL;
 use crate::bars::Bars;
 use crate::outcome::{Outcome, print, say, say_findings};
@@ -25,7 +27,7 @@ pub enum Command {
     Image(ImageArgs),
     /// Scores submissions on a dataset.
     Score(ScoreArgs),
-    /// Albedo of truth and submissions side by side, and where they err: two PNG a scene.
+    /// Albedo or light of truth and submissions side by side, and where they err: two PNG a scene and picture.
     Pictures(PicturesArgs),
     /// Sets results side by side, as the paper's Tables II to V, and ours in the same layout.
     Tables(TablesArgs),
@@ -93,26 +95,6 @@ pub struct ScoreArgs {
     pub force: bool,
 }
 
-/// What `eval pictures` is given.
-#[derive(clap::Args)]
-pub struct PicturesArgs {
-    /// Submission folders, a column each behind the truth's.
-    #[arg(required = true)]
-    submissions: Vec<PathBuf>,
-    /// The dataset's folder.
-    #[arg(long)]
-    dataset: PathBuf,
-    /// The folder of the pictures.
-    #[arg(long)]
-    out: PathBuf,
-    /// Only this scene; may be given several times.
-    #[arg(long = "scene")]
-    scenes: Vec<SceneId>,
-    /// Replace pictures that are there.
-    #[arg(long)]
-    force: bool,
-}
-
 /// What `eval tables` is given.
 #[derive(clap::Args)]
 pub struct TablesArgs {
@@ -177,7 +159,7 @@ enum TableName {
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Image(args) => image(args),
-        Command::Pictures(args) => pictures(args),
+        Command::Pictures(args) => pictures::pictures(args),
         Command::Score(args) => score_submissions(args).map(|_| Outcome::Good),
         Command::Tables(args) => print_tables(args),
         Command::Explain(args) => print_explanation(args),
@@ -234,17 +216,6 @@ fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)
     }
     lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::MEND)));
     lines.join("\n") + "\n"
-}
-
-fn pictures(args: &PicturesArgs) -> anyhow::Result<Outcome> {
-    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
-    let submissions: Vec<&Path> = args.submissions.iter().map(PathBuf::as_path).collect();
-    let bars = Bars::new();
-    let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
-    let written = strips::write(&dataset, &submissions, &args.scenes, &args.out, args.force, &progress)?;
-    drop(bars);
-    written.iter().try_for_each(|path| print(&format!("{}\n", path.display())))?;
-    Ok(Outcome::Good)
 }
 
 /// Scores, writes the result files and gives their paths.

@@ -8,10 +8,8 @@
 
 use std::collections::BTreeMap;
 
-use mateval_image::{LinearRgb, Picture};
-use mateval_metrics::{Halves, NoisePsnr, noise_free_mse, psnr_mean_error};
+use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::INPUT;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::{Camera, Progress, TriangleMesh};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
@@ -25,11 +23,11 @@ use crate::error::EvalError;
 use crate::light_fit::{LightFit, fit_lights};
 use crate::light_rules::{LightRules, Track};
 use crate::light_stage::{self, NamedLight};
-use crate::noise_blocks::noise_blocks;
+use crate::pilot::enough_samples;
 use crate::prediction::PredictedScene;
 use crate::relit::{RelitLighting, luminance};
-use crate::rgb::encoded;
-use crate::truth::{RgbTruth, ViewTruth};
+use crate::rgb::LightReference;
+use crate::truth::ViewTruth;
 
 /// A scene and the truth of its light.
 pub struct LitScene<'a> {
@@ -43,12 +41,25 @@ pub struct LitScene<'a> {
     pub views: Vec<&'a View>,
     /// Of each view.
     pub truths: &'a [ViewTruth],
-    /// Of each view.
-    pub light: Vec<RgbTruth>,
-    /// The input view, its light and what of it is valid: what radiances are fitted to.
-    pub input: (&'a View, RgbTruth, &'a mateval_image::Mask),
+    /// Of each view, under the scene's own lights.
+    pub references: &'a [LightReference],
+    /// Of each view, as [`crate::noise_blocks`] says.
+    pub blocks: &'a [Picture<u32>],
+    /// What radiances are fitted to.
+    pub photo: Photo<'a>,
     /// The lightings of track `relit`.
     pub lightings: Vec<RelitLighting>,
+}
+
+/// The input view as the truth shows it.
+#[derive(Clone)]
+pub struct Photo<'a> {
+    /// The view.
+    pub view: &'a View,
+    /// Its picture, linear, before exposure.
+    pub light: Picture<LinearRgb>,
+    /// The pixels that count.
+    pub valid: &'a Mask,
 }
 
 /// A prediction under some of the lights.
@@ -59,6 +70,8 @@ pub struct PredictedLight {
     pub fit: Option<FittedRadiances>,
     /// Samples a pixel of each half.
     pub samples: u32,
+    /// Contributions that were not finite and count as none: of all its pictures, pilot and fit aside.
+    pub not_finite: u64,
 }
 
 /// A prediction under one light.
@@ -184,7 +197,8 @@ impl Renderer<'_> {
             let renders = self.trace(&batch, &cameras, Lighting::Mixed(&mixes), count, &["a", "b"], &what)?;
             for (&index, render) in batch.iter().zip(renders) {
                 let fit = mixings[index].fit.clone();
-                each(index, PredictedLight { pictures: self.pictures(render), fit, samples: count })?;
+                let not_finite = render.stats.not_finite;
+                each(index, PredictedLight { pictures: self.pictures(render), fit, samples: count, not_finite })?;
             }
         }
         Ok(())
@@ -229,7 +243,7 @@ impl Renderer<'_> {
 
     /// Radiances of each prediction, from stream `fit` of the input view.
     fn fits(&self, all: &[usize]) -> Result<Vec<FittedRadiances>, EvalError> {
-        let (input, light, valid) = &self.lit.input;
+        let Photo { view, light, valid } = &self.lit.photo;
         let lights = self.pass.lights.len();
         let groups = LightGroups::apart(lights);
         let start = self.start_radiance(&groups)?;
@@ -237,10 +251,10 @@ impl Renderer<'_> {
         let samples = self.rules.fit.samples;
         for batch in self.batches(all, |_| samples, lights) {
             let what = format!("scene {}: light basis", self.lit.scene.id);
-            let renders = self.trace(&batch, &[input.camera], Lighting::Apart(&groups), samples, &["fit"], &what)?;
+            let renders = self.trace(&batch, &[view.camera], Lighting::Apart(&groups), samples, &["fit"], &what)?;
             for (&index, render) in batch.iter().zip(renders) {
                 let basis = &render.views[0].halves[0].basis;
-                let fit = fit_lights(basis, &light.shown, Some(valid), Some(start))?;
+                let fit = fit_lights(basis, light, Some(valid), Some(start))?;
                 fits.insert(index, self.radiances(fit, start));
             }
         }
@@ -263,7 +277,7 @@ impl Renderer<'_> {
 
     /// The radiance whose picture of grey surfaces is nearest to the photo, by the mean square of luminance.
     fn start_radiance(&self, groups: &LightGroups) -> Result<f64, EvalError> {
-        let (input, light, valid) = &self.lit.input;
+        let Photo { view, light, valid } = &self.lit.photo;
         let scattering = &self.rules.fit;
         let repaint = self.grey(scattering.start_grey)?;
         let settings = self.rules.settings(scattering.samples);
@@ -271,10 +285,10 @@ impl Renderer<'_> {
         let lighting = Lighting::Apart(groups);
         let quiet = |_: usize, _: usize| ();
         let renders =
-            render_repainted(self.pass.world, &repaint, 0..1, &[input.camera], lighting, &settings, &seeds, &quiet)?;
+            render_repainted(self.pass.world, &repaint, 0..1, &[view.camera], lighting, &settings, &seeds, &quiet)?;
         let grey = renders[0].views[0].halves[0].basis.sum();
         let error = |radiance: f64| -> f64 {
-            let pairs = grey.pixels().iter().zip(light.shown.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
+            let pairs = grey.pixels().iter().zip(light.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
             pairs
                 .map(|((g, t), _)| radiance * luminance(*g) - luminance(*t))
                 .map(|difference| difference * difference)
@@ -292,10 +306,9 @@ impl Renderer<'_> {
         // Relit pictures are sums of the same paths: they take what the others need.
         let watched: Vec<usize> =
             (0..self.pass.pictures.len()).filter(|&at| self.pass.pictures[at].0 != Track::Relit).collect();
-        if watched.is_empty() {
+        if watched.is_empty() || noise.least_samples >= noise.most_samples {
             return Ok(vec![noise.least_samples; all.len()]);
         }
-        let pilot = Pilot::new(self.lit, noise.block_pixels);
         let mut samples = vec![noise.least_samples; all.len()];
         for batch in self.batches(all, |_| noise.pilot_samples, 2 * watched.len()) {
             let chosen = |index: usize| watched.iter().map(|&at| mixings[index].mixes[at].clone()).collect();
@@ -305,9 +318,9 @@ impl Renderer<'_> {
             let renders =
                 self.trace(&batch, &cameras, Lighting::Mixed(&mixes), noise.pilot_samples, &streams, &what)?;
             for (&index, render) in batch.iter().zip(&renders) {
-                let errors = (0..watched.len()).map(|at| pilot.errors(render, at)).collect::<Result<Vec<_>, _>>()?;
-                let needed = errors.into_iter().flatten().map(|error| enough_samples(noise, error));
-                samples[index] = needed.max().unwrap_or(noise.least_samples);
+                for at in 0..watched.len() {
+                    samples[index] = samples[index].max(enough_samples(noise, self.lit, render, at)?);
+                }
             }
         }
         Ok(samples)
@@ -375,76 +388,5 @@ impl Renderer<'_> {
     fn seed(&self, stream: &str) -> u64 {
         let text = format!("mateval/{}/{}/{stream}", self.lit.scene.id, self.pass.name);
         u64::from_str_radix(&sha256_of_bytes(text.as_bytes())[..16], 16).expect("a hash is hexadecimal")
-    }
-}
-
-/// What the pilot's pictures are held against.
-struct Pilot<'a> {
-    lit: &'a LitScene<'a>,
-    truths: Vec<[Picture<mateval_image::SrgbRgb>; 2]>,
-    blocks: Vec<Picture<u32>>,
-}
-
-impl<'a> Pilot<'a> {
-    fn new(lit: &'a LitScene<'a>, block_pixels: u32) -> Self {
-        let exposure = lit.scene.exposure;
-        let cameras: Vec<Camera> = lit.views.iter().map(|view| view.camera).collect();
-        let encode = |light: &RgbTruth| [0, 1].map(|half| encoded(&light.halves[half], exposure));
-        Self { lit, truths: lit.light.iter().map(encode).collect(), blocks: noise_blocks(&cameras, block_pixels) }
-    }
-
-    /// How sure the mean PSNR is, of the input view and of the novel ones; none where the error is nothing but noise.
-    fn errors(&self, render: &ViewsRender, picture: usize) -> Result<Vec<Option<NoisePsnr>>, EvalError> {
-        let mut kinds = [Vec::new(), Vec::new()];
-        for (at, view) in self.lit.views.iter().enumerate() {
-            let half = |half: usize| {
-                encoded(&render.views[at].halves[half].basis.pictures()[picture], self.lit.scene.exposure)
-            };
-            let ([a, b], [truth_a, truth_b]) = ([half(0), half(1)], &self.truths[at]);
-            let prediction = Halves { a: &a, b: &b };
-            let reference = Halves { a: truth_a, b: truth_b };
-            let mse = noise_free_mse(prediction, reference, &self.lit.truths[at].valid, &self.blocks[at]);
-            let what = || format!("scene '{}', view '{}'", self.lit.scene.id, view.id);
-            if let Some(mse) = mse.map_err(|source| EvalError::Metric { what: what(), source })? {
-                kinds[usize::from(view.id.as_str() != INPUT)].push(mse);
-            }
-        }
-        let kinds = kinds.iter().filter(|mses| !mses.is_empty());
-        Ok(kinds.map(|mses| psnr_mean_error(&mses.iter().collect::<Vec<_>>())).collect())
-    }
-}
-
-/// Samples that bring our own noise under its bound, by what the pilot's had: variance falls as samples rise.
-fn enough_samples(noise: &crate::light_rules::NoiseRules, pilot: Option<NoisePsnr>) -> u32 {
-    let Some(NoisePsnr { prediction, reference, .. }) = pilot else { return noise.most_samples };
-    let bound = noise.target_db.max(noise.truth_share * reference);
-    let needed = f64::from(noise.pilot_samples) * (prediction / bound) * (prediction / bound);
-    let mut samples = noise.least_samples;
-    while f64::from(samples) < needed && samples < noise.most_samples {
-        samples *= 2;
-    }
-    samples.min(noise.most_samples)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::protocol::Protocol;
-
-    #[test]
-    fn samples_follow_the_pilot() {
-        let noise = Protocol::named("mateval-1").unwrap().light.noise;
-        let samples = |prediction: f64, reference: f64| {
-            let error = NoisePsnr { total: prediction, prediction, reference };
-            enough_samples(&noise, Some(error))
-        };
-        assert_eq!(samples(0.001, 0.0), 16);
-        // Two and a half times the bound at 4 samples: 6.25 times as many, and the next power of two.
-        assert_eq!(samples(0.05, 0.0), 32);
-        assert_eq!(samples(0.039, 0.0), 16);
-        assert_eq!(samples(1.0, 0.0), noise.most_samples);
-        // A truth with 0.08 dB of its own: as much will do.
-        assert_eq!((samples(0.08, 0.08), samples(0.2, 0.08)), (16, 32));
-        assert_eq!(enough_samples(&noise, None), noise.most_samples);
     }
 }

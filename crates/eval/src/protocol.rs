@@ -1,7 +1,7 @@
 //! Protocols: every rule that a number depends on, as data with a fingerprint.
 
-use mateval_scene::SceneId;
 use mateval_scene::material::PrincipledFlavour;
+use mateval_scene::{RendererId, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -103,18 +103,20 @@ impl Protocol {
         mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
     }
 
-    /// SHA-256, hex, over this protocol, the dataset's manifest, the scenes that are scored and the weights of LPIPS (or
-    /// a word for their absence).
+    /// SHA-256, hex, over this protocol, the dataset's manifest, the scenes that are scored, the renderer whose pictures
+    /// light is compared with and the weights of LPIPS (or a word for their absence).
     pub fn fingerprint(
         &self,
         dataset_manifest_sha256: &str,
         scenes: &[&SceneId],
+        scored_renderer: Option<&RendererId>,
         lpips_weights_sha256: Option<&str>,
     ) -> String {
         let text = mateval_scene::json::to_text(&(
             self,
             dataset_manifest_sha256,
             scenes,
+            scored_renderer.map_or("missing", RendererId::as_str),
             lpips_weights_sha256.unwrap_or("missing"),
         ));
         mateval_scene::manifest::sha256_of_bytes(text.as_bytes())
@@ -129,13 +131,16 @@ mod tests {
     fn the_fingerprint_holds_everything() {
         let base = Protocol::named("mateval-1").unwrap();
         let scene = SceneId::new("s").unwrap();
-        let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some("w"));
+        let renderer = RendererId::new("r").unwrap();
+        let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some(&renderer), Some("w"));
         let mut prints = vec![
             print(&base),
-            base.fingerprint("b", &[&scene], Some("w")),
-            base.fingerprint("a", &[], Some("w")),
-            base.fingerprint("a", &[&scene], Some("v")),
-            base.fingerprint("a", &[&scene], None),
+            base.fingerprint("b", &[&scene], Some(&renderer), Some("w")),
+            base.fingerprint("a", &[], Some(&renderer), Some("w")),
+            base.fingerprint("a", &[&scene], None, Some("w")),
+            base.fingerprint("a", &[&scene], Some(&RendererId::new("q").unwrap()), Some("w")),
+            base.fingerprint("a", &[&scene], Some(&renderer), Some("v")),
+            base.fingerprint("a", &[&scene], Some(&renderer), None),
             print(&Protocol::named("paper").unwrap()),
             print(&Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }),
             print(&Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }),
@@ -143,7 +148,7 @@ mod tests {
         ];
         prints.sort();
         prints.dedup();
-        assert_eq!(prints.len(), 9);
+        assert_eq!(prints.len(), 11);
     }
 
     /// `PROTOCOL.md` publishes the hashes: a constant that changes must change them there, and raise [`SCORER_VERSION`] if

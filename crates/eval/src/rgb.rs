@@ -39,11 +39,6 @@ pub struct RgbMeasured {
     pub mse: Option<NoiseFreeMse>,
 }
 
-/// A linear picture times the exposure, clipped to 0..1 and sRGB-encoded.
-pub fn encoded(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<SrgbRgb> {
-    exposed(picture, exposure).to_srgb()
-}
-
 fn exposed(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<LinearRgb> {
     picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)))
 }
@@ -58,10 +53,20 @@ impl EncodedLight {
         Self::new(halves, &mean, exposure)
     }
 
+    /// As people see it.
+    pub(crate) fn shown(self) -> Picture<SrgbRgb> {
+        self.shown
+    }
+
+    /// One half alone, as it is compared.
+    pub(crate) fn half(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<SrgbRgb> {
+        exposed(picture, exposure).to_srgb()
+    }
+
     fn new(halves: &[Picture<LinearRgb>; 2], shown: &Picture<LinearRgb>, exposure: f64) -> Self {
         let linear = [0, 1].map(|half| exposed(&halves[half], exposure));
         let encoded = [0, 1].map(|half| linear[half].to_srgb());
-        Self { linear, halves: encoded, shown: self::encoded(shown, exposure) }
+        Self { linear, halves: encoded, shown: Self::half(shown, exposure) }
     }
 
     /// The squared error of pixel `k`, mean over channels, free of noise: the product of both halves' differences.
@@ -96,6 +101,16 @@ impl LightReference {
             _ => None,
         };
         Ok(Self { light, features })
+    }
+
+    /// The truth as people see it.
+    pub(crate) fn shown(&self) -> &Picture<SrgbRgb> {
+        &self.light.shown
+    }
+
+    /// The truth's halves, as they are compared.
+    pub(crate) fn halves(&self) -> Halves<'_, SrgbRgb> {
+        self.light.halves()
     }
 }
 

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
-use mateval_metrics::{Lpips, MetricError, NoiseFreeMse, psnr_mean_error};
+use mateval_metrics::{Lpips, MetricError};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::layout::SceneFolder;
 use mateval_scene::submission::Map;
-use mateval_scene::{Camera, Progress, RendererId, TriangleMesh};
+use mateval_scene::{Progress, RendererId, TriangleMesh};
 use mateval_tracer::World;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -15,20 +15,15 @@ use serde::{Deserialize, Serialize};
 use crate::alignment::{channel_scales, scaled};
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
-use crate::light_rules::{NoiseRules, Track};
+use crate::light_score::score_light;
 use crate::material_pictures::{MaterialPictures, material_pictures};
 use crate::measure::{Measured, albedo_metrics, scalar_metrics};
-use crate::noise_blocks::noise_blocks;
-use crate::predicted_light::{FittedRadiances, LitPicture, LitScene, PredictedLight, predicted_light};
+use crate::predicted_light::FittedRadiances;
 use crate::prediction::PredictedScene;
 use crate::protocol::{AlbedoSpace, Protocol};
-use crate::relit::lightings;
-use crate::result::{
-    InstancePixelErrors, InstanceTexelErrors, NoiseState, PictureValue, PsnrNoise, Region, TexelErrors, views,
-};
-use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
+use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValue, PsnrNoise, Region, TexelErrors, views};
 use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
-use crate::truth::{RgbTruth, ViewTruth, intersection};
+use crate::truth::{ViewTruth, intersection};
 
 /// What one submission got in one scene under one protocol.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -39,6 +34,8 @@ pub(crate) struct SceneScore {
     pub(crate) instances: Vec<InstancePixelErrors>,
     pub(crate) noise: BTreeMap<String, PsnrNoise>,
     pub(crate) fit: Option<FittedRadiances>,
+    /// Contributions of light that were not finite and count as none.
+    pub(crate) not_finite: u64,
 }
 
 /// A scene, its predictions and the rules.
@@ -58,17 +55,32 @@ pub(crate) struct SceneOrder<'a> {
 }
 
 /// A region of a view's pixels and what its pictures' names end with.
-struct MaskedRegion {
-    region: Region,
-    suffix: &'static str,
-    mask: Mask,
+pub(crate) struct MaskedRegion {
+    pub(crate) region: Region,
+    pub(crate) suffix: &'static str,
+    pub(crate) mask: Mask,
+}
+
+/// What a view shows of one submission.
+#[derive(Clone, Copy)]
+struct Predicted<'a> {
+    pictures: &'a MaterialPictures,
+    /// Its base colour, scaled.
+    aligned: &'a Picture<LinearRgb>,
+}
+
+impl<'a> Predicted<'a> {
+    /// By the names of the result's pictures.
+    fn albedos(self) -> [(&'static str, &'a Picture<LinearRgb>); 2] {
+        [("albedo", &self.pictures.base_color), ("albedo_aligned", self.aligned)]
+    }
 }
 
 /// Scores on the way, of one submission and protocol.
 #[derive(Default)]
-struct Sheet {
-    score: SceneScore,
-    errors: InstanceErrors,
+pub(crate) struct Sheet {
+    pub(crate) score: SceneScore,
+    pub(crate) errors: InstanceErrors,
 }
 
 /// By submission, then by protocol.
@@ -80,7 +92,7 @@ pub(crate) fn score_scene(order: &SceneOrder<'_>) -> Result<Vec<Vec<SceneScore>>
     order.texels(&mut sheets)?;
     if let Some(renderer) = order.renderer {
         for at in 0..order.protocols.len() {
-            order.light(renderer, &truths, at, &mut sheets)?;
+            score_light(order, renderer, &truths, at, &mut sheets)?;
         }
     }
     let finish = |sheet: Sheet| SceneScore { instances: sheet.errors.finish(order.scene), ..sheet.score };
@@ -94,16 +106,19 @@ impl SceneOrder<'_> {
             (self.progress)(&format!("scene {}: materials", self.scene.id), at, self.views.len());
             let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
             let regions = regions(truth);
+            let aligned: Vec<_> = pictures.iter().map(|pictures| aligned(pictures, truth)).collect();
+            let predicted: Vec<Predicted<'_>> =
+                pictures.iter().zip(&aligned).map(|(pictures, aligned)| Predicted { pictures, aligned }).collect();
             let jobs: Vec<(usize, usize)> =
                 (0..sheets.len()).flat_map(|s| (0..self.protocols.len()).map(move |p| (s, p))).collect();
             let measured: Vec<_> = jobs
                 .par_iter()
-                .map(|&(s, p)| self.material_values(&self.protocols[p], view, &pictures[s], truth, &regions))
+                .map(|&(s, p)| self.material_values(&self.protocols[p], view, predicted[s], truth, &regions))
                 .collect();
             for ((s, p), values) in jobs.into_iter().zip(measured) {
                 let sheet = &mut sheets[s][p];
                 sheet.score.pictures.extend(values?);
-                self.material_errors(&self.protocols[p], view, &pictures[s], truth, &mut sheet.errors);
+                self.material_errors(&self.protocols[p], view, predicted[s], truth, &mut sheet.errors);
             }
         }
         Ok(())
@@ -114,20 +129,19 @@ impl SceneOrder<'_> {
         &self,
         protocol: &Protocol,
         view: &View,
-        predicted: &MaterialPictures,
+        predicted: Predicted<'_>,
         truth: &ViewTruth,
         regions: &[MaskedRegion],
     ) -> Result<Vec<PictureValue>, EvalError> {
-        let aligned = aligned(predicted, truth);
         let mut values = Vec::new();
         for region in regions {
-            for (name, picture) in [("albedo", &predicted.base_color), ("albedo_aligned", &aligned)] {
+            for (name, picture) in predicted.albedos() {
                 let found = albedo_metrics(protocol, self.lpips, picture, &truth.albedo, &region.mask);
                 values.extend(self.values(view, region, name, None, self.or_named(view, found)?));
             }
             let scalars = [
-                ("roughness", &predicted.roughness, &truth.roughness),
-                ("metallic", &predicted.metallic, &truth.metallic),
+                ("roughness", &predicted.pictures.roughness, &truth.roughness),
+                ("metallic", &predicted.pictures.metallic, &truth.metallic),
             ];
             for (name, picture, truth) in scalars {
                 let found = scalar_metrics(protocol, picture, truth, &region.mask);
@@ -141,12 +155,11 @@ impl SceneOrder<'_> {
         &self,
         protocol: &Protocol,
         view: &View,
-        predicted: &MaterialPictures,
+        predicted: Predicted<'_>,
         truth: &ViewTruth,
         errors: &mut InstanceErrors,
     ) {
-        let aligned = aligned(predicted, truth);
-        for (name, picture) in [("albedo", &predicted.base_color), ("albedo_aligned", &aligned)] {
+        for (name, picture) in predicted.albedos() {
             let spaces = match protocol.albedo_space {
                 AlbedoSpace::Linear => [picture.clone(), truth.albedo.clone()],
                 AlbedoSpace::Srgb => [picture, &truth.albedo].map(|p| p.to_srgb().map(|SrgbRgb(v)| LinearRgb(v))),
@@ -171,90 +184,7 @@ impl SceneOrder<'_> {
         Ok(())
     }
 
-    /// Everything under the lights of protocol `at`.
-    fn light(
-        &self,
-        renderer: &RendererId,
-        truths: &[ViewTruth],
-        at: usize,
-        sheets: &mut [Vec<Sheet>],
-    ) -> Result<(), EvalError> {
-        let protocol = &self.protocols[at];
-        let lit = self.lit_scene(renderer, truths, protocol)?;
-        let cameras: Vec<Camera> = self.views.iter().map(|view| view.camera).collect();
-        let bench = LightBench {
-            order: self,
-            protocol,
-            truths,
-            regions: truths.iter().map(regions).collect(),
-            references: self.references(renderer, &lit, protocol)?,
-            blocks: noise_blocks(&cameras, protocol.light.noise.block_pixels),
-        };
-        predicted_light(&lit, &protocol.light, self.predictions, self.progress, &mut |submission, light| {
-            bench.measure(light, &mut sheets[submission][at])
-        })
-    }
-
-    fn lit_scene<'a>(
-        &'a self,
-        renderer: &RendererId,
-        truths: &'a [ViewTruth],
-        protocol: &Protocol,
-    ) -> Result<LitScene<'a>, EvalError> {
-        let unsound =
-            || EvalError::Invalid(format!("scene '{}' has no input view; run `mateval prep verify`", self.scene.id));
-        let input = self.scene.view(INPUT).ok_or_else(unsound)?;
-        let place = self.views.iter().position(|view| view.id == input.id).ok_or_else(|| {
-            let what =
-                format!("scene '{}': targets.json leaves out the input view, which light is fitted to", self.scene.id);
-            EvalError::Invalid(what)
-        })?;
-        let light =
-            self.views.iter().map(|view| RgbTruth::read(self.folder, renderer, view)).collect::<Result<Vec<_>, _>>()?;
-        let valid = &truths[place].valid;
-        let lightings = if protocol.light.tracks.contains(&Track::Relit) {
-            let group = |group| Ok(RgbTruth::of_group(self.folder, renderer, input, group)?.shown);
-            let groups = (0..self.world.emitters().groups()).map(group).collect::<Result<Vec<_>, EvalError>>()?;
-            lightings(&protocol.light.relit, &groups, valid)
-        } else {
-            Vec::new()
-        };
-        Ok(LitScene {
-            scene: self.scene,
-            world: self.world,
-            atlases: self.atlases,
-            views: self.views.clone(),
-            truths,
-            input: (input, light[place].clone(), valid),
-            light,
-            lightings,
-        })
-    }
-
-    /// What each light's pictures are compared with, by lighting (none is the scene's own) and view.
-    fn references(
-        &self,
-        renderer: &RendererId,
-        lit: &LitScene<'_>,
-        protocol: &Protocol,
-    ) -> Result<BTreeMap<Option<String>, Vec<LightReference>>, EvalError> {
-        let reference = |view: &View, truth: &RgbTruth| {
-            let found = LightReference::new(protocol, self.lpips, truth, self.scene.exposure);
-            self.or_named(view, found)
-        };
-        let own: Vec<LightReference> =
-            self.views.iter().zip(&lit.light).map(|(view, truth)| reference(view, truth)).collect::<Result<_, _>>()?;
-        let mut references = BTreeMap::from([(None, own)]);
-        for view in &self.views {
-            let relit = RgbTruth::relit(self.folder, renderer, view, &lit.lightings)?;
-            for (lighting, truth) in lit.lightings.iter().zip(&relit) {
-                references.entry(Some(lighting.name.clone())).or_default().push(reference(view, truth)?);
-            }
-        }
-        Ok(references)
-    }
-
-    fn values(
+    pub(crate) fn values(
         &self,
         view: &View,
         region: &MaskedRegion,
@@ -277,7 +207,8 @@ impl SceneOrder<'_> {
         measured.into_iter().map(value).collect()
     }
 
-    fn or_named<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
+    /// An error of a metric, with where it was.
+    pub(crate) fn or_named<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
         found.map_err(|source| EvalError::Metric {
             what: format!("scene '{}', view '{}'", self.scene.id, view.id),
             source,
@@ -285,110 +216,8 @@ impl SceneOrder<'_> {
     }
 }
 
-/// Where pictures of light are measured.
-struct LightBench<'a> {
-    order: &'a SceneOrder<'a>,
-    protocol: &'a Protocol,
-    truths: &'a [ViewTruth],
-    /// Of each view.
-    regions: Vec<Vec<MaskedRegion>>,
-    references: BTreeMap<Option<String>, Vec<LightReference>>,
-    /// Of each view.
-    blocks: Vec<Picture<u32>>,
-}
-
-impl LightBench<'_> {
-    fn measure(&self, light: PredictedLight, sheet: &mut Sheet) -> Result<(), EvalError> {
-        let PredictedLight { pictures, fit, samples } = light;
-        for picture in &pictures {
-            self.measure_picture(picture, samples, sheet)?;
-        }
-        if fit.is_some() {
-            sheet.score.fit = fit;
-        }
-        Ok(())
-    }
-
-    fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut Sheet) -> Result<(), EvalError> {
-        let order = self.order;
-        let name = picture.track.picture();
-        let lights: Vec<EncodedLight> =
-            picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, order.scene.exposure)).collect();
-        let references = &self.references[&picture.lighting];
-        let jobs: Vec<(usize, &MaskedRegion)> = self
-            .regions
-            .iter()
-            .enumerate()
-            .flat_map(|(view, regions)| regions.iter().map(move |region| (view, region)))
-            .collect();
-        let measured: Vec<Result<RgbMeasured, MetricError>> = jobs
-            .par_iter()
-            .map(|&(view, region)| {
-                let (light, reference, blocks) = (&lights[view], &references[view], &self.blocks[view]);
-                rgb_metrics(self.protocol, order.lpips, light, reference, &region.mask, blocks)
-            })
-            .collect();
-        let mut errors: BTreeMap<String, Vec<NoiseFreeMse>> = BTreeMap::new();
-        for (&(view, region), measured) in jobs.iter().zip(measured) {
-            let view = order.views[view];
-            let RgbMeasured { values, mse } = order.or_named(view, measured)?;
-            sheet.score.pictures.extend(order.values(view, region, name, picture.lighting.as_ref(), values));
-            let key = format!("{name}{}.{}.psnr", region.suffix, views(&view.id, region.region));
-            errors.entry(key).or_default().extend(mse);
-        }
-        if picture.track != Track::Relit {
-            let noise = errors.into_iter().filter(|(_, views)| !views.is_empty());
-            sheet
-                .score
-                .noise
-                .extend(noise.map(|(key, views)| (key, psnr_noise(&self.protocol.light.noise, &views, samples))));
-            self.add_errors(name, &lights, references, &mut sheet.errors);
-        }
-        Ok(())
-    }
-
-    fn add_errors(
-        &self,
-        name: &str,
-        lights: &[EncodedLight],
-        references: &[LightReference],
-        errors: &mut InstanceErrors,
-    ) {
-        let pairs = lights.iter().zip(references);
-        for ((view, truth), (light, reference)) in self.order.views.iter().zip(self.truths).zip(pairs) {
-            let error = |k: usize| light.noise_free_square(reference, k);
-            errors.add(name, views(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
-            if let Some(unobserved) = &truth.unobserved {
-                errors.add(name, "unobserved", &truth.instances, unobserved, error);
-            }
-        }
-    }
-}
-
-/// How sure the mean PSNR of some views is, and why.
-fn psnr_noise(rules: &NoiseRules, views: &[NoiseFreeMse], samples: u32) -> PsnrNoise {
-    let noise = psnr_mean_error(&views.iter().collect::<Vec<_>>());
-    let state = match &noise {
-        Some(noise) if noise.prediction <= rules.target_db && noise.reference <= rules.target_db => {
-            NoiseState::Certified
-        }
-        Some(noise) if noise.prediction <= rules.target_db.max(rules.truth_share * noise.reference) => {
-            NoiseState::LimitedByTruth
-        }
-        _ if samples >= rules.most_samples => NoiseState::SampleCap,
-        _ => NoiseState::AboveTarget,
-    };
-    PsnrNoise {
-        standard_error_db: noise.as_ref().map(|noise| noise.total),
-        own_db: noise.as_ref().map(|noise| noise.prediction),
-        truth_db: noise.as_ref().map(|noise| noise.reference),
-        samples,
-        state,
-    }
-}
-
 /// The regions of a view that have values of their own.
-fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
+pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
     let mut regions = vec![MaskedRegion { region: Region::Valid, suffix: "", mask: truth.valid.clone() }];
     let unobserved = truth.unobserved.as_ref();
     regions.extend(unobserved.map(|mask| MaskedRegion { region: Region::Unobserved, suffix: "", mask: mask.clone() }));

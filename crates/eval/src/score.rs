@@ -2,31 +2,25 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
 
-use mateval_image::{LinearRgb, Picture};
 use mateval_metrics::Lpips;
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::SceneFolder;
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_scene::{
-    Finding, Progress, RendererId, SceneError, SceneId, Severity, TriangleMesh, glb, json, reference_io,
-};
-use mateval_tracer::World;
+use mateval_scene::{Finding, Progress, SceneError, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
-use crate::material_pictures::material_pictures;
+use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
 use crate::prediction::{PredictedScene, read_scene};
 use crate::protocol::Protocol;
 use crate::result::{
     DatasetId, MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
 };
 use crate::scene_score::{SceneOrder, SceneScore, score_scene};
-use crate::truth::ViewTruth;
 
 /// The network that scores use, or why it is not there.
 pub enum LpipsWeights {
@@ -114,7 +108,9 @@ fn score_scenes(
     let next = AtomicUsize::new(0);
     let done: Vec<OnceLock<Result<Vec<Outcome>, EvalError>>> = scenes.iter().map(|_| OnceLock::new()).collect();
     let work = || {
-        while let Some((at, scene)) = { scenes.iter().enumerate().nth(next.fetch_add(1, Ordering::Relaxed)) } {
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            let Some(scene) = scenes.get(at) else { break };
             let outcome = score_one(plan, scene, progress);
             if outcome.is_err() {
                 next.store(scenes.len(), Ordering::Relaxed);
@@ -177,7 +173,8 @@ impl ScorePlan<'_> {
     /// Where scores of a scene under a protocol are kept: everything that they depend on is in the name.
     fn place(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
         let weights = self.lpips.network().map(Lpips::sha256);
-        let print = protocol.fingerprint(&self.dataset.file.manifest_sha256, &[&scene.id], weights);
+        let file = &self.dataset.file;
+        let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], file.scored_renderer.as_ref(), weights);
         let key = sha256_of_bytes(json::to_text(&(&self.tool, print, &prediction.files)).as_bytes());
         Some(self.cache?.join(format!("{key}.json")))
     }
@@ -196,21 +193,6 @@ impl ScorePlan<'_> {
         }
         Ok(())
     }
-}
-
-/// The scenes of these ids, all where there are none; in the dataset's order.
-pub(crate) fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
-    let all = &dataset.scenes;
-    let unknown: Vec<String> = scenes
-        .iter()
-        .filter(|id| !all.iter().any(|scene| scene.id == **id))
-        .map(|id| format!("the dataset has no scene '{id}'"))
-        .collect();
-    if !unknown.is_empty() {
-        let known: Vec<&str> = all.iter().map(|scene| scene.id.as_str()).collect();
-        return Err(EvalError::Invalid(format!("{}; it has: {}", unknown.join("; "), known.join(", "))));
-    }
-    Ok(all.iter().filter(|scene| scenes.is_empty() || scenes.contains(&scene.id)).collect())
 }
 
 fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
@@ -235,86 +217,6 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     Ok(Entry { file, findings, files, scores: vec![Vec::new(); plan.protocols.len()] })
 }
 
-/// A scene, ready to be looked at.
-struct OpenScene {
-    folder: SceneFolder,
-    world: World,
-    atlases: Vec<TriangleMesh>,
-}
-
-impl OpenScene {
-    /// `renderer` is the one whose pictures will be looked at.
-    fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
-        let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
-        let is_light = |file: &str| {
-            let name = file.rsplit('/').next().unwrap_or(file);
-            render.as_ref().is_some_and(|render| file.starts_with(render.as_str()))
-                && name.ends_with(".exr")
-                && (name.starts_with("rgb") || name.starts_with("group_"))
-        };
-        // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
-        dataset.check_files(&scene.id, |file| !file.contains("/renders/") || is_light(file))?;
-        let folder = dataset.folder(&scene.id);
-        let world = World::new(Arc::new(reference_io::read(&folder)?))?;
-        let atlases = read_atlases(&folder, scene, &world)?;
-        Ok(Self { folder, world, atlases })
-    }
-}
-
-/// The truth and every submission's albedo of one view, linear.
-pub(crate) struct SceneAlbedo {
-    pub(crate) truth: ViewTruth,
-    /// In the plan's order.
-    pub(crate) predicted: Vec<Picture<LinearRgb>>,
-}
-
-/// The views of a scene that are scored, in the scene's order.
-pub(crate) fn scene_albedo(
-    dataset: &Dataset,
-    scene: &SceneFile,
-    submissions: &[&Path],
-) -> Result<Vec<SceneAlbedo>, EvalError> {
-    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, None)?;
-    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
-    let view = |view: &View| {
-        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
-        let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
-        Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
-    };
-    scored_views(dataset, scene)?.into_iter().map(view).collect()
-}
-
-/// The views of the scene that `targets.json` names, in the scene's order; at least one.
-pub(crate) fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
-    let targets = &dataset.targets.targets;
-    let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
-    let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
-    if views.is_empty() {
-        let what = format!("scene '{}': targets.json names no view of it; run `mateval prep verify`", scene.id);
-        return Err(EvalError::Invalid(what));
-    }
-    Ok(views)
-}
-
-/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
-/// surfaces, or the dataset is unsound.
-fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
-    let nodes = glb::read(&folder.instances())?;
-    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
-    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
-    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
-    let surfaces = &world.scene().surfaces;
-    let fits = named
-        && meshes.len() == surfaces.len()
-        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
-    if fits {
-        return Ok(meshes);
-    }
-    let path = folder.instances();
-    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
-    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
-}
-
 /// The hash of a submission: of `submission.json` and of the maps of the scored scenes, path and SHA-256 each, in order.
 pub(crate) fn submission_sha256(files: &[(String, String)]) -> String {
     let lines: String = files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
@@ -325,8 +227,11 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     let manifest = &plan.dataset.file.manifest_sha256;
     let weights = plan.lpips.network().map(Lpips::sha256);
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
+    let lost = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| lost_light(protocol, scores));
+    entry.findings.extend(lost);
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
-        let fingerprint = protocol.fingerprint(manifest, &ids, weights);
+        let renderer = plan.dataset.file.scored_renderer.as_ref();
+        let fingerprint = protocol.fingerprint(manifest, &ids, renderer, weights);
         (protocol.name.clone(), protocol_result(protocol, fingerprint, scores))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
@@ -349,6 +254,20 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
         missing,
         findings: entry.findings,
     }
+}
+
+/// A finding for each scene in which light of the prediction could not be counted.
+fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
+    let lost = scores.iter().filter(|(_, score)| score.not_finite > 0);
+    lost.map(|(scene, score)| Finding {
+        severity: Severity::Warning,
+        code: "not_finite_light".to_owned(),
+        file: format!("scenes/{scene}"),
+        place: String::new(),
+        message: format!("protocol '{}': {} contributions of light were not finite", protocol.name, score.not_finite),
+        action: "they count as no light; please report this submission".to_owned(),
+    })
+    .collect()
 }
 
 /// All scenes' scores in one.

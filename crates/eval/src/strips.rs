@@ -3,16 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use mateval_image::transfer::byte_from_unit;
-use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::{Progress, SceneError, SceneId};
 
 use crate::error::EvalError;
-use crate::score::{SceneAlbedo, chosen_scenes, scene_albedo};
+use crate::light_rules::Track;
+use crate::open_scene::chosen_scenes;
+use crate::protocol::Protocol;
+use crate::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
+use crate::truth::ViewTruth;
 
 /// What the input view shows is darkened to this share in the other views (of the sRGB value).
 const OBSERVED_SHARE: f32 = 0.4;
-/// The error that is white: root mean square over the channels, linear.
+/// The error that is white: root mean square over the channels.
 pub const WHITE_ERROR: f32 = 0.5;
 /// Pixels between pictures, and their colour.
 const GAP: usize = 4;
@@ -20,76 +25,162 @@ pub(crate) const GAP_COLOR: [u8; 3] = [255; 3];
 /// Rows of the scale beneath error maps.
 pub(crate) const SCALE_ROWS: usize = 12;
 
-/// Writes `<scene>-albedo.png` and `<scene>-albedo-error.png` into the folder `out`. Gives their paths.
+/// What strips show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// base_color; errors are of linear values.
+    Albedo,
+    /// The scene lit as a track of protocol `mateval-1` lights it; errors are of sRGB values. Not [`Track::Relit`], which
+    /// has many lights.
+    Light {
+        /// Which.
+        track: Track,
+        /// Samples a pixel of each of two halves.
+        samples: u32,
+    },
+}
+
+/// What strips are made of.
+pub struct StripPlan<'a> {
+    /// With its ground truth.
+    pub dataset: &'a Dataset,
+    /// Folders; a column each.
+    pub submissions: &'a [&'a Path],
+    /// All where there are none.
+    pub scenes: &'a [SceneId],
+    /// A pair of files each.
+    pub shown: &'a [Shown],
+    /// The folder of the pictures.
+    pub out: &'a Path,
+    /// Whether pictures that are there are replaced.
+    pub force: bool,
+}
+
+/// A view's row: masks, and pictures of the truth and then of every submission.
+struct StripRow {
+    truth: ViewTruth,
+    shown: Vec<Picture<SrgbRgb>>,
+    /// What errors are taken of.
+    compared: Vec<Picture<[f32; 3]>>,
+}
+
+impl Shown {
+    /// As in the keys of a result.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Light { track, .. } => track.picture(),
+        }
+    }
+}
+
+/// Writes `<scene>-<name>.png` and `<scene>-<name>-error.png` of all that shall be shown. Gives their paths.
 ///
 /// Views are rows in the dataset's order; columns are the truth, then the submissions in the plan's. In views other
 /// than the input what it shows is darkened, and what is not valid is black. Error maps leave the truth's column out;
 /// their last row is the scale, black 0 to white [`WHITE_ERROR`] from left to right.
-pub fn write(
-    dataset: &Dataset,
-    submissions: &[&Path],
-    scenes: &[SceneId],
-    out: &Path,
-    force: bool,
-    progress: Progress<'_>,
-) -> Result<Vec<PathBuf>, EvalError> {
-    let chosen = chosen_scenes(dataset, scenes)?;
-    let paths = |scene: &SceneId| ["albedo", "albedo-error"].map(|what| out.join(format!("{scene}-{what}.png")));
-    let there = chosen.iter().flat_map(|scene| paths(&scene.id)).find(|path| path.exists() && !force);
-    if let Some(path) = there {
+pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, EvalError> {
+    let chosen = chosen_scenes(plan.dataset, plan.scenes)?;
+    let paths = |scene: &SceneId, shown: Shown| {
+        ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.name())))
+    };
+    let jobs: Vec<(&SceneFile, Shown)> =
+        chosen.iter().flat_map(|scene| plan.shown.iter().map(|shown| (*scene, *shown))).collect();
+    let there = jobs.iter().flat_map(|(scene, shown)| paths(&scene.id, *shown)).find(|path| path.exists());
+    if let Some(path) = there.filter(|_| !plan.force) {
         let what = format!("'{}' is already there; choose another --out, or add --force to replace it", path.display());
         return Err(EvalError::Invalid(what));
     }
-    std::fs::create_dir_all(out).map_err(SceneError::io("make", out))?;
+    std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
     let mut written = Vec::new();
-    for (done, scene) in chosen.iter().enumerate() {
-        progress("pictures", done, chosen.len());
-        let views = scene_albedo(dataset, scene, submissions)?;
-        let shown: Vec<Vec<Picture<[u8; 3]>>> = views.iter().map(shown).collect();
-        let [albedo, error] = paths(&scene.id);
-        png_io::write_rgb_bytes(&albedo, &grid(&shown))?;
-        let mut errors: Vec<Vec<Picture<[u8; 3]>>> = views.iter().map(errors).collect();
+    for (done, &(scene, shown)) in jobs.iter().enumerate() {
+        progress("pictures", done, jobs.len());
+        let rows = rows(plan, scene, shown, progress)?;
+        let files = paths(&scene.id, shown);
+        let strips: Vec<Vec<Picture<[u8; 3]>>> = rows.iter().map(strip).collect();
+        png_io::write_rgb_bytes(&files[0], &grid(&strips))?;
+        let mut errors: Vec<Vec<Picture<[u8; 3]>>> = rows.iter().map(errors).collect();
         if let Some(row) = errors.first() {
             errors.push(row.iter().map(|picture| scale(picture.width())).collect());
         }
-        png_io::write_rgb_bytes(&error, &grid(&errors))?;
-        written.extend([albedo, error]);
+        png_io::write_rgb_bytes(&files[1], &grid(&errors))?;
+        written.extend(files);
     }
     Ok(written)
 }
 
-/// The truth and the predictions of one view.
-fn shown(view: &SceneAlbedo) -> Vec<Picture<[u8; 3]>> {
-    std::iter::once(&view.truth.albedo).chain(&view.predicted).map(|picture| darkened(view, picture)).collect()
+fn rows(
+    plan: &StripPlan<'_>,
+    scene: &SceneFile,
+    shown: Shown,
+    progress: Progress<'_>,
+) -> Result<Vec<StripRow>, EvalError> {
+    match shown {
+        Shown::Albedo => Ok(scene_albedo(plan.dataset, scene, plan.submissions)?.into_iter().map(albedo_row).collect()),
+        Shown::Light { track: Track::Relit, .. } => {
+            Err(EvalError::Invalid("track 'relit' has many lights; show 'true' or 'fitted'".to_owned()))
+        }
+        Shown::Light { track, samples } => {
+            let mut protocol = Protocol::named("mateval-1")?;
+            protocol.light.tracks = vec![track];
+            (protocol.light.noise.least_samples, protocol.light.noise.most_samples) = (samples, samples);
+            let renderer = plan.dataset.file.scored_renderer.as_ref().ok_or_else(|| {
+                let what = "the dataset has no pictures of light to compare with; run `mateval prep render DATASET`";
+                EvalError::Invalid(what.to_owned())
+            })?;
+            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, renderer, progress)?;
+            Ok(views.into_iter().map(light_row).collect())
+        }
+    }
 }
 
-fn darkened(view: &SceneAlbedo, picture: &Picture<LinearRgb>) -> Picture<[u8; 3]> {
-    let encoded = picture.to_srgb();
+fn albedo_row(view: SceneAlbedo) -> StripRow {
+    let pictures: Vec<Picture<LinearRgb>> = std::iter::once(view.truth.albedo.clone()).chain(view.predicted).collect();
+    StripRow {
+        truth: view.truth,
+        shown: pictures.iter().map(Picture::to_srgb).collect(),
+        compared: pictures.iter().map(|picture| picture.map(|LinearRgb(rgb)| rgb)).collect(),
+    }
+}
+
+fn light_row(view: SceneLight) -> StripRow {
+    let shown: Vec<Picture<SrgbRgb>> = std::iter::once(view.shown.truth).chain(view.shown.predicted).collect();
+    let compared = shown.iter().map(|picture| picture.map(|SrgbRgb(rgb)| rgb)).collect();
+    StripRow { truth: view.truth, shown, compared }
+}
+
+/// The truth and the predictions of one view.
+fn strip(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
+    row.shown.iter().map(|picture| darkened(&row.truth, picture)).collect()
+}
+
+fn darkened(truth: &ViewTruth, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
     Picture::from_fn(picture.width(), picture.height(), |x, y| {
-        let is_observed = view.truth.unobserved.as_ref().is_some_and(|mask| !mask.get(x, y));
-        let share = match (view.truth.valid.get(x, y), is_observed) {
+        let is_observed = truth.unobserved.as_ref().is_some_and(|mask| !mask.get(x, y));
+        let share = match (truth.valid.get(x, y), is_observed) {
             (false, _) => 0.0,
             (true, true) => OBSERVED_SHARE,
             (true, false) => 1.0,
         };
-        encoded.get(x, y).0.map(|v| byte_from_unit(v * share))
+        picture.get(x, y).0.map(|v| byte_from_unit(v * share))
     })
 }
 
-fn errors(view: &SceneAlbedo) -> Vec<Picture<[u8; 3]>> {
-    let error = |picture: &Picture<LinearRgb>| {
+fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
+    let Some((reference, predicted)) = row.compared.split_first() else { return Vec::new() };
+    let error = |picture: &Picture<[f32; 3]>| {
         Picture::from_fn(picture.width(), picture.height(), |x, y| {
-            if !view.truth.valid.get(x, y) {
+            if !row.truth.valid.get(x, y) {
                 return [0; 3];
             }
-            error_color(picture.get(x, y), view.truth.albedo.get(x, y))
+            error_color(picture.get(x, y), reference.get(x, y))
         })
     };
-    view.predicted.iter().map(error).collect()
+    predicted.iter().map(error).collect()
 }
 
 /// The colour of a pixel's error.
-pub(crate) fn error_color(LinearRgb(a): LinearRgb, LinearRgb(b): LinearRgb) -> [u8; 3] {
+pub(crate) fn error_color(a: [f32; 3], b: [f32; 3]) -> [u8; 3] {
     let squares: f32 = (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum();
     glow((squares / 3.0).sqrt() / WHITE_ERROR)
 }
@@ -130,9 +221,8 @@ mod tests {
     use mateval_image::Mask;
 
     use super::*;
-    use crate::truth::ViewTruth;
 
-    fn view() -> SceneAlbedo {
+    fn row() -> StripRow {
         let truth = Picture::filled(4, 3, LinearRgb([1.0; 3]));
         let predicted = vec![truth.clone(), Picture::filled(4, 3, LinearRgb([0.5; 3]))];
         let unobserved = Some(Mask::from_fn(4, 3, |x, _| x == 3));
@@ -145,26 +235,26 @@ mod tests {
             specular: None,
             instances: Picture::filled(4, 3, 1),
         };
-        SceneAlbedo { truth, predicted }
+        albedo_row(SceneAlbedo { truth, predicted })
     }
 
     #[test]
     fn observed_is_dark_and_invalid_black() {
-        let shown = shown(&view());
+        let shown = strip(&row());
         assert_eq!(shown.len(), 3);
         assert_eq!((shown[0].get(3, 1), shown[0].get(0, 1), shown[0].get(3, 0)), ([255; 3], [102; 3], [0; 3]));
     }
 
     #[test]
     fn no_error_is_black_and_half_is_white() {
-        let errors = errors(&view());
+        let errors = errors(&row());
         assert_eq!((errors[0].get(2, 2), errors[1].get(2, 2), errors[1].get(2, 0)), ([0; 3], [255; 3], [0; 3]));
         assert_eq!((glow(1.0 / 3.0), glow(2.0 / 3.0)), ([255, 0, 0], [255, 255, 0]));
     }
 
     #[test]
     fn grids_have_gaps_inside_only() {
-        let grid = grid(&[shown(&view()), shown(&view())]);
+        let grid = grid(&[strip(&row()), strip(&row())]);
         assert_eq!((grid.width(), grid.height()), (3 * 4 + 2 * GAP, 2 * 3 + GAP));
         assert_eq!((grid.get(4, 1), grid.get(4 + GAP + 3, 1)), (GAP_COLOR, [255; 3]));
     }

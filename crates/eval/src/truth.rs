@@ -71,12 +71,18 @@ pub struct RgbTruth {
 impl RgbTruth {
     /// The view under the scene's own lights.
     pub fn read(folder: &SceneFolder, renderer: &RendererId, view: &View) -> Result<Self, EvalError> {
-        Self::named(folder, renderer, view, "rgb")
+        let part = |name: &str| Self::read_part(folder, renderer, view, name);
+        Ok(Self { halves: [part("rgb_a")?, part("rgb_b")?], shown: part("rgb")? })
     }
 
-    /// The view under one light group alone.
-    pub fn of_group(folder: &SceneFolder, renderer: &RendererId, view: &View, group: usize) -> Result<Self, EvalError> {
-        Self::named(folder, renderer, view, &format!("group_{group:02}"))
+    /// What is shown of the view under one light group alone.
+    pub fn shown_of_group(
+        folder: &SceneFolder,
+        renderer: &RendererId,
+        view: &View,
+        group: usize,
+    ) -> Result<Picture<LinearRgb>, EvalError> {
+        Self::read_part(folder, renderer, view, &group_name(group))
     }
 
     /// The view under each of `lightings`: weighted sums of the groups' pictures, which are read once.
@@ -87,14 +93,13 @@ impl RgbTruth {
         lightings: &[RelitLighting],
     ) -> Result<Vec<Self>, EvalError> {
         let Some(first) = lightings.first() else { return Ok(Vec::new()) };
-        let groups = (0..first.weights.len())
-            .map(|group| Self::of_group(folder, renderer, view, group))
-            .collect::<Result<Vec<_>, _>>()?;
         let k = view.camera.intrinsics;
-        let basis = |picture: fn(&Self) -> &Picture<LinearRgb>| {
-            LightBasis::new(k.width as usize, k.height as usize, groups.iter().map(|g| picture(g).clone()).collect())
+        let basis = |ending: &str| -> Result<LightBasis, EvalError> {
+            let group = |group| Self::read_part(folder, renderer, view, &format!("{}{ending}", group_name(group)));
+            let pictures = (0..first.weights.len()).map(group).collect::<Result<_, _>>()?;
+            Ok(LightBasis::new(k.width as usize, k.height as usize, pictures)?)
         };
-        let [a, b, shown] = [basis(|g| &g.halves[0])?, basis(|g| &g.halves[1])?, basis(|g| &g.shown)?];
+        let (a, b, shown) = (basis("_a")?, basis("_b")?, basis("")?);
         let mixed = |lighting: &RelitLighting| {
             let halves = [a.weighted(&lighting.weights)?, b.weighted(&lighting.weights)?];
             Ok(Self { halves, shown: shown.weighted(&lighting.weights)? })
@@ -102,13 +107,20 @@ impl RgbTruth {
         lightings.iter().map(mixed).collect()
     }
 
-    fn named(folder: &SceneFolder, renderer: &RendererId, view: &View, name: &str) -> Result<Self, EvalError> {
-        let place = folder.render(renderer, &view.id);
-        let read = |ending: &str| exr_io::read_linear(&place.join(format!("{name}{ending}.exr")));
-        let truth = Self { halves: [read("_a")?, read("_b")?], shown: read("")? };
-        check_sizes(view, &[size(&truth.halves[0]), size(&truth.halves[1]), size(&truth.shown)])?;
-        Ok(truth)
+    fn read_part(
+        folder: &SceneFolder,
+        renderer: &RendererId,
+        view: &View,
+        name: &str,
+    ) -> Result<Picture<LinearRgb>, EvalError> {
+        let picture = exr_io::read_linear(&folder.render(renderer, &view.id).join(format!("{name}.exr")))?;
+        check_sizes(view, &[size(&picture)])?;
+        Ok(picture)
     }
+}
+
+fn group_name(group: usize) -> String {
+    format!("group_{group:02}")
 }
 
 /// Where both masks are set; they are of one size.

@@ -8,6 +8,8 @@
 
 mod suite {
     mod cache;
+    #[path = "../../../../tests/suite/kept_folder.rs"]
+    mod kept_folder;
     mod mask_rules;
     mod planted_light;
     mod relit;

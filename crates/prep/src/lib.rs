@@ -27,7 +27,6 @@ pub mod sample;
 pub mod source;
 pub mod stats;
 pub mod survey;
-pub(crate) mod table;
 pub mod verify;
 pub mod views;
 

@@ -25,6 +25,7 @@ pub mod reference;
 pub mod reference_io;
 pub mod source_folder;
 pub mod submission;
+pub mod text_table;
 pub mod uv_atlas;
 pub mod work_folder;
 

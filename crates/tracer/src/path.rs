@@ -16,14 +16,18 @@ use crate::sampler::Sampler;
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
+/// The most predictions that the same paths are followed for.
+pub(crate) const TOGETHER: usize = 8;
+
 /// What paths had to leave out or would have to explain.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathCounts {
     pub(crate) rays: u64,
     pub(crate) shadow_rays: u64,
     pub(crate) capped: u64,
-    pub(crate) capped_throughput: f64,
-    pub(crate) not_finite: u64,
+    /// By prediction, as all that follows.
+    pub(crate) capped_throughput: [f64; TOGETHER],
+    pub(crate) not_finite: [u64; TOGETHER],
 }
 
 /// The last scattering: where the ray started and how likely its direction was.
@@ -152,7 +156,9 @@ impl<'w, const K: usize> PathTracer<'w, K> {
             }
             if scatterings > self.settings.max_bounces {
                 found.counts.capped += 1;
-                found.counts.capped_throughput += f64::from(path.throughputs[0].element_sum() / 3.0);
+                for (sum, throughput) in found.counts.capped_throughput.iter_mut().zip(path.throughputs) {
+                    *sum += f64::from(throughput.element_sum() / 3.0);
+                }
                 continue;
             }
             let uv = match self.painted {
@@ -318,7 +324,8 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     fn contribute(&mut self, which: usize, light: LightIndex, values: [Vec3; K]) {
         // One prediction's accident is not the others'.
         let finite = values.map(|value| if value.is_finite() { value } else { Vec3::ZERO });
-        self.counts.not_finite += values.iter().filter(|value| !value.is_finite()).count() as u64;
+        let counts = self.counts.not_finite.iter_mut().zip(values);
+        counts.for_each(|(count, value)| *count += u64::from(!value.is_finite()));
         (self.add)(which, light, finite);
     }
 }

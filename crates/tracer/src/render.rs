@@ -102,7 +102,7 @@ pub fn render(
         || progress(finished.fetch_add(1, Ordering::Relaxed) + 1, total),
     );
     let paths = (width * height) as u64 * u64::from(settings.samples);
-    Ok(Render { picture, stats: stats(paths, &counts) })
+    Ok(Render { picture, stats: stats(paths, &counts, 0) })
 }
 
 pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
@@ -138,9 +138,10 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
     (sums, tracer.counts)
 }
 
-pub(crate) fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {
+/// Of one of the predictions that the paths were followed for.
+pub(crate) fn stats(paths: u64, tiles: &[PathCounts], prediction: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
-    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput).sum();
+    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[prediction]).sum();
     let all = paths.max(1) as f64;
     RenderStats {
         paths,
@@ -148,6 +149,6 @@ pub(crate) fn stats(paths: u64, tiles: &[PathCounts]) -> RenderStats {
         shadow_rays: sum(|tile| tile.shadow_rays),
         capped_share: sum(|tile| tile.capped) as f64 / all,
         capped_throughput: capped_throughput / all,
-        not_finite: sum(|tile| tile.not_finite),
+        not_finite: tiles.iter().map(|tile| tile.not_finite[prediction]).sum(),
     }
 }

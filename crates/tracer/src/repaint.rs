@@ -35,6 +35,7 @@ pub struct Repaint {
     uvs: Vec<[Vec2; 3]>,
     predictions: usize,
     flavour: PrincipledFlavour,
+    eta: f32,
     tables: BlenderTables,
 }
 
@@ -79,8 +80,8 @@ impl Repaint {
             return Err(TracerError::Invalid(format!("surface {index} '{name}': a coat for a mesh without sound uv")));
         }
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
-        let tables = BlenderTables::new(eta_from_specular(SPECULAR));
-        Ok(Self { coats, uvs, predictions, flavour, tables })
+        let eta = eta_from_specular(SPECULAR);
+        Ok(Self { coats, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
     }
 
     /// How many predictions there are.
@@ -126,7 +127,7 @@ impl Repaint {
             base_color: base_colors[0],
             roughness: scalar(&coat.roughness),
             metallic: scalar(&coat.metallic),
-            eta: eta_from_specular(SPECULAR),
+            eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         };
         Some(PaintAt { principled, base_colors })

@@ -12,7 +12,7 @@ use crate::alignment::scaled;
 use crate::error::EvalError;
 use crate::measure::albedo_mse;
 use crate::protocol::Protocol;
-use crate::score::SceneAlbedo;
+use crate::shown_scene::SceneAlbedo;
 
 const ALL: [AlignedBy; 6] = [
     AlignedBy::None,

@@ -7,10 +7,11 @@ use mateval_scene::submission::{SUBMISSION, SubmissionFile};
 use super::file::{AlignedBy, ExplainFile};
 use super::{ExplainPlan, protocol_of};
 use crate::error::EvalError;
+use crate::open_scene::chosen_scenes;
 use crate::prediction::map_files;
 use crate::protocol::SCORER_VERSION;
 use crate::result::{ProtocolResult, RESULT_FORMAT};
-use crate::score::{chosen_scenes, submission_sha256};
+use crate::score::submission_sha256;
 
 /// The scores that are to be explained; fails with everything that does not fit.
 pub(super) fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, EvalError> {

@@ -5,7 +5,7 @@ use mateval_image::{LinearRgb, Picture};
 
 use super::kinds::patch_error;
 use super::patch::Patch;
-use crate::score::SceneAlbedo;
+use crate::shown_scene::SceneAlbedo;
 use crate::strips::{GAP_COLOR, SCALE_ROWS, error_color, grid, scale};
 
 /// Pixels around the instance that are shown too.
@@ -41,7 +41,7 @@ pub(super) fn crop(views: &[SceneAlbedo], patches: &[Patch]) -> Picture<[u8; 3]>
         })
     };
     let error = area.picture(|x, y| match area.is_instance(patch, x, y) {
-        true => error_color(predicted.get(x, y), truth.get(x, y)),
+        true => error_color(predicted.get(x, y).0, truth.get(x, y).0),
         false => [0; 3],
     });
     let below = Picture::filled(error.width(), SCALE_ROWS, GAP_COLOR);

@@ -36,8 +36,9 @@ use self::kinds::{Explained, explained};
 use self::patch::{Patch, patches};
 use crate::error::EvalError;
 use crate::instance_errors::categories;
+use crate::open_scene::{chosen_scenes, scored_views};
 use crate::result::{ProtocolResult, ResultFile};
-use crate::score::{SceneAlbedo, chosen_scenes, scene_albedo, scored_views};
+use crate::shown_scene::{SceneAlbedo, scene_albedo};
 
 /// Instances that are told and shown.
 pub const WORST: usize = 10;

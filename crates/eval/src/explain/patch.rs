@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::score::SceneAlbedo;
+use crate::shown_scene::SceneAlbedo;
 
 /// A patch of fewer pixels has neither a smooth factor nor a shift of its own: both would fit what is chance. (Eight for
 /// each term of the factor.)

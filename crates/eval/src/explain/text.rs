@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use mateval_scene::ViewId;
+use mateval_scene::text_table::Table;
 
 use super::WORST;
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
@@ -16,15 +17,6 @@ pub(super) struct Crop {
     pub(super) view: ViewId,
 }
 
-/// A table before it is set.
-struct Table {
-    title: String,
-    /// Columns from the left that hold words; all others hold numbers.
-    words: usize,
-    /// The first is the head.
-    rows: Vec<Vec<String>>,
-}
-
 const KINDS: &str = "\
 Shares of the squared error (linear), each of what the steps before it have left; together they are all of it.
 The steps: one scale an instance; one a channel (chroma); a smooth factor a view (shading left in); a shift of up
@@ -32,7 +24,7 @@ to 4 pixels (misplacement); the truth's own detail (blur). The rest is none of t
 
 /// Tables set in columns.
 pub fn plain(file: &ExplainFile) -> String {
-    let tables = tables(file).into_iter().map(|table| format!("{}\n{}", table.title, table.plain()));
+    let tables = tables(file).iter().map(Table::text).collect::<Vec<_>>();
     let mut parts = vec![format!("{}\n", title(file))];
     parts.extend(tables);
     parts.push(format!("{KINDS}\n"));
@@ -44,7 +36,7 @@ pub fn plain(file: &ExplainFile) -> String {
 pub(super) fn markdown(file: &ExplainFile, crops: &[Crop]) -> String {
     let mut parts = vec![format!("# {}\n", title(file))];
     for (at, table) in tables(file).iter().enumerate() {
-        parts.push(format!("## {}\n\n{}", table.title, table.markdown()));
+        parts.push(format!("## {}\n\n{}", table.title, rows_in_markdown(table)));
         if at == 0 {
             parts.push(format!("{KINDS}\n"));
         }
@@ -180,32 +172,16 @@ fn unsigned_zero(value: f64, steps: f64) -> f64 {
     if (value * steps).abs() < 0.5 { 0.0 } else { value }
 }
 
-impl Table {
-    fn plain(&self) -> String {
-        let columns = self.rows.first().map_or(0, Vec::len);
-        let width = |column: usize| self.rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..columns).map(width).collect();
-        let mut text = String::new();
-        for row in &self.rows {
-            let cells = row.iter().zip(&widths).enumerate().map(|(at, (cell, width))| match at < self.words {
-                true => format!("{cell:<width$}"),
-                false => format!("{cell:>width$}"),
-            });
-            // Writing to a String cannot fail, here and below.
-            let _ = writeln!(text, "  {}", cells.collect::<Vec<_>>().join("  ").trim_end());
+/// The rows of a table on a page, without its title.
+fn rows_in_markdown(table: &Table) -> String {
+    let mut text = String::new();
+    for (at, row) in table.rows.iter().enumerate() {
+        let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "| {} |", cells.join(" | "));
+        if at == 0 {
+            let _ = writeln!(text, "{}{}|", "|---".repeat(table.words), "|---:".repeat(row.len() - table.words));
         }
-        text
     }
-
-    fn markdown(&self) -> String {
-        let mut text = String::new();
-        for (at, row) in self.rows.iter().enumerate() {
-            let cells: Vec<String> = row.iter().map(|cell| cell.replace('|', "\\|")).collect();
-            let _ = writeln!(text, "| {} |", cells.join(" | "));
-            if at == 0 {
-                let _ = writeln!(text, "{}{}|", "|---".repeat(self.words), "|---:".repeat(row.len() - self.words));
-            }
-        }
-        text
-    }
+    text
 }

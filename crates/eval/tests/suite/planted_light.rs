@@ -8,8 +8,10 @@ use std::sync::{Arc, LazyLock};
 use mateval_eval::light_fit::fit_lights;
 use mateval_eval::light_rules::{LightRules, Track};
 use mateval_eval::light_stage::{self, NamedLight};
-use mateval_eval::predicted_light::{FittedRadiances, LitScene, predicted_light};
+use mateval_eval::noise_blocks::noise_blocks;
+use mateval_eval::predicted_light::{FittedRadiances, LitScene, Photo, predicted_light};
 use mateval_eval::prediction::{PredictedScene, read_scene};
+use mateval_eval::rgb::LightReference;
 use mateval_eval::truth::{RgbTruth, ViewTruth};
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;
@@ -18,7 +20,8 @@ use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
 };
 
-use super::sample::{dataset, hasty, kept_folder, write_truth};
+use super::kept_folder::kept_folder;
+use super::sample::{dataset, hasty, write_truth};
 
 /// The furnished room of the sample on its stage, with the prediction `gt`.
 struct Staged {
@@ -82,16 +85,19 @@ impl Staged {
 
     /// What scoring fits to `photo`.
     fn fitted(&self, photo: &Picture<LinearRgb>, rules: &LightRules) -> FittedRadiances {
-        let light = || RgbTruth { halves: [photo.clone(), photo.clone()], shown: photo.clone() };
         let view = &self.scene.views[0];
+        let truth = RgbTruth { halves: [photo.clone(), photo.clone()], shown: photo.clone() };
+        let protocol = hasty();
+        let reference = LightReference::new(&protocol, None, &truth, self.scene.exposure).unwrap();
         let lit = LitScene {
             scene: self.scene,
             world: &self.world,
             atlases: &self.atlases,
             views: vec![view],
             truths: std::slice::from_ref(&self.truth),
-            light: vec![light()],
-            input: (view, light(), &self.truth.valid),
+            references: &[reference],
+            blocks: &noise_blocks(&[view.camera], protocol.light.noise.block_pixels),
+            photo: Photo { view, light: photo.clone(), valid: &self.truth.valid },
             lightings: Vec::new(),
         };
         let mut fits = Vec::new();

@@ -22,7 +22,7 @@ fn groups_and_lightings(scene: &SceneFile) -> (Vec<Picture<LinearRgb>>, Vec<Reli
     let folder = dataset().folder(&scene.id);
     let count = reference_io::read(&folder).unwrap().lights.len();
     let view = &scene.views[0];
-    let group = |group| RgbTruth::of_group(&folder, &renderer(), view, group).unwrap().shown;
+    let group = |group| RgbTruth::shown_of_group(&folder, &renderer(), view, group).unwrap();
     let groups: Vec<_> = (0..count).map(group).collect();
     let valid = ViewTruth::read(&folder, view).unwrap().valid;
     let lightings = lightings(&hasty().light.relit, &groups, &valid);

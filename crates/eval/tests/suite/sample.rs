@@ -17,33 +17,21 @@ use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::Map;
 
-/// Both sources: `room` keeps its own emitters in every track, `living` is fitted by a light stage.
-const RECIPE: &str = r#"name = "sample"
-resolution = [64, 48]
-atlas_size = 128
-samples = 64
+use super::kept_folder::kept_folder;
 
-[[scene]]
-id = "living"
-camera = { designer = 0 }
-
-[scene.front3d]
-house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json"
-room = "LivingDiningRoom-101"
-models = "house/3D-FUTURE-model"
-textures = "house/3D-FRONT-texture"
-
-[[scene]]
-id = "room"
-bitterli = "room/scene.xml"
-"#;
+/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is fitted
+/// by a light stage.
+const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\natlas_size = 128\nsamples = 64\n"];
 
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     let folder = kept_folder("dataset");
     let (source, out) = (folder.join("source"), folder.join("dataset"));
     mateval_prep::sample::write(&source).unwrap();
-    std::fs::write(source.join("recipe.toml"), RECIPE).unwrap();
-    let options = BuildOptions { recipe: source.join("recipe.toml"), source: None, out: out.clone(), force: false };
+    let recipe = source.join("recipe.toml");
+    let whole = std::fs::read_to_string(&recipe).unwrap();
+    assert!(whole.contains(HEAD[0]), "{whole}");
+    std::fs::write(&recipe, whole.replace(HEAD[0], HEAD[1])).unwrap();
+    let options = BuildOptions { recipe, source: None, out: out.clone(), force: false };
     build(&options, "test", &|_, _, _| ()).unwrap();
     render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
     Dataset::open(&out).unwrap()
@@ -52,20 +40,6 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
 /// The dataset, with renders of 64 samples a half; nobody writes to it.
 pub fn dataset() -> &'static Dataset {
     &DATASET
-}
-
-/// A new folder that outlives this run's tests (nothing drops a static); older runs' are removed.
-pub fn kept_folder(name: &str) -> PathBuf {
-    const OLD: std::time::Duration = std::time::Duration::from_secs(3600);
-    let root = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    for entry in std::fs::read_dir(root).into_iter().flatten().flatten() {
-        let modified = entry.metadata().and_then(|metadata| metadata.modified());
-        if modified.is_ok_and(|time| time.elapsed().is_ok_and(|age| age > OLD)) {
-            // Another run may be removing it too.
-            let _ = std::fs::remove_dir_all(entry.path());
-        }
-    }
-    tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
 }
 
 /// Writes the submission `gt`.

@@ -1,7 +1,8 @@
 //! The comparison as tables for people: numbers are rounded here, the JSON has them whole.
 
+use mateval_scene::text_table::{Table, row};
+
 use super::file::{Check, CompareFile, LightComparison, Quantity, SceneComparison, State, ViewComparison};
-use crate::table::{Table, row};
 
 /// The tables, then every check that does not agree, then the verdict.
 pub fn text(file: &CompareFile) -> String {

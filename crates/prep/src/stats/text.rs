@@ -1,9 +1,9 @@
 //! The counts as tables for people: numbers are rounded here, the JSON has them whole.
 
 use mateval_scene::Severity;
+use mateval_scene::text_table::{Table, row};
 
 use super::{Counts, SUPER_CATEGORIES, SceneStats, Spread, StatsFile, shown};
-use crate::table::{Table, row};
 
 /// Longest name that is written whole.
 const LONGEST: usize = 60;

@@ -18,7 +18,7 @@ use mateval_scene::Camera;
 
 use crate::error::TracerError;
 use crate::light_basis::{LightBasis, LightGroups};
-use crate::path::{Painted, PathCounts};
+use crate::path::{Painted, PathCounts, TOGETHER};
 use crate::render::{self, RenderSettings, RenderStats};
 use crate::repaint::Repaint;
 use crate::world::World;
@@ -152,9 +152,6 @@ pub fn render_repainted(
     Ok(renders)
 }
 
-/// Predictions that the same paths are followed for.
-const TOGETHER: usize = 8;
-
 fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
     let end = which.end;
     which.step_by(TOGETHER).map(|start| start..end.min(start + TOGETHER)).collect()
@@ -215,8 +212,11 @@ impl Order<'_> {
                 }
             }
         }
-        let stats = stats(&counts);
-        views.map(|views| ViewsRender { views, passes: planes.len(), stats })
+        let mut views = views.into_iter().enumerate();
+        std::array::from_fn(|_| {
+            let (prediction, views) = views.next().expect("there are as many as predictions");
+            ViewsRender { views, passes: planes.len(), stats: stats(&counts, prediction) }
+        })
     }
 }
 
@@ -242,7 +242,7 @@ fn check(seeds: &[u64]) -> Result<(), TracerError> {
     }
 }
 
-fn stats(tiles: &[splat::TileCounts]) -> RenderStats {
+fn stats(tiles: &[splat::TileCounts], prediction: usize) -> RenderStats {
     let paths: Vec<PathCounts> = tiles.iter().map(|tile| tile.path).collect();
-    render::stats(tiles.iter().map(|tile| tile.paths).sum(), &paths)
+    render::stats(tiles.iter().map(|tile| tile.paths).sum(), &paths, prediction)
 }

@@ -3,25 +3,25 @@
 use std::fmt::Write as _;
 
 /// Rows of cells; the first row is the head.
-pub(crate) struct Table {
+pub struct Table {
     /// Said above.
-    pub(crate) title: String,
+    pub title: String,
     /// Columns from the left that hold words; all others hold numbers.
-    pub(crate) words: usize,
+    pub words: usize,
     /// Of any length each.
-    pub(crate) rows: Vec<Vec<String>>,
+    pub rows: Vec<Vec<String>>,
 }
 
 /// A row of a table.
-pub(crate) fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
+pub fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
     cells.map(str::to_owned).to_vec()
 }
 
 impl Table {
-    /// Title and rows, in columns: words to the left, numbers to the right.
-    pub(crate) fn text(&self) -> String {
+    /// Title and rows, in columns: words to the left, numbers to the right; a head alone says `none`.
+    pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
-        if self.rows.len() == 1 {
+        if self.rows.len() <= 1 {
             text.push_str("  none\n");
             return text;
         }

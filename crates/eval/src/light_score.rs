@@ -1,0 +1,250 @@
+//! Submissions compared with a scene's truth under light.
+
+use std::collections::BTreeMap;
+
+use mateval_image::{Picture, SrgbRgb};
+use mateval_metrics::{MetricError, NoiseFreeMse, psnr_mean_error};
+use mateval_scene::dataset::View;
+use mateval_scene::layout::INPUT;
+use mateval_scene::{Camera, RendererId};
+use rayon::prelude::*;
+
+use crate::error::EvalError;
+use crate::instance_errors::InstanceErrors;
+use crate::light_rules::{NoiseRules, Track};
+use crate::noise_blocks::noise_blocks;
+use crate::predicted_light::{LitPicture, LitScene, Photo, PredictedLight, predicted_light};
+use crate::protocol::Protocol;
+use crate::relit::{RelitLighting, lightings};
+use crate::result::{NoiseState, PsnrNoise, Region, views};
+use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
+use crate::scene_score::{MaskedRegion, SceneOrder, Sheet, regions};
+use crate::truth::{RgbTruth, ViewTruth};
+
+/// Scores everything under the lights of protocol `at`; `renderer` made the truth's pictures.
+pub(crate) fn score_light(
+    order: &SceneOrder<'_>,
+    renderer: &RendererId,
+    truths: &[ViewTruth],
+    at: usize,
+    sheets: &mut [Vec<Sheet>],
+) -> Result<(), EvalError> {
+    let bench = LightBench::new(order, renderer, truths, &order.protocols[at])?;
+    bench.predict(&mut |submission, light| bench.measure(light, &mut sheets[submission][at]))
+}
+
+/// A view's light as people see it.
+pub(crate) struct ShownLight {
+    pub(crate) truth: Picture<SrgbRgb>,
+    /// One a submission.
+    pub(crate) predicted: Vec<Picture<SrgbRgb>>,
+}
+
+/// View by view the truth's light and every submission's as people see it, in the first track of the first protocol.
+pub(crate) fn shown_light(
+    order: &SceneOrder<'_>,
+    renderer: &RendererId,
+    truths: &[ViewTruth],
+) -> Result<Vec<ShownLight>, EvalError> {
+    let bench = LightBench::new(order, renderer, truths, &order.protocols[0])?;
+    // Predictions come in any order.
+    let mut predicted = BTreeMap::new();
+    bench.predict(&mut |submission, light| {
+        let first = light.pictures.first().into_iter().flat_map(|picture| &picture.views);
+        let shown = |halves| EncodedLight::of_prediction(halves, order.scene.exposure).shown();
+        predicted.insert(submission, first.map(shown).collect::<Vec<_>>());
+        Ok(())
+    })?;
+    let references = bench.references[&None].iter().enumerate();
+    let of_view = |at: usize| predicted.values().map(|views| views[at].clone()).collect();
+    let shown = |(at, reference): (usize, &LightReference)| ShownLight {
+        truth: reference.shown().clone(),
+        predicted: of_view(at),
+    };
+    Ok(references.map(shown).collect())
+}
+
+/// Where pictures of light are measured.
+struct LightBench<'a> {
+    order: &'a SceneOrder<'a>,
+    protocol: &'a Protocol,
+    truths: &'a [ViewTruth],
+    photo: Photo<'a>,
+    lightings: Vec<RelitLighting>,
+    /// Of each view.
+    regions: Vec<Vec<MaskedRegion>>,
+    /// What each light's pictures are compared with, by lighting (none is the scene's own) and view.
+    references: BTreeMap<Option<String>, Vec<LightReference>>,
+    /// Of each view.
+    blocks: Vec<Picture<u32>>,
+}
+
+impl<'a> LightBench<'a> {
+    fn new(
+        order: &'a SceneOrder<'a>,
+        renderer: &RendererId,
+        truths: &'a [ViewTruth],
+        protocol: &'a Protocol,
+    ) -> Result<Self, EvalError> {
+        let own = order.views.iter().map(|view| RgbTruth::read(order.folder, renderer, view));
+        let own = own.collect::<Result<Vec<_>, _>>()?;
+        let photo = photo(order, truths, &own)?;
+        let lightings = if protocol.light.tracks.contains(&Track::Relit) {
+            let group = |group| RgbTruth::shown_of_group(order.folder, renderer, photo.view, group);
+            let groups = (0..order.world.emitters().groups()).map(group).collect::<Result<Vec<_>, EvalError>>()?;
+            lightings(&protocol.light.relit, &groups, photo.valid)
+        } else {
+            Vec::new()
+        };
+        let cameras: Vec<Camera> = order.views.iter().map(|view| view.camera).collect();
+        Ok(Self {
+            order,
+            protocol,
+            truths,
+            photo,
+            regions: truths.iter().map(regions).collect(),
+            references: references(order, renderer, protocol, &own, &lightings)?,
+            blocks: noise_blocks(&cameras, protocol.light.noise.block_pixels),
+            lightings,
+        })
+    }
+
+    /// Renders every submission and hands it on with its number.
+    fn predict(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
+        let order = self.order;
+        let lit = LitScene {
+            scene: order.scene,
+            world: order.world,
+            atlases: order.atlases,
+            views: order.views.clone(),
+            truths: self.truths,
+            references: &self.references[&None],
+            blocks: &self.blocks,
+            photo: self.photo.clone(),
+            lightings: self.lightings.clone(),
+        };
+        predicted_light(&lit, &self.protocol.light, order.predictions, order.progress, each)
+    }
+
+    fn measure(&self, light: PredictedLight, sheet: &mut Sheet) -> Result<(), EvalError> {
+        let PredictedLight { pictures, fit, samples, not_finite } = light;
+        for picture in &pictures {
+            self.measure_picture(picture, samples, sheet)?;
+        }
+        if fit.is_some() {
+            sheet.score.fit = fit;
+        }
+        sheet.score.not_finite += not_finite;
+        Ok(())
+    }
+
+    fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut Sheet) -> Result<(), EvalError> {
+        let order = self.order;
+        let name = picture.track.picture();
+        let lights: Vec<EncodedLight> =
+            picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, order.scene.exposure)).collect();
+        let references = &self.references[&picture.lighting];
+        let jobs: Vec<(usize, &MaskedRegion)> = self
+            .regions
+            .iter()
+            .enumerate()
+            .flat_map(|(view, regions)| regions.iter().map(move |region| (view, region)))
+            .collect();
+        let measured: Vec<Result<RgbMeasured, MetricError>> = jobs
+            .par_iter()
+            .map(|&(view, region)| {
+                let (light, reference, blocks) = (&lights[view], &references[view], &self.blocks[view]);
+                rgb_metrics(self.protocol, order.lpips, light, reference, &region.mask, blocks)
+            })
+            .collect();
+        let mut errors: BTreeMap<String, Vec<NoiseFreeMse>> = BTreeMap::new();
+        for (&(view, region), measured) in jobs.iter().zip(measured) {
+            let view = order.views[view];
+            let RgbMeasured { values, mse } = order.or_named(view, measured)?;
+            sheet.score.pictures.extend(order.values(view, region, name, picture.lighting.as_ref(), values));
+            let key = format!("{name}{}.{}.psnr", region.suffix, views(&view.id, region.region));
+            errors.entry(key).or_default().extend(mse);
+        }
+        if picture.track != Track::Relit {
+            let noise = errors.into_iter().filter(|(_, views)| !views.is_empty());
+            sheet
+                .score
+                .noise
+                .extend(noise.map(|(key, views)| (key, psnr_noise(&self.protocol.light.noise, &views, samples))));
+            self.add_errors(name, &lights, references, &mut sheet.errors);
+        }
+        Ok(())
+    }
+
+    fn add_errors(
+        &self,
+        name: &str,
+        lights: &[EncodedLight],
+        references: &[LightReference],
+        errors: &mut InstanceErrors,
+    ) {
+        let pairs = lights.iter().zip(references);
+        for ((view, truth), (light, reference)) in self.order.views.iter().zip(self.truths).zip(pairs) {
+            let error = |k: usize| light.noise_free_square(reference, k);
+            errors.add(name, views(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
+            if let Some(unobserved) = &truth.unobserved {
+                errors.add(name, "unobserved", &truth.instances, unobserved, error);
+            }
+        }
+    }
+}
+
+fn photo<'a>(order: &SceneOrder<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
+    let id = &order.scene.id;
+    let unsound = || EvalError::Invalid(format!("scene '{id}' has no input view; run `mateval prep verify`"));
+    let view = order.scene.view(INPUT).ok_or_else(unsound)?;
+    let place = order.views.iter().position(|scored| scored.id == view.id).ok_or_else(|| {
+        let what = format!("scene '{id}': targets.json leaves out the input view, which light is fitted to");
+        EvalError::Invalid(what)
+    })?;
+    Ok(Photo { view, light: own[place].shown.clone(), valid: &truths[place].valid })
+}
+
+fn references(
+    order: &SceneOrder<'_>,
+    renderer: &RendererId,
+    protocol: &Protocol,
+    own: &[RgbTruth],
+    lightings: &[RelitLighting],
+) -> Result<BTreeMap<Option<String>, Vec<LightReference>>, EvalError> {
+    let reference = |view: &View, truth: &RgbTruth| {
+        order.or_named(view, LightReference::new(protocol, order.lpips, truth, order.scene.exposure))
+    };
+    let own: Vec<LightReference> =
+        order.views.iter().zip(own).map(|(view, truth)| reference(view, truth)).collect::<Result<_, _>>()?;
+    let mut references = BTreeMap::from([(None, own)]);
+    for view in &order.views {
+        let relit = RgbTruth::relit(order.folder, renderer, view, lightings)?;
+        for (lighting, truth) in lightings.iter().zip(&relit) {
+            references.entry(Some(lighting.name.clone())).or_default().push(reference(view, truth)?);
+        }
+    }
+    Ok(references)
+}
+
+/// How sure the mean PSNR of some views is, and why.
+fn psnr_noise(rules: &NoiseRules, views: &[NoiseFreeMse], samples: u32) -> PsnrNoise {
+    let noise = psnr_mean_error(&views.iter().collect::<Vec<_>>());
+    let state = match &noise {
+        Some(noise) if noise.prediction <= rules.target_db && noise.reference <= rules.target_db => {
+            NoiseState::Certified
+        }
+        Some(noise) if noise.prediction <= rules.target_db.max(rules.truth_share * noise.reference) => {
+            NoiseState::LimitedByTruth
+        }
+        _ if samples >= rules.most_samples => NoiseState::SampleCap,
+        _ => NoiseState::AboveTarget,
+    };
+    PsnrNoise {
+        standard_error_db: noise.as_ref().map(|noise| noise.total),
+        own_db: noise.as_ref().map(|noise| noise.prediction),
+        truth_db: noise.as_ref().map(|noise| noise.reference),
+        samples,
+        state,
+    }
+}

@@ -1,0 +1,85 @@
+//! Scenes of a dataset, ready to be looked at.
+
+use std::sync::Arc;
+
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::open::Dataset;
+use mateval_scene::{RendererId, SceneError, SceneId, TriangleMesh, glb, reference_io};
+use mateval_tracer::World;
+
+use crate::error::EvalError;
+
+/// The scenes of these ids, all where there are none; in the dataset's order.
+pub(crate) fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
+    let all = &dataset.scenes;
+    let unknown: Vec<String> = scenes
+        .iter()
+        .filter(|id| !all.iter().any(|scene| scene.id == **id))
+        .map(|id| format!("the dataset has no scene '{id}'"))
+        .collect();
+    if !unknown.is_empty() {
+        let known: Vec<&str> = all.iter().map(|scene| scene.id.as_str()).collect();
+        return Err(EvalError::Invalid(format!("{}; it has: {}", unknown.join("; "), known.join(", "))));
+    }
+    Ok(all.iter().filter(|scene| scenes.is_empty() || scenes.contains(&scene.id)).collect())
+}
+
+/// The views of the scene that `targets.json` names, in the scene's order; at least one.
+pub(crate) fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+    let targets = &dataset.targets.targets;
+    let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
+    let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
+    if views.is_empty() {
+        let what = format!("scene '{}': targets.json names no view of it; run `mateval prep verify`", scene.id);
+        return Err(EvalError::Invalid(what));
+    }
+    Ok(views)
+}
+
+/// A scene, ready to be looked at.
+pub(crate) struct OpenScene {
+    pub(crate) folder: SceneFolder,
+    pub(crate) world: World,
+    /// The meshes of `instances.glb`, one a surface of the world.
+    pub(crate) atlases: Vec<TriangleMesh>,
+}
+
+impl OpenScene {
+    /// Fails where a file is not what the dataset's manifest says, or does not fit the others. `renderer` is the one whose
+    /// pictures will be looked at.
+    pub(crate) fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
+        let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
+        let is_light = |file: &str| {
+            let name = file.rsplit('/').next().unwrap_or(file);
+            render.as_ref().is_some_and(|render| file.starts_with(render.as_str()))
+                && name.ends_with(".exr")
+                && (name.starts_with("rgb") || name.starts_with("group_"))
+        };
+        // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
+        dataset.check_files(&scene.id, |file| !file.contains("/renders/") || is_light(file))?;
+        let folder = dataset.folder(&scene.id);
+        let world = World::new(Arc::new(reference_io::read(&folder)?))?;
+        let atlases = read_atlases(&folder, scene, &world)?;
+        Ok(Self { folder, world, atlases })
+    }
+}
+
+/// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's
+/// surfaces, or the dataset is unsound.
+fn read_atlases(folder: &SceneFolder, scene: &SceneFile, world: &World) -> Result<Vec<TriangleMesh>, EvalError> {
+    let nodes = glb::read(&folder.instances())?;
+    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
+    let named = nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids);
+    let meshes: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
+    let surfaces = &world.scene().surfaces;
+    let fits = named
+        && meshes.len() == surfaces.len()
+        && meshes.iter().zip(surfaces).all(|(mesh, surface)| mesh.triangles.len() == surface.mesh.triangles.len());
+    if fits {
+        return Ok(meshes);
+    }
+    let path = folder.instances();
+    let what = "it does not fit scene.json and ground_truth/reference/geometry.glb; run `mateval prep verify`";
+    Err(SceneError::Unsupported { path, what: what.to_owned() }.into())
+}

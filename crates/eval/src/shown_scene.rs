@@ -1,0 +1,77 @@
+//! What people see of a scene: the truth and every submission.
+
+use std::path::Path;
+
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::open::Dataset;
+use mateval_scene::{Progress, RendererId};
+
+use crate::error::EvalError;
+use crate::light_score::{ShownLight, shown_light};
+use crate::material_pictures::material_pictures;
+use crate::open_scene::{OpenScene, scored_views};
+use crate::prediction::{PredictedScene, read_scene};
+use crate::protocol::Protocol;
+use crate::scene_score::SceneOrder;
+use crate::truth::ViewTruth;
+
+/// The truth and every submission's albedo of one view, linear.
+pub(crate) struct SceneAlbedo {
+    pub(crate) truth: ViewTruth,
+    /// In the plan's order.
+    pub(crate) predicted: Vec<Picture<LinearRgb>>,
+}
+
+/// The views of a scene that are scored, in the scene's order.
+pub(crate) fn scene_albedo(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    submissions: &[&Path],
+) -> Result<Vec<SceneAlbedo>, EvalError> {
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, None)?;
+    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let view = |view: &View| {
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
+        let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
+        Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
+    };
+    scored_views(dataset, scene)?.into_iter().map(view).collect()
+}
+
+/// The truth's light and every submission's of one view, as people see it.
+pub(crate) struct SceneLight {
+    pub(crate) truth: ViewTruth,
+    /// Submissions in the plan's order.
+    pub(crate) shown: ShownLight,
+}
+
+/// The views of a scene that are scored, in the scene's order, in the first of the protocol's tracks.
+pub(crate) fn scene_light(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    submissions: &[&Path],
+    protocol: &Protocol,
+    renderer: &RendererId,
+    progress: Progress<'_>,
+) -> Result<Vec<SceneLight>, EvalError> {
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, Some(renderer))?;
+    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let views = scored_views(dataset, scene)?;
+    let truths = views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
+    let order = SceneOrder {
+        scene,
+        folder: &folder,
+        world: &world,
+        atlases: &atlases,
+        views,
+        predictions: &predictions,
+        protocols: std::slice::from_ref(protocol),
+        lpips: None,
+        renderer: Some(renderer),
+        progress,
+    };
+    let shown = shown_light(&order, renderer, &truths)?;
+    let rows = truths.into_iter().zip(shown);
+    Ok(rows.map(|(truth, shown)| SceneLight { truth, shown }).collect())
+}
