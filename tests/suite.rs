@@ -23,6 +23,7 @@ mod suite {
     mod mitsuba_export;
     mod part_labels;
     mod planted;
+    mod publish;
     mod readme;
     mod real_scenes;
     mod relit;

@@ -1,6 +1,7 @@
 //! `mateval eval`.
 
 mod pictures;
+mod verify;
 
 use std::path::{Path, PathBuf};
 
@@ -15,6 +16,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, json};
 
 use self::pictures::PicturesArgs;
+use self::verify::VerifyArgs;
 use crate::TOOL;
 use crate::bars::Bars;
 use crate::outcome::{Outcome, print, say, say_findings};
@@ -33,6 +35,8 @@ pub enum Command {
     Tables(TablesArgs),
     /// Tells where one scene's albedo errs and how: brightness, tint, shading left in, misplacement, lost detail.
     Explain(ExplainArgs),
+    /// Makes every number of a result anew: exit code 0 where all are the same, 1 where one is not.
+    Verify(VerifyArgs),
 }
 
 /// What `eval image` is given.
@@ -163,6 +167,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Score(args) => score_submissions(args).map(|_| Outcome::Good),
         Command::Tables(args) => print_tables(args),
         Command::Explain(args) => print_explanation(args),
+        Command::Verify(args) => verify::run(args),
     }
 }
 

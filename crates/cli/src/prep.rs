@@ -2,6 +2,7 @@
 
 pub mod blender;
 mod compare;
+mod publish;
 mod survey;
 
 use std::path::{Path, PathBuf};
@@ -32,6 +33,8 @@ pub enum Command {
     Compare(compare::CompareArgs),
     /// Looks for faults in a dataset: hashes, schemas, reprojection, ids, masks.
     Verify(VerifyArgs),
+    /// Writes a dataset as two trees: what everybody may see, and the ground truth of a hidden split.
+    Publish(publish::PublishArgs),
     /// Counts what a dataset holds: the paper's Table I, objects by category, scene by scene.
     Stats(StatsArgs),
     /// Writes a view with its ground truth as a scene for Mitsuba 3; exit code 1 where Mitsuba cannot say all of it.
@@ -146,6 +149,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Render(args) => render(args),
         Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify(args),
+        Command::Publish(args) => publish::run(args),
         Command::Stats(args) => count(args),
         Command::Mitsuba(args) => mitsuba(args),
     }

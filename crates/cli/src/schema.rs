@@ -6,6 +6,7 @@ use anyhow::{Context as _, bail};
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::explain::file::ExplainFile;
 use mateval_eval::result::ResultFile;
+use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::compare::file::CompareFile;
 use mateval_prep::render::RenderFile;
@@ -43,7 +44,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 16] {
+fn schemas() -> [(&'static str, Schema); 17] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -54,6 +55,7 @@ fn schemas() -> [(&'static str, Schema); 16] {
         ("submission", schema_for!(SubmissionFile)),
         ("result", schema_for!(ResultFile)),
         ("explain", schema_for!(ExplainFile)),
+        ("verification", schema_for!(VerificationFile)),
         ("stats", schema_for!(StatsFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),

@@ -37,5 +37,6 @@ pub mod texel_map;
 pub mod texture_space;
 pub mod truth;
 pub mod truth_material;
+pub mod verify;
 
 pub use error::EvalError;

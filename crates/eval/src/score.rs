@@ -15,7 +15,7 @@ use mateval_scene::{Finding, Progress, SceneError, SceneId, Severity, json};
 use crate::error::EvalError;
 use crate::light_rules::Track;
 use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
-use crate::prediction::{PredictedScene, read_scene};
+use crate::prediction::{PredictedScene, map_files, read_scene};
 use crate::protocol::Protocol;
 use crate::result::{
     DatasetId, MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
@@ -217,8 +217,30 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
     Ok(Entry { file, findings, files, scores: vec![Vec::new(); plan.protocols.len()] })
 }
 
+/// What tells a submission from others.
+pub(crate) struct HashedSubmission {
+    /// As it calls itself.
+    pub(crate) method: String,
+    /// As a result of these scenes has it.
+    pub(crate) sha256: String,
+    /// How many files the hash is over, `submission.json` aside.
+    pub(crate) maps: usize,
+}
+
+/// Hashes the files of a submission that matter for these scenes.
+pub(crate) fn hashed_submission(
+    path: &Path,
+    dataset: &Dataset,
+    scenes: &[SceneId],
+) -> Result<HashedSubmission, EvalError> {
+    let file: SubmissionFile = json::read(&path.join(SUBMISSION))?;
+    let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
+    files.extend(chosen_scenes(dataset, scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
+    Ok(HashedSubmission { method: file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
+}
+
 /// The hash of a submission: of `submission.json` and of the maps of the scored scenes, path and SHA-256 each, in order.
-pub(crate) fn submission_sha256(files: &[(String, String)]) -> String {
+fn submission_sha256(files: &[(String, String)]) -> String {
     let lines: String = files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
     sha256_of_bytes(lines.as_bytes())
 }

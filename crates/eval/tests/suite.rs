@@ -15,4 +15,5 @@ mod suite {
     mod relit;
     mod same_bytes;
     mod sample;
+    mod verify;
 }

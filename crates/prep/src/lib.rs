@@ -21,6 +21,7 @@ pub mod mitsuba_export;
 pub(crate) mod part_labels;
 pub mod part_split;
 pub mod parts;
+pub mod publish;
 pub mod recipe;
 pub mod render;
 pub mod sample;

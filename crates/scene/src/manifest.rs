@@ -74,6 +74,29 @@ pub fn write(root: &Path) -> Result<String, SceneError> {
     Ok(sha256_of_bytes(text.as_bytes()))
 }
 
+/// A line of the manifest.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// SHA-256 of the file, hex.
+    pub sha256: String,
+    /// Relative to the dataset, with forward slashes; never outside it.
+    pub file: String,
+}
+
+impl Entry {
+    fn parse(line: &str) -> Option<Self> {
+        let (sha256, file) = line.split_once("  ").filter(|(hash, file)| hash.len() == 64 && is_inside(file))?;
+        Some(Self { sha256: sha256.to_owned(), file: file.to_owned() })
+    }
+}
+
+/// The lines of the manifest, in its order; those that [`check`] faults are left out.
+pub fn entries(root: &Path) -> Result<Vec<Entry>, SceneError> {
+    let path = root.join(MANIFEST);
+    let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
+    Ok(text.lines().filter_map(Entry::parse).collect())
+}
+
 /// Holds every file against the manifest: each one that is missing, changed or not listed is a finding.
 pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
     check_those(root, |_| true)
@@ -86,8 +109,7 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
     let mut findings = Vec::new();
     let mut listed = std::collections::BTreeSet::new();
     for (number, line) in text.lines().enumerate() {
-        let Some((hash, file)) = line.split_once("  ").filter(|(hash, file)| hash.len() == 64 && is_inside(file))
-        else {
+        let Some(Entry { sha256: hash, file }) = Entry::parse(line) else {
             let place = format!("line {}", number + 1);
             findings.push(fault(
                 "bad_manifest_line",
@@ -97,19 +119,21 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
             ));
             continue;
         };
-        if !concerns(file) {
+        if !concerns(&file) {
             continue;
         }
-        listed.insert(file.to_owned());
-        match sha256_of_file(&root.join(file)) {
-            Err(error) if root.join(file).exists() => {
-                findings.push(fault("unreadable", file, String::new(), &error.to_string()));
+        listed.insert(file.clone());
+        match sha256_of_file(&root.join(&file)) {
+            Err(error) if root.join(&file).exists() => {
+                findings.push(fault("unreadable", &file, String::new(), &error.to_string()));
             }
-            Err(_) => findings.push(fault("missing_file", file, String::new(), "listed in the manifest but not there")),
+            Err(_) => {
+                findings.push(fault("missing_file", &file, String::new(), "listed in the manifest but not there"))
+            }
             Ok(found) if found != hash => {
                 findings.push(fault(
                     "changed_file",
-                    file,
+                    &file,
                     String::new(),
                     &format!("SHA-256 is {found}, expected {hash}"),
                 ));

@@ -1,17 +1,13 @@
 //! Whether a result, a dataset and a submission belong together.
 
-use mateval_scene::json;
-use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::submission::{SUBMISSION, SubmissionFile};
+use mateval_scene::submission::SUBMISSION;
 
 use super::file::{AlignedBy, ExplainFile};
 use super::{ExplainPlan, protocol_of};
 use crate::error::EvalError;
-use crate::open_scene::chosen_scenes;
-use crate::prediction::map_files;
 use crate::protocol::SCORER_VERSION;
 use crate::result::{ProtocolResult, RESULT_FORMAT};
-use crate::score::submission_sha256;
+use crate::score::{HashedSubmission, hashed_submission};
 
 /// The scores that are to be explained; fails with everything that does not fit.
 pub(super) fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, EvalError> {
@@ -52,21 +48,17 @@ pub(super) fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, Ev
 /// The hash is one over all scored scenes: it tells that a file differs, not which.
 fn submission_fault(plan: &ExplainPlan<'_>) -> Result<Option<String>, EvalError> {
     let (result, path) = (plan.result, plan.submission);
-    let file: SubmissionFile = json::read(&path.join(SUBMISSION))?;
-    let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    let scenes = chosen_scenes(plan.dataset, &result.dataset.scenes)?;
-    files.extend(scenes.iter().flat_map(|scene| map_files(path, scene)));
-    let found = submission_sha256(&files);
+    let HashedSubmission { method, sha256: found, maps } =
+        hashed_submission(path, plan.dataset, &result.dataset.scenes)?;
     Ok((found != result.submission.sha256).then(|| {
         format!(
             "the result was made of '{}' with hash {}, but the submission '{}' is '{}' with hash {found} over \
-             {SUBMISSION} and its {} maps of the scored scenes: it is another one, or one of these files has changed; \
+             {SUBMISSION} and its {maps} maps of the scored scenes: it is another one, or one of these files has changed; \
              score it again",
             result.method,
             result.submission.sha256,
             path.display(),
-            file.method,
-            files.len() - 1
+            method
         )
     }))
 }

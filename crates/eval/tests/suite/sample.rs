@@ -24,6 +24,13 @@ use super::kept_folder::kept_folder;
 const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\natlas_size = 128\nsamples = 64\n"];
 
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
+    let out = built();
+    render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
+    Dataset::open(&out).unwrap()
+});
+
+/// Builds it, without renders.
+pub fn built() -> PathBuf {
     let folder = kept_folder("dataset");
     let (source, out) = (folder.join("source"), folder.join("dataset"));
     mateval_prep::sample::write(&source).unwrap();
@@ -33,9 +40,8 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     std::fs::write(&recipe, whole.replace(HEAD[0], HEAD[1])).unwrap();
     let options = BuildOptions { recipe, source: None, out: out.clone(), force: false };
     build(&options, "test", &|_, _, _| ()).unwrap();
-    render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
-    Dataset::open(&out).unwrap()
-});
+    out
+}
 
 /// The dataset, with renders of 64 samples a half; nobody writes to it.
 pub fn dataset() -> &'static Dataset {

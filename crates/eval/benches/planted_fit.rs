@@ -1,0 +1,109 @@
+//! How well planted radiances are found again in a noisy photo of a real room, by samples of photo and light basis.
+//!
+//! `cargo bench -p mateval-eval --bench planted_fit -- DATASET SCENE SUBMISSION`. Radiances of 0.5 to 3.5, another for every
+//! light and channel, are planted on the light stage of a 3D-FRONT room, on the own emitters of another scene. The photo
+//! is rendered with one seed, the basis with another, both of the submission's materials, so that noise alone moves the fit.
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use mateval_eval::light_fit::fit_lights;
+use mateval_eval::light_rules::{LightRules, Track};
+use mateval_eval::light_stage;
+use mateval_eval::prediction::read_scene;
+use mateval_eval::truth::ViewTruth;
+use mateval_scene::material::PrincipledFlavour;
+use mateval_scene::{Camera, SceneId, glb, open::Dataset, reference_io};
+use mateval_tracer::{
+    Coat, LightBasis, LightGroups, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
+};
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
+    let [dataset, scene, submission] = words.as_slice() else {
+        println!("give DATASET SCENE SUBMISSION");
+        return;
+    };
+    let dataset = Dataset::open(Path::new(dataset)).unwrap();
+    let id = SceneId::new(scene).unwrap();
+    let scene = dataset.scenes.iter().find(|scene| scene.id == id).unwrap();
+    let folder = dataset.folder(&id);
+    let own = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+    let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
+    let rules = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Blender);
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let world = if scene.source.kind == "bitterli" {
+        own
+    } else {
+        let architecture: Vec<usize> =
+            (0..scene.instances.len()).filter(|&at| scene.instances[at].category.is_none()).collect();
+        let lights = light_stage::lights(&rules.stage, &own, &architecture, &cameras);
+        let quads: Vec<StageLight> = lights.into_iter().map(|named| named.light).collect();
+        own.on_stage(&quads).unwrap()
+    };
+    let predicted = read_scene(Path::new(submission), scene);
+    let coats = predicted.materials.iter().map(|material| {
+        material.as_ref().map(|material| Coat {
+            base_colors: vec![material.base_color.clone()],
+            roughness: material.roughness.clone(),
+            metallic: material.metallic.clone(),
+        })
+    });
+    let repaint = Repaint::new(&world, &atlases, coats.collect(), PrincipledFlavour::Blender).unwrap();
+    let view = &scene.views[0];
+    let valid = ViewTruth::read(&folder, view).unwrap().valid;
+    let groups = LightGroups::apart(world.emitters().groups());
+    let basis = |samples: u32, seed: u64| -> LightBasis {
+        let settings = RenderSettings { samples, ..Default::default() };
+        let light = Lighting::Apart(&groups);
+        let quiet = |_: usize, _: usize| ();
+        let done = render_repainted(&world, &repaint, 0..1, &[view.camera], light, &settings, &[seed], &quiet);
+        done.unwrap().remove(0).views.remove(0).halves.remove(0).basis
+    };
+    let weights: Vec<[f64; 3]> = (0..world.emitters().groups()).map(planted).collect();
+    println!("{} lights", weights.len());
+    for photo_samples in [128, 512] {
+        let photo = basis(photo_samples, 99).weighted(&weights).unwrap();
+        for samples in [32, 128, 512] {
+            let start = Instant::now();
+            let basis = basis(samples, 7);
+            let seconds = start.elapsed().as_secs_f64();
+            let fit = fit_lights(&basis, &photo, Some(&valid), Some(1.0)).unwrap();
+            let errors = errors(&fit.weights, &weights);
+            let shares = shares(&basis, &weights);
+            println!(
+                "photo {photo_samples}, basis {samples} ({seconds:.1} s): median {:.3}, by share of the photo's light {:.3}, \
+                 largest light {:.3}",
+                median(&mut errors.clone()),
+                errors.iter().zip(&shares).map(|(error, share)| error * share).sum::<f64>()
+                    / shares.iter().sum::<f64>(),
+                errors[shares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).unwrap().0],
+            );
+        }
+    }
+}
+
+fn planted(light: usize) -> [f64; 3] {
+    [0, 1, 2].map(|c| 0.5 + 3.0 * ((light * 7 + c * 5) % 11) as f64 / 10.0)
+}
+
+/// Of every light and channel.
+fn errors(found: &[[f64; 3]], planted: &[[f64; 3]]) -> Vec<f64> {
+    found.iter().flatten().zip(planted.iter().flatten()).map(|(found, planted)| (found / planted - 1.0).abs()).collect()
+}
+
+/// What each light and channel brings to the photo.
+fn shares(basis: &LightBasis, weights: &[[f64; 3]]) -> Vec<f64> {
+    let sum = |at: usize, c: usize| {
+        let pixels = basis.pictures()[at].pixels();
+        weights[at][c] * pixels.iter().map(|pixel| f64::from(pixel.0[c])).sum::<f64>()
+    };
+    (0..weights.len()).flat_map(|at| [0, 1, 2].map(|c| sum(at, c))).collect()
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,107 @@
+//! A result held against itself: every number of it made anew from the same dataset and submission.
+//!
+//! In: a result file, the submission and the dataset that it names. Out: a [`VerificationFile`]. Before anything is
+//! rendered, hashes and rules are compared: where they differ, numbers must too, and the findings say what has changed.
+
+mod differences;
+pub mod file;
+mod sameness;
+
+use std::path::Path;
+
+use mateval_scene::manifest::sha256_of_file;
+use mateval_scene::open::Dataset;
+use mateval_scene::{Finding, Progress, Severity, json};
+
+use crate::error::EvalError;
+use crate::protocol::Protocol;
+use crate::result::ResultFile;
+use crate::score::{LpipsWeights, ScorePlan, score};
+use differences::{Difference, differences};
+pub use file::{VERIFICATION_FORMAT, VerificationFile};
+
+/// So many numbers that differ are told; all are counted.
+const TOLD: usize = 20;
+
+/// What to verify.
+pub struct VerifyPlan<'a> {
+    /// RESULT.json.
+    pub result: &'a Path,
+    /// The submission folder that it was made of.
+    pub submission: &'a Path,
+    /// The dataset that it was made on.
+    pub dataset: &'a Dataset,
+    /// The network of LPIPS; not asked for where the result has none.
+    pub lpips: LpipsWeights,
+    /// Name and version of this tool.
+    pub tool: String,
+    /// Scenes that are scored at once.
+    pub jobs: usize,
+}
+
+/// Verifies a result. Fails where that cannot be done: files that cannot be read, weights of LPIPS that are missing.
+pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<VerificationFile, EvalError> {
+    let result: ResultFile = json::read(plan.result)?;
+    let verification = VerificationFile {
+        format: VERIFICATION_FORMAT.to_owned(),
+        tool: plan.tool.clone(),
+        result_sha256: sha256_of_file(plan.result)?,
+        submission_sha256: result.submission.sha256.clone(),
+        dataset_manifest_sha256: result.dataset.manifest_sha256.clone(),
+        confirmed: false,
+        differences: 0,
+        findings: sameness::findings(&plan, &result)?,
+    };
+    if !verification.findings.is_empty() {
+        return Ok(verification);
+    }
+    let name = file_name(plan.result);
+    let again = scored_again(plan, &result, progress)?;
+    let found = differences(&to_value(&result)?, &to_value(&again)?);
+    let findings = found.iter().take(TOLD).map(|difference| finding(&name, difference)).collect();
+    Ok(VerificationFile { confirmed: found.is_empty(), differences: found.len(), findings, ..verification })
+}
+
+fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_>) -> Result<ResultFile, EvalError> {
+    let protocols = result.protocols.keys().map(|name| Protocol::named(name)).collect::<Result<_, _>>()?;
+    let plan = ScorePlan {
+        dataset: plan.dataset,
+        submissions: vec![plan.submission],
+        protocols,
+        scenes: result.dataset.scenes.clone(),
+        lpips: as_in_the_result(plan.lpips, result),
+        // Which version it was is compared by the rules' own version.
+        tool: result.tool.clone(),
+        jobs: plan.jobs,
+        cache: None,
+    };
+    Ok(score(&plan, progress)?.remove(0))
+}
+
+/// A result without LPIPS is made anew without it.
+fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
+    match result.missing.iter().find(|missing| missing.metric == "lpips_alex") {
+        Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), mend: missing.mend.clone() },
+        None => lpips,
+    }
+}
+
+fn to_value(result: &ResultFile) -> Result<serde_json::Value, EvalError> {
+    let invalid = |error: serde_json::Error| EvalError::Invalid(format!("cannot compare results: {error}"));
+    serde_json::to_value(result).map_err(invalid)
+}
+
+fn finding(file: &str, difference: &Difference) -> Finding {
+    Finding {
+        severity: Severity::Error,
+        code: "differs".to_owned(),
+        file: file.to_owned(),
+        place: difference.place.clone(),
+        message: format!("the result says {}, made anew it is {}", difference.said, difference.found),
+        action: "the result was changed, or made by another version; score it again".to_owned(),
+    }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,92 @@
+//! Whether a result can be made anew at all: same format, rules, dataset, submission and network.
+
+use mateval_scene::{Finding, Severity};
+
+use super::differences::differences;
+use super::{VerifyPlan, file_name};
+use crate::error::EvalError;
+use crate::protocol::Protocol;
+use crate::result::{RESULT_FORMAT, ResultFile};
+use crate::score::{LpipsWeights, hashed_submission};
+
+/// Everything that has changed; numbers must be made anew only where this is empty. Fails where weights of LPIPS that the
+/// result was made with are missing.
+pub(super) fn findings(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>, EvalError> {
+    let name = file_name(plan.result);
+    let finding = |code: &str, place: &str, message: String, action: &str| Finding {
+        severity: Severity::Error,
+        code: code.to_owned(),
+        file: name.clone(),
+        place: place.to_owned(),
+        message,
+        action: action.to_owned(),
+    };
+    let mut findings = Vec::new();
+    if result.format != RESULT_FORMAT {
+        let message = format!("the format is '{}'; this version makes '{RESULT_FORMAT}'", result.format);
+        findings.push(finding("other_format", "/format", message, "verify it with the version that made it"));
+    }
+    findings.extend(rules(result, &finding)?);
+    let (said, found) = (&result.dataset.manifest_sha256, &plan.dataset.file.manifest_sha256);
+    if said != found {
+        let message = format!("made on a dataset with manifest {said}; this one's is {found}");
+        let action = "verify it on the dataset that it was made on";
+        findings.push(finding("other_dataset", "/dataset/manifest_sha256", message, action));
+    } else {
+        let submission = hashed_submission(plan.submission, plan.dataset, &result.dataset.scenes)?;
+        if submission.sha256 != result.submission.sha256 {
+            let message = format!(
+                "made of a submission with hash {}; this one's is {} over submission.json and {} maps of the scored scenes",
+                result.submission.sha256, submission.sha256, submission.maps
+            );
+            let action = "it is another submission, or one of its files has changed; score it again";
+            findings.push(finding("other_submission", "/submission/sha256", message, action));
+        }
+    }
+    findings.extend(weights(plan, result, &finding)?);
+    findings.sort();
+    Ok(findings)
+}
+
+type MakeFinding<'a> = dyn Fn(&str, &str, String, &str) -> Finding + 'a;
+
+fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>, EvalError> {
+    let invalid = |error: serde_json::Error| EvalError::Invalid(format!("cannot compare protocols: {error}"));
+    let mut findings = Vec::new();
+    for (name, scores) in &result.protocols {
+        let place = format!("/protocols/{name}/protocol");
+        let Ok(known) = Protocol::named(name) else {
+            let message = format!("there is no protocol '{name}' in this version");
+            findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
+            continue;
+        };
+        let values = [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(invalid));
+        let [said, known] = values;
+        for difference in differences(&said?, &known?) {
+            let message = format!("the result says {}; protocol '{name}' has {}", difference.said, difference.found);
+            let place = format!("{place}{}", difference.place);
+            findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
+        }
+    }
+    Ok(findings)
+}
+
+fn weights(
+    plan: &VerifyPlan<'_>,
+    result: &ResultFile,
+    finding: &MakeFinding<'_>,
+) -> Result<Option<Finding>, EvalError> {
+    let Some(said) = result.lpips_weights.get("alex").and_then(Option::as_ref) else { return Ok(None) };
+    match &plan.lpips {
+        LpipsWeights::Missing { reason, mend } => {
+            let what = format!("the result has LPIPS, and its weights are not here: {reason}; run: {mend}");
+            Err(EvalError::Invalid(what))
+        }
+        LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),
+        LpipsWeights::Loaded(lpips) => {
+            let message = format!("made with weights {said}; those here are {}", lpips.sha256());
+            let action = "fetch the published weights: python3 tools/fetch_lpips_weights.py";
+            Ok(Some(finding("other_weights", "/lpips_weights/alex", message, action)))
+        }
+    }
+}

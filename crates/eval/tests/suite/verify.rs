@@ -1,0 +1,118 @@
+//! A result is confirmed only as it was made: one digit, texel or constant more, and the reason is told.
+
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+use mateval_baselines::grey;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Picture, Wrap, png_io};
+use mateval_scene::json;
+use mateval_scene::open::Dataset;
+use serde_json::Value;
+
+use super::kept_folder::kept_folder;
+use super::sample::built;
+
+/// Without renders, so that all that a protocol asks for is measured within seconds.
+struct Scored {
+    dataset: Dataset,
+    submission: PathBuf,
+    result: Value,
+}
+
+static SCORED: LazyLock<Scored> = LazyLock::new(|| {
+    let dataset = Dataset::open(&built()).unwrap();
+    let submission = kept_folder("verify").join("grey");
+    grey::write(&dataset, &submission, false).unwrap();
+    let plan = ScorePlan {
+        dataset: &dataset,
+        submissions: vec![&submission],
+        protocols: vec![Protocol::named("mateval-1").unwrap()],
+        scenes: Vec::new(),
+        lpips: missing(),
+        tool: "test".to_owned(),
+        jobs: 1,
+        cache: None,
+    };
+    let result = score(&plan, &|_, _, _| ()).unwrap().remove(0);
+    Scored { submission, result: serde_json::to_value(result).unwrap(), dataset }
+});
+
+fn missing() -> LpipsWeights {
+    LpipsWeights::Missing { reason: "not asked for".to_owned(), mend: String::new() }
+}
+
+fn verified(result: &Value, submission: &Path) -> VerificationFile {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("RESULT.json");
+    json::write(&path, result).unwrap();
+    let plan = VerifyPlan {
+        result: &path,
+        submission,
+        dataset: &SCORED.dataset,
+        lpips: missing(),
+        tool: "test".to_owned(),
+        jobs: 1,
+    };
+    verify(plan, &|_, _, _| ()).unwrap()
+}
+
+/// Code and place of all findings of what is not confirmed.
+fn refused(result: &Value, submission: &Path) -> Vec<(String, String)> {
+    let found = verified(result, submission);
+    assert!(!found.confirmed, "{found:?}");
+    found.findings.into_iter().map(|finding| (finding.code, finding.place)).collect()
+}
+
+fn one(code: &str, place: &str) -> Vec<(String, String)> {
+    vec![(code.to_owned(), place.to_owned())]
+}
+
+#[test]
+fn a_clean_result_is_confirmed() {
+    let found = verified(&SCORED.result, &SCORED.submission);
+    assert!(found.confirmed && found.findings.is_empty() && found.differences == 0, "{found:?}");
+}
+
+#[test]
+fn a_digit_more_is_found() {
+    for place in ["/protocols/mateval-1/summary/albedo.input.mse", "/protocols/mateval-1/pictures/0/value"] {
+        let mut changed = SCORED.result.clone();
+        let value = changed.pointer_mut(place).unwrap();
+        let number = value.as_f64().unwrap();
+        *value = f64::from_bits(number.to_bits() + 1).into();
+        assert_eq!(refused(&changed, &SCORED.submission), one("differs", place));
+    }
+}
+
+#[test]
+fn another_constant_is_found() {
+    let mut changed = SCORED.result.clone();
+    changed["protocols"]["mateval-1"]["protocol"]["light"]["noise"]["target_db"] = 0.03.into();
+    let place = "/protocols/mateval-1/protocol/light/noise/target_db";
+    assert_eq!(refused(&changed, &SCORED.submission), one("other_protocol", place));
+    changed["dataset"]["manifest_sha256"] = "0".into();
+    let both = refused(&changed, &SCORED.submission);
+    assert_eq!(both, [one("other_dataset", "/dataset/manifest_sha256"), one("other_protocol", place)].concat());
+}
+
+#[test]
+fn another_texel_is_found() {
+    let changed = tempfile::tempdir().unwrap();
+    let submission = changed.path().join("grey");
+    grey::write(&SCORED.dataset, &submission, false).unwrap();
+    // The twin: a copy is the same submission.
+    assert!(verified(&SCORED.result, &submission).confirmed);
+    let scene = submission.join("scenes/room");
+    let instance = std::fs::read_dir(&scene).unwrap().map(|entry| entry.unwrap().path()).min().unwrap();
+    let path = instance.join("base_color.png");
+    let texture = read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap();
+    let byte = |v: f32| (v * 255.0).round() as u8;
+    let mut texels = Picture::from_fn(texture.width(), texture.height(), |x, y| texture.texel(x, y).map(byte));
+    texels.set(0, 0, [7, 8, 9]);
+    png_io::write_rgb_bytes(&path, &texels).unwrap();
+    assert_eq!(refused(&SCORED.result, &submission), one("other_submission", "/submission/sha256"));
+}
