@@ -6,5 +6,4 @@ python3 tools/test_fetch_lpips_weights.py
 python3 tools/test_run_marigold.py
 python3 blender_scripts/tests/test_pure.py
 cargo test --workspace --no-fail-fast
-# The optimised build renders the same bytes.
-cargo test --release --package mateval-tracer --test suite same_bytes
+tools/test_builds.sh

@@ -18,4 +18,4 @@ if ! cmp -s "$requirements" "$venv/requirements.txt"; then
 fi
 
 cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
-MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --test peers -- --show-output "$@"
+MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --workspace --test peers -- --show-output "$@"

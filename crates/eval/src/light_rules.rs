@@ -87,6 +87,8 @@ pub struct FitRules {
     pub start_radiances: Vec<f64>,
     /// Base colour, linear, of those grey materials.
     pub start_grey: f32,
+    /// Samples a pixel of that picture: few, since the start does not move where the fit ends.
+    pub start_samples: u32,
 }
 
 /// The weights of track `relit`. Groups are ordered by the luminance of the truth's input view under each alone, over valid
@@ -145,9 +147,10 @@ impl LightRules {
             },
             fit: FitRules {
                 pool: crate::light_fit::POOL as u32,
-                samples: 32,
+                samples: 64,
                 start_radiances: vec![0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0],
                 start_grey: 0.5,
+                start_samples: 2,
             },
             relit: RelitRules { dim: 0.3, warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3 },
             noise: NoiseRules {

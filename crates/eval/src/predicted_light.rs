@@ -280,7 +280,7 @@ impl Renderer<'_> {
         let Photo { view, light, valid } = &self.lit.photo;
         let scattering = &self.rules.fit;
         let repaint = self.grey(scattering.start_grey)?;
-        let settings = self.rules.settings(scattering.samples);
+        let settings = self.rules.settings(scattering.start_samples);
         let seeds = [self.seed("start")];
         let lighting = Lighting::Apart(groups);
         let quiet = |_: usize, _: usize| ();

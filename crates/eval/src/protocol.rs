@@ -60,7 +60,7 @@ pub struct Protocol {
 }
 
 /// Raised whenever a number could change for the same inputs.
-pub const SCORER_VERSION: u32 = 2;
+pub const SCORER_VERSION: u32 = 3;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.

@@ -53,6 +53,8 @@ struct Path<const K: usize> {
     which: usize,
     sampler: Sampler,
     throughputs: [Vec3; K],
+    /// As `throughputs`, for the lights of a stage that the ray meets.
+    stage_throughputs: [Vec3; K],
     /// None on the camera's ray.
     scattered: Option<Scattered>,
 }
@@ -122,7 +124,8 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         self.paths.clear();
         self.rays.clear();
         for (which, (sampler, ray)) in starts.into_iter().enumerate() {
-            self.paths.push(Path { which, sampler, throughputs: [Vec3::ONE; K], scattered: None });
+            let throughputs = [Vec3::ONE; K];
+            self.paths.push(Path { which, sampler, throughputs, stage_throughputs: throughputs, scattered: None });
             self.rays.push(ray);
         }
         let mut scatterings = 0;
@@ -144,7 +147,11 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         }
         self.arrivals.clear();
         let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        let on_stage = self.world.emitters().are_on_stage();
         for ((path, ray), hit) in self.paths.drain(..).zip(&self.rays).zip(&self.hits) {
+            if on_stage {
+                found.add_stage(&path, ray, hit.map_or(f32::INFINITY, |hit| hit.distance));
+            }
             let Some(hit) = hit else {
                 found.add_outside(&path, ray.direction());
                 continue;
@@ -198,7 +205,7 @@ impl<'w, const K: usize> PathTracer<'w, K> {
                 self.offers.push(offer);
                 self.shadow_rays.push(ray);
             }
-            if let Some((path, ray)) = scattered(self.settings, path, &bsdf, &place, scatterings) {
+            if let Some((path, ray)) = scattered(self.world, self.settings, path, &bsdf, &place, scatterings) {
                 self.paths.push(path);
                 self.rays.push(ray);
             }
@@ -242,8 +249,6 @@ fn offered<const K: usize>(
     };
     let weight = match settings.light_sampling {
         LightSampling::Emitters => 1.0,
-        // No ray meets the lights of a stage: this is the only way to find them.
-        _ if light.on_stage => 1.0,
         _ => power_heuristic(light.density, density),
     };
     let brought = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
@@ -254,6 +259,7 @@ fn offered<const K: usize>(
 /// The path and the ray that it goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
 /// length of paths follows from geometry alone.
 fn scattered<const K: usize>(
+    world: &World,
     settings: &RenderSettings,
     mut path: Path<K>,
     bsdf: &Bsdf<'_, K>,
@@ -268,6 +274,10 @@ fn scattered<const K: usize>(
         path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
     let sample = bsdf.sample([a, b, c])?;
+    if world.emitters().are_on_stage() {
+        let weights = bsdf.stage_weights(&sample);
+        path.stage_throughputs = std::array::from_fn(|k| path.throughputs[k] * weights[k]);
+    }
     path.throughputs.iter_mut().zip(sample.weights).for_each(|(throughput, weight)| *throughput *= weight);
     if path.throughputs == [Vec3::ZERO; K] {
         return None;
@@ -296,28 +306,36 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
         }
         let from = path.scattered.map_or(ray.origin(), |scattered| scattered.from);
         if let Some(emitted) = emitters.emitted(place, from) {
-            self.add_met(path, &emitted);
+            self.add_met(path, path.throughputs, &emitted);
         }
         hidden
+    }
+
+    /// Adds the lights of a stage that the ray passes before it meets a surface, which is `end` metres away.
+    fn add_stage(&mut self, path: &Path<K>, ray: &Ray, end: f32) {
+        let Some(Scattered { from, .. }) = path.scattered else { return };
+        for emitted in self.world.emitters().from_stage(&Ray::new(ray.origin(), ray.direction(), end), from) {
+            self.add_met(path, path.stage_throughputs, &emitted);
+        }
     }
 
     fn add_outside(&mut self, path: &Path<K>, direction: Vec3) {
         let emitters = self.world.emitters();
         for emitted in emitters.from_outside(direction) {
             if path.scattered.is_some() || emitters.is_camera_visible(emitted.light) {
-                self.add_met(path, &emitted);
+                self.add_met(path, path.throughputs, &emitted);
             }
         }
     }
 
     /// Adds light that the surface's own sampling found.
-    fn add_met(&mut self, path: &Path<K>, emitted: &Emitted) {
+    fn add_met(&mut self, path: &Path<K>, throughputs: [Vec3; K], emitted: &Emitted) {
         let weight = match (path.scattered, self.settings.light_sampling) {
             (None | Some(Scattered { delta: true, .. }), _) | (_, LightSampling::Bsdf) => 1.0,
             (_, LightSampling::Emitters) => 0.0,
             (Some(Scattered { density, .. }), LightSampling::Both) => power_heuristic(density, emitted.density),
         };
-        let values = path.throughputs.map(|throughput| throughput * emitted.radiance * weight);
+        let values = throughputs.map(|throughput| throughput * emitted.radiance * weight);
         self.contribute(path.which, emitted.light, values);
     }
 

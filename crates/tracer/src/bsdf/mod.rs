@@ -182,6 +182,18 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
+    /// The weights of `sample`, one of [`Self::sample`]'s, for the lights of a stage: what shows none of them left out.
+    pub(crate) fn stage_weights(&self, sample: &BsdfSample<K>) -> [Vec3; K] {
+        match &self.principled {
+            _ if sample.delta => [Vec3::ZERO; K],
+            Some((view, _)) if view.is_smoother_than(STAGE_ROUGHNESS) => {
+                let (values, _) = self.evaluate_all(sample.wi, Shown::Stage);
+                values.map(|value| value / sample.density)
+            }
+            _ => sample.weights,
+        }
+    }
+
     /// Whether all light goes to single directions, so that sampling lights finds nothing.
     pub fn is_delta(&self) -> bool {
         self.lobe.is_delta()

@@ -186,6 +186,11 @@ impl AreaEmitter {
         SurfaceHit::new(surface, index, &self.records[triangle], warp::triangle(u))
     }
 
+    /// The place on the light of a stage that a ray has met.
+    pub(crate) fn place_on_stage(&self, triangle: TriangleIndex, weights: Vec3) -> SurfaceHit {
+        SurfaceHit::new(STAGE, triangle, &self.records[triangle.0], weights)
+    }
+
     /// Whether it is a light of a stage, which is no surface of the scene.
     pub(crate) fn is_on_stage(&self) -> bool {
         self.surfaces.is_empty()

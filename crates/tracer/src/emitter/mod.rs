@@ -14,7 +14,9 @@ use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 
+use crate::accel::Accel;
 use crate::error::TracerError;
+use crate::ray::Ray;
 use crate::surface_hit::SurfaceHit;
 use area::{AreaEmitter, Glow, Outlines, TOGETHER};
 use environment::EnvironmentMap;
@@ -28,6 +30,8 @@ pub struct Emitters {
     outlines: Outlines,
     /// For each surface the place in `areas`, if it glows.
     area_of: Vec<Option<usize>>,
+    /// The lights of a stage, one a surface: `areas`, in their order.
+    stage: Option<Accel>,
     distant: Vec<DistantEmitter>,
     /// For each light group, whether the camera sees it.
     camera_visible: Vec<bool>,
@@ -59,7 +63,7 @@ pub struct EmitterSample {
     pub density: f32,
     /// The place on the emitter; none for one far outside.
     pub place: Option<SurfaceHit>,
-    /// Whether it is a light of a stage, which no ray meets.
+    /// Whether it is a light of a stage, which smooth facets do not show.
     pub on_stage: bool,
 }
 
@@ -96,6 +100,7 @@ impl Emitters {
             areas: Vec::new(),
             outlines: Outlines::default(),
             area_of: vec![None; scene.surfaces.len()],
+            stage: None,
             distant: Vec::new(),
             camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
             scene_size,
@@ -120,6 +125,7 @@ impl Emitters {
             areas: Vec::new(),
             outlines: Outlines::default(),
             area_of: vec![None; surfaces],
+            stage: None,
             distant: Vec::new(),
             camera_visible: vec![false; stage.len()],
             scene_size,
@@ -134,6 +140,8 @@ impl Emitters {
             let glow = Glow { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
             emitters.areas.push(AreaEmitter::on_stage(LightIndex(index), glow, &light.mesh, scene_size));
         }
+        let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
+        emitters.stage = Some(Accel::build(&meshes)?);
         emitters.outlines = Outlines::new(&emitters.areas);
         Ok(emitters)
     }
@@ -262,7 +270,34 @@ impl Emitters {
 
     /// What the surface at `place` sends to `from`, if it glows there.
     pub fn emitted(&self, place: &SurfaceHit, from: Vec3) -> Option<Emitted> {
-        let which = self.area_of[place.surface.0]?;
+        self.emitted_by(self.area_of[place.surface.0]?, place, from)
+    }
+
+    /// Whether these are the lights of a stage.
+    pub(crate) fn are_on_stage(&self) -> bool {
+        self.stage.is_some()
+    }
+
+    /// What the lights of a stage that `ray` meets send back to the place `from`. They hide nothing, one another neither,
+    /// so all of them count; in the order of the lights.
+    pub(crate) fn from_stage(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = Emitted> + '_ {
+        let met = std::cell::RefCell::new(Vec::new());
+        if let Some(stage) = &self.stage {
+            // Taking none, it is asked about all.
+            stage.occluded_where(ray, |hit| {
+                met.borrow_mut().push(*hit);
+                false
+            });
+        }
+        let mut met = met.into_inner();
+        met.sort_by_key(|hit| hit.global);
+        met.into_iter().filter_map(move |hit| {
+            let light = hit.surface.0;
+            self.emitted_by(light, &self.areas[light].place_on_stage(hit.triangle, hit.barycentrics), from)
+        })
+    }
+
+    fn emitted_by(&self, which: usize, place: &SurfaceHit, from: Vec3) -> Option<Emitted> {
         let area = &self.areas[which];
         let towards = place.position - from;
         if !area.glows(place, -towards) {

@@ -7,11 +7,13 @@ use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::material::{ColorInput, MaterialModel, PrincipledFlavour, ScalarInput};
 use mateval_scene::reference::{Emission, ReferenceScene};
 use mateval_scene::{Camera, TriangleMesh};
-use mateval_tracer::{Coat, LightGroups, Lighting, Render, RenderSettings, Repaint, StageLight, World};
+use mateval_tracer::{Coat, LightGroups, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World};
 use mateval_tracer::{ViewsRender, render, render_repainted, render_views};
 
+use super::estimators::worst;
 use super::light_basis::{lit_room, view};
 use super::scenes::{Builder, camera, grey, material, quad};
+use super::statistics::Renders;
 
 const COLORS: [[f32; 3]; 3] = [[0.6, 0.5, 0.4], [0.0, 0.9, 0.1], [1.0, 1.0, 1.0]];
 
@@ -200,6 +202,43 @@ fn smooth_facets_do_not_show_a_stage() {
     assert!((shine(0.1, false) - 0.04).abs() < 2e-3);
     let (stage, scene) = (shine(0.4, true), shine(0.4, false));
     assert!(scene > 0.01 && (stage / scene - 1.0).abs() < 0.02, "{stage} {scene}");
+}
+
+/// A room of dull walls with a smooth floor and a stage of two lights, one of them 2 mm before the back wall.
+fn room_on_stage() -> World {
+    let smooth = MaterialModel::Principled {
+        base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
+        roughness: ScalarInput::Constant(0.1),
+        metallic: ScalarInput::Constant(0.3),
+        specular: 0.5,
+        flavour: PrincipledFlavour::Blender,
+    };
+    let floor = quad(Vec3::new(-0.9, -0.9, -0.998), Vec3::Z * 1.8, Vec3::X * 1.8);
+    let world = World::new(Arc::new(lit_room([[1.0; 3]; 4]))).unwrap();
+    let scene = Builder::from(world.scene().clone()).surface(floor, material(smooth)).scene();
+    let ceiling = quad(Vec3::new(-0.5, 0.8, -0.5), Vec3::X * 0.6, Vec3::Z * 0.6);
+    let back = quad(Vec3::new(-0.8, -0.95, -0.998), Vec3::X * 1.6, Vec3::Y * 1.6);
+    let stage = [(ceiling, [2.0, 3.0, 1.0]), (back, [1.0, 0.5, 2.0])];
+    World::new(Arc::new(scene)).unwrap().on_stage(&stage.map(|(mesh, radiance)| StageLight { mesh, radiance })).unwrap()
+}
+
+/// Lights of a stage that are sampled, that rays meet, and both together give one picture; and what lies beside a light is
+/// far less noisy by both than by sampling alone.
+#[test]
+fn ways_of_finding_a_stage_agree() {
+    let world = room_on_stage();
+    let by = |light_sampling: LightSampling, seed: u64| {
+        let settings = RenderSettings { samples: 32, seed, light_sampling, ..Default::default() };
+        Renders::new(&world, &view(32), settings, 16)
+    };
+    let [both, emitters, bsdf] = [(LightSampling::Both, 1), (LightSampling::Emitters, 2), (LightSampling::Bsdf, 3)]
+        .map(|(how, seed)| by(how, seed));
+    for other in [&emitters, &bsdf] {
+        let found = worst(&both, other);
+        assert!(found < 4.5, "{found}");
+    }
+    let [both, emitters] = [both, emitters].map(|renders| renders.whole().error);
+    assert!(both < 0.7 * emitters, "{both} {emitters}");
 }
 
 /// A stage needs lights that are there.

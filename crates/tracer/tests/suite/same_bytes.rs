@@ -1,6 +1,6 @@
 //! The same bytes of a picture for any number of threads, for either set of instructions, in every build, on every machine.
 //!
-//! `tools/test.sh` runs this in the dev and in the release profile, against the same stored hashes.
+//! That the optimised build renders these bytes too is what `tools/test_builds.sh` tests.
 
 use std::sync::Arc;
 
