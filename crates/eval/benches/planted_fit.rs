@@ -1,6 +1,6 @@
 //! How well planted radiances are found again in a noisy photo of a real room, by samples of the light basis.
 //!
-//! `cargo bench -p mateval-eval --bench planted_fit -- DATASET SCENE SUBMISSION`. Radiances of 0.5 to 3.5, another for every
+//! `cargo bench --workspace --bench planted_fit -- DATASET SCENE SUBMISSION`. Radiances of 0.5 to 3.5, another for every
 //! light and channel, are planted on the light stage of a 3D-FRONT room, on the own emitters of another scene. The photo
 //! is rendered with one seed, the basis with another, both of the submission's materials, so that noise alone moves the fit. Light by light
 //! it tells the share of the photo, the noise of the averaged squares between photo and basis, and what was found.

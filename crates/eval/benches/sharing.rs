@@ -1,7 +1,7 @@
 //! What it costs to look at eight submissions together, against eight apart: submissions that differ in base colour alone
 //! are followed by the same paths. And what five lightings more cost: track `relit` is sums over the same paths.
 //!
-//! `cargo bench -p mateval-eval --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES]`. The eight are the submission's own
+//! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES]`. The eight are the submission's own
 //! maps, each with its own copies of the textures, so that none finds another's in the caches. Runs alternate; tracing only.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 

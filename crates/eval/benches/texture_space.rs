@@ -1,5 +1,5 @@
 //! What the comparison in texture space costs, scene by scene:
-//! `cargo bench -p mateval-eval --bench texture_space -- DATASET SUBMISSION...`.
+//! `cargo bench --workspace --bench texture_space -- DATASET SUBMISSION...`.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a table, of files that the caller names
 
 use std::path::PathBuf;

@@ -283,9 +283,10 @@ impl Renderer<'_> {
         let settings = self.rules.settings(scattering.start_samples);
         let seeds = [self.seed("start")];
         let lighting = Lighting::Apart(groups);
-        let quiet = |_: usize, _: usize| ();
+        let what = format!("scene {}: start of the fit", self.lit.scene.id);
+        let shown = |done: usize, all: usize| (self.progress)(&what, done, all);
         let renders =
-            render_repainted(self.pass.world, &repaint, 0..1, &[view.camera], lighting, &settings, &seeds, &quiet)?;
+            render_repainted(self.pass.world, &repaint, 0..1, &[view.camera], lighting, &settings, &seeds, &shown)?;
         let grey = renders[0].views[0].halves[0].basis.sum();
         let error = |radiance: f64| -> f64 {
             let pairs = grey.pixels().iter().zip(light.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);

@@ -8,9 +8,12 @@
 
 mod suite {
     mod cache;
+    mod damages;
     #[path = "../../../../tests/suite/kept_folder.rs"]
     mod kept_folder;
     mod mask_rules;
+    mod noise;
+    mod noisy_room;
     mod planted_light;
     mod relit;
     mod same_bytes;

@@ -1,6 +1,6 @@
 //! What a scene's five views cost, with their lights fitted: ours, and the same with Mitsuba.
 //!
-//! `MATEVAL_PEERS_PYTHON=... cargo bench -p mateval-eval --bench five_views -- [quick|full]` on `bench/dense` (864,036
+//! `MATEVAL_PEERS_PYTHON=... cargo bench --workspace --bench five_views -- [quick|full]` on `bench/dense` (864,036
 //! triangles, 15 emitters), 480 x 270 pixels, 6 bounces (Mitsuba's max_depth 8). Ours: a light basis of the input view
 //! at 256 x 256 pixels (stream C), the fit, and two halves of all five views' light bases in one pass. Mitsuba's: radiances fitted by `prb` and
 //! Adam, 100 iterations at 256 x 256 pixels and 16 samples (our assumption: nobody published a number), then five renders.

@@ -1,0 +1,89 @@
+//! What it costs to score one submission in one room in full: ours, and the same with other projects' parts.
+//!
+//! `MATEVAL_PEERS_PYTHON=... cargo bench --workspace --bench whole_room -- DATASET SCENE SUBMISSION [full]`;
+//! `tools/bench_whole_room.sh` makes all three of the shared data and runs it. Ours: `score`, protocol `mateval-1` with
+//! everything in it, from opening the dataset to the result. Theirs, by `tests/peers/score_room_mitsuba.py`: both tracks'
+//! five views by Mitsuba, radiances fitted by `prb` and Adam, albedo by its `aov`; MSE, PSNR and SSIM by scikit-image and
+//! LPIPS by `lpips` of both tracks and of albedo, raw and aligned. Theirs has no track `relit`, no texture space, no
+//! roughness and metallic, no specular regions, no halves. Importing and compiling is not counted for theirs. Tools take turns.
+//!
+//! **The fit**: 100 iterations of 8 samples a pixel of the photo as it is: at 480 x 270 pixels as many paths as
+//! `five_views` takes, our assumption there. PSDR-Room, whose stage this is, publishes 201 iterations of 128 samples
+//! forward and 4 backward at 800 x 600 pixels, for materials and lights together.
+//!
+//! **What is scaled**: with `full` nothing but for noise. Else theirs is timed for 5 iterations and a quarter of the samples,
+//! and the times of the fit and of the renders are multiplied.
+//!
+//! **Equal noise**: theirs takes as many samples a pixel as ours took, both halves together; then the time of its renders,
+//! and of nothing else, is multiplied by its noise over ours. Twice, since noise may mean two things: the variance of a
+//! pixel, clipped and sRGB-encoded; and the square of the standard error that results certify, of the mean PSNR, the
+//! larger of the input view's and the novel views'. Ours makes five views of one set of paths, so their noise is not
+//! independent; the second knows that. Noise is compared between pictures of as many samples, of our fitted radiances and
+//! of Mitsuba's `principled`, which both can make, so that the tools converge to one picture (how nearly is told); pixels
+//! that show lights that only ours can hide from the camera are left out, and lights with a map have its mean in both.
+
+#![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints")]
+
+#[path = "../five_views/noise.rs"]
+#[allow(dead_code, reason = "five_views uses all of it")]
+mod noise;
+mod ours;
+mod peer_scene;
+mod peers;
+mod pictures;
+mod report;
+mod room;
+#[path = "../five_views/stage.rs"]
+#[allow(dead_code, reason = "five_views uses all of it")]
+mod stage;
+
+use std::path::Path;
+
+use room::Room;
+use stage::Stage;
+
+/// Iterations of the fit that count, and those that are timed unless `full`.
+pub const ITERATIONS: [u32; 2] = [100, 5];
+/// Of ours samples over theirs that are timed, with `full` and without.
+const FEWER: [u32; 2] = [1, 4];
+const ROUNDS: u64 = 2;
+
+/// The pictures that both tools render.
+pub const TRACKS: [&str; 2] = ["true", "fitted"];
+
+/// One tool's way through the room, once.
+pub struct Run {
+    /// What took how long.
+    pub stages: Vec<Stage>,
+    /// Of each of [`TRACKS`] all views; none of ours, whose result holds no pictures.
+    pub pictures: [Vec<pictures::Linear>; 2],
+}
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let full = words.iter().any(|word| word == "full");
+    let words: Vec<&str> =
+        words.iter().map(String::as_str).filter(|word| !word.starts_with("--") && *word != "full").collect();
+    let [dataset, scene, submission] = words[..] else {
+        return println!("whole_room: give DATASET SCENE SUBMISSION [full]");
+    };
+    let Some(python) = std::env::var_os("MATEVAL_PEERS_PYTHON") else {
+        return eprintln!("SKIPPED: whole_room: MATEVAL_PEERS_PYTHON names no Python; see tools/bench_whole_room.sh");
+    };
+    let weights =
+        std::env::var_os("MATEVAL_CACHE").map(|cache| Path::new(&cache).join(mateval_metrics::Net::Alex.file_name()));
+    let room = Room::open(Path::new(dataset), scene, Path::new(submission), weights);
+    let (mut own, mut theirs) = (Vec::new(), Vec::new());
+    // The first says how many samples theirs is to take.
+    let mut scored = None;
+    for round in 0..ROUNDS {
+        let (run, result) = ours::score(&room);
+        own.push(run);
+        let scored = scored.get_or_insert(result);
+        let iterations = if round > 0 { 0 } else { ITERATIONS[usize::from(!full)] };
+        let samples = pictures::samples(scored).map(|half| 2 * half / FEWER[usize::from(!full)]);
+        theirs.push(peers::run(&python, &room, scored, round, iterations, samples));
+    }
+    report::print(&room, &scored.unwrap(), &own, &theirs);
+}

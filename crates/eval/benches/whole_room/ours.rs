@@ -1,0 +1,81 @@
+//! The room scored by this project.
+
+use std::sync::Mutex;
+use std::time::Instant;
+
+use cpu_time::ProcessTime;
+use mateval_eval::result::ResultFile;
+use mateval_eval::score::{LpipsWeights, ScorePlan, score as score_plan};
+use mateval_metrics::{Lpips, Net};
+use mateval_scene::open::Dataset;
+
+use crate::Run;
+use crate::room::Room;
+use crate::stage::Stage;
+
+/// Scores the submission in the room; every step that scoring tells of is a stage.
+pub fn score(room: &Room) -> (Run, ResultFile) {
+    let clock = Clock::start();
+    let dataset = Dataset::open(&room.dataset).unwrap();
+    let lpips = match &room.weights {
+        Some(path) => LpipsWeights::Loaded(Box::new(Lpips::load(Net::Alex, path).unwrap())),
+        None => panic!("MATEVAL_CACHE names no folder with the weights of LPIPS"),
+    };
+    let plan = ScorePlan {
+        dataset: &dataset,
+        submissions: vec![&room.submission],
+        protocols: vec![room.protocol.clone()],
+        scenes: vec![room.scene.id.clone()],
+        lpips,
+        tool: "whole_room".to_owned(),
+        jobs: 1,
+        cache: None,
+    };
+    let prefix = format!("scene {}: ", room.scene.id);
+    let tell = |step: &str, done: usize, all: usize| {
+        let step = step.strip_prefix(&prefix).unwrap_or(step);
+        // A step that is done is followed by what tells nothing of itself.
+        clock.enter(&if done < all { step.to_owned() } else { format!("after {step}") });
+    };
+    let result = score_plan(&plan, &tell).unwrap().remove(0);
+    (Run { stages: clock.stop(), pictures: Default::default() }, result)
+}
+
+/// Tells the stages of work apart that says what it is at.
+struct Clock(Mutex<Times>);
+
+struct Times {
+    stages: Vec<Stage>,
+    name: String,
+    since: (ProcessTime, Instant),
+}
+
+impl Clock {
+    fn start() -> Self {
+        let since = (ProcessTime::now(), Instant::now());
+        Self(Mutex::new(Times { stages: Vec::new(), name: "reading".to_owned(), since }))
+    }
+
+    fn enter(&self, name: &str) {
+        let mut times = self.0.lock().unwrap();
+        // Tiles may tell of themselves out of order: the end of a step is not taken back.
+        if times.name != name && times.name != format!("after {name}") {
+            times.close();
+            name.clone_into(&mut times.name);
+        }
+    }
+
+    fn stop(self) -> Vec<Stage> {
+        let mut times = self.0.into_inner().unwrap();
+        times.close();
+        times.stages
+    }
+}
+
+impl Times {
+    fn close(&mut self) {
+        let (cpu, wall) = (self.since.0.elapsed().as_secs_f64(), self.since.1.elapsed().as_secs_f64());
+        self.since = (ProcessTime::now(), Instant::now());
+        self.stages.push(Stage { name: self.name.clone(), samples: 0, iterations: 0, cpu, wall });
+    }
+}

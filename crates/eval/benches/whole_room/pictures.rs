@@ -1,0 +1,129 @@
+//! Pictures of both tools and their noise.
+
+use mateval_eval::noise_blocks::noise_blocks;
+use mateval_eval::result::ResultFile;
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
+use mateval_metrics::{Halves, noise_free_mse, psnr_mean_error};
+use mateval_scene::material::PrincipledFlavour;
+use mateval_tracer::{Coat, LightMix, Lighting, Repaint, StageLight, World, render_repainted};
+
+use crate::noise::Noise;
+use crate::room::Room;
+
+/// A picture of light.
+pub type Linear = Picture<LinearRgb>;
+
+/// Two independent pictures of every view.
+pub type Pair = [Vec<Linear>; 2];
+
+/// How noisy a tool's pictures are.
+pub struct TrackNoise {
+    /// Of a pixel, times samples a pixel.
+    pub variance: f64,
+    /// The square of the standard error of the mean PSNR, in dB squared, times samples a pixel; the larger of the input
+    /// view's and the novel views'.
+    pub certified: f64,
+}
+
+/// Samples a pixel and half that the tracks took.
+pub fn samples(scored: &ResultFile) -> [u32; 2] {
+    let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
+    crate::TRACKS.map(|track| noise[&format!("rgb_{track}.input.psnr")].samples)
+}
+
+/// What was fitted, light by light.
+pub fn radiances(room: &Room, scored: &ResultFile) -> LightMix {
+    scored.protocols["mateval-1"].fits[&room.scene.id].lights.iter().map(|light| light.radiance).collect()
+}
+
+/// Two independent halves of every view under the lights of track `track` (see [`crate::TRACKS`]) of a world of the room,
+/// `samples` a pixel and half, of Mitsuba's or Blender's flavour.
+pub fn ours(
+    room: &Room,
+    world: &World,
+    scored: &ResultFile,
+    track: usize,
+    flavour: PrincipledFlavour,
+    samples: u32,
+) -> Pair {
+    let staged;
+    let (world, mix): (&World, LightMix) = match (track, room.is_staged()) {
+        (0, _) => (world, vec![[1.0; 3]; world.emitters().groups()]),
+        (_, false) => (world, radiances(room, scored)),
+        (_, true) => {
+            let quads: Vec<StageLight> = room.stage().into_iter().map(|named| named.light).collect();
+            staged = world.on_stage(&quads).unwrap();
+            (&staged, radiances(room, scored))
+        }
+    };
+    let coat = |material: &mateval_eval::prediction::PredictedMaterial| Coat {
+        base_colors: vec![material.base_color.clone()],
+        roughness: material.roughness.clone(),
+        metallic: material.metallic.clone(),
+    };
+    let coats = room.predicted.materials.iter().map(|material| material.as_ref().map(coat)).collect();
+    let repaint = Repaint::new(world, &room.atlases, coats, flavour).unwrap();
+    let settings = room.protocol.light.settings(samples);
+    let mixes = vec![vec![mix]];
+    let lighting = Lighting::Mixed(&mixes);
+    let quiet = |_: usize, _: usize| ();
+    let render = render_repainted(world, &repaint, 0..1, &room.cameras(), lighting, &settings, &[1, 2], &quiet);
+    let views = render.unwrap().remove(0).views;
+    [0, 1].map(|half| views.iter().map(|view| view.halves[half].basis.pictures()[0].clone()).collect())
+}
+
+/// The pixels whose noise is compared: valid ones; under the room's own lights without those that show a lamp which
+/// Mitsuba cannot hide.
+pub fn masks(room: &Room, track: usize) -> Vec<Mask> {
+    let hidden: Vec<u16> =
+        room.hidden_lights().into_iter().map(|surface| room.scene.instances[surface].index.0.get()).collect();
+    let counts = |truth: &mateval_eval::truth::ViewTruth, x, y| {
+        truth.valid.get(x, y) && !(track == 0 && hidden.contains(&truth.instances.get(x, y)))
+    };
+    let mask = |truth| Mask::from_fn(truth_size(truth)[0], truth_size(truth)[1], |x, y| counts(truth, x, y));
+    room.truths.iter().map(mask).collect()
+}
+
+fn truth_size(truth: &mateval_eval::truth::ViewTruth) -> [usize; 2] {
+    [truth.valid.width(), truth.valid.height()]
+}
+
+/// How noisy pictures of `samples` a pixel each are.
+pub fn noise(room: &Room, pair: &Pair, masks: &[Mask], samples: u32) -> TrackNoise {
+    let samples = f64::from(samples);
+    let [a, b] = [0, 1].map(|k| flat(&pair[k], masks, room.scene.exposure as f32));
+    // A pair stands for pictures of twice the samples.
+    let certified = certified(room, pair, masks).powi(2) * 2.0 * samples;
+    TrackNoise { variance: Noise::of(&a, &b).srgb * samples, certified }
+}
+
+/// The standard error of the mean PSNR of the pair's mean, in dB, by its own noise: what the result calls `own_db`.
+fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
+    let exposure = room.scene.exposure as f32;
+    let blocks = noise_blocks(&room.cameras(), room.protocol.light.noise.block_pixels);
+    let mse = |view: usize| {
+        let [a, b] = [0, 1].map(|k| encoded(&pair[k][view], exposure));
+        let [truth_a, truth_b] = [0, 1].map(|k| encoded(&room.light[view].halves[k], exposure));
+        let (prediction, truth) = (Halves { a: &a, b: &b }, Halves { a: &truth_a, b: &truth_b });
+        noise_free_mse(prediction, truth, &masks[view], &blocks[view]).unwrap().unwrap()
+    };
+    let views: Vec<_> = (0..masks.len()).map(mse).collect();
+    // The input view is the first.
+    let (input, novel) = views.split_at(1);
+    let error = |views: &[mateval_metrics::NoiseFreeMse]| psnr_mean_error(&views.iter().collect::<Vec<_>>());
+    [input, novel].into_iter().filter_map(error).map(|noise| noise.prediction).fold(0.0, f64::max)
+}
+
+/// As it is compared: times the exposure, clipped to 0..1 and sRGB-encoded.
+fn encoded(picture: &Linear, exposure: f32) -> Picture<SrgbRgb> {
+    picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * exposure))).to_srgb()
+}
+
+/// The pixels of all views within their masks, one after another.
+pub fn flat(views: &[Linear], masks: &[Mask], exposure: f32) -> Vec<f32> {
+    let inside = |(view, mask): (&Linear, &Mask)| {
+        let pixels = view.pixels().iter().zip(mask.pixels()).filter(|(_, inside)| **inside);
+        pixels.flat_map(|(pixel, _)| pixel.0).map(|value| value * exposure).collect::<Vec<_>>()
+    };
+    views.iter().zip(masks).flat_map(inside).collect()
+}

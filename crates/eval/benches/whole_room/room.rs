@@ -1,0 +1,91 @@
+//! The room, its submission, and what both tools need to know of them.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mateval_eval::light_stage::{self, NamedLight};
+use mateval_eval::prediction::{PredictedScene, read_scene};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::truth::{RgbTruth, ViewTruth};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::open::Dataset;
+use mateval_scene::reference::Emission;
+use mateval_scene::{Camera, RendererId, SceneId, TriangleMesh, glb, reference_io};
+use mateval_tracer::World;
+
+/// One scene of a dataset and one submission.
+pub struct Room {
+    pub dataset: PathBuf,
+    pub submission: PathBuf,
+    /// LPIPS'.
+    pub weights: Option<PathBuf>,
+    pub scene: SceneFile,
+    pub folder: SceneFolder,
+    pub renderer: RendererId,
+    pub world: World,
+    /// One a surface, with the uv of its atlas.
+    pub atlases: Vec<TriangleMesh>,
+    pub predicted: PredictedScene,
+    pub protocol: Protocol,
+    /// Of each view.
+    pub truths: Vec<ViewTruth>,
+    pub light: Vec<RgbTruth>,
+}
+
+impl Room {
+    pub fn open(dataset: &Path, scene: &str, submission: &Path, weights: Option<PathBuf>) -> Self {
+        let open = Dataset::open(dataset).unwrap();
+        let id = SceneId::new(scene).unwrap();
+        let scene = open.scenes.iter().find(|scene| scene.id == id).unwrap().clone();
+        let folder = open.folder(&id);
+        let renderer = open.file.scored_renderer.clone().expect("a dataset whose light was rendered");
+        let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+        let truth = |view: &View| ViewTruth::read(&folder, view).unwrap();
+        let light = |view: &View| RgbTruth::read(&folder, &renderer, view).unwrap();
+        Self {
+            dataset: dataset.to_owned(),
+            submission: submission.to_owned(),
+            weights,
+            atlases: glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect(),
+            predicted: read_scene(submission, &scene),
+            protocol: Protocol::named("mateval-1").unwrap(),
+            truths: scene.views.iter().map(truth).collect(),
+            light: scene.views.iter().map(light).collect(),
+            world,
+            folder,
+            renderer,
+            scene,
+        }
+    }
+
+    pub fn cameras(&self) -> Vec<Camera> {
+        self.scene.views.iter().map(|view| view.camera).collect()
+    }
+
+    /// Whether a stage replaces the room's own lights in track `fitted`.
+    pub fn is_staged(&self) -> bool {
+        self.scene.source.kind != "bitterli"
+    }
+
+    /// The stage, as scoring sets it up; empty where the scene's own lights are fitted.
+    pub fn stage(&self) -> Vec<NamedLight> {
+        if !self.is_staged() {
+            return Vec::new();
+        }
+        let instances = self.scene.instances.iter().enumerate();
+        let architecture: Vec<usize> =
+            instances.filter(|(_, instance)| instance.category.is_none()).map(|(surface, _)| surface).collect();
+        light_stage::lights(&self.protocol.light.stage, &self.world, &architecture, &self.cameras())
+    }
+
+    /// Surfaces that glow, and are hidden from the camera alone.
+    pub fn hidden_lights(&self) -> Vec<usize> {
+        let groups = self.world.scene().lights.iter().filter(|group| !group.camera_visible);
+        let surfaces = groups.filter_map(|group| match &group.emission {
+            Emission::Area { surfaces, .. } => Some(surfaces.iter().map(|surface| surface.0)),
+            _ => None,
+        });
+        surfaces.flatten().collect()
+    }
+}

@@ -1,0 +1,184 @@
+//! The truth is never beaten: not by grey, and not by itself after damage, the worse the more of it.
+//!
+//! All of them are scored together, on the same paths, so that what differs is the damage and little of the noise.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mateval_eval::result::{PictureValue, ProtocolResult, Region};
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{LinearRgb, Picture, Wrap, png_io};
+
+use super::kept_folder::kept_folder;
+use super::sample::{dataset, hasty, plan, scored, write_changed, write_grey, write_truth};
+
+/// What is done to the truth, and how many strengths of it there are.
+const KINDS: [(&str, usize); 7] =
+    [("grey", 1), ("blurred", 2), ("tinted", 2), ("shaded", 2), ("replaced", 2), ("smoother", 2), ("metallic", 2)];
+
+/// Writes the truth after damage; 0 is the least strength.
+fn write_damaged(kind: &str, strength: usize, out: &Path) {
+    match kind {
+        "grey" => write_grey(out),
+        "blurred" => write_changed(out, |truth| blurred(truth, [2, 6][strength])),
+        "tinted" => write_changed(out, |truth| tinted(truth, [[1.0, 0.8, 0.6], [1.0, 0.6, 0.3]][strength])),
+        "shaded" => write_changed(out, |truth| shaded(truth, [0.4, 0.8][strength])),
+        "replaced" => write_changed(out, |truth| replaced(truth, [1, 2][strength])),
+        "smoother" => write_moved(out, "roughness", [0.4, 0.8][strength], 0.0),
+        _ => write_moved(out, "metallic", [0.4, 0.8][strength], 1.0),
+    }
+}
+
+/// By a box of 2 `radius` + 1 texels a side.
+fn blurred(truth: &Picture<LinearRgb>, radius: usize) -> Picture<LinearRgb> {
+    let around = |at: usize, end: usize| at.saturating_sub(radius)..(at + radius + 1).min(end);
+    Picture::from_fn(truth.width(), truth.height(), |x, y| {
+        let rows = around(y, truth.height());
+        let texels = rows.flat_map(|y| around(x, truth.width()).map(move |x| truth.get(x, y).0));
+        let (sum, count) =
+            texels.fold(([0.0; 3], 0.0), |(sum, count), rgb| ([0, 1, 2].map(|c| sum[c] + rgb[c]), count + 1.0));
+        LinearRgb(sum.map(|v: f32| v / count))
+    })
+}
+
+fn tinted(truth: &Picture<LinearRgb>, factor: [f32; 3]) -> Picture<LinearRgb> {
+    truth.map(|LinearRgb(rgb)| LinearRgb([0, 1, 2].map(|c| rgb[c] * factor[c])))
+}
+
+/// By light that was left in: less of it towards one corner of the atlas, down to 1 - `depth`.
+fn shaded(truth: &Picture<LinearRgb>, depth: f32) -> Picture<LinearRgb> {
+    let (width, height) = (truth.width() as f32, truth.height() as f32);
+    Picture::from_fn(truth.width(), truth.height(), |x, y| {
+        let light = 1.0 - depth * 0.5 * (x as f32 / width + y as f32 / height);
+        LinearRgb(truth.get(x, y).0.map(|v| v * light))
+    })
+}
+
+/// By grey, so many of every four squares.
+fn replaced(truth: &Picture<LinearRgb>, quarters: usize) -> Picture<LinearRgb> {
+    Picture::from_fn(truth.width(), truth.height(), |x, y| {
+        if (x / 8 + 2 * (y / 8)) % 4 < quarters { LinearRgb([0.5; 3]) } else { truth.get(x, y) }
+    })
+}
+
+/// The truth with every value of `map` moved by `share` of its way to `end`.
+fn write_moved(out: &Path, map: &str, share: f32, end: f32) {
+    write_truth(out);
+    for scene in &dataset().scenes {
+        for instance in scene.instances.iter().filter(|instance| instance.atlas.is_some()) {
+            let path = out.join(format!("scenes/{}/{}/{map}.png", scene.id, instance.id));
+            let texture = read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap();
+            let moved = |value: f32| ((value + share * (end - value)) * 255.0).round() as u8;
+            let texels = Picture::from_fn(texture.width(), texture.height(), |x, y| moved(texture.texel(x, y)[0]));
+            png_io::write_grey_bytes(&path, &texels).unwrap();
+        }
+    }
+}
+
+/// The truth's result, and by kind those of its strengths.
+struct Results {
+    truth: ProtocolResult,
+    damaged: Vec<(&'static str, Vec<ProtocolResult>)>,
+}
+
+fn results() -> Results {
+    let folder = kept_folder("damages");
+    write_truth(&folder.join("gt"));
+    let places: Vec<(&str, usize, PathBuf)> = KINDS
+        .iter()
+        .flat_map(|&(kind, strengths)| (0..strengths).map(move |strength| (kind, strength)))
+        .map(|(kind, strength)| (kind, strength, folder.join(format!("{kind}_{strength}"))))
+        .collect();
+    places.iter().for_each(|(kind, strength, place)| write_damaged(kind, *strength, place));
+    let truth = folder.join("gt");
+    let submissions: Vec<&Path> =
+        std::iter::once(truth.as_path()).chain(places.iter().map(|(.., place)| place.as_path())).collect();
+    let mut protocol = hasty();
+    protocol.light.noise.least_samples = protocol.light.noise.most_samples;
+    let mut all = scored(&plan(&submissions, &protocol, &[]))
+        .into_iter()
+        .map(|mut result| result.protocols.remove("mateval-1").unwrap());
+    let truth = all.next().unwrap();
+    let damaged = KINDS.iter().map(|&(kind, strengths)| (kind, all.by_ref().take(strengths).collect())).collect();
+    Results { truth, damaged }
+}
+
+/// Standard errors of the summary's values that render noise makes: of each picture's, averaged as the values are, as if
+/// all were off by the same noise.
+fn noise(result: &ProtocolResult) -> BTreeMap<String, f64> {
+    let mut scenes: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+    for picture in result.pictures.iter().filter(|picture| picture.value.is_some()) {
+        let error = picture.noise.as_ref().map_or(0.0, |noise| noise.standard_error);
+        scenes.entry((key(picture), picture.scene.to_string())).or_default().push(error);
+    }
+    let mut summary: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for ((key, _), errors) in scenes {
+        summary.entry(key).or_default().push(mean(&errors));
+    }
+    summary.into_iter().map(|(key, errors)| (key, mean(&errors))).collect()
+}
+
+fn key(picture: &PictureValue) -> String {
+    let views = match (picture.region, picture.view.as_str()) {
+        (Region::Unobserved, _) => "unobserved",
+        (_, "input") => "input",
+        _ => "novel",
+    };
+    format!("{}.{views}.{}", picture.picture, picture.metric)
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// By how much `a` is better than `b`, in the metric's own units.
+fn lead(key: &str, a: &ProtocolResult, b: &ProtocolResult) -> f64 {
+    let less_is_better = key.ends_with("mse");
+    let difference = a.summary[key] - b.summary[key];
+    if less_is_better { -difference } else { difference }
+}
+
+/// Pictures whose squared error a kind of damage has to raise, the more of it the more.
+fn told_by(kind: &str) -> &'static [&'static str] {
+    match kind {
+        "smoother" => &["roughness", "texture_roughness"],
+        "metallic" => &["metallic", "texture_metallic", "rgb_true", "rgb_relit"],
+        _ => &["albedo", "texture_base_color", "rgb_true", "rgb_fitted", "rgb_relit"],
+    }
+}
+
+#[test]
+fn the_truth_is_never_beaten_and_more_damage_is_worse() {
+    let Results { truth, damaged } = results();
+    let noise = noise(&truth);
+    let (mut wrong, mut compared) = (Vec::new(), 0);
+    let mut hold = |what: &str, key: &str, lead: f64, least: f64| {
+        compared += 1;
+        if lead < least {
+            wrong.push(format!("{what}: {key}: {lead:.2e}, expected {least:.2e} or more"));
+        }
+    };
+    for (kind, strengths) in &damaged {
+        for (strength, damage) in strengths.iter().enumerate() {
+            let what = format!("{kind} {strength}");
+            for key in truth.summary.keys() {
+                // What SSIM owes to noise is not told with it.
+                let own = if key.ends_with("ssim") { 0.01 } else { noise.get(key).copied().unwrap_or(0.0) };
+                hold(&what, key, lead(key, &truth, damage), -3.0 * own);
+            }
+            let before = strength.checked_sub(1).map_or(&truth, |less| &strengths[less]);
+            for key in truth.summary.keys().filter(|key| key.ends_with(".mse")) {
+                let picture = key.split('.').next().unwrap();
+                if told_by(kind).contains(&picture) {
+                    hold(&what, key, lead(key, before, damage), f64::MIN_POSITIVE);
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "of {compared} comparisons these fail:\n{}", wrong.join("\n"));
+    assert!(compared > 1000, "{compared}");
+    // The twin: the worst damage as if it were the truth.
+    let worst = &damaged[3].1[1];
+    let beaten = truth.summary.keys().filter(|key| lead(key, worst, &truth) < -3.0 * noise.get(*key).unwrap_or(&0.0));
+    assert!(beaten.count() > 20);
+}

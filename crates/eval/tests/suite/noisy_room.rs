@@ -1,0 +1,168 @@
+//! The room of the sample, rendered over and over: its own materials, and others to be compared with them.
+//!
+//! All materials are rendered with every seed. Seeds come in twos: a prediction is held against the truth of the other
+//! seed of the two, so that they share no noise, and one two has nothing to do with the next.
+
+use std::ops::Range;
+use std::sync::{Arc, LazyLock};
+
+use mateval_eval::noise_blocks::noise_blocks;
+use mateval_eval::prediction::{PredictedMaterial, read_scene};
+use mateval_eval::truth::ViewTruth;
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, Texels, Texture};
+use mateval_metrics::Halves;
+use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
+use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
+
+use super::kept_folder::kept_folder;
+use super::sample::{dataset, hasty, write_truth};
+
+/// How often everything is rendered.
+pub const SEEDS: usize = 50;
+
+/// The truth comes first; then what is compared with it: far from it (about 18 dB), and near (about 35 dB).
+pub const OTHERS: [usize; 2] = [1, 2];
+
+/// What the truth's base colours are multiplied by.
+const FACTORS: [[f32; 3]; 3] = [[1.0; 3], [0.6, 0.7, 0.8], [0.97, 0.95, 0.93]];
+
+/// Samples a pixel of each half of what stands for no noise.
+const MANY: u32 = 2048;
+
+/// Of the sample's pictures, so that thousands of samples take seconds.
+const SCALE: f64 = 0.75;
+
+/// The input view and two more.
+const VIEWS: usize = 3;
+
+/// Two independent renders of one view.
+pub type Pair = [Picture<LinearRgb>; 2];
+
+/// The room under its own lights.
+pub struct Room {
+    cameras: Vec<Camera>,
+    /// By view.
+    pub valid: Vec<Mask>,
+    /// By view.
+    pub blocks: Vec<Picture<u32>>,
+    world: World,
+    repaint: Repaint,
+}
+
+/// Renders of one number of samples.
+pub struct Level {
+    /// A pixel of each half.
+    pub samples: u32,
+    /// By prediction (the truth is the first), view and seed.
+    pub pairs: Vec<Vec<Vec<Pair>>>,
+}
+
+pub static ROOM: LazyLock<Room> = LazyLock::new(Room::new);
+
+/// 4, 16 and 64 samples.
+pub static LEVELS: LazyLock<[Level; 3]> = LazyLock::new(|| [4, 16, 64].map(|samples| ROOM.level(samples)));
+
+/// By prediction and view, of 4096 samples in all; one set of paths for all predictions, so that their difference has
+/// less noise still.
+pub static EXACT: LazyLock<Vec<Vec<Pair>>> = LazyLock::new(|| {
+    let all = ROOM.pictures(0..FACTORS.len(), MANY, 0..2);
+    all.into_iter().map(|views| views.into_iter().map(|view| in_pairs(view).remove(0)).collect()).collect()
+});
+
+impl Room {
+    fn new() -> Self {
+        let scene = dataset().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap();
+        assert_eq!(scene.exposure, 1.0, "pictures are compared as they are");
+        let folder = dataset().folder(&scene.id);
+        let submission = kept_folder("noise").join("gt");
+        write_truth(&submission);
+        let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
+        let nodes = glb::read(&folder.instances()).unwrap();
+        let atlases: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
+        let coats =
+            read_scene(&submission, scene).materials.iter().map(|material| material.as_ref().map(coat)).collect();
+        let repaint = Repaint::new(&world, &atlases, coats, hasty().light.flavour).unwrap();
+        let views = &scene.views[..VIEWS];
+        let cameras: Vec<Camera> = views.iter().map(|view| smaller(&view.camera)).collect();
+        let valid = views.iter().zip(&cameras).map(|(view, camera)| {
+            let valid = ViewTruth::read(&folder, view).unwrap().valid;
+            let place = |at: usize| ((at as f64 + 0.5) / SCALE) as usize;
+            let k = camera.intrinsics;
+            Mask::from_fn(k.width as usize, k.height as usize, |x, y| valid.get(place(x), place(y)))
+        });
+        let valid = valid.collect();
+        let blocks = noise_blocks(&cameras, hasty().light.noise.block_pixels);
+        Self { cameras, valid, blocks, world, repaint }
+    }
+
+    /// By prediction and view the pictures of every seed; one bounce is noise enough.
+    fn pictures(&self, which: Range<usize>, samples: u32, seeds: Range<u64>) -> Vec<Vec<Vec<Picture<LinearRgb>>>> {
+        let mut settings = hasty().light.settings(samples);
+        settings.max_bounces = 1;
+        let seeds: Vec<u64> = seeds.map(|seed| (u64::from(samples) << 32) + seed).collect();
+        let groups = LightGroups::together(self.world.emitters().groups());
+        let (lighting, quiet) = (Lighting::Apart(&groups), |_: usize, _: usize| ());
+        let done =
+            render_repainted(&self.world, &self.repaint, which, &self.cameras, lighting, &settings, &seeds, &quiet);
+        let view = |view: ViewLight| view.halves.into_iter().map(|half| half.basis.sum()).collect::<Vec<_>>();
+        done.unwrap().into_iter().map(|render| render.views.into_iter().map(view).collect()).collect()
+    }
+
+    fn level(&self, samples: u32) -> Level {
+        let all = self.pictures(0..FACTORS.len(), samples, 0..2 * SEEDS as u64);
+        Level { samples, pairs: all.into_iter().map(|views| views.into_iter().map(in_pairs).collect()).collect() }
+    }
+}
+
+impl Level {
+    /// A prediction of one seed and the truth of another, seed by seed.
+    pub fn against(&self, other: usize, view: usize) -> impl Iterator<Item = (&Pair, &Pair)> {
+        let truths = &self.pairs[0][view];
+        self.pairs[other][view].iter().enumerate().map(|(seed, pair)| (pair, &truths[seed ^ 1]))
+    }
+}
+
+fn smaller(camera: &Camera) -> Camera {
+    let k = camera.intrinsics;
+    let side = |pixels: u32| (f64::from(pixels) * SCALE) as u32;
+    let (width, height, [fx, fy, cx, cy]) =
+        (side(k.width), side(k.height), [k.fx, k.fy, k.cx, k.cy].map(|v| v * SCALE));
+    Camera { intrinsics: Intrinsics { width, height, fx, fy, cx, cy }, ..*camera }
+}
+
+fn coat(material: &PredictedMaterial) -> Coat {
+    Coat {
+        base_colors: FACTORS.map(|factor| scaled(&material.base_color, factor)).to_vec(),
+        roughness: material.roughness.clone(),
+        metallic: material.metallic.clone(),
+    }
+}
+
+fn scaled(texture: &Texture, factor: [f32; 3]) -> Texture {
+    let (width, height) = (texture.width(), texture.height());
+    let scaled = |texel: [f32; 3]| [0, 1, 2].map(|c| texel[c] * factor[c]);
+    let texels = (0..width * height).map(|at| scaled(texture.texel(at % width, at / width))).collect();
+    Texture::new(width, height, Texels::Linear(texels), texture.wrap()).unwrap()
+}
+
+fn in_pairs(pictures: Vec<Picture<LinearRgb>>) -> Vec<Pair> {
+    pictures.chunks(2).map(|two| [two[0].clone(), two[1].clone()]).collect()
+}
+
+/// As metrics take them.
+pub fn halves<P>(pair: &[Picture<P>; 2]) -> Halves<'_, P> {
+    Halves { a: &pair[0], b: &pair[1] }
+}
+
+/// Clipped and sRGB-encoded.
+pub fn encoded(pair: &Pair) -> [Picture<SrgbRgb>; 2] {
+    [0, 1].map(|half| pair[half].to_srgb())
+}
+
+/// Of both halves.
+pub fn mean_of(pair: &Pair) -> Picture<LinearRgb> {
+    Picture::from_fn(pair[0].width(), pair[0].height(), |x, y| {
+        let [LinearRgb(a), LinearRgb(b)] = [0, 1].map(|half| pair[half].get(x, y));
+        LinearRgb([0, 1, 2].map(|c| 0.5 * (a[c] + b[c])))
+    })
+}

@@ -1,0 +1,45 @@
+#!/bin/sh
+# What scoring a room costs, ours and with other projects' parts (Mitsuba, scikit-image, lpips): installs those into
+# target/peers_score (2.9 GB to fetch, 5.8 GB on disk), makes a dataset of two real rooms and a submission, and runs the
+# bench. MATEVAL_DATA is where the rooms are; beside the project where it is not set. Arguments go to the bench: `full`
+# times every iteration of the fit.
+set -eu
+cd "$(dirname "$0")/.."
+tools/setup.sh
+# mitsuba: libatomic1, and LLVM 19 for its fast variant.
+tools/apt_install.sh libatomic1 libllvm19 python3-venv
+
+data="${MATEVAL_DATA:-$PWD/../shared/data}"
+if ! [ -d "$data/3d-front" ]; then
+    echo "SKIPPED: no 3d-front in '$data'; set MATEVAL_DATA" >&2
+    exit 0
+fi
+
+venv=target/peers_score
+requirements=tests/peers/requirements_score.txt
+if ! cmp -s "$requirements" "$venv/requirements.txt"; then
+    rm -rf "$venv"
+    python3.11 -m venv "$venv"
+    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
+    cp "$requirements" "$venv/requirements.txt"
+fi
+
+rooms=target/whole_room
+recipe=crates/eval/benches/whole_room/recipe.toml
+if ! cmp -s "$recipe" "$rooms/recipe.toml"; then
+    rm -rf "$rooms"
+    mkdir -p "$rooms"
+    cargo run --quiet --release -- prep build "$recipe" --source "$data" --out "$rooms/dataset"
+    cargo run --quiet --release -- prep render "$rooms/dataset" --renderer builtin
+    cargo run --quiet --release -- baseline nn --dataset "$rooms/dataset" --out "$rooms/nn"
+    cp "$recipe" "$rooms/recipe.toml"
+fi
+
+MATEVAL_CACHE="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
+MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python"
+export MATEVAL_CACHE MATEVAL_PEERS_PYTHON
+for scene in living staircase2; do
+    echo "== $scene"
+    # Benches run in their crate's folder.
+    cargo bench --quiet --workspace --bench whole_room -- "$PWD/$rooms/dataset" "$scene" "$PWD/$rooms/nn" "$@"
+done
