@@ -314,7 +314,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     /// Adds the lights of a stage that the ray passes before it meets a surface, which is `end` metres away.
     fn add_stage(&mut self, path: &Path<K>, ray: &Ray, end: f32) {
         let Some(Scattered { from, .. }) = path.scattered else { return };
-        for emitted in self.world.emitters().from_stage(&Ray::new(ray.origin(), ray.direction(), end), from) {
+        for emitted in self.world.emitters().stage_along(&Ray::new(ray.origin(), ray.direction(), end), from) {
             self.add_met(path, path.stage_throughputs, &emitted);
         }
     }

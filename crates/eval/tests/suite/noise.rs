@@ -1,5 +1,7 @@
 //! Render noise, of the tracer that scores: it is as large as it is said to be, and moves no mean.
 
+#![allow(clippy::print_stdout, reason = "what was measured is told")]
+
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_metrics::lpips::MeanAndHalves;

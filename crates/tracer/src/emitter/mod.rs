@@ -280,7 +280,7 @@ impl Emitters {
 
     /// What the lights of a stage that `ray` meets send back to the place `from`. They hide nothing, one another neither,
     /// so all of them count; in the order of the lights.
-    pub(crate) fn from_stage(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = Emitted> + '_ {
+    pub(crate) fn stage_along(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = Emitted> + '_ {
         let met = std::cell::RefCell::new(Vec::new());
         if let Some(stage) = &self.stage {
             // Taking none, it is asked about all.
