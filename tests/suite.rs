@@ -20,7 +20,10 @@ mod suite {
     mod importing;
     mod kept_folder;
     mod lifting;
+    mod linting;
     mod mitsuba_export;
+    #[path = "../../crates/eval/tests/suite/packed.rs"]
+    mod packed;
     mod part_labels;
     mod planted;
     mod publish;

@@ -24,9 +24,7 @@ pub fn mateval() -> Command {
 
 /// Runs what was put together.
 pub fn run(command: &mut Command) -> Run {
-    let Output { status, stdout, stderr } = command.output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    Run { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
+    Run::of(command.output().unwrap())
 }
 
 /// `mateval` with these words.
@@ -35,6 +33,12 @@ pub fn run_words<W: AsRef<OsStr>>(words: impl IntoIterator<Item = W>) -> Run {
 }
 
 impl Run {
+    /// What a process left.
+    pub fn of(Output { status, stdout, stderr }: Output) -> Self {
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        Self { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
+    }
+
     /// Panics with all that was printed where the exit code is another one.
     #[track_caller]
     pub fn ends_with(self, code: i32) -> Self {

@@ -19,7 +19,7 @@ fn the_version() {
 #[test]
 fn what_is_not_there() {
     let not_there = "No such file or directory (os error 2)\n";
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
         (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
         (
@@ -32,6 +32,10 @@ fn what_is_not_there() {
             "cannot export to Mitsuba: cannot read 'nowhere/dataset.json': ",
         ),
         (&["eval", "image", "a.png", "b.png"], "cannot read 'a.png': "),
+        (
+            &["eval", "lint", "grey", "--dataset", "nowhere"],
+            "cannot open the dataset: cannot read 'nowhere/dataset.json': ",
+        ),
         (&["eval", "tables", "RESULT.json"], "cannot read 'RESULT.json': "),
         (
             &["eval", "score", "grey", "--dataset", "nowhere", "--out", "RESULT.json"],
@@ -71,7 +75,7 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 15] = [
+    let subcommands: [&[&str]; 16] = [
         &["demo"],
         &["sample"],
         &["prep"],
@@ -84,6 +88,7 @@ fn every_subcommand_has_help() {
         &["prep", "mitsuba"],
         &["baseline"],
         &["eval", "image"],
+        &["eval", "lint"],
         &["eval", "score"],
         &["eval", "tables"],
         &["eval", "explain"],

@@ -1,11 +1,13 @@
 //! `mateval eval`.
 
+mod lint;
 mod pictures;
 mod verify;
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_eval::archive::{self, Opened};
 use mateval_eval::explain::{self, ExplainPlan};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
@@ -27,6 +29,8 @@ use crate::weights;
 pub enum Command {
     /// The metrics of two pictures, with both mask rules.
     Image(ImageArgs),
+    /// Looks a submission over before it is scored: every fault at once, in seconds; exit code 1 where there is an error.
+    Lint(lint::LintArgs),
     /// Scores submissions on a dataset.
     Score(ScoreArgs),
     /// Albedo or light of truth and submissions side by side, and where they err: two PNG a scene and picture.
@@ -72,7 +76,7 @@ enum ImageFormat {
 /// What `eval score` is given.
 #[derive(clap::Args)]
 pub struct ScoreArgs {
-    /// Submission folders.
+    /// Submissions: folders, .zip or .tar.gz.
     #[arg(required = true)]
     pub submissions: Vec<PathBuf>,
     /// The dataset's folder.
@@ -163,6 +167,7 @@ enum TableName {
 pub fn run(command: &Command) -> anyhow::Result<Outcome> {
     match command {
         Command::Image(args) => image(args),
+        Command::Lint(args) => lint::run(args),
         Command::Pictures(args) => pictures::pictures(args),
         Command::Score(args) => score_submissions(args).map(|_| Outcome::Good),
         Command::Tables(args) => print_tables(args),
@@ -230,9 +235,11 @@ pub fn score_submissions(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let cache = args.cache.clone().unwrap_or_else(|| beside(&args.out));
     std::fs::create_dir_all(&cache).with_context(|| format!("cannot make '{}'", cache.display()))?;
+    let work = std::env::temp_dir();
+    let opened = args.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
     let plan = ScorePlan {
         dataset: &dataset,
-        submissions: args.submissions.iter().map(PathBuf::as_path).collect(),
+        submissions: opened.iter().map(Opened::root).collect(),
         protocols,
         scenes: args.scenes.clone(),
         lpips: weights::load(Net::Alex),
@@ -288,9 +295,12 @@ fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
     Ok(outs)
 }
 
+/// The name of a submission's folder or archive, without the archive's ending.
 fn folder_name(path: &Path) -> String {
     let whole = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    whole.file_name().map_or_else(|| "submission".to_owned(), |name| name.to_string_lossy().into_owned())
+    let name = whole.file_name().map_or_else(|| "submission".to_owned(), |name| name.to_string_lossy().into_owned());
+    let stem = [".zip", ".tar.gz", ".tgz"].iter().find_map(|ending| name.strip_suffix(ending).map(str::to_owned));
+    stem.unwrap_or(name)
 }
 
 fn print_tables(args: &TablesArgs) -> anyhow::Result<Outcome> {

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::explain::file::ExplainFile;
+use mateval_eval::lint::LintFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
@@ -44,7 +45,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 17] {
+fn schemas() -> [(&'static str, Schema); 18] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -56,6 +57,7 @@ fn schemas() -> [(&'static str, Schema); 17] {
         ("result", schema_for!(ResultFile)),
         ("explain", schema_for!(ExplainFile)),
         ("verification", schema_for!(VerificationFile)),
+        ("lint", schema_for!(LintFile)),
         ("stats", schema_for!(StatsFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),

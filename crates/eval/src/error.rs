@@ -15,6 +15,14 @@ pub enum EvalError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// An archive that is not unpacked.
+    #[error("'{}' is not unpacked:{}", path.display(), mateval_scene::Finding::list(findings))]
+    Archive {
+        /// The archive.
+        path: PathBuf,
+        /// What is wrong with it.
+        findings: Vec<mateval_scene::Finding>,
+    },
     /// What was asked for does not go together.
     #[error("{0}")]
     Invalid(String),

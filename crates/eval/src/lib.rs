@@ -8,6 +8,7 @@
 //! [`score`] goes through the dataset, [`tables`] and [`strips`] show, [`explain`] tells kinds of error apart.
 
 pub mod alignment;
+pub mod archive;
 mod coverage;
 pub mod error;
 pub mod explain;
@@ -16,6 +17,8 @@ pub mod light_fit;
 pub mod light_rules;
 mod light_score;
 pub mod light_stage;
+pub mod lint;
+pub mod map_file;
 pub mod material_pictures;
 pub mod measure;
 pub mod noise_blocks;

@@ -3,18 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::{Texels, Texture, Wrap, exr_io};
+use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
-use mateval_scene::submission::{GREY, MAP_SIZES, Map, instance_folder};
+use mateval_scene::submission::{GREY, Map};
 use mateval_scene::{Finding, Severity};
 
-/// What a base colour may be, linear; a stray value must not swamp the mean over all pixels.
-pub const BASE_COLOR_RANGE: std::ops::RangeInclusive<f32> = -1.0..=16.0;
-
-/// What a roughness and a metallic may be.
-pub const SCALAR_RANGE: std::ops::RangeInclusive<f32> = 0.0..=1.0;
+use crate::map_file::{self, MapFile, candidates, check_place, is_there};
 
 /// What a missing roughness scores as; perceptual.
 pub const MISSING_ROUGHNESS: f32 = 0.5;
@@ -58,15 +53,19 @@ pub struct PredictedScene {
     pub files: Vec<(String, String)>,
 }
 
+/// Most bytes that the texels of a scene's maps may take in memory together.
+pub const MAX_SCENE_BYTES: usize = 8 << 30;
+
 /// Reads the maps of one scene.
 pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
     let (mut findings, mut files) = (Vec::new(), Vec::new());
+    let mut room = Room { bytes: MAX_SCENE_BYTES };
     let materials: Vec<Option<PredictedMaterial>> = scene
         .instances
         .iter()
         .map(|instance| {
             instance.atlas.as_ref()?;
-            let mut map = |map| read_map(submission, scene, instance, map, &mut findings);
+            let mut map = |map| read_map(submission, scene, instance, map, &mut room, &mut findings);
             let [base_color, roughness, metallic] = Map::ALL.map(&mut map);
             files.extend(files_there(submission, scene, instance));
             Some(PredictedMaterial { base_color, roughness, metallic })
@@ -81,14 +80,21 @@ fn read_map(
     scene: &SceneFile,
     instance: &Instance,
     map: Map,
+    room: &mut Room,
     findings: &mut Vec<Finding>,
 ) -> Texture {
-    let candidates = candidates(submission, scene, instance, map);
-    let present: Vec<&PathBuf> = candidates.iter().filter(|path| path.is_file()).collect();
+    let candidates = candidates(submission, &scene.id, &instance.id, map);
+    let present: Vec<&PathBuf> = candidates.iter().filter(|path| is_there(path)).collect();
     let fault = match present.as_slice() {
-        [path] => match read_sound(path, map) {
-            Ok(texture) => return texture,
-            Err(message) => replaced("unsound_map", &relative(submission, path), map, &message),
+        [path] => match map_file::read(submission, path, map) {
+            Ok(file) => match room.holding(in_memory(file, map)) {
+                Some(texture) => return texture,
+                None => replaced("unsound_map", &relative(submission, path), map, &Room::full()),
+            },
+            Err(fault) => {
+                let finding = replaced("unsound_map", &relative(submission, path), map, &fault.message);
+                Finding { place: fault.place, ..finding }
+            }
         },
         // The format lets the others be left out.
         [] if map != Map::BaseColor => return default_of(map),
@@ -103,6 +109,24 @@ fn read_map(
     };
     findings.push(fault);
     default_of(map)
+}
+
+/// What is left for a scene's texels in memory.
+pub(crate) struct Room {
+    pub(crate) bytes: usize,
+}
+
+impl Room {
+    /// The texture, if there is room for it.
+    pub(crate) fn holding(&mut self, texture: Texture) -> Option<Texture> {
+        self.bytes = self.bytes.checked_sub(texture.bytes().len())?;
+        Some(texture)
+    }
+
+    /// What is wrong where there is none.
+    pub(crate) fn full() -> String {
+        format!("the maps of its scene take more than {MAX_SCENE_BYTES} bytes together")
+    }
 }
 
 /// What scores where a map is missing or unsound.
@@ -120,8 +144,9 @@ fn one_texel(value: f32) -> Texture {
 
 /// Every map that is there with its hash: what a result was made of, whatever was made of it.
 fn files_there(submission: &Path, scene: &SceneFile, instance: &Instance) -> Vec<(String, String)> {
-    let paths = Map::ALL.into_iter().flat_map(|map| candidates(submission, scene, instance, map));
-    paths.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
+    let paths = Map::ALL.into_iter().flat_map(|map| candidates(submission, &scene.id, &instance.id, map));
+    let inside = paths.filter(|path| check_place(submission, path).is_ok());
+    inside.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
 }
 
 /// Path in the submission and SHA-256 of every map of the scene that is there, as [`read_scene`] tells them.
@@ -130,67 +155,14 @@ pub(crate) fn map_files(submission: &Path, scene: &SceneFile) -> Vec<(String, St
     recovered.flat_map(|instance| files_there(submission, scene, instance)).collect()
 }
 
-/// Where a map may lie.
-fn candidates(submission: &Path, scene: &SceneFile, instance: &Instance, map: Map) -> [PathBuf; 2] {
-    let folder = instance_folder(submission, &scene.id, &instance.id);
-    ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
-}
-
 fn relative(submission: &Path, path: &Path) -> String {
     path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
 }
 
-/// The texture, or what is wrong with it.
-fn read_sound(path: &Path, map: Map) -> Result<Texture, String> {
-    let texture = if map == Map::BaseColor {
-        read_texture(path, Encoding::Srgb, Wrap::Clamp).map_err(|error| error.to_string())?
-    } else {
-        read_scalar(path)?
-    };
-    let (width, height) = (texture.width(), texture.height());
-    if width != height || !MAP_SIZES.contains(&width) {
-        let (least, most) = (MAP_SIZES.start(), MAP_SIZES.end());
-        return Err(format!("{width}x{height} texels; expected a square of {least} to {most} a side"));
-    }
-    let (name, range) = match map {
-        Map::BaseColor => ("base colour", BASE_COLOR_RANGE),
-        Map::Roughness => ("roughness", SCALAR_RANGE),
-        Map::Metallic => ("metallic", SCALAR_RANGE),
-    };
-    let stray = match texture.texels() {
-        Texels::Linear(values) => values.as_flattened().iter().find(|value| !range.contains(value)),
-        Texels::Grey(values) => values.iter().find(|value| !range.contains(value)),
-        _ => None,
-    };
-    if let Some(value) = stray {
-        return Err(format!("a {name} of {value}; expected {} to {}", range.start(), range.end()));
-    }
-    Ok(if map == Map::BaseColor { texture.collapsed() } else { as_scalars(&texture) })
-}
-
-/// A texture of scalars: channel `V` (or `Y`) of an EXR, the first channel of anything else.
-fn read_scalar(path: &Path) -> Result<Texture, String> {
-    if path.extension().is_none_or(|ending| ending != "exr") {
-        return read_texture(path, Encoding::Linear, Wrap::Clamp).map_err(|error| error.to_string());
-    }
-    let picture = exr_io::read_scalar(path).map_err(|error| error.to_string())?;
-    let (width, height) = (picture.width(), picture.height());
-    let texels = Texels::Grey(picture.into_pixels());
-    Texture::new(width, height, texels, Wrap::Clamp).map_err(|error| error.to_string())
-}
-
-/// The first channel alone, in as little memory as holds it. Equal values everywhere become one float, whatever they were
-/// stored as.
-fn as_scalars(texture: &Texture) -> Texture {
-    let (width, height) = (texture.width(), texture.height());
-    let texels = match texture.texels() {
-        Texels::Grey8(bytes) => Texels::Grey8(bytes.clone()),
-        Texels::Linear8(bytes) => Texels::Grey8(bytes.iter().map(|byte| byte[0]).collect()),
-        _ => Texels::Grey((0..width * height).map(|at| texture.texel(at % width, at / width)[0]).collect()),
-    };
-    let scalars =
-        Texture::new(width, height, texels, Wrap::Clamp).expect("there is a scalar for every texel").collapsed();
-    if scalars.width() == 1 { one_texel(scalars.texel(0, 0)[0]) } else { scalars }
+/// In as little memory as holds it. Equal scalars everywhere become one float, whatever they were stored as.
+pub(crate) fn in_memory(file: MapFile, map: Map) -> Texture {
+    let texture = file.texture.collapsed();
+    if map != Map::BaseColor && texture.width() == 1 { one_texel(texture.texel(0, 0)[0]) } else { texture }
 }
 
 fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
@@ -222,7 +194,7 @@ fn replaced(code: &str, file: &str, map: Map, message: &str) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use mateval_image::exr_io::Precision;
+    use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
     use serde_json::json;
 
@@ -305,6 +277,14 @@ mod tests {
         assert_eq!(read.findings, Vec::new());
         // Three of b, one of a; the twin: with all of them there are six.
         assert_eq!((read.files.len(), super::read_scene(sound().path(), &scene()).files.len()), (4, 6));
+    }
+
+    #[test]
+    fn a_scene_has_so_much_room_and_no_more() {
+        let texture = |side: usize| Texture::new(side, side, Texels::Grey8(vec![0; side * side]), Wrap::Clamp).unwrap();
+        let mut room = Room { bytes: 150 };
+        assert!(room.holding(texture(10)).is_some() && room.holding(texture(8)).is_none());
+        assert!(room.holding(texture(7)).is_some() && room.bytes == 1);
     }
 
     /// A map, the finding's code, a word of its action, and the fault.

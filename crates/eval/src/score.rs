@@ -9,11 +9,12 @@ use mateval_metrics::Lpips;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::Dataset;
-use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
-use mateval_scene::{Finding, Progress, SceneError, SceneId, Severity, json};
+use mateval_scene::submission::{SUBMISSION, SubmissionFile};
+use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
+use crate::map_file::{MapFault, check_place, is_there};
 use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
 use crate::prediction::{PredictedScene, map_files, read_scene};
 use crate::protocol::Protocol;
@@ -195,12 +196,18 @@ impl ScorePlan<'_> {
     }
 }
 
-fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
-    let file: SubmissionFile = json::read(&path.join(SUBMISSION))?;
-    if file.format != SUBMISSION_FORMAT {
-        let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", file.format);
-        return Err(SceneError::Unsupported { path: path.join(SUBMISSION), what }.into());
+/// Reads `submission.json`, if it is not a link that leads out.
+fn read_submission_file(submission: &Path) -> Result<SubmissionFile, EvalError> {
+    let place = submission.join(SUBMISSION);
+    if is_there(&place) {
+        let invalid = |fault: MapFault| EvalError::Invalid(format!("'{}': {}", place.display(), fault.message));
+        check_place(submission, &place).map_err(invalid)?;
     }
+    Ok(SubmissionFile::read(submission)?)
+}
+
+fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
+    let file = read_submission_file(path)?;
     let mut findings = Vec::new();
     let expected = &plan.dataset.file.manifest_sha256;
     if file.dataset_manifest_sha256 != *expected {
@@ -233,7 +240,7 @@ pub(crate) fn hashed_submission(
     dataset: &Dataset,
     scenes: &[SceneId],
 ) -> Result<HashedSubmission, EvalError> {
-    let file: SubmissionFile = json::read(&path.join(SUBMISSION))?;
+    let file = read_submission_file(path)?;
     let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
     files.extend(chosen_scenes(dataset, scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
     Ok(HashedSubmission { method: file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })

@@ -7,13 +7,17 @@
 )]
 
 mod suite {
+    mod archives;
     mod cache;
     mod damages;
+    mod hostile_pictures;
     #[path = "../../../../tests/suite/kept_folder.rs"]
     mod kept_folder;
+    mod lint;
     mod mask_rules;
     mod noise;
     mod noisy_room;
+    mod packed;
     mod planted_light;
     mod relit;
     mod same_bytes;

@@ -60,17 +60,33 @@ pub fn read_normal(path: &Path) -> Result<Picture<Normal>, ImageError> {
 
 /// Reads channel `V` (or `Y`, where others wrote a grey picture) of the first layer. Every value must be finite.
 pub fn read_scalar(path: &Path) -> Result<Picture<f32>, ImageError> {
-    let layer = read_first_layer(path)?;
-    let (width, height) = (layer.size.width(), layer.size.height());
+    let picture = scalar_of_bytes(path, &read_file(path)?)?;
+    check_finite(path, picture.width(), picture.pixels().iter().map(|v| v.is_finite()))?;
+    Ok(picture)
+}
+
+/// Channel `V` (or `Y`) of a file's bytes, as it stands.
+pub(crate) fn scalar_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<f32>, ImageError> {
+    let layer = first_layer(path, bytes)?;
     let values = channel(path, &layer, "V").or_else(|error| channel(path, &layer, "Y").map_err(|_| error))?;
-    check_finite(path, width, values.iter().map(|v| v.is_finite()))?;
-    Picture::new(width, height, values)
+    Picture::new(layer.size.width(), layer.size.height(), values)
+}
+
+/// Width, height and the channels of these names of a file's bytes, as they stand.
+pub(crate) fn channels_of_bytes(
+    path: &Path,
+    bytes: &[u8],
+    names: [&str; 3],
+) -> Result<(usize, usize, [Vec<f32>; 3]), ImageError> {
+    let layer = first_layer(path, bytes)?;
+    let [a, b, c] = names.map(|name| channel(path, &layer, name));
+    Ok((layer.size.width(), layer.size.height(), [a?, b?, c?]))
 }
 
 /// Reads every channel of the first layer, by its full name, as in `ViewLayer.Combined.R`. Numbers are as they stand: they
 /// may be NaN or infinite.
 pub fn read_channels(path: &Path) -> Result<BTreeMap<String, Picture<f32>>, ImageError> {
-    let layer = read_first_layer(path)?;
+    let layer = first_layer(path, &read_file(path)?)?;
     let (width, height) = (layer.size.width(), layer.size.height());
     let names = layer.channel_data.list.iter().map(|channel| channel.name.to_string());
     names
@@ -125,23 +141,21 @@ fn write_channels(
 type FlatLayer = ex::Layer<ex::AnyChannels<ex::FlatSamples>>;
 
 fn read_triples(path: &Path, names: [&'static str; 3]) -> Result<Picture<[f32; 3]>, ImageError> {
-    let layer = read_first_layer(path)?;
-    let (width, height) = (layer.size.width(), layer.size.height());
-    let [a, b, c] = names.map(|name| channel(path, &layer, name));
-    let (a, b, c) = (a?, b?, c?);
+    let (width, height, [a, b, c]) = channels_of_bytes(path, &read_file(path)?, names)?;
     let pixels: Vec<[f32; 3]> = a.into_iter().zip(b).zip(c).map(|((a, b), c)| [a, b, c]).collect();
     check_finite(path, width, pixels.iter().map(|p| p.iter().all(|v| v.is_finite())))?;
     Picture::new(width, height, pixels)
 }
 
-fn read_first_layer(path: &Path) -> Result<FlatLayer, ImageError> {
+fn first_layer(path: &Path, bytes: &[u8]) -> Result<FlatLayer, ImageError> {
+    check_headers(path, bytes)?;
     let image = ex::read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .first_valid_layer()
         .all_attributes()
-        .from_buffered(Cursor::new(checked_bytes(path)?))
+        .from_buffered(Cursor::new(bytes))
         .map_err(|error| invalid(path, &error))?;
     Ok(image.layer_data)
 }
@@ -160,16 +174,15 @@ fn channel(path: &Path, layer: &FlatLayer, name: &str) -> Result<Vec<f32>, Image
     Ok(found.sample_data.values_as_f32().collect())
 }
 
-/// The file's bytes, once every layer that the header tells of is of a size that is read.
-fn checked_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
-    let bytes = read_file(path)?;
-    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes.as_slice()), false)
-        .map_err(|error| invalid(path, &error))?;
+/// Fails where a layer that a header tells of is of a size that is not read.
+fn check_headers(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
+    let meta =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| invalid(path, &error))?;
     for header in &meta.headers {
         check_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
         check_amount(path, header)?;
     }
-    Ok(bytes)
+    Ok(())
 }
 
 /// Memory follows samples and blocks, so both are bounded before any is taken.

@@ -7,9 +7,12 @@
 //! Between: size limits are checked on the header, before memory is taken; colours are decoded once, by [`transfer`].
 
 pub mod error;
+pub mod exr_header;
 pub mod exr_io;
 pub mod limits;
+pub mod map_io;
 pub mod picture;
+pub mod png_header;
 pub mod png_io;
 pub mod store;
 pub mod texture;

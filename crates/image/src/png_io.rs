@@ -78,8 +78,7 @@ pub fn read_ids(path: &Path) -> Result<Picture<u16>, ImageError> {
     if (raw.color, raw.depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
         return Err(raw.unexpected(path, "16-bit grey"));
     }
-    let ids = raw.data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
-    Picture::new(raw.width, raw.height, ids)
+    Picture::new(raw.width, raw.height, raw.words())
 }
 
 /// Reads an 8-bit grey picture of 0 (does not count) and 255 (counts); nothing else will do.
@@ -122,15 +121,20 @@ fn write(
 }
 
 /// A decoded PNG: samples as stored, palettes and less than eight bits expanded.
-struct Raw {
-    width: usize,
-    height: usize,
-    color: png::ColorType,
-    depth: png::BitDepth,
-    data: Vec<u8>,
+pub(crate) struct Raw {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) color: png::ColorType,
+    pub(crate) depth: png::BitDepth,
+    pub(crate) data: Vec<u8>,
 }
 
 impl Raw {
+    /// The samples of 16 bits.
+    pub(crate) fn words(&self) -> Vec<u16> {
+        self.data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+    }
+
     fn unexpected(&self, path: &Path, expected: &str) -> ImageError {
         let what = format!("expected {expected}, found {}-bit {:?}", self.depth as u8, self.color);
         ImageError::Invalid { path: path.to_owned(), what }
@@ -138,7 +142,11 @@ impl Raw {
 }
 
 fn decode(path: &Path) -> Result<Raw, ImageError> {
-    let bytes = read_file(path)?;
+    decode_bytes(path, read_file(path)?)
+}
+
+/// From a file's bytes. Text and profiles, which may be packed a thousandfold, are passed over.
+pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageError> {
     let invalid = |error: png::DecodingError| ImageError::Invalid {
         path: path.to_owned(),
         what: format!("not a sound PNG: {error}"),
@@ -146,6 +154,8 @@ fn decode(path: &Path) -> Result<Raw, ImageError> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
     decoder.set_limits(png::Limits { bytes: 1 << 28 });
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
     let header = decoder.read_header_info().map_err(invalid)?;
     check_size(path, u64::from(header.width), u64::from(header.height))?;
     let mut reader = decoder.read_info().map_err(invalid)?;

@@ -27,7 +27,12 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
 
 /// Reads a file; what does not fit is an error with the line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
-    let text = read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?;
+    read_within(path, MAX_JSON_BYTES)
+}
+
+/// The same of a file of at most so many bytes.
+pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
+    let text = read_at_most(path, most).map_err(SceneError::io("read", path))?;
     serde_json::from_slice(&text)
         .map_err(|error| invalid(path, format!("line {} column {}", error.line(), error.column()), error.to_string()))
 }

@@ -5,13 +5,18 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::findings::shortened;
 use crate::ids::{InstanceId, SceneId};
+use crate::{SceneError, json};
 
 /// `submission.json`.
 pub const SUBMISSION: &str = "submission.json";
 
 /// The word for this version of a submission.
 pub const SUBMISSION_FORMAT: &str = "mateval-submission/1";
+
+/// Largest `submission.json` that is read, in bytes.
+pub const MAX_SUBMISSION_BYTES: u64 = 1 << 20;
 
 /// `submission.json`: who made this, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,6 +31,19 @@ pub struct SubmissionFile {
     pub description: String,
     /// `manifest_sha256` of the dataset that it was made for.
     pub dataset_manifest_sha256: String,
+}
+
+impl SubmissionFile {
+    /// Reads a submission's own; fails where it is of another format.
+    pub fn read(submission: &Path) -> Result<Self, SceneError> {
+        let path = submission.join(SUBMISSION);
+        let file: Self = json::read_within(&path, MAX_SUBMISSION_BYTES)?;
+        if file.format == SUBMISSION_FORMAT {
+            return Ok(file);
+        }
+        let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", shortened(&file.format));
+        Err(SceneError::Unsupported { path, what })
+    }
 }
 
 /// Texels a side that a submission may use.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use mateval_eval::archive;
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_metrics::Net;
 use mateval_scene::json;
@@ -18,7 +19,7 @@ use crate::weights;
 pub struct VerifyArgs {
     /// RESULT.json.
     result: PathBuf,
-    /// The submission that it was made of.
+    /// The submission that it was made of: a folder, a .zip or a .tar.gz.
     #[arg(long)]
     submission: PathBuf,
     /// The dataset that it was made on.
@@ -50,9 +51,10 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
         bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
     }
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let opened = archive::open(&args.submission, &std::env::temp_dir())?;
     let plan = VerifyPlan {
         result: &args.result,
-        submission: &args.submission,
+        submission: opened.root(),
         dataset: &dataset,
         lpips: weights::load(Net::Alex),
         tool: TOOL.to_owned(),

@@ -1,21 +1,27 @@
 //! The built-in sample as a tiny dataset with renders, and submissions for it.
 
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
+use mateval_baselines::estimate::EstimateSource;
+use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::{grey, submission, truth};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_eval::texel_map::TexelMap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 use mateval_metrics::{Lpips, Net};
 use mateval_prep::build::{BuildOptions, build};
 use mateval_prep::render::{RenderOptions, render};
-use mateval_scene::SceneId;
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
+use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
+use mateval_scene::{SceneId, glb, reference_io};
+use mateval_tracer::World;
 
 use super::kept_folder::kept_folder;
 
@@ -56,6 +62,41 @@ pub fn write_truth(out: &Path) {
 /// Writes the baseline `grey`, whose roughness is the default.
 pub fn write_grey(out: &Path) {
     grey::write(dataset(), out, false).unwrap();
+}
+
+/// Writes the truth of the photo lifted to the atlases, the rest by nearest neighbours.
+pub fn write_nearest(out: &Path) {
+    write_lifted(out, &EstimateSource::Truth);
+}
+
+/// Writes the photo itself, lifted to the atlases.
+pub fn write_from_photo(out: &Path) {
+    write_lifted(out, &EstimateSource::Input);
+}
+
+fn write_lifted(out: &Path, source: &EstimateSource) {
+    nn::write(dataset(), out, false, source, &NnOptions::default(), &|_, _, _| ()).unwrap();
+}
+
+/// Makes the base colour of a scene's atlases black where the input view does not show them.
+pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
+    let source = dataset().folder(&scene.id);
+    let world = World::new(Arc::new(reference_io::read(&source).unwrap())).unwrap();
+    for (at, node) in glb::read(&source.instances()).unwrap().into_iter().enumerate() {
+        let path = folder.join(&node.name).join("base_color.png");
+        if !path.is_file() {
+            continue;
+        }
+        let colors = png_io::read_rgb_bytes(&path).unwrap();
+        let map = TexelMap::new(&world, SurfaceIndex(at), &node.mesh, colors.width(), &scene.views[0].camera);
+        let mut filled = Picture::filled(colors.width(), colors.height(), [0; 3]);
+        for y in 0..colors.height() {
+            for texel in map.row(y).filter(|texel| texel.observed) {
+                filled.set(texel.column, y, colors.get(texel.column, y));
+            }
+        }
+        png_io::write_rgb_bytes(&path, &filled).unwrap();
+    }
 }
 
 /// Writes `gt` with the base colour of every atlas (linear) changed.

@@ -1,0 +1,244 @@
+//! One entry of an archive: its name made a place, its bytes written there.
+
+use std::io::{ErrorKind, Read, Write as _};
+use std::path::Path;
+
+use mateval_scene::Finding;
+
+use super::limits::Budget;
+use super::{Fault, refusal};
+use crate::map_file::MAX_MAP_BYTES;
+
+/// Longest name, in bytes.
+const LONGEST_NAME: usize = 512;
+/// Most folders in one another.
+const DEEPEST: usize = 8;
+/// Most faults that are told.
+const MOST_FAULTS: usize = 100;
+/// Bytes that are read at once.
+const BLOCK: usize = 1 << 16;
+
+/// What is wrong with an entry: code and message.
+type Wrong = (&'static str, String);
+
+/// What an entry is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EntryKind {
+    File,
+    Folder,
+    Link,
+    /// Devices, pipes and what else there is.
+    Special,
+}
+
+/// A folder that entries are written to. What is wrong with single ones is gathered, so that all of it can be told at once.
+pub(super) struct Writer<'a> {
+    root: &'a Path,
+    pub(super) budget: Budget,
+    faults: Vec<Finding>,
+}
+
+impl<'a> Writer<'a> {
+    pub(super) fn new(root: &'a Path) -> Self {
+        Self { root, budget: Budget::default(), faults: Vec::new() }
+    }
+
+    /// Remembers what is wrong with an entry.
+    pub(super) fn fault(&mut self, code: &str, entry: &str, message: impl Into<String>, action: &str) {
+        if self.faults.len() < MOST_FAULTS {
+            self.faults.push(refusal(code, entry, message, action));
+        }
+    }
+
+    /// The place of an entry below the folder; none where it is to be passed over: a fault, or the folder itself.
+    pub(super) fn place(&mut self, name: &[u8], kind: EntryKind) -> Result<Option<String>, Fault> {
+        self.budget.add_entry()?;
+        let shown = String::from_utf8_lossy(name).into_owned();
+        let place = match place_of(name) {
+            Ok(place) => place,
+            Err((code, message)) => {
+                self.fault(code, &shown, message, "pack the folder with relative names");
+                return Ok(None);
+            }
+        };
+        match kind {
+            EntryKind::Link => {
+                self.fault("link_in_archive", &shown, "a link; links are not unpacked", "pack the file itself");
+                Ok(None)
+            }
+            EntryKind::Special => {
+                self.fault("special_entry", &shown, "neither a file nor a folder", "leave it out");
+                Ok(None)
+            }
+            EntryKind::File | EntryKind::Folder if place.is_empty() => Ok(None),
+            EntryKind::Folder => {
+                self.make_folder(&shown, &place)?;
+                Ok(None)
+            }
+            EntryKind::File => Ok(Some(place)),
+        }
+    }
+
+    /// Whether a file of so many bytes would be read at all.
+    pub(super) fn is_small(&mut self, entry: &str, bytes: u64) -> bool {
+        if bytes > MAX_MAP_BYTES {
+            let message = format!("{bytes} bytes; expected at most {MAX_MAP_BYTES}");
+            self.fault("file_too_large", entry, message, "save it with compression, or with fewer texels");
+        }
+        bytes <= MAX_MAP_BYTES
+    }
+
+    /// Writes a file: all of `data`, which may be `expected` bytes and no more. `packed` says how much of the archive has been
+    /// read. Gives the checksum (CRC-32), or none where there is a fault.
+    pub(super) fn write<R: Read>(
+        &mut self,
+        place: &str,
+        expected: u64,
+        data: &mut R,
+        packed: impl Fn(&R) -> u64,
+    ) -> Result<Option<u32>, Fault> {
+        let parent = place.rsplit_once('/').map_or("", |(parent, _)| parent);
+        if !self.make_folder(place, parent)? {
+            return Ok(None);
+        }
+        let mut file = match std::fs::File::create_new(self.root.join(place)) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                self.twice(place);
+                return Ok(None);
+            }
+            Err(error) => return Err(error.into()),
+        };
+        match self.copy(&mut file, expected, data, packed)? {
+            Ok(sum) => Ok(Some(sum)),
+            Err((code, message)) => {
+                self.fault(code, place, message, "pack it again");
+                Ok(None)
+            }
+        }
+    }
+
+    /// The checksum of what was copied, or what is wrong with it.
+    fn copy<R: Read>(
+        &mut self,
+        file: &mut std::fs::File,
+        expected: u64,
+        data: &mut R,
+        packed: impl Fn(&R) -> u64,
+    ) -> Result<Result<u32, Wrong>, Fault> {
+        let (mut block, mut written, mut sum) = (vec![0; BLOCK], 0_u64, flate2::Crc::new());
+        while written <= expected {
+            let count = match data.read(&mut block) {
+                Ok(0) => break,
+                Ok(count) => count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Ok(Err(("damaged_archive", format!("it cannot be unpacked: {error}")))),
+            };
+            written += count as u64;
+            self.budget.add_bytes(count as u64, packed(data))?;
+            file.write_all(&block[..count])?;
+            sum.update(&block[..count]);
+        }
+        if written == expected {
+            return Ok(Ok(sum.sum()));
+        }
+        let found = if written > expected { "more".to_owned() } else { written.to_string() };
+        Ok(Err(("wrong_size", format!("it says to have {expected} bytes, and has {found}"))))
+    }
+
+    /// Whether the folder is there now; a file of its name is a fault. Each that is made counts as an entry does.
+    fn make_folder(&mut self, entry: &str, place: &str) -> Result<bool, Fault> {
+        let path = self.root.join(place);
+        if path.is_dir() {
+            return Ok(true);
+        }
+        let ends = place.match_indices('/').map(|(end, _)| end).chain([place.len()]);
+        for folder in ends.map(|end| self.root.join(&place[..end])) {
+            match std::fs::create_dir(&folder) {
+                Ok(()) => self.budget.add_entry()?,
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && folder.is_dir() => {}
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                    self.twice(entry);
+                    return Ok(false);
+                }
+                Err(error) => return Err(error.into()),
+            }
+        }
+        Ok(true)
+    }
+
+    fn twice(&mut self, entry: &str) {
+        self.fault("duplicate_name", entry, "this name is there twice", "pack each file once");
+    }
+
+    /// Fails where anything was wrong.
+    pub(super) fn finish(mut self) -> Result<(), Fault> {
+        if self.faults.is_empty() {
+            return Ok(());
+        }
+        self.faults.sort();
+        Err(Fault::Refused(self.faults))
+    }
+}
+
+/// A name without `.` and empty parts; a code and a message where it leads anywhere else.
+fn place_of(name: &[u8]) -> Result<String, Wrong> {
+    let text = std::str::from_utf8(name).map_err(|_| ("bad_name", "a name that is not UTF-8".to_owned()))?;
+    if text.len() > LONGEST_NAME || text.contains(['\0', '\\']) || text.chars().any(char::is_control) {
+        let message = format!(
+            "a name of {} bytes; expected at most {LONGEST_NAME}, without \\ and control characters",
+            text.len()
+        );
+        return Err(("bad_name", message));
+    }
+    if text.starts_with('/') || text.as_bytes().get(1) == Some(&b':') {
+        return Err(("absolute_name", "a name that does not begin in the archive".to_owned()));
+    }
+    let parts: Vec<&str> = text.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
+    if parts.contains(&"..") {
+        return Err(("name_leads_out", "a name with '..'".to_owned()));
+    }
+    if parts.len() > DEEPEST {
+        return Err(("bad_name", format!("{} folders in one another; expected at most {DEEPEST}", parts.len())));
+    }
+    Ok(parts.join("/"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::archive::limits::MAX_ENTRIES;
+
+    /// A name of many folders is no cheaper than the folders.
+    #[test]
+    fn folders_count_as_entries_do() {
+        for (left, fits) in [(3, true), (2, false)] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut writer = Writer::new(folder.path());
+            writer.budget.entries = MAX_ENTRIES - left;
+            assert_eq!(writer.place(b"a/b/", EntryKind::Folder).is_ok(), fits);
+        }
+    }
+
+    #[test]
+    fn names_stay_inside() {
+        assert_eq!(place_of(b"./scenes//a/b.png").unwrap(), "scenes/a/b.png");
+        assert_eq!(place_of(b"./").unwrap(), "");
+        assert_eq!(place_of(b"a..b/...").unwrap(), "a..b/...");
+        let bad: [(&[u8], &str); 9] = [
+            (b"../a", "name_leads_out"),
+            (b"a/../../b", "name_leads_out"),
+            (b"a/..", "name_leads_out"),
+            (b"/etc/passwd", "absolute_name"),
+            (b"C:/a", "absolute_name"),
+            (b"a\\..\\b", "bad_name"),
+            (b"a\0b", "bad_name"),
+            (b"\xff", "bad_name"),
+            (b"1/2/3/4/5/6/7/8/9", "bad_name"),
+        ];
+        for (name, code) in bad {
+            assert_eq!(place_of(name).unwrap_err().0, code, "{name:?}");
+        }
+        assert!(place_of(&[b'a'; 513]).is_err());
+    }
+}

@@ -1,0 +1,63 @@
+//! Maps that are the truth's own. That is no fault (the baseline `gt` is such a submission), but who ranks must know.
+
+use mateval_image::texture_io::{Encoding, read_texture};
+use mateval_image::{Texture, Wrap};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::submission::Map;
+use mateval_scene::{Finding, InstanceId};
+
+use super::finding::note;
+use super::scene::Seen;
+use crate::map_file::MapFile;
+
+/// From this share of maps on a scene is a copy.
+const LEAST_SHARE: f64 = 0.5;
+
+/// How many maps that are not one value all over are the truth's, and how many there are.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct CopyCount {
+    copies: usize,
+    of: usize,
+}
+
+impl CopyCount {
+    /// Of an instance's maps; nothing where the ground truth is withheld.
+    pub(super) fn of(folder: &SceneFolder, instance: &InstanceId, files: &[Option<MapFile>; 3]) -> Self {
+        let mut count = Self::default();
+        for (map, file) in Map::ALL.into_iter().zip(files) {
+            let path = folder.truth_material(instance).join(map.stem()).with_extension("png");
+            let Some(file) = file.as_ref().filter(|file| path.is_file() && !is_constant(&file.texture)) else {
+                continue;
+            };
+            let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
+            // What of the truth cannot be read scoring will tell.
+            let Ok(truth) = read_texture(&path, encoding, Wrap::Clamp) else { continue };
+            count.of += 1;
+            count.copies += usize::from(same(&file.texture, &truth));
+        }
+        count
+    }
+}
+
+fn is_constant(texture: &Texture) -> bool {
+    texture.clone().collapsed().width() == 1
+}
+
+fn same(map: &Texture, truth: &Texture) -> bool {
+    let (width, height) = (truth.width(), truth.height());
+    (map.width(), map.height()) == (width, height)
+        && (0..width * height).all(|at| {
+            let [a, b] = [map, truth].map(|texture| texture.texel(at % width, at / width));
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5)
+        })
+}
+
+/// A note where most of a scene's maps are the truth's.
+pub(super) fn copies(place: &str, all: &[Seen]) -> Option<Finding> {
+    let [copies, of] = [|count: &CopyCount| count.copies, |count: &CopyCount| count.of]
+        .map(|number| all.iter().map(|seen| number(&seen.copies)).sum::<usize>());
+    (of > 0 && copies as f64 >= LEAST_SHARE * of as f64).then(|| {
+        let message = format!("{copies} of {of} maps that are not one value all over are the truth's, texel by texel");
+        note("copy_of_truth", place, message, "mark it as a ceiling, not as a method")
+    })
+}

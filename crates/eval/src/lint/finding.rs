@@ -1,0 +1,35 @@
+//! Findings in one line of code each.
+
+use mateval_scene::{Finding, Severity};
+
+/// Something that scoring replaces or refuses.
+pub(super) fn error(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Error, code, file, message, action)
+}
+
+/// Something that is scored and is probably a mistake.
+pub(super) fn warning(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Warning, code, file, message, action)
+}
+
+/// Something to know.
+pub(super) fn note(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
+    finding(Severity::Note, code, file, message, action)
+}
+
+fn finding(
+    severity: Severity,
+    code: &str,
+    file: &str,
+    message: impl Into<String>,
+    action: impl Into<String>,
+) -> Finding {
+    Finding {
+        severity,
+        code: code.to_owned(),
+        file: file.to_owned(),
+        place: String::new(),
+        message: message.into(),
+        action: action.into(),
+    }
+}

@@ -1,0 +1,56 @@
+//! Atlases that are turned: v counted from the wrong end, left and right exchanged.
+//!
+//! Within a small neighbourhood of the picture, and within an instance, light hardly changes: what is brighter there is of a
+//! brighter material. So the base colour goes along with the picture if it lies where it belongs, and does not where
+//! it was turned. Turning it back must then make it do so.
+
+use mateval_scene::Finding;
+
+use super::finding::warning;
+use super::looks::{Look, Turn, luminance};
+use super::statistics::Pairs;
+
+/// Fewest pixels that say anything.
+const FEWEST: f64 = 400.0;
+/// How well a turned base colour must go along with the picture, at least.
+const LEAST_CORRELATION: f64 = 0.35;
+/// And by how much better than as it is.
+const LEAST_GAIN: f64 = 0.25;
+/// Darker values say more of noise than of materials.
+const DARKEST: f64 = 1e-3;
+
+/// A finding where another turn explains the picture clearly better.
+pub(super) fn check(place: &str, looks: &[Look]) -> Option<Finding> {
+    let own = detail(looks, 0);
+    let (turn, best) = (1..Turn::ALL.len())
+        .map(|at| (Turn::ALL[at], detail(looks, at)))
+        .max_by(|a, b| a.1.correlation().total_cmp(&b.1.correlation()))?;
+    let (now, then) = (own.correlation(), best.correlation());
+    if own.count() < FEWEST || then < LEAST_CORRELATION || then - now < LEAST_GAIN {
+        return None;
+    }
+    let (code, what, action) = match turn {
+        Turn::None => return None,
+        Turn::Vertical => {
+            ("flipped_vertically", "upside down", "write row 0 of a texture at v = 0 of instances.glb: the top")
+        }
+        Turn::Horizontal => ("flipped_horizontally", "left and right exchanged", "write column 0 at u = 0"),
+        Turn::Half => ("turned_half", "turned by half a turn", "write column 0 at u = 0, row 0 at v = 0: the top left"),
+        Turn::Transposed => ("transposed", "rows and columns exchanged", "write u along rows, v along columns"),
+    };
+    let message = format!(
+        "base colours seem {what}: turned back their detail goes along with the input picture's ({then:.2}, as it is \
+         {now:.2}, over {:.0} pixels)",
+        own.count()
+    );
+    Some(warning(code, place, message, action))
+}
+
+/// How the base colour's brightness goes along with the picture's, within instances and neighbourhoods.
+fn detail(looks: &[Look], turn: usize) -> Pairs {
+    let pair = |look: &Look| {
+        let [base, photo] = [luminance(look.base_color[turn]), luminance(look.photo?)];
+        (photo > DARKEST).then(|| ((look.instance, look.tile), base.max(DARKEST).ln(), photo.ln()))
+    };
+    Pairs::within(looks.iter().filter_map(pair))
+}

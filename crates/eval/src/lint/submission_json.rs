@@ -1,0 +1,152 @@
+//! `submission.json`: every fault with its JSON pointer.
+
+use std::path::Path;
+
+use mateval_image::limits::read_at_most;
+use mateval_scene::Finding;
+use mateval_scene::findings::shortened;
+use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
+use serde_json::{Map, Value};
+
+use super::finding::{error, warning};
+use super::names::nearest;
+use crate::map_file::{check_place, is_there};
+
+/// Its keys, and whether it must have them.
+const KEYS: [(&str, bool); 4] =
+    [("format", true), ("method", true), ("description", false), ("dataset_manifest_sha256", true)];
+
+/// Longest name of a method, in characters.
+const LONGEST_METHOD: usize = 100;
+
+/// The method's name, where there is one, and what is wrong. The submission was made for the dataset of this manifest.
+pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<Finding>) {
+    match read(submission) {
+        Ok(object) => {
+            let method = object.get("method").and_then(Value::as_str).map(str::to_owned);
+            (method, check_object(object, manifest_sha256))
+        }
+        Err(finding) => (None, vec![*finding]),
+    }
+}
+
+fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
+    let path = submission.join(SUBMISSION);
+    let fault = |code: &str, message: String, action: &str| Box::new(error(code, SUBMISSION, message, action));
+    if !is_there(&path) {
+        let action = "write it beside scenes/; FORMAT.md, section 11, tells its keys";
+        return Err(fault("no_submission_file", "there is none".to_owned(), action));
+    }
+    check_place(submission, &path).map_err(|found| fault(found.code, found.message, found.action))?;
+    let bytes = read_at_most(&path, MAX_SUBMISSION_BYTES).map_err(|found| match found.kind() {
+        std::io::ErrorKind::FileTooLarge => {
+            let message = format!("more than {MAX_SUBMISSION_BYTES} bytes");
+            fault("json_too_large", message, "shorten the description; results need no more")
+        }
+        _ => fault("unreadable_file", found.to_string(), "make it an ordinary file that can be read"),
+    })?;
+    let bad = |found: serde_json::Error| {
+        let place = format!("line {} column {}", found.line(), found.column());
+        Box::new(Finding { place, ..*fault("bad_json", found.to_string(), "write it as JSON") })
+    };
+    match serde_json::from_slice(&bytes).map_err(bad)? {
+        // What a map of keys cannot tell, as a key that is there twice, the type does.
+        Value::Object(object) => match serde_json::from_slice::<SubmissionFile>(&bytes) {
+            Err(found) if is_sound(&object) => Err(bad(found)),
+            _ => Ok(object),
+        },
+        other => Err(fault("wrong_type", format!("expected an object, found {}", kind(&other)), "write { ... }")),
+    }
+}
+
+fn is_sound(object: &Map<String, Value>) -> bool {
+    let known = |key: &String| KEYS.iter().any(|(known, _)| known == key);
+    object.iter().all(|(key, value)| known(key) && value.is_string())
+        && KEYS.iter().all(|(key, required)| !required || object.contains_key(*key))
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "a truth value",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a text",
+        Value::Array(_) => "a list",
+        Value::Object(_) => "an object",
+    }
+}
+
+fn check_object(object: Map<String, Value>, manifest_sha256: &str) -> Vec<Finding> {
+    let mut findings = check_keys(&object);
+    for (key, value) in &object {
+        let Some(text) = value.as_str() else { continue };
+        let found = match key.as_str() {
+            "format" => check_format(text),
+            "method" => check_method(text),
+            "dataset_manifest_sha256" => check_hash(text, manifest_sha256),
+            _ => None,
+        };
+        findings.extend(found.map(|finding| Finding { place: format!("/{key}"), ..finding }));
+    }
+    findings
+}
+
+fn check_keys(object: &Map<String, Value>) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let mut at = |key: &str, finding: Finding| {
+        findings.push(Finding { place: format!("/{}", key.replace('~', "~0").replace('/', "~1")), ..finding });
+    };
+    let missing = || KEYS.iter().filter(|(key, required)| *required && !object.contains_key(*key)).map(|(key, _)| *key);
+    for key in missing() {
+        at(key, error("missing_key", SUBMISSION, format!("no key '{key}'"), "add it"));
+    }
+    // A stranger's file may have any number of keys.
+    for (key, value) in object.iter().take(100) {
+        let short = shortened(key);
+        if !KEYS.iter().any(|(known, _)| known == key) {
+            let action = nearest(key, KEYS.map(|(key, _)| key))
+                .map_or("leave it out".to_owned(), |near| format!("leave it out, or write '{near}'"));
+            at(&short, error("unknown_key", SUBMISSION, format!("no such key as '{short}'"), action));
+        } else if !value.is_string() {
+            at(key, error("wrong_type", SUBMISSION, format!("expected a text, found {}", kind(value)), "write a text"));
+        }
+    }
+    findings
+}
+
+fn check_format(text: &str) -> Option<Finding> {
+    let message = || format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", shortened(text));
+    let action = format!("write '{SUBMISSION_FORMAT}'");
+    (text != SUBMISSION_FORMAT).then(|| error("wrong_format", SUBMISSION, message(), action))
+}
+
+fn check_method(text: &str) -> Option<Finding> {
+    if text.trim().is_empty() {
+        return Some(warning(
+            "no_method_name",
+            SUBMISSION,
+            "the method has no name",
+            "name it as tables shall show it",
+        ));
+    }
+    let (length, control) = (text.chars().count(), text.chars().any(char::is_control));
+    (length > LONGEST_METHOD || control).then(|| {
+        let message = format!(
+            "a method's name of {length} characters{}",
+            if control { ", some of them unprintable" } else { "" }
+        );
+        let action = format!("name it in at most {LONGEST_METHOD} printable characters");
+        warning("bad_method_name", SUBMISSION, message, action)
+    })
+}
+
+fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
+    let is_hash = text.len() == 64 && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
+    let action = "copy manifest_sha256 of the dataset's dataset.json, if it was made for that";
+    if !is_hash {
+        let message = format!("'{}' is no SHA-256: expected 64 digits, 0-9 and a-f", shortened(text));
+        return Some(warning("bad_hash", SUBMISSION, message, action));
+    }
+    let message = || format!("made for the dataset {text}, held against {manifest_sha256}");
+    (text != manifest_sha256).then(|| warning("other_dataset", SUBMISSION, message(), action))
+}

@@ -1,0 +1,155 @@
+//! `eval lint` on the sample: the good submission is clean, and every planted fault is found by its own code, with no other
+//! error and no other warning.
+
+mod files;
+mod folder;
+mod pictures;
+pub mod written;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use mateval_eval::lint::{LintFile, LintPlan, lint};
+use mateval_scene::Severity;
+
+use super::sample::{dataset, write_truth};
+
+/// A code, its severity, and what is done to a good submission.
+type Fault = (&'static str, Severity, fn(&Path));
+
+const ERROR: Severity = Severity::Error;
+const WARNING: Severity = Severity::Warning;
+const NOTE: Severity = Severity::Note;
+
+/// Where faults are planted that one map is enough for: textured, and seen by the input view.
+fn map(submission: &Path, name: &str) -> PathBuf {
+    submission.join("scenes/room/rug").join(name)
+}
+
+/// Every map of a name.
+fn every(submission: &Path, name: &str) -> Vec<PathBuf> {
+    let scenes = ["living", "room"].map(|scene| submission.join("scenes").join(scene));
+    let instances = scenes.iter().flat_map(|scene| std::fs::read_dir(scene).unwrap());
+    let files: Vec<PathBuf> = instances.map(|entry| entry.unwrap().path().join(name)).collect();
+    assert!(files.len() > 20 && files.iter().all(|file| file.is_file()));
+    files
+}
+
+fn good() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    write_truth(&folder.path().join("gt"));
+    folder
+}
+
+fn linted(submission: &Path) -> LintFile {
+    let plan = LintPlan { dataset: dataset(), submission, tool: "test".to_owned() };
+    lint(&plan, &|_, _, _| ()).unwrap()
+}
+
+fn codes(file: &LintFile, severity: Severity) -> BTreeSet<String> {
+    let of_severity = file.findings.iter().filter(|finding| finding.severity == severity);
+    of_severity.map(|finding| finding.code.clone()).collect()
+}
+
+#[test]
+fn the_good_submission_is_clean() {
+    let folder = good();
+    let file = linted(&folder.path().join("gt"));
+    assert!(file.good && file.maps > 60, "{file:?}");
+    assert_eq!((codes(&file, ERROR), codes(&file, WARNING)), (BTreeSet::new(), BTreeSet::new()), "{file:?}");
+    // That it is the truth is no fault, but is told.
+    assert_eq!(codes(&file, NOTE), BTreeSet::from(["copy_of_truth".to_owned()]));
+    assert_eq!(file.method.as_deref(), Some("gt"));
+}
+
+/// Checks one table of faults. Gives how many codes there were.
+fn check(faults: &[Fault]) {
+    let mut wrong = Vec::new();
+    for (at, (code, severity, plant)) in faults.iter().enumerate() {
+        let folder = good();
+        let submission = folder.path().join("gt");
+        plant(&submission);
+        let file = linted(&submission);
+        let (errors, warnings) = (codes(&file, ERROR), codes(&file, WARNING));
+        let own = BTreeSet::from([(*code).to_owned()]);
+        let found = match severity {
+            Severity::Error => errors == own && warnings.is_empty(),
+            Severity::Warning => errors.is_empty() && warnings == own,
+            Severity::Note => errors.is_empty() && warnings.is_empty() && codes(&file, NOTE).contains(*code),
+        };
+        if !found || file.good != errors.is_empty() {
+            wrong
+                .push(format!("{at} {code}: errors {errors:?}, warnings {warnings:?}, notes {:?}", codes(&file, NOTE)));
+        }
+    }
+    assert_eq!(wrong, Vec::<String>::new());
+}
+
+#[test]
+fn faults_of_names_and_of_submission_json() {
+    check(folder::FAULTS);
+}
+
+#[test]
+fn faults_of_files() {
+    check(files::FAULTS);
+}
+
+#[test]
+fn faults_that_only_pictures_tell() {
+    check(pictures::FAULTS);
+}
+
+#[test]
+fn each_fault_has_a_code_of_its_own() {
+    let all = [folder::FAULTS, files::FAULTS, pictures::FAULTS].concat();
+    let distinct: BTreeSet<&str> = all.iter().map(|(code, ..)| *code).collect();
+    // A cut JSON and a key that is there twice are the same fault.
+    assert_eq!(distinct.len(), all.len() - 1);
+    assert!(distinct.len() >= 40, "{} codes", distinct.len());
+}
+
+/// Baselines are no mistakes: nothing but what they are is said of them.
+#[test]
+fn baselines_are_not_accused() {
+    let folder = tempfile::tempdir().unwrap();
+    let nn = folder.path().join("nn");
+    super::sample::write_nearest(&nn);
+    let file = linted(&nn);
+    assert_eq!((codes(&file, ERROR), codes(&file, WARNING)), (BTreeSet::new(), BTreeSet::new()), "{file:?}");
+    let grey = folder.path().join("grey");
+    super::sample::write_grey(&grey);
+    let file = linted(&grey);
+    assert_eq!(codes(&file, ERROR), BTreeSet::new());
+    assert!(codes(&file, WARNING).contains("same_base_color"), "{file:?}");
+}
+
+/// Ground truth may be withheld: the same is found, but for copies of it.
+#[test]
+fn a_public_dataset_is_enough() {
+    let (folder, public) = (good(), tempfile::tempdir().unwrap());
+    copy_public(&dataset().root, public.path());
+    let opened = mateval_scene::open::Dataset::open(public.path()).unwrap();
+    let submission = folder.path().join("gt");
+    let look = |submission: &Path| {
+        lint(&LintPlan { dataset: &opened, submission, tool: "test".to_owned() }, &|_, _, _| ()).unwrap()
+    };
+    assert!(look(&submission).findings.is_empty());
+    pictures::flip(&submission);
+    assert_eq!(codes(&look(&submission), WARNING), BTreeSet::from(["flipped_vertically".to_owned()]));
+}
+
+fn copy_public(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap()) {
+        let place = to.join(entry.file_name());
+        if entry.file_name() == "ground_truth" {
+            continue;
+        }
+        if entry.path().is_dir() {
+            copy_public(&entry.path(), &place);
+        } else {
+            std::fs::copy(entry.path(), place).unwrap();
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Archives, sound and otherwise, byte by byte.
+
+use std::io::Write as _;
+use std::path::Path;
+
+/// What stands for a file in a zip: `data` as they lie there, and what the list says of them.
+#[derive(Clone)]
+pub struct ZipEntry {
+    pub name: Vec<u8>,
+    pub data: Vec<u8>,
+    pub method: u16,
+    pub flags: u16,
+    /// Unix mode, in the upper half of the attributes.
+    pub mode: u32,
+    pub size: u64,
+    pub checksum: u32,
+    pub comment: Vec<u8>,
+    /// Whose data it has; none: its own.
+    pub shares: Option<usize>,
+}
+
+/// The checksum of zip and gzip.
+pub fn crc32(bytes: &[u8]) -> u32 {
+    let mut sum = flate2::Crc::new();
+    sum.update(bytes);
+    sum.sum()
+}
+
+impl ZipEntry {
+    /// A deflated file.
+    pub fn new(name: &str, bytes: &[u8]) -> Self {
+        let mut packed = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::default());
+        packed.write_all(bytes).unwrap();
+        Self {
+            name: name.into(),
+            data: packed.finish().unwrap(),
+            method: 8,
+            flags: 0,
+            mode: 0o100_644,
+            size: bytes.len() as u64,
+            checksum: crc32(bytes),
+            comment: Vec::new(),
+            shares: None,
+        }
+    }
+
+    /// A file as it is.
+    pub fn stored(name: &str, bytes: &[u8]) -> Self {
+        Self { data: bytes.into(), method: 0, ..Self::new(name, bytes) }
+    }
+}
+
+/// A zip of these entries, with Zip64 sizes where they need them.
+pub fn zip(entries: &[ZipEntry], comment: &[u8]) -> Vec<u8> {
+    let (mut bytes, mut offsets) = (Vec::new(), Vec::new());
+    for entry in entries {
+        if let Some(other) = entry.shares {
+            offsets.push(offsets[other]);
+            continue;
+        }
+        offsets.push(bytes.len());
+        bytes.extend(b"PK\x03\x04");
+        bytes.extend(numbers(&[20, entry.flags, entry.method, 0, 0]));
+        bytes.extend(entry.checksum.to_le_bytes());
+        bytes.extend((entry.data.len() as u32).to_le_bytes());
+        bytes.extend((entry.size.min(u64::from(u32::MAX)) as u32).to_le_bytes());
+        bytes.extend(numbers(&[entry.name.len() as u16, 0]));
+        bytes.extend(&entry.name);
+        bytes.extend(&entry.data);
+    }
+    let start = bytes.len();
+    for (entry, offset) in entries.iter().zip(&offsets) {
+        let data = entry.shares.map_or(&entry.data, |other| &entries[other].data);
+        let long = entry.size >= u64::from(u32::MAX);
+        let extra = if long { [&[1, 0, 8, 0][..], &entry.size.to_le_bytes()].concat() } else { Vec::new() };
+        bytes.extend(b"PK\x01\x02");
+        bytes.extend(numbers(&[3 << 8 | 20, 20, entry.flags, entry.method, 0, 0]));
+        bytes.extend(entry.checksum.to_le_bytes());
+        bytes.extend((data.len() as u32).to_le_bytes());
+        bytes.extend((if long { u32::MAX } else { entry.size as u32 }).to_le_bytes());
+        bytes.extend(numbers(&[entry.name.len() as u16, extra.len() as u16, entry.comment.len() as u16, 0, 0]));
+        bytes.extend((entry.mode << 16).to_le_bytes());
+        bytes.extend((*offset as u32).to_le_bytes());
+        bytes.extend([&entry.name[..], &extra, &entry.comment].concat());
+    }
+    let length = bytes.len() - start;
+    bytes.extend(end(entries.len() as u16, length as u32, start as u32, comment));
+    bytes
+}
+
+/// The closing record.
+pub fn end(count: u16, size: u32, offset: u32, comment: &[u8]) -> Vec<u8> {
+    let mut bytes = b"PK\x05\x06".to_vec();
+    bytes.extend(numbers(&[0, 0, count, count]));
+    bytes.extend(size.to_le_bytes());
+    bytes.extend(offset.to_le_bytes());
+    bytes.extend(numbers(&[comment.len() as u16]));
+    bytes.extend(comment);
+    bytes
+}
+
+fn numbers(values: &[u16]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+/// An entry's block in a tar, of a size that may not be that of what follows.
+pub fn tar_header(name: &str, kind: u8, size: u64) -> Vec<u8> {
+    let mut block = vec![0; 512];
+    block[..name.len()].copy_from_slice(name.as_bytes());
+    block[100..108].copy_from_slice(b"0000644\0");
+    block[124..136].copy_from_slice(format!("{size:011o}\0").as_bytes());
+    block[156] = kind;
+    block[257..265].copy_from_slice(b"ustar\x0000");
+    block[148..156].fill(b' ');
+    let sum: u32 = block.iter().map(|byte| u32::from(*byte)).sum();
+    block[148..156].copy_from_slice(format!("{sum:06o}\0 ").as_bytes());
+    block
+}
+
+/// A whole entry.
+pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
+    let padding = (512 - bytes.len() % 512) % 512;
+    [&tar_header(name, kind, bytes.len() as u64)[..], bytes, &vec![0; padding]].concat()
+}
+
+/// One member of a gzip; several behind one another are read as one.
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    packed.write_all(bytes).unwrap();
+    packed.finish().unwrap()
+}
+
+/// Names, relative, and bytes of all files of a folder, sorted.
+pub fn files(root: &Path) -> Vec<(String, Vec<u8>)> {
+    let (mut found, mut folders) = (Vec::new(), vec![root.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(root).unwrap().to_str().unwrap().to_owned();
+                found.push((name, std::fs::read(path).unwrap()));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// A submission's folder as a zip, below `prefix`.
+pub fn zipped(root: &Path, prefix: &str) -> Vec<u8> {
+    let entries: Vec<ZipEntry> =
+        files(root).iter().map(|(name, bytes)| ZipEntry::new(&format!("{prefix}{name}"), bytes)).collect();
+    zip(&entries, b"a comment")
+}
+
+/// The same as a tar in gzip.
+pub fn tarred(root: &Path, prefix: &str) -> Vec<u8> {
+    let entries = files(root).into_iter().map(|(name, bytes)| tar_entry(&format!("{prefix}{name}"), b'0', &bytes));
+    gzip(&[entries.collect::<Vec<_>>().concat(), vec![0; 1024]].concat())
+}

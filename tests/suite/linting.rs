@@ -1,0 +1,168 @@
+//! `eval lint` as a user runs it, on folders and archives; scores of an archive.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use super::command::{Run, baseline, mateval, run, score};
+use super::packed::{ZipEntry, gzip, tar_header, tarred, zip, zipped};
+use super::sample::{dataset, json};
+
+fn truth(folder: &Path) -> PathBuf {
+    let submission = folder.join("gt");
+    run(&mut baseline("gt", dataset(), &submission)).ends_with(0);
+    submission
+}
+
+fn lint_command(submission: &Path, words: &[&str]) -> Command {
+    let mut command = mateval();
+    command.args(["eval", "lint"]).arg(submission).arg("--dataset").arg(dataset()).args(words);
+    command
+}
+
+fn lint(submission: &Path, words: &[&str]) -> Run {
+    run(&mut lint_command(submission, words))
+}
+
+/// Exit code, stdout and stderr of a good submission, of one that is not, and of none.
+#[test]
+fn the_verdict_is_one_line_and_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let submission = truth(folder.path());
+    let (good, cost) = watched(&mut lint_command(&submission, &[]));
+    let good = good.ends_with(0);
+    assert!(cost.cpu_seconds < 5.0, "{} s", cost.cpu_seconds);
+    let lines: Vec<&str> = good.stdout.lines().collect();
+    assert_eq!(lines.len(), 2, "{}", good.stdout);
+    assert!(lines[0].starts_with("note [copy_of_truth] 'scenes/room': "), "{}", good.stdout);
+    assert!(lines[1].starts_with("good: 0 errors, 0 warnings, 1 note; "), "{}", good.stdout);
+    assert_eq!(good.stderr, "scenes looked over: 0/1\nscenes looked over: 1/1\n");
+
+    let room = submission.join("scenes/room");
+    for instance in ["floor", "rug", "sofa"] {
+        std::fs::remove_file(room.join(instance).join("base_color.png")).unwrap();
+    }
+    std::fs::rename(room.join("wall_paper"), room.join("wallpaper")).unwrap();
+    let bad = lint(&submission, &[]).ends_with(1);
+    let expected = "error [misnamed_object] 'scenes/room/wallpaper': no instance has this name, and 'wall_paper' is missing; \
+                    rename it to 'wall_paper'\n\
+                    error [missing_map] 'scenes/room/floor/base_color.png': expected a PNG or an EXR, found none; write it; as \
+                    it is it scores as linear 0.5 (3 times; also 'scenes/room/rug/base_color.png', \
+                    'scenes/room/sofa/base_color.png')\n";
+    assert!(bad.stdout.starts_with(expected), "{}", bad.stdout);
+    assert!(bad.stdout.contains("\nnot good: 4 errors, "), "{}", bad.stdout);
+    let none = lint(&folder.path().join("none"), &[]).ends_with(2);
+    assert!(none.stdout.is_empty() && none.error().contains("none'"), "{}", none.stderr);
+    std::fs::write(folder.path().join("a.rar"), "Rar!").unwrap();
+    lint(&folder.path().join("a.rar"), &[]).ends_with(2).says("expected a folder, a .zip or a .tar.gz");
+}
+
+#[test]
+fn an_archive_is_the_folder_that_it_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let submission = truth(folder.path());
+    std::fs::remove_file(submission.join("scenes/room/rug/base_color.png")).unwrap();
+    let out = folder.path().join("lint.json");
+    let words = ["--format", "json", "--out", out.to_str().unwrap()];
+    let expected = lint(&submission, &words).ends_with(1).stdout;
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), expected);
+    lint(&submission, &words).ends_with(2).says("add --force to replace it");
+    let [zip, tar] = ["gt.zip", "gt.tar.gz"].map(|name| folder.path().join(name));
+    std::fs::write(&zip, zipped(&submission, "mine/")).unwrap();
+    std::fs::write(&tar, tarred(&submission, "./")).unwrap();
+    for archive in [&zip, &tar] {
+        assert_eq!(lint(archive, &["--format", "json"]).ends_with(1).stdout, expected);
+    }
+    let file: serde_json::Value = serde_json::from_str(&expected).unwrap();
+    assert_eq!((&file["good"], &file["errors"]), (&false.into(), &1.into()));
+    assert_eq!(file["findings"][0]["code"], "missing_map");
+
+    // The score is the folder's, and says what it would.
+    let [of_folder, of_zip] = ["folder.json", "zip.json"].map(|name| folder.path().join(name));
+    let scored = |submission: &Path, out: &Path| {
+        run(score(submission, dataset(), out).env("MATEVAL_CACHE", folder.path())).ends_with(0);
+        json(out)
+    };
+    assert_eq!(scored(&submission, &of_folder), scored(&zip, &of_zip));
+}
+
+/// What a run took.
+struct Cost {
+    cpu_seconds: f64,
+    peak_mib: f64,
+}
+
+/// Runs a command, and looks on. What the kernel counts for it stands until it is waited for, but for its memory.
+fn watched(command: &mut Command) -> (Run, Cost) {
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let told = |file: &str| std::fs::read_to_string(format!("/proc/{}/{file}", child.id())).unwrap();
+    let mut peak_kib = 0.0;
+    let cpu_seconds = loop {
+        let stat = told("stat");
+        // Behind the name, which may hold anything: the state, and ten numbers on the ticks in user and system.
+        let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
+        if fields[0] == "Z" {
+            const TICKS_A_SECOND: f64 = 100.0;
+            break (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / TICKS_A_SECOND;
+        }
+        let status = told("status");
+        if let Some(line) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
+            peak_kib = line.trim().trim_end_matches(" kB").parse::<f64>().unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    (Run::of(child.wait_with_output().unwrap()), Cost { cpu_seconds, peak_mib: peak_kib / 1024.0 })
+}
+
+/// 10 MB of zip from which 100 GB would come, three ways: entries that share their bytes, entries that say to be that large, and
+/// entries that say to be small.
+fn zip_bombs() -> Vec<(&'static str, Vec<u8>)> {
+    let zeros = ZipEntry::new("0", &vec![0; 500 << 20]);
+    let filler = ZipEntry::stored("filler", &vec![7; (10 << 20) - zeros.data.len()]);
+    let bomb = |change: fn(usize, ZipEntry) -> ZipEntry| {
+        let rest = (2..202).map(|at| change(at, ZipEntry { name: at.to_string().into(), ..zeros.clone() }));
+        zip(&[zeros.clone(), filler.clone()].into_iter().chain(rest).collect::<Vec<_>>(), b"")
+    };
+    let sharing = bomb(|_, entry| ZipEntry { shares: Some(0), ..entry });
+    let boasting = bomb(|_, entry| ZipEntry { data: vec![0; 9], ..entry });
+    let modest = zip(&[ZipEntry { size: 1000, ..zeros.clone() }, filler.clone()], b"");
+    vec![("overlapping_entries", sharing), ("archive_too_large", boasting), ("wrong_size", modest)]
+}
+
+/// The same as a stream, of which no more than a thousandth is packed: ten gigabytes of a file, of what is passed over, and a file that
+/// says to be of 8 GB.
+fn tar_bombs() -> Vec<(&'static str, Vec<u8>)> {
+    let zeros = gzip(&vec![0; 64 << 20]);
+    let body = zeros.repeat((10 << 20) / zeros.len());
+    let bomb = |kind: u8, size: u64| [gzip(&tar_header("scenes/a.png", kind, size)), body.clone()].concat();
+    let most = 8_589_934_591;
+    vec![
+        ("archive_bomb", bomb(b'0', 500 << 20)),
+        ("archive_bomb", bomb(b'2', most)),
+        ("file_too_large", bomb(b'0', most)),
+    ]
+}
+
+/// Each ends within a second of the processor's time and 200 MB of memory, and says why.
+#[test]
+fn bombs_end_early_and_take_no_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let bomb = folder.path().join("bomb");
+    for (code, bytes) in zip_bombs().into_iter().chain(tar_bombs()) {
+        assert!(bytes.len() < 12 << 20, "{} bytes", bytes.len());
+        std::fs::write(&bomb, bytes).unwrap();
+        let (run, cost) = watched(lint_command(&bomb, &[]).env("TMPDIR", folder.path()));
+        run.ends_with(1).prints(&format!("error [{code}]")).prints("not good: 1 error, ");
+        assert!(
+            cost.cpu_seconds < 1.0 && cost.peak_mib < 200.0,
+            "{code}: {} s, {} MiB",
+            cost.cpu_seconds,
+            cost.peak_mib
+        );
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "left behind");
+    }
+    // The twin: what is measured is measured.
+    let (run, cost) = watched(Command::new("dd").args(["if=/dev/zero", "of=/dev/null", "bs=300M", "count=10"]));
+    run.ends_with(0);
+    assert!(cost.cpu_seconds > 0.1 && cost.peak_mib > 300.0, "{} s, {} MiB", cost.cpu_seconds, cost.peak_mib);
+}
