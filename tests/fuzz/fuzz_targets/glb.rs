@@ -1,0 +1,14 @@
+#![no_main]
+//! Meshes as binary glTF: triangles name vertices that there are.
+
+use libfuzzer_sys::fuzz_target;
+use mateval_scene::glb;
+
+fuzz_target!(|bytes: &[u8]| {
+    mateval_fuzz::with_file("a.glb", bytes, |path| {
+        for node in glb::read(path).into_iter().flatten() {
+            let vertices = node.mesh.positions.len();
+            assert!(node.mesh.triangles.iter().flatten().all(|vertex| (*vertex as usize) < vertices));
+        }
+    });
+});

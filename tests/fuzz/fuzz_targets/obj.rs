@@ -1,0 +1,15 @@
+#![no_main]
+//! An OBJ mesh and an MTL: triangles name vertices that there are.
+
+use libfuzzer_sys::fuzz_target;
+use mateval_scene::obj::{self, Materials, ObjLimits};
+
+fuzz_target!(|bytes: &[u8]| {
+    let limits = ObjLimits { triangles: 100_000, corners: 300_000 };
+    if let Ok(found) = obj::read(bytes, limits, Materials::Told) {
+        let vertices = found.mesh.positions.len();
+        assert!(found.mesh.triangles.iter().flatten().all(|vertex| (*vertex as usize) < vertices));
+    }
+    let _ = obj::read_materials(bytes);
+    let _ = obj::material_files(bytes);
+});

@@ -1,0 +1,16 @@
+#![no_main]
+//! `RESULT.json`, and tables of it.
+
+use libfuzzer_sys::fuzz_target;
+use mateval_eval::result::ResultFile;
+use mateval_eval::tables::{Grouping, TableFormat, tables};
+use mateval_scene::json;
+
+fuzz_target!(|bytes: &[u8]| {
+    mateval_fuzz::with_file("RESULT.json", bytes, |path| {
+        let Ok(result) = json::read::<ResultFile>(path) else { return };
+        for grouping in [Grouping::Dataset, Grouping::Scene, Grouping::Category] {
+            let _ = tables(std::slice::from_ref(&result), "mateval-1", grouping, TableFormat::Latex);
+        }
+    });
+});

@@ -1,0 +1,11 @@
+//! What targets share: bytes as a file of its own folder, for parsers that read files.
+
+use std::path::{Path, PathBuf};
+
+/// Writes the bytes as `name` into a new folder, and hands the file's path over.
+pub fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
+    let folder = tempfile::tempdir().expect("there is a place for temporary files");
+    let path: PathBuf = folder.path().join(name);
+    std::fs::write(&path, bytes).expect("there is room for a small file");
+    read(&path)
+}

@@ -1,0 +1,23 @@
+#!/bin/sh
+# Runs every fuzz target of tests/fuzz for SECONDS (60 unless said otherwise), or only those named behind it:
+#   tools/fuzz.sh [SECONDS [TARGET...]]
+# Needs cargo-fuzz (cargo install cargo-fuzz) and a stable Rust. What crashes is kept in tests/fuzz/artifacts/TARGET/.
+set -eu
+cd "$(dirname "$0")/.."
+seconds="${1:-60}"
+[ "$#" -eq 0 ] || shift
+# libFuzzer's counters are not stable Rust yet.
+export RUSTC_BOOTSTRAP=1
+# The versions that everything else is built with.
+cp Cargo.lock tests/fuzz/Cargo.lock
+[ "$#" -gt 0 ] || set -- $(cargo fuzz list --fuzz-dir tests/fuzz | grep -v '^seeds$')
+cargo fuzz build --fuzz-dir tests/fuzz
+cargo run --quiet --manifest-path tests/fuzz/Cargo.toml --bin seeds -- tests/fuzz/corpus
+failed=""
+for target in "$@"; do
+  mkdir -p "tests/fuzz/corpus/$target"
+  echo "== $target for $seconds s"
+  cargo fuzz run --fuzz-dir tests/fuzz "$target" -- \
+    -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=10 -max_len=65536 -print_final_stats=1 || failed="$failed $target"
+done
+[ -z "$failed" ] || { echo "crashed:$failed" >&2; exit 1; }
