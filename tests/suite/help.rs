@@ -37,6 +37,7 @@ fn what_is_not_there() {
             "cannot open the dataset: cannot read 'nowhere/dataset.json': ",
         ),
         (&["eval", "tables", "RESULT.json"], "cannot read 'RESULT.json': "),
+        (&["eval", "leaderboard", "RESULT.json", "--out", "site"], "cannot read 'RESULT.json': "),
         (
             &["eval", "score", "grey", "--dataset", "nowhere", "--out", "RESULT.json"],
             "cannot open the dataset: cannot read 'nowhere/dataset.json': ",
@@ -92,6 +93,7 @@ fn every_subcommand_has_help() {
         &["eval", "score"],
         &["eval", "tables"],
         &["eval", "explain"],
+        &["eval", "leaderboard"],
     ];
     for words in subcommands {
         let shown = run(mateval().args(words).arg("--help")).ends_with(0);

@@ -71,6 +71,9 @@ pub fn write_scenes(
         format: SUBMISSION_FORMAT.to_owned(),
         method: method.name.clone(),
         description: method.description.clone(),
+        url: None,
+        licence: None,
+        cost: None,
         dataset_manifest_sha256: dataset.file.manifest_sha256.clone(),
     };
     json::write(&work.path().join(SUBMISSION), &file)?;

@@ -10,6 +10,8 @@ use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 
 use crate::bars::Bars;
+use crate::eval::leaderboard::LeaderboardArgs;
+use crate::eval::pictures::StripPicture;
 use crate::outcome::{Outcome, print, say};
 use crate::{eval, prep};
 
@@ -32,23 +34,23 @@ pub struct Args {
     force: bool,
 }
 
-/// Sample, dataset, renders, baselines, scores, table.
+/// Sample, dataset, renders, baselines, scores, leaderboard, table.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.out.as_path();
     if out.exists() && !args.force {
         bail!("'{}' is already there; choose another --out, or add --force to replace what a demo left", out.display());
     }
     let [source, dataset, results] = ["source", "dataset", "results"].map(|name| out.join(name));
-    say("1/5 sample: a house and a room that the program makes itself");
+    say("1/6 sample: a house and a room that the program makes itself");
     mateval_prep::sample::write(&source).context("cannot write the sample")?;
-    say("2/5 prep build: geometry, atlases, pictures of five views");
+    say("2/6 prep build: geometry, atlases, pictures of five views");
     prep::build(&prep::BuildArgs {
         recipe: source.join("recipe.toml"),
         out: dataset.clone(),
         source: None,
         force: args.force,
     })?;
-    say("3/5 prep render: RGB truth");
+    say("3/6 prep render: RGB truth");
     prep::render(&prep::RenderArgs {
         dataset: dataset.clone(),
         renderer: args.renderer,
@@ -57,18 +59,32 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         scenes: Vec::new(),
         force: args.force,
     })?;
-    say("4/5 baselines: gt, nn, median and grey");
+    say("4/6 baselines: gt, nn, median and grey");
     let opened = Dataset::open(&dataset)?;
     let submissions = make_baselines(&opened, out, args.force)?;
-    say("5/5 eval score");
+    say("5/6 eval score");
     let files = eval::score_submissions(&eval::ScoreArgs {
-        submissions,
-        dataset,
+        submissions: submissions.clone(),
+        dataset: dataset.clone(),
         out: results,
         scenes: Vec::new(),
         protocols: vec!["mateval-1".to_owned()],
         jobs: 1,
         cache: None,
+        force: args.force,
+    })?;
+    say("6/6 eval leaderboard");
+    eval::leaderboard::run(&LeaderboardArgs {
+        results: files.clone(),
+        out: out.join("leaderboard"),
+        protocol: "mateval-1".to_owned(),
+        partial: false,
+        dataset: Some(dataset),
+        submissions,
+        shown: vec![StripPicture::Albedo],
+        samples: 64,
+        pictures: None,
+        errata: None,
         force: args.force,
     })?;
     print_closing(&opened, out, &files)?;
@@ -101,5 +117,6 @@ fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Re
         print(&format!("truth:          {}\n", scene.truth().display()))?;
     }
     print(&format!("results:        {}\n", out.join("results").display()))?;
+    print(&format!("leaderboard:    {}\n", out.join("leaderboard/index.html").display()))?;
     Ok(())
 }

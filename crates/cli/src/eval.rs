@@ -1,7 +1,8 @@
 //! `mateval eval`.
 
+pub mod leaderboard;
 mod lint;
-mod pictures;
+pub mod pictures;
 mod verify;
 
 use std::path::{Path, PathBuf};
@@ -41,6 +42,8 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Makes every number of a result anew: exit code 0 where all are the same, 1 where one is not.
     Verify(VerifyArgs),
+    /// Ranks results and writes a site of them that opens from the disk.
+    Leaderboard(leaderboard::LeaderboardArgs),
 }
 
 /// What `eval image` is given.
@@ -173,6 +176,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Tables(args) => print_tables(args),
         Command::Explain(args) => print_explanation(args),
         Command::Verify(args) => verify::run(args),
+        Command::Leaderboard(args) => leaderboard::run(args),
     }
 }
 

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::explain::file::ExplainFile;
+use mateval_eval::leaderboard::errata::ErrataFile;
+use mateval_eval::leaderboard::file::LeaderboardFile;
 use mateval_eval::lint::LintFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
@@ -45,7 +47,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 18] {
+fn schemas() -> [(&'static str, Schema); 20] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -58,6 +60,8 @@ fn schemas() -> [(&'static str, Schema); 18] {
         ("explain", schema_for!(ExplainFile)),
         ("verification", schema_for!(VerificationFile)),
         ("lint", schema_for!(LintFile)),
+        ("leaderboard", schema_for!(LeaderboardFile)),
+        ("errata", schema_for!(ErrataFile)),
         ("stats", schema_for!(StatsFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),

@@ -5,7 +5,8 @@
 //!
 //! Between: [`protocol`] holds every constant, [`prediction`] reads the submission's maps, [`material_pictures`] makes
 //! pictures of them, [`alignment`] takes out the scale, [`light_fit`] lights the scene as the photo is lit, [`measure`] compares,
-//! [`score`] goes through the dataset, [`tables`] and [`strips`] show, [`explain`] tells kinds of error apart.
+//! [`score`] goes through the dataset, [`tables`] and [`strips`] show, [`explain`] tells kinds of error apart,
+//! [`ranking`] ranks, [`leaderboard`] makes a site of it.
 
 pub mod alignment;
 pub mod archive;
@@ -13,6 +14,7 @@ mod coverage;
 pub mod error;
 pub mod explain;
 mod instance_errors;
+pub mod leaderboard;
 pub mod light_fit;
 pub mod light_rules;
 mod light_score;
@@ -21,13 +23,16 @@ pub mod lint;
 pub mod map_file;
 pub mod material_pictures;
 pub mod measure;
+pub mod metric_kind;
 pub mod noise_blocks;
 mod open_scene;
 pub mod pair;
+pub mod picture_set;
 mod pilot;
 pub mod predicted_light;
 pub mod prediction;
 pub mod protocol;
+pub mod ranking;
 pub mod relit;
 pub mod result;
 pub mod rgb;

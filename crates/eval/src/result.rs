@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use mateval_metrics::Psnr;
-use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
+use mateval_scene::submission::Cost;
+use mateval_scene::{Finding, InstanceId, RendererId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,13 +40,22 @@ pub struct ResultFile {
 }
 
 /// What was scored.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {
     /// SHA-256, hex, over path and SHA-256 of submission.json and of every map of the scored scenes, in order.
     pub sha256: String,
     /// Its own description.
     pub description: String,
+    /// Where to read about it, as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub url: Option<String>,
+    /// The method's licence, as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub licence: Option<String>,
+    /// What the method takes, as it says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<Cost>,
 }
 
 /// What it was scored on.
@@ -62,6 +72,12 @@ pub struct DatasetId {
     pub scenes: Vec<SceneId>,
     /// How many scenes it has.
     pub scenes_in_all: usize,
+    /// The house of each scored scene: rankings draw scenes of one house together.
+    #[serde(default)]
+    pub houses: BTreeMap<SceneId, String>,
+    /// The renderer whose pictures light was compared with; null where there were none.
+    #[serde(default)]
+    pub scored_renderer: Option<RendererId>,
 }
 
 /// The scores of one protocol.

@@ -57,9 +57,9 @@ pub struct StripPlan<'a> {
 }
 
 /// A view's row: masks, and pictures of the truth and then of every submission.
-struct StripRow {
-    truth: ViewTruth,
-    shown: Vec<Picture<SrgbRgb>>,
+pub(crate) struct StripRow {
+    pub(crate) truth: ViewTruth,
+    pub(crate) shown: Vec<Picture<SrgbRgb>>,
     /// What errors are taken of.
     compared: Vec<Picture<[f32; 3]>>,
 }
@@ -109,7 +109,8 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     Ok(written)
 }
 
-fn rows(
+/// One scene's views.
+pub(crate) fn rows(
     plan: &StripPlan<'_>,
     scene: &SceneFile,
     shown: Shown,
@@ -166,7 +167,8 @@ fn darkened(truth: &ViewTruth, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
     })
 }
 
-fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
+/// Where each submission errs.
+pub(crate) fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
     let Some((reference, predicted)) = row.compared.split_first() else { return Vec::new() };
     let error = |picture: &Picture<[f32; 3]>| {
         Picture::from_fn(picture.width(), picture.height(), |x, y| {

@@ -29,6 +29,15 @@ pub struct SubmissionFile {
     /// Anything that a reader should know: settings, training data, links.
     #[serde(default)]
     pub description: String,
+    /// Where to read about the method; leaderboards link to it if it begins with `https://` or `http://`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub url: Option<String>,
+    /// The licence of the method's code and weights, as in `MIT` or `CC-BY-NC-4.0`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub licence: Option<String>,
+    /// What it took, as its makers say; nobody checks it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cost: Option<Cost>,
     /// `manifest_sha256` of the dataset that it was made for.
     pub dataset_manifest_sha256: String,
 }
@@ -44,6 +53,18 @@ impl SubmissionFile {
         let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", shortened(&file.format));
         Err(SceneError::Unsupported { path, what })
     }
+}
+
+/// What a method takes for a scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cost {
+    /// Seconds for a scene, on the average.
+    #[schemars(range(min = 0.0))]
+    pub seconds_a_scene: f64,
+    /// On what, as in `one RTX 4090`.
+    #[serde(default)]
+    pub hardware: String,
 }
 
 /// Texels a side that a submission may use.

@@ -39,7 +39,7 @@ pub struct PicturesArgs {
 
 /// What they show.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum StripPicture {
+pub enum StripPicture {
     /// base_color.
     Albedo,
     /// Under the scene's own lights.
@@ -50,18 +50,25 @@ enum StripPicture {
     RgbFitted,
 }
 
+impl StripPicture {
+    /// With so many samples a pixel, half of them in each of two halves.
+    pub fn shown(self, samples: u32) -> Shown {
+        let light = |track| Shown::Light { track, samples: samples / 2 };
+        match self {
+            Self::Albedo => Shown::Albedo,
+            Self::RgbTrue => light(Track::True),
+            Self::RgbFitted => light(Track::Fitted),
+        }
+    }
+}
+
 /// Writes the pictures and prints their paths.
 pub fn pictures(args: &PicturesArgs) -> anyhow::Result<Outcome> {
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let submissions: Vec<&Path> = args.submissions.iter().map(PathBuf::as_path).collect();
     let bars = Bars::new();
     let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
-    let light = |track| Shown::Light { track, samples: args.samples / 2 };
-    let shown = args.pictures.iter().map(|picture| match picture {
-        StripPicture::Albedo => Shown::Albedo,
-        StripPicture::RgbTrue => light(Track::True),
-        StripPicture::RgbFitted => light(Track::Fitted),
-    });
+    let shown = args.pictures.iter().map(|picture| picture.shown(args.samples));
     let plan = StripPlan {
         dataset: &dataset,
         submissions: &submissions,

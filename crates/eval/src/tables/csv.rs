@@ -28,6 +28,6 @@ fn numbers(column: &Column<'_>, cell: &Cell) -> impl Iterator<Item = String> {
     [number(cell.value.map(|value| value.value))].into_iter().chain(error)
 }
 
-fn quoted(field: &str) -> String {
+pub(crate) fn quoted(field: &str) -> String {
     format!("\"{}\"", field.replace('"', "\"\""))
 }

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::layouts::Better;
 use super::table::Table;
+use crate::metric_kind::Better;
 
 /// A comment with the title and the table.
 pub(super) fn text(table: &Table<'_>) -> String {

@@ -1,23 +1,6 @@
 //! Which tables there are, and their columns.
 
-/// Whether more is better.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Better {
-    Lower,
-    Higher,
-}
-
-/// One kind of number.
-pub(super) struct Metric {
-    /// Last word of its key.
-    pub(super) key: &'static str,
-    pub(super) title: &'static str,
-    /// What values are multiplied by to be shown.
-    pub(super) scale: f64,
-    pub(super) digits: usize,
-    /// None for what is no score.
-    pub(super) better: Option<Better>,
-}
+use crate::metric_kind::{MSE, Metric, PIXELS, PSNR, SCORES};
 
 /// Columns that stand under one title.
 pub(super) struct Block {
@@ -33,15 +16,6 @@ pub(super) struct Layout {
     pub(super) blocks: Vec<Block>,
 }
 
-/// The paper prints MSE in units of 1e-3.
-const MSE: Metric = Metric { key: "mse", title: "MSE (1e-3)", scale: 1e3, digits: 3, better: Some(Better::Lower) };
-const PSNR: Metric = Metric { key: "psnr", title: "PSNR", scale: 1.0, digits: 2, better: Some(Better::Higher) };
-const SSIM: Metric = Metric { key: "ssim", title: "SSIM", scale: 1.0, digits: 4, better: Some(Better::Higher) };
-const LPIPS: Metric = Metric { key: "lpips_alex", title: "LPIPS", scale: 1.0, digits: 4, better: Some(Better::Lower) };
-const PIXELS: Metric = Metric { key: "pixels", title: "Pixels", scale: 1.0, digits: 0, better: None };
-
-/// The paper's four columns.
-const COLUMNS: &[Metric] = &[MSE, PSNR, SSIM, LPIPS];
 const POOLED: &[Metric] = &[PIXELS, MSE, PSNR];
 
 /// A block's title, picture and views.
@@ -94,7 +68,7 @@ fn layout(title: &str, blocks: &[BlockWords], suffix: &str) -> Layout {
     let block = |&(title, picture, views): &BlockWords| Block {
         title,
         key: format!("{picture}{suffix}.{views}"),
-        metrics: COLUMNS,
+        metrics: SCORES,
     };
     Layout { title: title.to_owned(), blocks: blocks.iter().map(block).collect() }
 }

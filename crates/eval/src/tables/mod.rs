@@ -3,12 +3,12 @@
 //! `layouts` says which tables there are, `rows` where their numbers come from, `table` sets them and marks the best,
 //! and a file for each format writes them.
 
-mod csv;
+pub(crate) mod csv;
 mod latex;
 mod layouts;
 mod markdown;
-mod pooled;
-mod rows;
+pub(crate) mod pooled;
+pub(crate) mod rows;
 mod table;
 #[cfg(test)]
 mod tests;

@@ -15,7 +15,7 @@ pub(super) const OTHER: &str = "other";
 ///
 /// Every pixel weighs the same, whatever scene, view and instance it is of: unlike the other tables' this PSNR is that of a
 /// mean. It is missing where the error, freed of noise, is not above 0.
-pub(super) fn pooled(instances: &[InstancePixelErrors], by: Grouping) -> BTreeMap<String, BTreeMap<String, Value>> {
+pub(crate) fn pooled(instances: &[InstancePixelErrors], by: Grouping) -> BTreeMap<String, BTreeMap<String, Value>> {
     let mut sums: BTreeMap<(String, String), (f64, usize)> = BTreeMap::new();
     for errors in instances.iter().filter(|errors| errors.pixels > 0) {
         let category = if by == Grouping::SuperCategory { &errors.super_category } else { &errors.category };

@@ -10,10 +10,10 @@ use crate::result::{ProtocolResult, ResultFile};
 
 /// A number and how sure it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Value {
-    pub(super) value: f64,
+pub(crate) struct Value {
+    pub(crate) value: f64,
     /// That render noise makes, in the value's unit.
-    pub(super) standard_error: Option<f64>,
+    pub(crate) standard_error: Option<f64>,
 }
 
 /// One method's numbers.

@@ -1,8 +1,9 @@
 //! A table before it is written: heads, cells, and which of them are best.
 
 use super::Grouping;
-use super::layouts::{Better, Layout, Metric};
+use super::layouts::Layout;
 use super::rows::{Group, Value};
+use crate::metric_kind::{Better, Metric};
 
 /// A table whose every column has a value somewhere.
 pub(super) struct Table<'a> {

@@ -1,0 +1,57 @@
+//! `leaderboard.json`: all that a leaderboard shows of all methods together, for programs.
+
+use mateval_scene::submission::Cost;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::verified::Verified;
+use crate::ranking::file::Ranking;
+
+/// The word for this version of a leaderboard.
+pub const LEADERBOARD_FORMAT: &str = "mateval-leaderboard/1";
+
+/// A leaderboard.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeaderboardFile {
+    /// Always `mateval-leaderboard/1`.
+    pub format: String,
+    /// What made it, as in `mateval 0.1.0`.
+    pub tool: String,
+    /// The dataset that all were scored on.
+    pub dataset: LeaderboardDataset,
+    /// What each method says of itself, in the ranking's order.
+    pub methods: Vec<LeaderboardMethod>,
+    /// Numbers, intervals, ranks.
+    pub ranking: Ranking,
+}
+
+/// The dataset that all were scored on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeaderboardDataset {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of its manifest, hex.
+    pub manifest_sha256: String,
+}
+
+/// What a method says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LeaderboardMethod {
+    /// Its id in the ranking.
+    pub id: String,
+    /// Its description.
+    pub description: String,
+    /// Where to read about it.
+    pub url: Option<String>,
+    /// Its licence.
+    pub licence: Option<String>,
+    /// What it takes.
+    pub cost: Option<Cost>,
+    /// Whether its score was computed again.
+    pub verified: Verified,
+}

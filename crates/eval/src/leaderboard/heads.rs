@@ -1,0 +1,100 @@
+//! What pages show of a method wherever they name it, and of its numbers.
+
+use mateval_scene::submission::Cost;
+use serde::Serialize;
+
+use super::columns::Column;
+use super::file::LeaderboardMethod;
+use super::verified::Verified;
+use crate::ranking::file::{RankRange, RankedMethod, Ranking, Standing};
+
+/// A method.
+#[derive(Clone, Serialize)]
+pub(super) struct MethodHead {
+    pub(super) id: String,
+    pub(super) name: String,
+    pub(super) verified: Verified,
+    description: String,
+    /// Only if it leads to a web page: a stranger wrote it.
+    link: Option<String>,
+    licence: Option<String>,
+    cost: Option<Cost>,
+    /// Its cost, rounded.
+    seconds: String,
+    partial: bool,
+    /// Scenes that it is ranked on, if it is partial.
+    covered: usize,
+    /// Scenes that all have.
+    scenes: usize,
+    /// Scenes that it left to be grey.
+    left_out: usize,
+}
+
+impl MethodHead {
+    pub(super) fn new(ranked: &RankedMethod, said: &LeaderboardMethod, ranking: &Ranking) -> Self {
+        let is_page = |url: &String| url.starts_with("https://") || url.starts_with("http://");
+        let scenes = ranking.scenes.len();
+        Self {
+            id: ranked.id.clone(),
+            name: ranked.method.clone(),
+            verified: said.verified,
+            description: said.description.clone(),
+            link: said.url.clone().filter(is_page),
+            licence: said.licence.clone().filter(|licence| !licence.is_empty()),
+            seconds: said.cost.as_ref().map_or_else(String::new, |cost| seconds(cost.seconds_a_scene)),
+            cost: said.cost.clone(),
+            partial: ranked.partial,
+            covered: scenes - ranked.not_scored.len() - ranked.left_out.len(),
+            scenes,
+            left_out: ranked.left_out.len(),
+        }
+    }
+}
+
+fn seconds(seconds: f64) -> String {
+    let digits = if seconds >= 100.0 { 0 } else { 1 };
+    format!("{seconds:.digits$}")
+}
+
+/// A number of a method with all that is known of it.
+#[derive(Serialize)]
+pub(super) struct Cell {
+    /// All digits, as scripts sort by.
+    value: String,
+    low: Option<String>,
+    high: Option<String>,
+    text: String,
+    interval: Option<String>,
+    rank: String,
+    is_shown: bool,
+}
+
+impl Cell {
+    pub(super) fn new(column: &Column, standing: &Standing) -> Self {
+        let interval = standing.interval.as_ref();
+        Self {
+            value: short(standing.value),
+            low: interval.map(|interval| short(interval.low)),
+            high: interval.map(|interval| short(interval.high)),
+            text: column.text(standing.value),
+            interval: interval.map(|i| format!("{} – {}", column.text(i.low), column.text(i.high))),
+            rank: rank_text(standing.rank),
+            is_shown: column.is_shown,
+        }
+    }
+}
+
+/// Seven digits tell all values apart that a page need tell apart; the downloads have all.
+fn short(value: f64) -> String {
+    format!("{value:.6e}").parse().map_or_else(|_| value.to_string(), |rounded: f64| rounded.to_string())
+}
+
+/// `2`, or `2–5`.
+pub(super) fn rank_text(rank: RankRange) -> String {
+    if rank.best == rank.worst { rank.best.to_string() } else { format!("{}–{}", rank.best, rank.worst) }
+}
+
+/// The method's place by one number.
+pub(super) fn standing<'a>(ranking: &'a Ranking, key: &str, method: &str) -> Option<&'a Standing> {
+    ranking.keys.get(key)?.standings.iter().find(|standing| standing.method == method)
+}

@@ -1,0 +1,180 @@
+"use strict";
+// The leaderboard: which columns and rows are shown, by what they are sorted, and who beats whom by that. All of it is in
+// the address behind the #, so that a view can be linked to.
+
+const table = document.getElementById("board");
+const form = document.getElementById("controls");
+const heads = [...table.tHead.rows[0].cells];
+const columns = heads.filter((head) => head.dataset.metric);
+const groups = ["picture", "views", "metric", "region"];
+let sorted = { key: table.dataset.first, ascending: headOf(table.dataset.first).dataset.better === "lower" };
+
+function headOf(key) {
+  return heads.find((head) => head.dataset.key === key);
+}
+
+function chosen(name) {
+  return [...form.querySelectorAll(`input[name=${name}]:checked`)].map((box) => box.value);
+}
+
+function showColumns() {
+  const words = Object.fromEntries(groups.map((name) => [name, chosen(name)]));
+  for (const head of columns) {
+    const hide = !groups.every((name) => words[name].includes(head.dataset[name]));
+    if (head.hidden === hide) continue;
+    head.hidden = hide;
+    for (const row of table.tBodies[0].rows) row.cells[head.cellIndex].hidden = hide;
+  }
+  table.classList.toggle("plain-values", !form.elements.intervals.checked);
+}
+
+function showRows() {
+  const name = form.elements.name.value.trim().toLowerCase();
+  for (const row of table.tBodies[0].rows) {
+    const fits = row.cells[1].dataset.v.toLowerCase().includes(name);
+    row.hidden = !fits || (form.elements.verified.checked && row.dataset.verified !== "confirmed");
+  }
+}
+
+function sortBoard() {
+  const head = headOf(sorted.key);
+  sortRows(table.tBodies[0], head.cellIndex, sorted.ascending);
+  markSorted(head, sorted.ascending);
+  if (!head.dataset.metric) return;
+  for (const row of table.tBodies[0].rows) row.cells[0].textContent = row.cells[head.cellIndex].dataset.r || "";
+  drawIntervals(head);
+}
+
+// A line from end to end and a dot at the value, on one scale for all rows, in the column that is sorted by.
+function drawIntervals(head) {
+  table.querySelectorAll("td svg").forEach((old) => old.remove());
+  const cells = [...table.tBodies[0].rows].map((row) => row.cells[head.cellIndex]).filter((cell) => cell.dataset.l);
+  if (!cells.length) return;
+  const low = Math.min(...cells.map((cell) => Number(cell.dataset.l)));
+  const span = Math.max(...cells.map((cell) => Number(cell.dataset.h))) - low || 1;
+  const x = (value) => 4 + (92 * (Number(value) - low)) / span;
+  for (const cell of cells) {
+    const { l, v, h } = cell.dataset;
+    const svg = element("svg", { width: 100, height: 8, viewBox: "0 0 100 8", "aria-hidden": "true" });
+    svg.append(element("line", { x1: x(l), x2: x(h), y1: 4, y2: 4, stroke: "currentColor", "stroke-width": 1.5 }));
+    svg.append(element("circle", { cx: x(v), cy: 4, r: 3, fill: "currentColor" }));
+    cell.append(svg);
+  }
+}
+
+function element(name, attributes) {
+  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}
+
+// As in "Albedo, novel views PSNR".
+function title(head) {
+  const metric = head.querySelector("b");
+  const words = head.querySelector("button").firstChild.textContent.trim();
+  return metric ? `${words} ${metric.firstChild.textContent.trim()}` : words;
+}
+
+function tell() {
+  const rows = [...table.tBodies[0].rows];
+  const shown = rows.filter((row) => !row.hidden).length;
+  const count = shown === rows.length ? "" : ` ${shown} of ${rows.length} methods are shown.`;
+  document.getElementById("status").textContent = `Sorted by ${title(headOf(sorted.key))}.${count}`;
+}
+
+// A script of its own for each number: pages opened from the disk may not fetch.
+const wins = {};
+let winsKey = null;
+function boardWins(key, data) {
+  wins[key] = data;
+  if (key === winsKey) showWins();
+}
+
+function loadWins() {
+  if (!headOf(sorted.key).dataset.metric) return;
+  winsKey = sorted.key;
+  if (wins[winsKey]) return showWins();
+  const script = document.createElement("script");
+  script.src = `wins/${winsKey}.js`;
+  document.head.append(script);
+}
+
+function showWins() {
+  const { names, wins: shares, sure } = wins[winsKey];
+  const made = document.createElement("table");
+  made.className = "wins";
+  const head = made.createTHead().insertRow();
+  head.append(cell("td", ""), ...names.map((name, at) => Object.assign(cell("th", at + 1), { title: name, scope: "col" })));
+  const body = made.createTBody();
+  names.forEach((name, row) => {
+    const cells = names.map((other, column) => {
+      const one = cell("td", shares[row][column] ?? "");
+      if (sure[row][column]) one.classList.add("sure", sure[row][column] > 0 ? "over" : "under");
+      return one;
+    });
+    body.insertRow().append(Object.assign(cell("th", `${row + 1} ${name}`), { scope: "row", title: name }), ...cells);
+  });
+  const words = cell("p", `In percent of draws, by ${title(headOf(winsKey))}.`);
+  words.className = "small";
+  document.getElementById("wins").replaceChildren(words, made);
+}
+
+function cell(name, text) {
+  const made = document.createElement(name);
+  made.textContent = text;
+  return made;
+}
+
+function remember() {
+  const words = new URLSearchParams();
+  for (const name of groups) words.set(name, chosen(name).join(","));
+  if (form.elements.name.value) words.set("name", form.elements.name.value);
+  if (form.elements.verified.checked) words.set("verified", "1");
+  if (!form.elements.intervals.checked) words.set("intervals", "0");
+  words.set("sort", (sorted.ascending ? "" : "-") + sorted.key);
+  history.replaceState(null, "", `#${words}`);
+}
+
+function recall() {
+  const words = new URLSearchParams(location.hash.slice(1));
+  const sort = words.get("sort");
+  if (!sort) return;
+  for (const name of groups) {
+    const values = (words.get(name) || "").split(",");
+    form.querySelectorAll(`input[name=${name}]`).forEach((box) => { box.checked = values.includes(box.value); });
+  }
+  form.elements.name.value = words.get("name") || "";
+  form.elements.verified.checked = words.has("verified");
+  form.elements.intervals.checked = words.get("intervals") !== "0";
+  const key = sort.replace(/^-/, "");
+  if (headOf(key)) sorted = { key, ascending: !sort.startsWith("-") };
+}
+
+function update() {
+  showColumns();
+  showRows();
+  tell();
+  remember();
+}
+
+form.addEventListener("input", update);
+form.addEventListener("submit", (event) => event.preventDefault());
+table.tHead.addEventListener("click", (event) => {
+  const head = event.target.closest("button") && event.target.closest("th");
+  if (!head) return;
+  const key = head.dataset.key;
+  const first = head.dataset.better !== "higher";
+  sorted = { key, ascending: sorted.key === key ? !sorted.ascending : first };
+  sortBoard();
+  tell();
+  remember();
+  loadWins();
+});
+window.addEventListener("hashchange", () => { recall(); showColumns(); showRows(); sortBoard(); tell(); loadWins(); });
+
+recall();
+showColumns();
+showRows();
+sortBoard();
+tell();
+loadWins();

@@ -1,0 +1,109 @@
+//! A small site from made-up results; the browser's tests are in `tests/site`.
+
+use mateval_image::{Picture, png_io};
+use mateval_scene::json;
+use mateval_scene::manifest::sha256_of_file;
+use mateval_scene::submission::Cost;
+
+use super::*;
+use crate::picture_set;
+use crate::ranking::tests::{result, scores};
+
+fn three() -> [ResultFile; 3] {
+    let mut results =
+        [("good", 30.0), ("<b>bold</b>", 25.0), ("bad", 20.0)].map(|(name, psnr)| result(name, &scores(psnr, 0.1)));
+    results[0].submission.url = Some("https://example.org/?a=1&b=2".to_owned());
+    results[1].submission.url = Some("javascript:alert(1)".to_owned());
+    results[2].submission.cost = Some(Cost { seconds_a_scene: 12.34, hardware: "a laptop".to_owned() });
+    results
+}
+
+fn plan(results: &[ResultFile]) -> LeaderboardPlan<'_> {
+    LeaderboardPlan {
+        results,
+        verified: vec![Verified::Confirmed, Verified::No, Verified::Stale],
+        protocol: "mateval-1",
+        partial: false,
+        errata: None,
+        pictures: None,
+        submissions: None,
+        tool: "mateval".to_owned(),
+    }
+}
+
+fn quiet(_: &str, _: usize, _: usize) {}
+
+#[test]
+fn a_site_has_all_its_pages() {
+    let folder = tempfile::tempdir().unwrap();
+    let (set, out) = (folder.path().join("set"), folder.path().join("site"));
+    let results = three();
+    let view = mateval_scene::ViewId::new("input").unwrap();
+    for (method, kind) in [("good", "albedo"), ("good", "albedo-error"), (picture_set::TRUTH, "albedo"), ("no id", "x")]
+    {
+        let path = picture_set::place(&set, method, &results[0].dataset.scenes[0], &view, kind);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        png_io::write_rgb_bytes(&path, &Picture::filled(8, 6, [90; 3])).unwrap();
+    }
+    write(&LeaderboardPlan { pictures: Some(&set), ..plan(&results) }, &out, false, &quiet).unwrap();
+    let text = |file: &str| std::fs::read_to_string(out.join(file)).unwrap();
+    let index = text("index.html");
+    assert!(index.contains("&lt;b&gt;bold&lt;&#x2f;b&gt;") && !index.contains("<b>bold"), "{index}");
+    assert_eq!((index.matches("> verified</span>").count(), index.matches("12.3<small>").count()), (1, 1));
+    assert!(text("methods/good.html").contains("href=\"https:&#x2f;&#x2f;example.org&#x2f;?a=1&amp;b=2\""));
+    assert!(!text("methods/b-bold-b.html").contains("javascript:"));
+    let scene = text("scenes/s00.html");
+    assert!(
+        scene.contains("data-kinds=\"albedo albedo-error\"") && scene.contains("width=\"8\" height=\"6\""),
+        "{scene}"
+    );
+    assert!(text("scenes/s01.html").contains("No pictures were given"));
+    assert!(text("protocol.html").contains(&results[0].protocols["mateval-1"].fingerprint));
+    assert!(text("errata.html").contains("None are known"));
+    assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
+    assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
+    let file: LeaderboardFile = json::read(&out.join(LEADERBOARD)).unwrap();
+    assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));
+    let lines = text("downloads/leaderboard.csv").lines().count();
+    assert_eq!((lines, text("methods/bad.csv").lines().count()), (1 + 3 * 2, 1 + 12));
+}
+
+#[test]
+fn only_a_leaderboard_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = three();
+    let out = folder.path().join("site");
+    write(&plan(&results), &out, false, &quiet).unwrap();
+    let error = write(&plan(&results), &out, false, &quiet).unwrap_err().to_string();
+    assert!(error.contains("add --force"), "{error}");
+    write(&plan(&results[..2]), &out, true, &quiet).unwrap();
+    assert!(!out.join("methods/bad.html").exists());
+    let other = folder.path().join("other");
+    std::fs::create_dir(&other).unwrap();
+    std::fs::write(other.join("mine.txt"), "mine").unwrap();
+    let error = write(&plan(&results), &other, true, &quiet).unwrap_err().to_string();
+    assert!(error.contains("is no leaderboard") && other.join("mine.txt").exists(), "{error}");
+}
+
+#[test]
+fn a_mark_is_of_the_very_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.json");
+    let result = result("a", &scores(30.0, 0.0));
+    json::write(&path, &result).unwrap();
+    assert_eq!(verified::read(&path, &result).unwrap(), Verified::No);
+    let say = |format: &str, result_sha256: &str, confirmed: bool| {
+        let said = serde_json::json!({
+            "format": format, "tool": "mateval", "result_sha256": result_sha256, "confirmed": confirmed, "differences": 0, "findings": [],
+            "submission_sha256": result.submission.sha256,
+            "dataset_manifest_sha256": result.dataset.manifest_sha256,
+        });
+        json::write(&verified::sidecar(&path), &said).unwrap();
+        verified::read(&path, &result)
+    };
+    let (format, sha256) = ("mateval-verification/1", sha256_of_file(&path).unwrap());
+    assert_eq!(say(format, &sha256, true).unwrap(), Verified::Confirmed);
+    assert_eq!(say(format, &sha256, false).unwrap(), Verified::Refuted);
+    assert_eq!(say(format, &"0".repeat(64), true).unwrap(), Verified::Stale);
+    assert!(say("mateval-verification/9", &sha256, true).is_err());
+}
