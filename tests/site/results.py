@@ -1,0 +1,140 @@
+"""Synthetic results and pictures: what a leaderboard is made of, without a dataset. All of it is CC0."""
+
+import hashlib
+import json
+import math
+import random
+import struct
+import zlib
+from pathlib import Path
+
+EXAMPLE = Path(__file__).parents[2] / "dataset_spec/examples/result.json"
+VIEWS = ["input", "up_left", "up_right", "down_left", "down_right"]
+WEIGHTS = "b24653d691930ef38ebb65d7139a65227e482b1abcf5709f4805fe743fecb6c1"
+MANIFEST = "5" * 64
+METRICS = ["mse", "psnr", "ssim", "lpips_alex"]
+PICTURES = {
+    "albedo": ["input", "novel", "unobserved"],
+    "albedo_aligned": ["input", "novel", "unobserved"],
+    "rgb_true": ["input", "novel", "unobserved"],
+    "rgb_fitted": ["input", "novel", "unobserved"],
+    "rgb_relit": ["input", "novel", "unobserved"],
+    "roughness": ["input", "novel", "unobserved"],
+    "metallic": ["input", "novel", "unobserved"],
+    "albedo_specular": ["input", "novel"],
+    "rgb_true_specular": ["input", "novel"],
+    "texture_base_color": ["observed", "unobserved"],
+}
+CATEGORIES = [("Sofa", "Seat"), ("Dining Table", "Table"), ("WallInner", "Architecture")]
+
+
+def pretty(value: object) -> str:
+    """As MatEval writes JSON."""
+    return json.dumps(value, indent=2, ensure_ascii=False) + "\n"
+
+
+def sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def scene_names(count: int) -> list[str]:
+    return [f"room-{number:03}" for number in range(count)]
+
+
+def scene_values(*, psnr: float, chance: random.Random) -> dict[str, float]:
+    values = {}
+    for picture, views in PICTURES.items():
+        for view in views:
+            level = psnr + chance.gauss(0, 0.8) + (2 if view in ("input", "observed") else 0)
+            values[f"{picture}.{view}.psnr"] = level
+            values[f"{picture}.{view}.mse"] = 10 ** (-level / 10)
+            if picture.startswith("texture"):
+                continue
+            values[f"{picture}.{view}.ssim"] = 1 - 0.9 * math.exp(-level / 20)
+            if not picture.startswith(("roughness", "metallic")):
+                values[f"{picture}.{view}.lpips_alex"] = 0.9 * math.exp(-level / 15)
+    return dict(sorted(values.items()))
+
+
+def instances(*, scenes: list[str], psnr: float) -> list[dict]:
+    found = []
+    for scene in scenes:
+        for at, (category, super_category) in enumerate(CATEGORIES):
+            for views in ["input", "novel"]:
+                found.append({
+                    "scene": scene, "instance": f"piece-{at}", "category": category, "super_category": super_category,
+                    "picture": "albedo", "views": views, "pixels": 1000 * (at + 1), "mse": 10 ** (-psnr / 10) * (1 + at),
+                })
+    return found
+
+
+def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: object) -> dict:
+    """A whole RESULT.json; two scenes share a house."""
+    example = json.loads(EXAMPLE.read_text())
+    protocol = example["protocols"]["mateval-1"]["protocol"]
+    chance = random.Random(seed)
+    values = {}
+    for at, scene in enumerate(scenes):
+        # Scenes are hard or easy for all methods alike.
+        ease = random.Random(f"scene {at}").gauss(0, 2)
+        values[scene] = scene_values(psnr=psnr + ease, chance=chance)
+    keys = values[scenes[0]]
+    scores = {
+        "protocol": protocol,
+        "fingerprint": sha256(pretty([protocol, MANIFEST, scenes, "builtin", WEIGHTS])),
+        "summary": {key: sum(v[key] for v in values.values()) / len(values) for key in keys},
+        "scenes": values, "summary_noise": {}, "noise": {}, "fits": {}, "pictures": [], "texels": [],
+        "instances": instances(scenes=scenes, psnr=psnr),
+    }
+    return {
+        "format": "mateval-result/2", "tool": "mateval 0.1.0", "method": method,
+        "submission": {"sha256": sha256(method + str(seed)), "description": said.pop("description", ""), **said},
+        "dataset": {
+            "name": "synthetic", "version": "1.0", "manifest_sha256": MANIFEST, "scenes": scenes,
+            "scenes_in_all": len(scenes), "scored_renderer": "builtin",
+            "houses": {scene: f"house-{at // 2 if len(scenes) > 12 else at}" for at, scene in enumerate(scenes)},
+        },
+        "lpips_weights": {"alex": WEIGHTS}, "protocols": {"mateval-1": scores}, "missing": [], "findings": [],
+    }
+
+
+def write_verification(path: Path, *, confirmed: bool) -> None:
+    """What `eval verify` leaves beside a result."""
+    found = json.loads(path.read_text())
+    path.with_suffix(".verified.json").write_text(pretty({
+        "format": "mateval-verification/1", "tool": "mateval 0.1.0", "result_sha256": sha256(path.read_text()),
+        "submission_sha256": found["submission"]["sha256"],
+        "dataset_manifest_sha256": MANIFEST, "confirmed": confirmed, "differences": 0, "findings": [],
+    }))
+
+
+def write_png(path: Path, *, width: int, height: int, color) -> None:
+    """An 8-bit RGB PNG; `color` gives the bytes of a pixel."""
+    rows = b"".join(b"\0" + bytes(v for x in range(width) for v in color(x, y)) for y in range(height))
+    chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+
+
+def write_pictures(folder: Path, *, methods: dict[str, float], scenes: list[str], width: int = 96, height: int = 54) -> None:
+    """A floor and a wall for each scene; methods miss their colours by a share. `methods` are ids."""
+    def room(scene: int, view: int, miss: float):
+        base = [60 + 40 * ((scene + c) % 4) for c in range(3)]
+        horizon = height * (0.45 + 0.05 * view)
+        def color(x: int, y: int) -> list[int]:
+            check = 25 if y > horizon and (x // 8 + y // 6) % 2 else 0
+            level = [v + check + (30 if y < horizon else 0) for v in base]
+            return [min(255, max(0, round(v * (1 - miss) + miss * 200 * x / width))) for v in level]
+        return color
+
+    for s, scene in enumerate(scenes):
+        for v, view in enumerate(VIEWS):
+            place = lambda method, kind: folder / method / scene / view / f"{kind}.png"
+            for kind in ["albedo", "rgb_true"]:
+                write_png(place("_truth", kind), width=width, height=height, color=room(s, v, 0.0))
+                for method, miss in methods.items():
+                    write_png(place(method, kind), width=width, height=height, color=room(s, v, miss))
+            for method, miss in methods.items():
+                heat = lambda x, y, miss=miss: [min(255, round(700 * miss * x / width)), min(255, round(300 * miss * x / width)), 0]
+                write_png(place(method, "albedo-error"), width=width, height=height, color=heat)

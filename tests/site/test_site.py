@@ -1,0 +1,387 @@
+"""Drives the leaderboard's site in headless Chromium: at two widths, light and dark, by mouse and by keyboard.
+
+`tools/test_site.sh` installs the browser, builds `mateval` and runs this. With MATEVAL_TEST_PICTURES=DIR it leaves
+screenshots there.
+"""
+
+import csv
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+from contextlib import closing
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
+
+import results
+from chromium import Page
+
+MATEVAL = os.environ.get("MATEVAL", str(Path(__file__).parents[2] / "target/debug/mateval"))
+PICTURES = os.environ.get("MATEVAL_TEST_PICTURES")
+EVIL = "<script>document.title='broken in'</script>"
+
+#: Name, id, PSNR, seed and what each says of itself. Two are copies of one method, one breaks in if it can.
+METHODS = [
+    ("TrueTexture", "truetexture", 33.0, 1, {"licence": "MIT", "url": "https://example.org/true",
+                                             "cost": {"seconds_a_scene": 12.5, "hardware": "one laptop"}}),
+    ("CopyA", "copya", 27.0, 2, {"licence": "CC-BY-NC-4.0", "cost": {"seconds_a_scene": 340.0, "hardware": "one large GPU"}}),
+    ("CopyB", "copyb", 27.0, 2, {"description": "the same as CopyA, bit by bit"}),
+    ("A method with a name that is quite a bit longer than others", "a-method-with-a-name-that-is-quite-a-bit-longer", 24.0, 4,
+     {"cost": {"seconds_a_scene": 3.0, "hardware": ""}}),
+    (EVIL, "script-document-title-broken-in-script", 20.0, 5, {"url": "javascript:alert(1)"}),
+    ("grey", "grey", 11.0, 6, {"description": "0.5 everywhere"}),
+]
+SCENES = results.scene_names(12)
+
+
+def make_small(folder: Path) -> Path:
+    """Six submissions on twelve scenes, with pictures of six, errata and verifications."""
+    paths = []
+    for name, method, psnr, seed, said in METHODS:
+        path = folder / f"{method[:10]}.json"
+        path.write_text(results.pretty(results.result(method=name, psnr=psnr, scenes=SCENES, seed=seed, **said)))
+        paths.append(path)
+    results.write_verification(paths[0], confirmed=True)
+    results.write_verification(paths[5], confirmed=False)
+    misses = {method: 0.1 * at for at, (_, method, *_) in enumerate(METHODS)}
+    results.write_pictures(folder / "pictures", methods=misses, scenes=SCENES[:6], width=64, height=36)
+    entry = {"date": "2026-03-01", "title": "A lamp was missing", "text": "room-002 was rendered anew.", "affects": ["room-002"]}
+    (folder / "errata.json").write_text(results.pretty({"format": "mateval-errata/1", "entries": [entry]}))
+    site = folder / "site"
+    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures",
+                    "--errata", folder / "errata.json"], check=True, stdout=subprocess.DEVNULL)
+    return site
+
+
+def make_large(folder: Path) -> Path:
+    """Fifty methods on 184 scenes; pictures of the first scene."""
+    scenes = results.scene_names(184)
+    paths = []
+    for at in range(50):
+        path = folder / f"{at}.json"
+        path.write_text(json.dumps(results.result(method=f"method {at}", psnr=15 + 0.3 * at, scenes=scenes, seed=at)))
+        paths.append(path)
+    misses = {f"method-{at}": 0.01 * at for at in range(50)}
+    results.write_pictures(folder / "pictures", methods=misses, scenes=scenes[:1], width=32, height=18)
+    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", folder / "site", "--pictures", folder / "pictures"],
+                   check=True, stdout=subprocess.DEVNULL)
+    return folder / "site"
+
+
+def setUpModule() -> None:
+    global temporary, small
+    temporary = tempfile.TemporaryDirectory()
+    small = make_small(Path(temporary.name))
+
+
+def tearDownModule() -> None:
+    temporary.cleanup()
+
+
+class Links(HTMLParser):
+    """What a page leads to."""
+
+    def __init__(self, text: str):
+        super().__init__()
+        self.found: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.found += [value for name, value in attributes if name in ("href", "src") and value]
+
+
+def broken_links(site: Path) -> tuple[int, list[str]]:
+    """How many links there are, and those that lead nowhere."""
+    seen, broken = 0, []
+    for page in site.rglob("*.html"):
+        for link in Links(page.read_text()).found:
+            parts = urlsplit(link)
+            if parts.scheme:
+                assert parts.scheme in ("https", "data"), link
+                continue
+            seen += 1
+            target = page if not parts.path else page.parent / unquote(parts.path)
+            if not target.is_file() or (parts.fragment and f'id="{parts.fragment}"' not in target.read_text()):
+                broken.append(f"{page.relative_to(site)}: {link}")
+    return seen, broken
+
+
+#: Texts whose colours are too near to each other for reading (WCAG 2: 4.5 to 1), and boxes wider than the window.
+LOOK = """(() => {
+  const channel = (v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+  const parse = (color) => {
+    const canvas = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+    canvas.fillStyle = color; canvas.fillRect(0, 0, 1, 1);
+    return [...canvas.getImageData(0, 0, 1, 1).data];
+  };
+  const light = (c) => 0.2126 * channel(c[0]) + 0.7152 * channel(c[1]) + 0.0722 * channel(c[2]);
+  const behind = (node) => {
+    for (; node; node = node.parentElement) {
+      const color = parse(getComputedStyle(node).backgroundColor);
+      if (color[3] > 250) return color;
+    }
+    return [255, 255, 255, 255];
+  };
+  const faint = new Set();
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  let seen = 0;
+  while (walker.nextNode()) {
+    const node = walker.currentNode.parentElement;
+    if (!walker.currentNode.textContent.trim() || !node.checkVisibility() || node.closest("script, .unseen")) continue;
+    seen += 1;
+    const [text, back] = [light(parse(getComputedStyle(node).color)), light(behind(node))];
+    if ((Math.max(text, back) + 0.05) / (Math.min(text, back) + 0.05) < 4.5) faint.add(node.tagName + "." + node.className);
+  }
+  return { seen, faint: [...faint], wide: document.documentElement.scrollWidth - document.documentElement.clientWidth };
+})()"""
+
+
+class TestLooks(unittest.TestCase):
+    PAGES = ["index.html", "scenes.html", "protocol.html", "paper.html", "errata.html", "methods/copya.html", "scenes/room-002.html"]
+
+    def test_every_page_at_two_widths_light_and_dark(self) -> None:
+        looked_at = 0
+        for width, height in [(1400, 900), (400, 800)]:
+            for dark in [False, True]:
+                with closing(Page(width=width, height=height, dark=dark)) as page:
+                    for name in self.PAGES:
+                        page.open((small / name).as_uri())
+                        look = page.run(LOOK)
+                        self.assertGreater(look["seen"], 10, name)
+                        self.assertEqual((look["faint"], look["wide"]), ([], 0), f"{name} at {width}, dark {dark}")
+                        looked_at += 1
+                        if PICTURES:
+                            shade = "dark" if dark else "light"
+                            page.picture(f"{PICTURES}/{name.replace('/', '-')}-{width}-{shade}.png", whole=True)
+                    self.assertEqual(page.faults, [])
+        self.assertEqual(looked_at, 28)
+
+    def test_faults_of_looks_are_found(self) -> None:
+        """The twin: faint text, a wide box, a script that fails, and a picture from elsewhere."""
+        page = Page(width=400, height=800, dark=True)
+        self.addCleanup(page.close)
+        page.open((small / "index.html").as_uri())
+        page.run("""document.querySelector('h1').style.color = 'var(--page)';
+                    document.querySelector('h1').style.width = '500px';
+                    setTimeout(() => { throw new Error('planted'); });""")
+        look = page.run(LOOK)
+        self.assertIn("H1.", look["faint"])
+        self.assertGreater(look["wide"], 0)
+        page.run("new Promise((done) => setTimeout(done, 50))")
+        self.assertIn("planted", " ".join(page.faults))
+
+
+class TestLinks(unittest.TestCase):
+    def test_all_lead_somewhere(self) -> None:
+        seen, broken = broken_links(small)
+        self.assertGreater(seen, 500)
+        self.assertEqual(broken, [])
+        # The twin.
+        gone = small / "methods/grey.html"
+        kept = gone.read_text()
+        gone.unlink()
+        self.assertTrue(any("grey.html" in link for link in broken_links(small)[1]))
+        gone.write_text(kept)
+
+    def test_downloads_hold_the_numbers(self) -> None:
+        board = json.loads((small / "downloads/leaderboard.json").read_text())
+        self.assertEqual([m["verified"] for m in board["methods"]], ["confirmed", "no", "no", "no", "no", "refuted"])
+        key = board["ranking"]["keys"]["albedo.novel.psnr"]
+        places = {standing["method"]: standing for standing in key["standings"]}
+        self.assertEqual(places["copya"]["rank"], places["copyb"]["rank"])
+        self.assertEqual(places["truetexture"]["rank"], {"best": 1, "worst": 1})
+        self.assertEqual(places["grey"]["rank"], {"best": 6, "worst": 6})
+        with open(small / "downloads/leaderboard.csv", newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["key"] == "albedo.novel.psnr"]
+        self.assertEqual([float(row["value"]) for row in rows], [places[row["id"]]["value"] for row in rows])
+        self.assertEqual(rows[4]["method"], EVIL)
+        self.assertIn("\\begin{tabular}", (small / "downloads/tables.tex").read_text())
+        with open(small / "methods/grey.csv", newline="") as file:
+            self.assertEqual([row["scene"] for row in csv.DictReader(file)], SCENES)
+
+    def test_nothing_of_strangers_runs(self) -> None:
+        for page in small.rglob("*.html"):
+            text = page.read_text()
+            self.assertNotIn(EVIL, text, page)
+            self.assertNotIn('href="javascript', text, page)
+        self.assertIn("&lt;script&gt;", (small / "index.html").read_text())
+
+
+class TestBoard(unittest.TestCase):
+    def setUp(self) -> None:
+        self.page = Page(width=1400, height=900, dark=False)
+        self.addCleanup(self.page.close)
+        self.page.open((small / "index.html").as_uri())
+
+    def tearDown(self) -> None:
+        self.assertEqual(self.page.faults, [])
+
+    def names(self) -> list[str]:
+        return self.page.run("[...document.querySelectorAll('#board tbody tr:not([hidden]) th a')].map((a) => a.textContent)")
+
+    def heads(self) -> list[str]:
+        return self.page.run("[...document.querySelectorAll('#board thead th:not([hidden])')].map((th) => th.dataset.key || '')")
+
+    def press(self, key: str) -> None:
+        self.page.run(f"document.querySelector('#board th[data-key=\"{key}\"] button').click()")
+
+    def tick(self, name: str, value: str) -> None:
+        self.page.run(f"document.querySelector('#controls input[name={name}][value=\"{value}\"]').click()")
+
+    def test_sorts(self) -> None:
+        values = "[...document.querySelectorAll('#board tbody tr')].map((row) => Number(row.cells[%d].dataset.v))"
+        at = self.page.run("document.querySelector('#board th[data-key=\"albedo.novel.psnr\"]').cellIndex")
+        best_first = self.page.run(values % at)
+        self.assertEqual(best_first, sorted(best_first, reverse=True))
+        self.press("albedo.novel.psnr")
+        self.assertEqual(self.page.run(values % at), sorted(best_first))
+        self.assertEqual(self.names()[0], "grey")
+        self.assertEqual(self.page.run("document.querySelector('[aria-sort]').dataset.key"), "albedo.novel.psnr")
+        self.assertIn("Albedo, novel views PSNR", self.page.run("document.getElementById('status').textContent"))
+        # Less is better: the first press brings the least; those that say nothing come last, either way.
+        for expected in [["A method", "TrueTexture", "CopyA"], ["CopyA", "TrueTexture", "A method"]]:
+            self.press("cost")
+            self.assertEqual([name[: len(word)] for name, word in zip(self.names(), expected)], expected)
+        self.press("name")
+        self.assertEqual(self.names()[-2:], ["grey", "TrueTexture"])
+
+    def test_sorts_by_keyboard(self) -> None:
+        self.page.run("document.querySelector('#board th[data-key=\"name\"] button').focus()")
+        self.page.key("Tab")
+        self.assertEqual(self.page.run("document.activeElement.closest('th').dataset.key"), "albedo.input.psnr")
+        self.page.key("Enter")
+        self.assertEqual(self.page.run("document.querySelector('[aria-sort]').dataset.key"), "albedo.input.psnr")
+
+    def test_filters_columns_and_rows(self) -> None:
+        self.assertEqual(self.heads()[2:-2], [f"{p}.{v}.psnr" for p in ["albedo", "rgb_true"] for v in ["input", "novel"]])
+        self.tick("metric", "ssim")
+        self.tick("picture", "rgb_true")
+        self.tick("views", "input")
+        self.assertEqual(self.heads()[2:-2], ["albedo.novel.psnr", "albedo.novel.ssim"])
+        # Cells go with their heads.
+        hidden = "[...document.querySelectorAll('#board tr')].map((row) => [...row.cells].filter((c) => !c.hidden).length)"
+        self.assertEqual(set(self.page.run(hidden)), {6})
+        self.tick("verified", "1")
+        self.assertEqual(self.names(), ["TrueTexture"])
+        self.tick("verified", "1")
+        self.page.run("""(() => { const box = document.querySelector('[name=name]'); box.value = 'copy';
+                         box.dispatchEvent(new Event('input', { bubbles: true })); })()""")
+        self.assertEqual(self.names(), ["CopyA", "CopyB"])
+        self.assertIn("2 of 6 methods", self.page.run("document.getElementById('status').textContent"))
+        # The address holds all of it.
+        address = self.page.run("location.href")
+        self.page.open(address)
+        self.assertEqual((self.names(), self.heads()[2:-2]), (["CopyA", "CopyB"], ["albedo.novel.psnr", "albedo.novel.ssim"]))
+
+    def test_intervals_and_ranks_are_shown(self) -> None:
+        row = "document.querySelector('#board a[href=\"methods/copya.html\"]').closest('tr')"
+        self.assertEqual(self.page.run(f"{row}.cells[0].textContent"), "2–3")
+        cell = self.page.run(f"[...{row}.cells].find((c) => !c.hidden && c.dataset.l).innerText")
+        self.assertRegex(cell, r"^\d+\.\d\d\n\d+\.\d\d – \d+\.\d\d\nrank \d")
+        self.assertEqual(self.page.run("document.querySelectorAll('#board td svg').length"), 6)
+        marks = self.page.run("[...document.querySelectorAll('#board .mark')].map((m) => m.textContent.trim())")
+        self.assertEqual(marks, ["✓ verified", "✗ refuted"])
+
+    def test_who_beats_whom(self) -> None:
+        self.page.run("new Promise((done) => setTimeout(done, 300))")
+        table = self.page.run("[...document.querySelectorAll('.wins tbody tr')].map((r) => [...r.cells].map((c) => c.textContent))")
+        self.assertEqual(len(table), 6)
+        self.assertEqual(table[0][1:], ["", "100", "100", "100", "100", "100"])
+        self.assertEqual((table[1][3], table[2][2]), ("50", "50"))
+        self.assertEqual(self.page.run("document.querySelectorAll('.wins tr:nth-child(2) .sure').length"), 4)
+
+    def test_everything_has_a_name_for_screen_readers(self) -> None:
+        for name in ["index.html", "scenes/room-000.html", "methods/grey.html"]:
+            self.page.open((small / name).as_uri())
+            nodes = self.page.send("Accessibility.getFullAXTree")["nodes"]
+            roles = {"button", "checkbox", "radio", "slider", "combobox", "link", "searchbox", "image", "region"}
+            told = [node for node in nodes if node.get("role", {}).get("value") in roles and not node.get("ignored")]
+            nameless = [node for node in told if not node.get("name", {}).get("value")]
+            self.assertGreater(len(told), 20)
+            self.assertEqual(nameless, [], name)
+
+
+class TestScene(unittest.TestCase):
+    def setUp(self) -> None:
+        self.page = Page(width=1400, height=900, dark=True)
+        self.addCleanup(self.page.close)
+        self.page.open((small / "scenes/room-002.html").as_uri())
+
+    def tearDown(self) -> None:
+        self.assertEqual(self.page.faults, [])
+
+    def source(self, image: str) -> str:
+        return self.page.run(f"document.getElementById('{image}').src").split("/pictures/")[1]
+
+    def choose(self, name: str, value: str) -> None:
+        self.page.run(f"""(() => {{ const box = document.querySelector('#compare-form [name={name}]'); box.value = '{value}';
+                          box.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()""")
+
+    def test_the_slider_moves(self) -> None:
+        at = lambda: self.page.run("getComputedStyle(document.querySelector('.slider')).getPropertyValue('--at')")
+        self.assertEqual(at(), "50%")
+        self.page.run("document.getElementById('split').focus()")
+        self.page.key("ArrowRight")
+        self.assertEqual(at(), "51%")
+        box = self.page.run("document.querySelector('.slider').getBoundingClientRect().toJSON()")
+        middle = box["y"] + box["height"] / 2
+        self.page.drag((box["x"] + 0.51 * box["width"], middle), (box["x"] + 0.2 * box["width"], middle))
+        self.assertLess(abs(float(at().strip("%")) - 20), 3)
+        # The truth is what is left of it.
+        self.assertIn("clip-path", self.page.run("document.querySelector('#truth').computedStyleMap().has('clip-path') ? 'clip-path' : ''"))
+
+    def test_pictures_are_those_chosen(self) -> None:
+        self.assertEqual(self.source("truth"), "_truth/room-002/input/albedo.png")
+        self.choose("method", "grey")
+        self.choose("view", "up_left")
+        self.assertEqual(self.source("prediction"), "grey/room-002/up_left/albedo.png")
+        self.assertEqual(self.source("truth"), "_truth/room-002/up_left/albedo.png")
+        self.assertEqual(self.source("error"), "grey/room-002/up_left/albedo-error.png")
+        # There is no heat map of this kind.
+        self.choose("kind", "rgb_true")
+        self.assertEqual(self.source("prediction"), "grey/room-002/up_left/rgb_true.png")
+        self.assertTrue(self.page.run("document.getElementById('heat').hidden"))
+        # A press on a small picture chooses it.
+        self.page.run("document.querySelector('.pick[data-method=copya][data-view=input]').click()")
+        self.assertEqual(self.source("prediction"), "copya/room-002/input/rgb_true.png")
+        self.assertEqual(self.page.run("document.querySelectorAll('.pick[aria-pressed=true]').length"), 1)
+
+    def test_the_gallery_shows_all_views_of_all_methods(self) -> None:
+        count = "document.querySelectorAll('.gallery tbody tr').length * document.querySelectorAll('.gallery tbody tr:first-child td').length"
+        self.assertEqual(self.page.run(count), 7 * 5)
+        self.page.run("document.querySelector('#kinds [value=albedo-error]').click()")
+        image = self.page.run("document.querySelector('.pick[data-method=grey][data-view=input] img').src")
+        self.assertTrue(image.endswith("grey/room-002/input/albedo-error.png"), image)
+
+
+class TestLarge(unittest.TestCase):
+    def test_fifty_methods_on_184_scenes(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            site = make_large(Path(folder))
+            page = Page(width=1400, height=900, dark=False)
+            self.addCleanup(page.close)
+            seconds = page.open((site / "index.html").as_uri())
+            rows, columns = page.run("[document.querySelectorAll('#board tbody tr').length, document.querySelectorAll('#board th[data-metric]').length]")
+            self.assertEqual(rows, 50)
+            self.assertGreater(columns, 80)
+            self.assertLess(seconds, 2.0)
+            sorting = page.run("""(() => { const start = performance.now();
+                document.querySelector('#board th[data-key="albedo.input.psnr"] button').click();
+                document.body.offsetHeight; return performance.now() - start; })()""")
+            self.assertLess(sorting, 1000)
+            print(f"50 x 184: opened in {seconds:.2f} s, sorted in {sorting:.0f} ms, {columns} columns", flush=True)
+            if PICTURES:
+                page.picture(f"{PICTURES}/large.png")
+            # Pictures that are far below are not loaded before they are seen.
+            page.open((site / "scenes/room-000.html").as_uri())
+            loaded = "document.querySelectorAll('.gallery img').length - [...document.querySelectorAll('.gallery img')].filter((i) => !i.complete).length"
+            self.assertLess(page.run(loaded), 200)
+            page.run("document.querySelector('.gallery tbody tr:last-child').scrollIntoView(); new Promise((done) => setTimeout(done, 500))")
+            self.assertTrue(page.run("document.querySelector('.gallery tbody tr:last-child img').complete"))
+            self.assertEqual(page.faults, [])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,7 @@
+#!/bin/sh
+# The leaderboard's site in headless Chromium, which this installs. Arguments go to the test: tools/test_site.sh TestBoard
+set -eu
+cd "$(dirname "$0")/.."
+tools/apt_install.sh chromium fonts-dejavu-core
+cargo build --workspace --quiet
+python3 tests/site/test_site.py "$@"
