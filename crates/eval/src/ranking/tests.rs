@@ -51,9 +51,8 @@ fn simulate(houses: usize, seed: u64) -> Simulated {
         for _ in 0..1 + (4.0 * chance.even()) as usize {
             let of_scene = chance.normal();
             board.houses.push(house);
-            for method in 0..METHODS {
-                let views: Vec<f64> =
-                    (0..VIEWS).map(|_| TRUTH + of_house + of_scene + of_method[method] + chance.normal()).collect();
+            for (method, own) in of_method.iter().enumerate() {
+                let views: Vec<f64> = (0..VIEWS).map(|_| TRUTH + of_house + of_scene + own + chance.normal()).collect();
                 board.scenes[method].push(views.iter().sum::<f64>() / VIEWS as f64);
                 board.pictures[method].extend(views);
             }
@@ -132,7 +131,7 @@ fn chances_are_what_they_say() {
 }
 
 fn scene(number: usize) -> SceneId {
-    SceneId::new(&format!("s{number:02}")).unwrap()
+    SceneId::new(format!("s{number:02}")).unwrap()
 }
 
 fn summary(scenes: &BTreeMap<SceneId, BTreeMap<String, f64>>) -> BTreeMap<String, f64> {
