@@ -19,7 +19,7 @@ fn the_version() {
 #[test]
 fn what_is_not_there() {
     let not_there = "No such file or directory (os error 2)\n";
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 10] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
         (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
         (
@@ -76,7 +76,7 @@ fn words_that_are_missing() {
 /// Every subcommand can say what it is for.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 16] = [
+    let subcommands: [&[&str]; 17] = [
         &["demo"],
         &["sample"],
         &["prep"],

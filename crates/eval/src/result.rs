@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use mateval_metrics::Psnr;
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::open::Dataset;
 use mateval_scene::submission::Cost;
 use mateval_scene::{Finding, InstanceId, RendererId, SceneId, ViewId};
 use schemars::JsonSchema;
@@ -78,6 +80,22 @@ pub struct DatasetId {
     /// The renderer whose pictures light was compared with; null where there were none.
     #[serde(default)]
     pub scored_renderer: Option<RendererId>,
+}
+
+impl DatasetId {
+    /// Of a dataset of which `scenes` are looked at.
+    pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
+        let scenes: Vec<&SceneFile> = scenes.into_iter().collect();
+        Self {
+            name: dataset.file.name.clone(),
+            version: dataset.file.version.clone(),
+            manifest_sha256: dataset.file.manifest_sha256.clone(),
+            scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
+            scenes_in_all: dataset.scenes.len(),
+            houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
+            scored_renderer: dataset.file.scored_renderer.clone(),
+        }
+    }
 }
 
 /// The scores of one protocol.

@@ -78,12 +78,6 @@ pub fn refused(dataset: &Dataset, tool: &str, findings: Vec<Finding>) -> LintFil
 }
 
 fn report(dataset: &Dataset, tool: &str, method: Option<String>, maps: usize, findings: Vec<Finding>) -> LintFile {
-    let id = DatasetId {
-        name: dataset.file.name.clone(),
-        version: dataset.file.version.clone(),
-        manifest_sha256: dataset.file.manifest_sha256.clone(),
-        scenes: dataset.scenes.iter().map(|scene| scene.id.clone()).collect(),
-        scenes_in_all: dataset.scenes.len(),
-    };
+    let id = DatasetId::new(dataset, &dataset.scenes);
     LintFile::new(tool.to_owned(), method, id, maps, fold::folded(findings))
 }

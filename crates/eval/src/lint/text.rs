@@ -53,6 +53,8 @@ mod tests {
             manifest_sha256: String::new(),
             scenes: Vec::new(),
             scenes_in_all: 0,
+            houses: Default::default(),
+            scored_renderer: None,
         };
         let text = plain(&LintFile::new(String::new(), None, dataset, 1, folded(findings)));
         let expected = "error [nan] 'f0': a NaN; mend it (6 times; also 'f1', 'f2', 'f3', ...)\n\
