@@ -140,7 +140,10 @@ fn source_files() -> Vec<(String, String)> {
                 let stem = file.file_stem().unwrap().to_str().unwrap().to_owned();
                 if file.is_dir() {
                     folders.push(file);
-                } else if !["lib", "error", "mod", "main"].contains(&stem.as_str()) && !stem.starts_with("tests") {
+                } else if file.extension().is_some_and(|extension| extension == "rs")
+                    && !["lib", "error", "mod", "main"].contains(&stem.as_str())
+                    && !stem.starts_with("tests")
+                {
                     found.push((name.clone(), stem));
                 }
             }
