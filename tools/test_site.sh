@@ -3,5 +3,6 @@
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh chromium fonts-dejavu-core
-cargo build --workspace --quiet
+# As the tests build it: nothing is compiled twice.
+cargo test --workspace --no-run --quiet
 python3 tests/site/test_site.py "$@"

@@ -1,16 +1,13 @@
 //! A scene as a method sees it: the instances' meshes with their atlas uv, and rays through them.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use mateval_image::png_io;
 use mateval_image::{Mask, Picture};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{SceneFolder, part_picture};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::submission::MAP_SIZES;
-use mateval_scene::{PartSetId, SceneError, TriangleMesh, glb};
+use mateval_scene::{PartSetId, SceneError, TriangleMesh, plain_instances};
 use mateval_tracer::World;
 
 use crate::error::BaselineError;
@@ -43,7 +40,7 @@ impl<'a> SceneGeometry<'a> {
             let what = format!("instance '{}' has an atlas of {size} texels; run `mateval prep verify`", instance.id);
             return Err(SceneError::Unsupported { path: folder.scene_file(), what }.into());
         }
-        let world = world(&folder.instances(), scene)?;
+        let world = World::new(Arc::new(plain_instances::read(&folder, scene)?))?;
         let valid = png_io::read_mask(&shown.join("valid.png"))?;
         let instances = png_io::read_ids(&shown.join("instance.png"))?;
         let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
@@ -70,24 +67,4 @@ impl<'a> SceneGeometry<'a> {
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
         Err(SceneError::Unsupported { path, what }.into())
     }
-}
-
-fn world(path: &Path, scene: &SceneFile) -> Result<World, BaselineError> {
-    let nodes = glb::read(path)?;
-    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
-    if !(nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids)) {
-        let what = "its nodes are not the instances of scene.json; run `mateval prep verify`".to_owned();
-        return Err(SceneError::Unsupported { path: path.to_owned(), what }.into());
-    }
-    let surface = |node: glb::GlbNode| Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) };
-    let plain = Material {
-        name: String::new(),
-        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
-        two_sided: true,
-        opacity: None,
-        bump: None,
-    };
-    let surfaces = nodes.into_iter().map(surface).collect();
-    let scene = ReferenceScene { surfaces, materials: vec![plain], ..ReferenceScene::default() };
-    World::new(Arc::new(scene)).map_err(BaselineError::from)
 }

@@ -20,6 +20,7 @@ pub mod material;
 pub mod mesh;
 pub mod obj;
 pub mod open;
+pub mod plain_instances;
 pub mod progress;
 pub mod reference;
 pub mod reference_io;

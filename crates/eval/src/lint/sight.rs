@@ -6,10 +6,9 @@ use glam::DVec2;
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::open::Dataset;
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
-use mateval_scene::{Camera, SceneError, TriangleMesh, glb};
+use mateval_scene::reference::SurfaceIndex;
+use mateval_scene::{Camera, TriangleMesh, plain_instances};
 use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
@@ -112,7 +111,8 @@ impl<'a> Eye<'a> {
         if !fits {
             return Err(unsound(folder, "the input view's pictures are not as large as it says"));
         }
-        Ok(Self { world: world(folder, scene)?, scene, camera: &view.camera, valid, ids, photo })
+        let world = World::new(Arc::new(plain_instances::read(folder, scene)?))?;
+        Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })
     }
 
     /// Every pixel that shows one instance alone, or every other one in both directions where there are too many, and so on.
@@ -142,27 +142,6 @@ impl<'a> Eye<'a> {
         let uvs = [uvs[0]?, uvs[1]?, uvs[2]?, uvs[3]?];
         Some((instance, SeenPixel { uvs, photo: self.photo.as_ref().map(|photo| photo.get(x, y).0), tile }))
     }
-}
-
-/// All instances, opaque and without light.
-fn world(folder: &SceneFolder, scene: &SceneFile) -> Result<World, EvalError> {
-    let path = folder.instances();
-    let nodes = glb::read(&path)?;
-    let ids = scene.instances.iter().map(|instance| instance.id.as_str());
-    if !(nodes.len() == scene.instances.len() && nodes.iter().map(|node| node.name.as_str()).eq(ids)) {
-        let what = "its nodes are not the instances of scene.json; run `mateval prep verify`".to_owned();
-        return Err(SceneError::Unsupported { path, what }.into());
-    }
-    let surface = |node: glb::GlbNode| Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) };
-    let plain = Material {
-        name: String::new(),
-        model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
-        two_sided: true,
-        opacity: None,
-        bump: None,
-    };
-    let surfaces = nodes.into_iter().map(surface).collect();
-    Ok(World::new(Arc::new(ReferenceScene { surfaces, materials: vec![plain], ..ReferenceScene::default() }))?)
 }
 
 fn coarse_texels(world: &World, instance: usize, camera: &Camera) -> Vec<CoarseTexel> {
