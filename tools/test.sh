@@ -6,4 +6,3 @@ python3 tools/test_fetch_lpips_weights.py
 python3 tools/test_run_marigold.py
 python3 blender_scripts/tests/test_pure.py
 cargo test --workspace --no-fail-fast
-tools/test_builds.sh

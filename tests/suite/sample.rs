@@ -10,17 +10,29 @@ use super::kept_folder::kept_folder;
 pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";
 
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = kept_folder("sample");
-    let recipe = write_source(&folder.join("source"), SMALL, &["room"]);
-    let dataset = folder.join("dataset");
-    run(&mut build(&recipe, &dataset)).ends_with(0);
+    let dataset = built("sample");
     run(&mut render(&dataset, 1)).ends_with(0);
     dataset
 });
 
+static UNRENDERED: LazyLock<PathBuf> = LazyLock::new(|| built("unrendered"));
+
+fn built(name: &str) -> PathBuf {
+    let folder = kept_folder(name);
+    let recipe = write_source(&folder.join("source"), SMALL, &["room"]);
+    let dataset = folder.join("dataset");
+    run(&mut build(&recipe, &dataset)).ends_with(0);
+    dataset
+}
+
 /// The shared dataset, rendered with one sample; nobody writes to it.
 pub fn dataset() -> &'static Path {
     &DATASET
+}
+
+/// As [`dataset`], without renders: what is scored on it takes a second, since no light is followed.
+pub fn unrendered() -> &'static Path {
+    &UNRENDERED
 }
 
 /// A copy of the shared dataset that may be damaged.

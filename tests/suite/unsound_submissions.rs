@@ -7,12 +7,12 @@ use mateval_image::{LinearRgb, Picture, png_io};
 use serde_json::Value;
 
 use super::command::{baseline, mateval, run, score};
-use super::sample::{dataset, json};
+use super::sample::{json, unrendered};
 
 /// `gt` on the shared dataset, to be damaged.
 fn truth(folder: &Path, name: &str) -> PathBuf {
     let submission = folder.join(name);
-    run(&mut baseline("gt", dataset(), &submission)).ends_with(0);
+    run(&mut baseline("gt", unrendered(), &submission)).ends_with(0);
     submission
 }
 
@@ -23,7 +23,7 @@ fn base_color(submission: &Path, instance: &str, ending: &str) -> PathBuf {
 /// Scores it; without LPIPS, which would only take time.
 fn scored(submission: &Path) -> Value {
     let out = submission.with_extension("json");
-    run(score(submission, dataset(), &out).env("MATEVAL_CACHE", submission)).ends_with(0);
+    run(score(submission, unrendered(), &out).env("MATEVAL_CACHE", submission)).ends_with(0);
     json(&out)
 }
 
@@ -99,7 +99,7 @@ fn findings_are_told_on_stderr_too() {
     let folder = tempfile::tempdir().unwrap();
     let submission = truth(folder.path(), "gt");
     std::fs::remove_file(base_color(&submission, "floor", "png")).unwrap();
-    let run = run(&mut score(&submission, dataset(), &folder.path().join("RESULT.json"))).ends_with(0);
+    let run = run(&mut score(&submission, unrendered(), &folder.path().join("RESULT.json"))).ends_with(0);
     run.says("gt: warning [missing_map] 'scenes/room/floor/base_color.png'").says("scored as base colour 0.5");
 }
 
@@ -117,12 +117,12 @@ fn another_datasets_submission_is_told() {
 fn what_is_no_submission_cannot_be_scored() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
-    run(&mut score(folder.path(), dataset(), &out)).ends_with(2).says("submission.json");
+    run(&mut score(folder.path(), unrendered(), &out)).ends_with(2).says("submission.json");
     let submission = truth(folder.path(), "gt");
-    let unknown = run(score(&submission, dataset(), &out).args(["--scene", "kitchen"])).ends_with(2);
+    let unknown = run(score(&submission, unrendered(), &out).args(["--scene", "kitchen"])).ends_with(2);
     unknown.says("no scene 'kitchen'").says("room");
     let mut command = mateval();
-    command.args(["eval", "score", "--protocol", "mine", "--dataset"]).arg(dataset()).arg("--out").arg(&out);
+    command.args(["eval", "score", "--protocol", "mine", "--dataset"]).arg(unrendered()).arg("--out").arg(&out);
     run(command.arg(&submission)).ends_with(2).says("no protocol 'mine'");
     assert!(!out.exists());
 }

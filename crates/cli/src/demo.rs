@@ -15,6 +15,19 @@ use crate::eval::pictures::StripPicture;
 use crate::outcome::{Outcome, print, say};
 use crate::{eval, prep};
 
+/// A baseline of the demo.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum DemoBaseline {
+    /// The truth, baked to the atlases.
+    Gt,
+    /// The truth of the photo, lifted by nearest neighbours.
+    Nn,
+    /// One colour an instance, that of the photo.
+    Median,
+    /// 0.5 everywhere.
+    Grey,
+}
+
 /// What it is given.
 #[derive(clap::Args)]
 pub struct Args {
@@ -27,6 +40,9 @@ pub struct Args {
     /// What renders the truth.
     #[arg(long, value_enum, default_value = "blender")]
     renderer: prep::RendererWord,
+    /// Which baselines are made and scored.
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["gt", "nn", "median", "grey"])]
+    baselines: Vec<DemoBaseline>,
     #[command(flatten)]
     blender: prep::blender::BlenderArgs,
     /// Replace what an earlier demo left there.
@@ -59,9 +75,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         scenes: Vec::new(),
         force: args.force,
     })?;
-    say("4/6 baselines: gt, nn, median and grey");
+    say("4/6 baselines");
     let opened = Dataset::open(&dataset)?;
-    let submissions = make_baselines(&opened, out, args.force)?;
+    let submissions = make_baselines(&opened, &args.baselines, &out.join("submissions"), args.force)?;
     say("5/6 eval score");
     let files = eval::score_submissions(&eval::ScoreArgs {
         submissions: submissions.clone(),
@@ -91,19 +107,42 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn make_baselines(dataset: &Dataset, out: &Path, force: bool) -> anyhow::Result<Vec<PathBuf>> {
-    let [gt, nn, median, grey] = ["gt", "nn", "median", "grey"].map(|name| out.join("submissions").join(name));
-    let folder = out.join("submissions");
-    std::fs::create_dir_all(&folder).with_context(|| format!("cannot make '{}'", folder.display()))?;
-    mateval_baselines::truth::write(dataset, &gt, force)?;
-    let bars = Bars::new();
-    let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
-    let (source, options) = (EstimateSource::Truth, NnOptions::default());
-    mateval_baselines::nn::write(dataset, &nn, force, &source, &options, &progress)?;
-    drop(bars);
-    mateval_baselines::homogeneous::write_by_instance(dataset, &median, force, &EstimateSource::Input)?;
-    mateval_baselines::grey::write(dataset, &grey, force)?;
-    Ok(vec![gt, nn, median, grey])
+fn make_baselines(
+    dataset: &Dataset,
+    baselines: &[DemoBaseline],
+    folder: &Path,
+    force: bool,
+) -> anyhow::Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(folder).with_context(|| format!("cannot make '{}'", folder.display()))?;
+    baselines.iter().map(|&baseline| make_baseline(dataset, baseline, folder, force)).collect()
+}
+
+fn make_baseline(dataset: &Dataset, baseline: DemoBaseline, folder: &Path, force: bool) -> anyhow::Result<PathBuf> {
+    match baseline {
+        DemoBaseline::Gt => {
+            let out = folder.join("gt");
+            mateval_baselines::truth::write(dataset, &out, force)?;
+            Ok(out)
+        }
+        DemoBaseline::Nn => {
+            let out = folder.join("nn");
+            let bars = Bars::new();
+            let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
+            let (source, options) = (EstimateSource::Truth, NnOptions::default());
+            mateval_baselines::nn::write(dataset, &out, force, &source, &options, &progress)?;
+            Ok(out)
+        }
+        DemoBaseline::Median => {
+            let out = folder.join("median");
+            mateval_baselines::homogeneous::write_by_instance(dataset, &out, force, &EstimateSource::Input)?;
+            Ok(out)
+        }
+        DemoBaseline::Grey => {
+            let out = folder.join("grey");
+            mateval_baselines::grey::write(dataset, &out, force)?;
+            Ok(out)
+        }
+    }
 }
 
 fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {

@@ -1,6 +1,6 @@
 //! The same bytes of a picture for any number of threads, for either set of instructions, in every build, on every machine.
 //!
-//! That the optimised build renders these bytes too is what `tools/test_builds.sh` tests.
+//! That the optimised build renders these bytes too is what `tools/test_builds.sh` tests, by hand.
 
 use std::sync::Arc;
 
