@@ -81,7 +81,10 @@ mod tests {
                 png_io::write_grey_alpha_bytes(&path, &Picture::from_fn(5, 3, |x, y| [0, 1].map(|c| byte(x, y, c))))
                     .unwrap();
             },
-            &|| png_io::write_ids(&path, &Picture::from_fn(5, 3, |x, y| 999 * u16::from(byte(x, y, 0)))).unwrap(),
+            &|| {
+                png_io::write_ids(&path, &Picture::from_fn(5, 3, |x, y| 999_u16.wrapping_mul(byte(x, y, 0).into())))
+                    .unwrap()
+            },
             &|| {
                 let words =
                     Picture::from_fn(5, 3, |x, y| [0, 1, 2].map(|c| 999_u16.wrapping_mul(byte(x, y, c).into())));
