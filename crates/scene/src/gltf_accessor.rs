@@ -3,9 +3,17 @@
 
 use gltf::accessor::DataType;
 
+/// The bytes of a binary file's header.
+const GLB_HEADER: u32 = 12;
+
 /// A glTF or GLB file, checked.
 pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, String> {
     let invalid = |error: gltf::Error| format!("no sound glTF: {error}");
+    // gltf takes its header from the length that a binary file says it has, before it looks at that.
+    let said = bytes.strip_prefix(b"glTF").and_then(|rest| rest.get(4..8)).map(word);
+    if let Some(said) = said.filter(|said| *said < GLB_HEADER) {
+        return Err(format!("no sound glTF: a binary file of {said} bytes, as it says itself"));
+    }
     let unchecked = gltf::Gltf::from_slice_without_validation(bytes).map_err(invalid)?;
     // gltf's own check looks the places' accessor up before it knows that there is one.
     let root = unchecked.document.as_json();
@@ -108,4 +116,19 @@ fn entries<'a>(
     let end = used.and_then(|used| used.checked_add(accessor.offset())).filter(|end| *end <= slice.len());
     let data = slice.get(accessor.offset()..end.ok_or_else(outside)?).ok_or_else(outside)?;
     Ok((0..count).map(move |index| &data[index * stride..index * stride + size]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse;
+
+    /// Found by fuzzing.
+    #[test]
+    fn a_binary_file_shorter_than_its_header_is_refused() {
+        for said in [0_u32, 11, 12, u32::MAX] {
+            let bytes = [&b"glTF"[..], &2_u32.to_le_bytes(), &said.to_le_bytes(), &[0; 8]].concat();
+            let found = parse(&bytes).unwrap_err();
+            assert_eq!(found.contains("as it says itself"), said < 12, "{found}");
+        }
+    }
 }

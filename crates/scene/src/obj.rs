@@ -198,10 +198,10 @@ pub fn material_files(bytes: &[u8]) -> Vec<String> {
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Reads an MTL file. Numbers may be anything that is finite.
+/// Reads an MTL file. Numbers may be anything that is finite; one number behind `Kd` is all three.
 pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjFault> {
     let whole_file = |what: String| ObjFault { line: 0, what, limit: false };
-    let text = String::from_utf8_lossy(bytes);
+    let text = with_whole_colors(&String::from_utf8_lossy(bytes))?;
     let (materials, _) =
         tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|error| whole_file(format!("no sound MTL: {error}")))?;
     let number = |material: &tobj::Material, key: &str| {
@@ -221,6 +221,26 @@ pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjFault> {
         Ok(ObjMaterial { name, diffuse, diffuse_map, roughness, roughness_map, metallic, metallic_map })
     };
     materials.into_iter().map(read).collect()
+}
+
+/// The text of an MTL file with three numbers behind every `Kd`, and without the other colours: tobj wants three everywhere
+/// and panics without, the format wants one or three.
+fn with_whole_colors(text: &str) -> Result<String, ObjFault> {
+    let mut out = String::with_capacity(text.len());
+    for (at, line) in text.lines().enumerate() {
+        let words: Vec<&str> = line.split_whitespace().take(4).collect();
+        match words[..] {
+            ["Ka" | "Ks" | "Ke", ..] => {}
+            ["Kd", grey] => out.push_str(&format!("Kd {grey} {grey} {grey}")),
+            ["Kd", ref rest @ ..] if rest.len() < 3 => {
+                let what = format!("Kd: expected one number or three, found {}", rest.len());
+                return Err(ObjFault { line: at + 1, what, limit: false });
+            }
+            _ => out.push_str(line),
+        }
+        out.push('\n');
+    }
+    Ok(out)
 }
 
 fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>), ObjFault> {
@@ -382,6 +402,16 @@ mod tests {
         assert_eq!(read[1], ObjMaterial { name: "y".to_owned(), ..Default::default() });
         for bad in ["newmtl x\nKd a b c", "newmtl x\nPr inf", "newmtl x\nPm -", "newmtl x\nKd nan 0 0"] {
             assert!(read_materials(bad.as_bytes()).is_err(), "{bad}");
+        }
+    }
+
+    /// Found by fuzzing: fewer than three made tobj panic.
+    #[test]
+    fn a_color_has_one_number_or_three() {
+        let read = read_materials(b"newmtl x\nKa 1\nKs\nKe 1 2\nKd 0.25\n").unwrap();
+        assert_eq!(read[0].diffuse, Some([0.25; 3]));
+        for (bad, line) in [("newmtl x\nKd 0.1 0.2", 2), ("newmtl x\n\nKd", 3)] {
+            assert_eq!(read_materials(bad.as_bytes()).unwrap_err().line, line, "{bad}");
         }
     }
 }

@@ -15,12 +15,15 @@
 //! and the times of the fit and of the renders are multiplied.
 //!
 //! **Equal noise**: theirs takes as many samples a pixel as ours took, both halves together; then the time of its renders,
-//! and of nothing else, is multiplied by its noise over ours. Twice, since noise may mean two things: the variance of a
-//! pixel, clipped and sRGB-encoded; and the square of the standard error that results certify, of the mean PSNR, the
-//! larger of the input view's and the novel views'. Ours makes five views of one set of paths, so their noise is not
-//! independent; the second knows that. Noise is compared between pictures of as many samples, of our fitted radiances and
-//! of Mitsuba's `principled`, which both can make, so that the tools converge to one picture (how nearly is told); pixels
-//! that show lights that only ours can hide from the camera are left out, and lights with a map have its mean in both.
+//! and of nothing else, is multiplied. Three times, since noise may mean three things. By its noise over ours: the variance
+//! of a pixel, clipped and sRGB-encoded; and the square of the standard error that results certify, of the mean PSNR, the
+//! larger of the input view's and the novel views'. Both are what a script would need that measured its error from halves as
+//! ours does. A script that hands its pictures to scikit-image as they are, as this one does, gets an MSE that is too
+//! large by the variance of a pixel: the third is how many samples bring that bias down to the standard error that ours
+//! certifies. Ours makes five views of one set of paths, so their noise is not independent; the second and third know that.
+//! Noise is compared between pictures of as many samples, of our fitted radiances and of Mitsuba's `principled`, which both
+//! can make, so that the tools converge to one picture (how nearly is told); pixels that show lights that only ours can
+//! hide from the camera are left out, and lights with a map have its mean in both.
 
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints")]

@@ -1,14 +1,19 @@
 //! Pictures of both tools and their noise.
 
+use std::f64::consts::LN_10;
+
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::result::ResultFile;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
-use mateval_metrics::{Halves, noise_free_mse, psnr_mean_error};
+use mateval_metrics::{Halves, NoiseFreeMse, noise_free_mse, psnr_mean_error};
 use mateval_scene::material::PrincipledFlavour;
 use mateval_tracer::{Coat, LightMix, Lighting, Repaint, StageLight, World, render_repainted};
 
 use crate::noise::Noise;
 use crate::room::Room;
+
+/// The first of a room's views.
+const INPUT_VIEWS: usize = 1;
 
 /// A picture of light.
 pub type Linear = Picture<LinearRgb>;
@@ -99,6 +104,14 @@ pub fn noise(room: &Room, pair: &Pair, masks: &[Mask], samples: u32) -> TrackNoi
 
 /// The standard error of the mean PSNR of the pair's mean, in dB, by its own noise: what the result calls `own_db`.
 fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
+    let views = noise_free(room, pair, masks);
+    let (input, novel) = views.split_at(INPUT_VIEWS);
+    let error = |views: &[NoiseFreeMse]| psnr_mean_error(&views.iter().collect::<Vec<_>>());
+    [input, novel].into_iter().filter_map(error).map(|noise| noise.prediction).fold(0.0, f64::max)
+}
+
+/// Of each view, the pair's error without noise.
+fn noise_free(room: &Room, pair: &Pair, masks: &[Mask]) -> Vec<NoiseFreeMse> {
     let exposure = room.scene.exposure as f32;
     let blocks = noise_blocks(&room.cameras(), room.protocol.light.noise.block_pixels);
     let mse = |view: usize| {
@@ -107,11 +120,29 @@ fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
         let (prediction, truth) = (Halves { a: &a, b: &b }, Halves { a: &truth_a, b: &truth_b });
         noise_free_mse(prediction, truth, &masks[view], &blocks[view]).unwrap().unwrap()
     };
-    let views: Vec<_> = (0..masks.len()).map(mse).collect();
-    // The input view is the first.
-    let (input, novel) = views.split_at(1);
-    let error = |views: &[mateval_metrics::NoiseFreeMse]| psnr_mean_error(&views.iter().collect::<Vec<_>>());
-    [input, novel].into_iter().filter_map(error).map(|noise| noise.prediction).fold(0.0, f64::max)
+    (0..masks.len()).map(mse).collect()
+}
+
+/// How many samples a pixel it takes until a plain mean PSNR, of pictures as they are, is off by no more than the standard
+/// error that `scored` certifies, in the input view and in the novel ones. `pair` shows how noisy `samples` are.
+///
+/// A plain MSE is too large by the variance of a pixel: the mean PSNR is too small by 10 / ln 10 times the mean of variance
+/// over MSE, to first order. The noise of the truth is in both; that of the plain MSE besides its bias is not counted.
+pub fn plain_samples(room: &Room, pair: &Pair, masks: &[Mask], samples: u32, scored: &ResultFile, track: usize) -> f64 {
+    let exposure = room.scene.exposure as f32;
+    let too_small = |view: usize, mse: &NoiseFreeMse| {
+        let [a, b] = [0, 1].map(|k| flat(&pair[k][view..=view], &masks[view..=view], exposure));
+        10.0 / LN_10 * Noise::of(&a, &b).srgb * f64::from(samples) / mse.mse
+    };
+    let by_view: Vec<f64> =
+        noise_free(room, pair, masks).iter().enumerate().map(|(view, mse)| too_small(view, mse)).collect();
+    let (input, novel) = by_view.split_at(INPUT_VIEWS);
+    let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
+    let needed = |(views, region): (&[f64], &str)| {
+        let mean = views.iter().sum::<f64>() / views.len() as f64;
+        mean / noise[&format!("rgb_{}.{region}.psnr", crate::TRACKS[track])].standard_error_db.unwrap()
+    };
+    [(input, "input"), (novel, "novel")].map(needed).into_iter().fold(0.0, f64::max)
 }
 
 /// As it is compared: times the exposure, clipped to 0..1 and sRGB-encoded.

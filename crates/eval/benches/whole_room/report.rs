@@ -29,7 +29,9 @@ pub fn print(room: &Room, scored: &ResultFile, own: &[Run], theirs: &[Run]) {
     println!(
         "\n| noise that is equal | fit | ours CPU s (wall) | theirs CPU s (wall) | ratio CPU | wall |\n|---|---|---|---|---|---|"
     );
-    for (kind, name) in ["samples alike", "of a pixel", "of the mean PSNR"].into_iter().enumerate() {
+    for (kind, name) in
+        ["samples alike", "of a pixel", "of the mean PSNR", "bias of a plain PSNR"].into_iter().enumerate()
+    {
         for with_fit in [true, false] {
             let ours = total(&own_stages);
             let counted = |stage: &&Stage| stage.name != "uncounted" && (with_fit || stage.name != "fit");
@@ -72,9 +74,9 @@ fn total(stages: &[Stage]) -> Stage {
 }
 
 /// Prints both tools' noise under the lights of a track and gives what times of their renders are multiplied by: for as many
-/// samples as ours took, and for ours noise of a pixel and of the mean PSNR. `unmapped` is the room with the lights that
+/// samples as ours took, for ours noise of a pixel and of the mean PSNR, and for a plain PSNR's bias. `unmapped` is the room with the lights that
 /// theirs has.
-fn compare(room: &Room, unmapped: &World, scored: &ResultFile, track: usize, theirs: &[Run]) -> [f64; 3] {
+fn compare(room: &Room, unmapped: &World, scored: &ResultFile, track: usize, theirs: &[Run]) -> [f64; 4] {
     let masks = pictures::masks(room, track);
     let name = format!("render {}", TRACKS[track]);
     let timed = find(&theirs[0].stages, &name, None).unwrap().samples;
@@ -93,6 +95,11 @@ fn compare(room: &Room, unmapped: &World, scored: &ResultFile, track: usize, the
     let flat = |pair: &Pair| [0, 1].map(|k| pictures::flat(&pair[k], &masks, exposure));
     let apart = disagreement(flat(&ours), flat(&pair));
     println!("| {} | squared difference of the last two | linear, sRGB, means | {apart} |", TRACKS[track]);
-    let as_many = f64::from(2 * samples(scored)[track]) / f64::from(timed);
-    [1.0, peers.variance / own.variance, peers.certified / own.certified].map(|factor| factor * as_many)
+    let plain = pictures::plain_samples(room, &pair, &masks, timed, scored, track);
+    println!("| {} | a plain PSNR as near as ours is certified takes | {plain:.0} samples | | |", TRACKS[track]);
+    let timed = f64::from(timed);
+    let as_many = f64::from(2 * samples(scored)[track]);
+    let noisier = [1.0, peers.variance / own.variance, peers.certified / own.certified];
+    let [alike, pixel, mean_psnr] = noisier.map(|factor| factor * as_many / timed);
+    [alike, pixel, mean_psnr, plain / timed]
 }
