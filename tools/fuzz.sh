@@ -14,10 +14,11 @@ cp Cargo.lock tests/fuzz/Cargo.lock
 cargo fuzz build --fuzz-dir tests/fuzz
 "tests/fuzz/target/$(rustc -vV | sed -n 's/^host: //p')/release/seeds" tests/fuzz/corpus
 failed=""
+# Threads that stay make libFuzzer suspect a leak behind every run, and look: that takes nearly all of the time.
 for target in "$@"; do
   mkdir -p "tests/fuzz/corpus/$target"
   echo "== $target for $seconds s"
   cargo fuzz run --fuzz-dir tests/fuzz "$target" -- \
-    -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=10 -max_len=131072 -print_final_stats=1 || failed="$failed $target"
+    -max_total_time="$seconds" -rss_limit_mb=2048 -timeout=10 -max_len=131072 -print_final_stats=1 -detect_leaks=0 || failed="$failed $target"
 done
 [ -z "$failed" ] || { echo "crashed:$failed" >&2; exit 1; }

@@ -26,12 +26,27 @@ const LEAST_FACTOR: f64 = 1.6;
 /// Darker values say more of noise, and of rounding, than of hues.
 const DARKEST: f32 = 0.01;
 
-/// Findings about the colours of a scene; `are_png` says what most files of it are.
-pub(super) fn check(place: &str, looks: &[Look], are_png: bool) -> Option<Finding> {
-    exchanged(place, looks).or_else(|| decoded_wrongly(place, looks, are_png))
+/// What the hues of a scene say of how its base colours were decoded.
+#[derive(Debug, Default)]
+pub(super) enum Decoding {
+    /// Nothing: too few, or they do not go along with the picture, or with one decoding as well as with the other.
+    #[default]
+    Untold,
+    Right,
+    Wrong(Finding),
 }
 
-fn exchanged(place: &str, looks: &[Look]) -> Option<Finding> {
+/// The findings of scenes whose base colours were decoded wrongly, if most are of which anything is told. One alone proves
+/// nothing: reflections of white light pale the picture as a wrong decoding would, and who decodes wrongly does it everywhere.
+pub(super) fn mostly_wrong(scenes: Vec<Decoding>) -> Vec<Finding> {
+    let told = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Untold)).count();
+    let wrong = |decoding| if let Decoding::Wrong(finding) = decoding { Some(finding) } else { None };
+    let wrong: Vec<Finding> = scenes.into_iter().filter_map(wrong).collect();
+    if 2 * wrong.len() > told { wrong } else { Vec::new() }
+}
+
+/// Whether red and blue are exchanged.
+pub(super) fn exchanged(place: &str, looks: &[Look]) -> Option<Finding> {
     let hues = hue(looks, 2, |value| value);
     let [base, photo] = hues.deviations();
     let correlation = hues.correlation();
@@ -46,8 +61,8 @@ fn exchanged(place: &str, looks: &[Look]) -> Option<Finding> {
     Some(warning("swapped_red_blue", place, message, "write red, green, blue in this order (OpenCV has blue first)"))
 }
 
-fn decoded_wrongly(place: &str, looks: &[Look], are_png: bool) -> Option<Finding> {
-    let own = strength(looks, |value| value)?;
+/// `are_png` says what most files of the scene are.
+pub(super) fn decoding(place: &str, looks: &[Look], are_png: bool) -> Decoding {
     let (code, what, action, mended): (_, _, _, fn(f32) -> f32) = if are_png {
         let action = "encode base_color.png as sRGB";
         ("linear_in_png", "linear numbers in PNG, which are read as sRGB", action, srgb_from_linear)
@@ -55,16 +70,18 @@ fn decoded_wrongly(place: &str, looks: &[Look], are_png: bool) -> Option<Finding
         let action = "decode sRGB before base_color.exr is written";
         ("srgb_in_exr", "sRGB numbers in EXR, which are read as linear", action, linear_from_srgb)
     };
+    let (Some(own), Some(then)) = (strength(looks, |value| value), strength(looks, mended)) else {
+        return Decoding::Untold;
+    };
     let off = if are_png { own } else { 1.0 / own };
-    let then = strength(looks, mended)?;
-    if off < LEAST_FACTOR || then.ln().abs() > own.ln().abs() / 2.0 {
-        return None;
+    if off >= LEAST_FACTOR && then.ln().abs() <= own.ln().abs() / 2.0 {
+        let message = format!(
+            "base colours seem to be {what}: their hues are {own:.2} times as strong as the input picture's, {then:.2} times \
+             if that is mended"
+        );
+        return Decoding::Wrong(warning(code, place, message, action));
     }
-    let message = format!(
-        "base colours seem to be {what}: their hues are {own:.2} times as strong as the input picture's, {then:.2} times \
-         if that is mended"
-    );
-    Some(warning(code, place, message, action))
+    if own.ln().abs() <= then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Untold }
 }
 
 /// How many times as strong the base colour's hues are as the picture's; none where they do not go along with it.
@@ -92,4 +109,19 @@ fn hue(looks: &[Look], channel: usize, change: fn(f32) -> f32) -> Pairs {
         }
     }
     pairs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Decoding::{Right, Untold, Wrong};
+    use super::*;
+
+    #[test]
+    fn most_scenes_must_agree() {
+        let wrong = || Wrong(warning("linear_in_png", "scenes/a", String::new(), "encode"));
+        assert_eq!(mostly_wrong(vec![wrong(), Untold, Untold]).len(), 1);
+        assert_eq!(mostly_wrong(vec![wrong(), Right, wrong()]).len(), 2);
+        assert_eq!(mostly_wrong(vec![wrong(), Right]).len(), 0);
+        assert_eq!(mostly_wrong(vec![Right, Untold]).len(), 0);
+    }
 }

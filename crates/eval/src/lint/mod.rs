@@ -62,12 +62,15 @@ pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, Eva
     findings.extend(layout::check(plan.dataset, &tree));
     let scenes = &plan.dataset.scenes;
     let mut maps = 0;
+    let mut decodings = Vec::new();
     for (at, scene) in scenes.iter().enumerate() {
         progress("scenes looked over", at, scenes.len());
-        let (found, read) = scene::check(plan, scene)?;
-        findings.extend(found);
-        maps += read;
+        let found = scene::check(plan, scene)?;
+        findings.extend(found.findings);
+        decodings.push(found.decoding);
+        maps += found.maps;
     }
+    findings.extend(colours::mostly_wrong(decodings));
     progress("scenes looked over", scenes.len(), scenes.len());
     Ok(report(plan.dataset, &plan.tool, method, maps, findings))
 }

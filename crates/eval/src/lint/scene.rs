@@ -8,13 +8,14 @@ use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::submission::Map;
 use rayon::prelude::*;
 
+use super::colours::{self, Decoding};
 use super::copies::{CopyCount, copies};
 use super::finding::{error, note};
 use super::looks::{Look, looks};
 use super::scalars::{ScalarLook, scalar_looks};
 use super::sight::{InstanceSight, Sight};
 use super::unobserved::{Fill, fill};
-use super::{LintPlan, colours, map_remarks, orientation, scalars, shading, unobserved};
+use super::{LintPlan, map_remarks, orientation, scalars, shading, unobserved};
 use crate::error::EvalError;
 use crate::map_file::{self, MapFile, MapHeader, candidates, is_there};
 use crate::prediction::{MAX_SCENE_BYTES, Room, in_memory};
@@ -39,10 +40,20 @@ pub(super) struct Seen {
     pub(super) base_color: Option<(String, bool)>,
 }
 
-/// The findings of a scene, and how many maps could be read.
-pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<(Vec<Finding>, usize), EvalError> {
+/// What was found in a scene.
+#[derive(Default)]
+pub(super) struct SceneFindings {
+    pub(super) findings: Vec<Finding>,
+    /// How many maps could be read.
+    pub(super) maps: usize,
+    /// Judged over all scenes, and not among the findings yet.
+    pub(super) decoding: Decoding,
+}
+
+/// Looks over one scene; nothing is found in one that the submission leaves out.
+pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<SceneFindings, EvalError> {
     if !plan.submission.join("scenes").join(scene.id.as_str()).is_dir() {
-        return Ok((Vec::new(), 0));
+        return Ok(SceneFindings::default());
     }
     let sight = Sight::read(plan.dataset, scene)?;
     let order: Vec<usize> = (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
@@ -52,11 +63,12 @@ pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<(Vec<Findi
     }
     let maps = all.iter().map(|seen| seen.maps).sum();
     let mut findings: Vec<Finding> = all.iter_mut().flat_map(|seen| std::mem::take(&mut seen.findings)).collect();
-    findings.extend(together(scene, &sight, &all));
-    Ok((findings, maps))
+    let (together, decoding) = together(scene, &sight, &all);
+    findings.extend(together);
+    Ok(SceneFindings { findings, maps, decoding })
 }
 
-fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> Vec<Finding> {
+fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> (Vec<Finding>, Decoding) {
     let place = format!("scenes/{}", scene.id);
     let mut findings = Vec::new();
     if all.iter().map(|seen| seen.bytes).sum::<usize>() > MAX_SCENE_BYTES {
@@ -71,12 +83,14 @@ fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> Vec<Finding> {
     let files: Vec<&(String, bool)> = all.iter().filter_map(|seen| seen.base_color.as_ref()).collect();
     let are_png = files.iter().filter(|(_, is_png)| *is_png).count() * 2 >= files.len();
     findings.extend(orientation::check(&place, &looks));
-    findings.extend(colours::check(&place, &looks, are_png));
+    let exchanged = colours::exchanged(&place, &looks);
+    let decoding = if exchanged.is_some() { Decoding::Untold } else { colours::decoding(&place, &looks, are_png) };
+    findings.extend(exchanged);
     findings.extend(shading::check(&place, &looks));
     findings.extend(scalars::check(&place, all));
     findings.extend(unobserved::check(&place, all.iter().filter_map(|seen| seen.fill.as_ref())));
     findings.extend(copies(&place, all));
-    findings
+    (findings, decoding)
 }
 
 fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceSight) -> Seen {
