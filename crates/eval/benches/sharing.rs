@@ -1,14 +1,15 @@
 //! What it costs to look at eight submissions together, against eight apart: submissions that differ in base colour alone
 //! are followed by the same paths. And what five lightings more cost: track `relit` is sums over the same paths.
 //!
-//! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES]`. The eight are the submission's own
-//! maps, each with its own copies of the textures, so that none finds another's in the caches. Runs alternate; tracing only.
+//! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES [lightings]]`. The eight are the submission's own
+//! maps, each with its own copies of the textures, so that none finds another's in the caches. Runs alternate; tracing only,
+//! CPU seconds of all threads. With `lightings` behind SAMPLES the eight are left out.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
+use cpu_time::ProcessTime;
 use mateval_eval::prediction::read_scene;
 use mateval_image::Texture;
 use mateval_scene::layout::SceneFolder;
@@ -22,7 +23,7 @@ const RUNS: usize = 3;
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let [dataset, scene, submission, rest @ ..] = words.as_slice() else {
-        println!("give DATASET SCENE SUBMISSION [SAMPLES]");
+        println!("give DATASET SCENE SUBMISSION [SAMPLES [lightings]]");
         return;
     };
     let samples = rest.first().map_or(16, |samples| samples.parse().unwrap());
@@ -46,27 +47,33 @@ fn main() {
     let settings = RenderSettings { samples, ..Default::default() };
     let repaint = Repaint::new(&world, &atlases, coats(SUBMISSIONS), PrincipledFlavour::Blender).unwrap();
     let trace = |which: std::ops::Range<usize>| {
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let lighting = Lighting::Apart(&groups);
         render_repainted(&world, &repaint, which, &cameras, lighting, &settings, &[1, 2], &|_, _| ()).unwrap();
         start.elapsed().as_secs_f64()
     };
     let lights = world.emitters().groups();
     let mixed = |pictures: usize| {
-        let start = Instant::now();
+        let start = ProcessTime::now();
         let mixes = vec![vec![vec![[0.7; 3]; lights]; pictures]; SUBMISSIONS];
         let lighting = Lighting::Mixed(&mixes);
         render_repainted(&world, &repaint, 0..1, &cameras, lighting, &settings, &[1, 2], &|_, _| ()).unwrap();
         start.elapsed().as_secs_f64()
     };
     let (mut together, mut apart, mut one, mut six) = (0.0, 0.0, 0.0, 0.0);
+    let lightings_alone = rest.get(1).is_some_and(|word| word == "lightings");
     for _ in 0..RUNS {
-        together += trace(0..SUBMISSIONS);
-        apart += (0..SUBMISSIONS).map(|one| trace(one..one + 1)).sum::<f64>();
+        if !lightings_alone {
+            together += trace(0..SUBMISSIONS);
+            apart += (0..SUBMISSIONS).map(|one| trace(one..one + 1)).sum::<f64>();
+        }
         one += mixed(1);
         six += mixed(6);
     }
-    println!("one lighting {:.2} s, six {:.2} s: {:.3}", one / RUNS as f64, six / RUNS as f64, six / one);
+    println!("CPU: one lighting {:.2} s, six {:.2} s: {:.3}", one / RUNS as f64, six / RUNS as f64, six / one);
+    if lightings_alone {
+        return;
+    }
     println!("{SUBMISSIONS} together {:.2} s, apart {:.2} s", together / RUNS as f64, apart / RUNS as f64);
     println!("together over apart: {:.3}", together / apart);
 }
