@@ -1,9 +1,9 @@
 //! What it costs to look at eight submissions together, against eight apart: submissions that differ in base colour alone
 //! are followed by the same paths. And what five lightings more cost: track `relit` is sums over the same paths.
 //!
-//! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES [lightings]]`. The eight are the submission's own
-//! maps, each with its own copies of the textures, so that none finds another's in the caches. Runs alternate; tracing only,
-//! CPU seconds of all threads. With `lightings` behind SAMPLES the eight are left out.
+//! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES [lightings]]`. The eight are the
+//! submission's own maps, each with its own copies of the textures, so that none finds another's in the caches. Runs
+//! alternate; tracing only, CPU seconds of all threads. With `lightings` behind SAMPLES the eight are left out.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 use std::path::Path;
