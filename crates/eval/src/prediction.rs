@@ -9,7 +9,7 @@ use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::submission::{GREY, Map};
 use mateval_scene::{Finding, Severity};
 
-use crate::map_file::{self, MapFile, candidates, check_place, is_there};
+use crate::map_file::{self, MAX_MAP_BYTES, MapFile, candidates, check_place, is_there};
 
 /// What a missing roughness scores as; perceptual.
 pub const MISSING_ROUGHNESS: f32 = 0.5;
@@ -142,10 +142,12 @@ fn one_texel(value: f32) -> Texture {
     Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
 }
 
-/// Every map that is there with its hash: what a result was made of, whatever was made of it.
+/// Every map that is there with its hash: what a result was made of, whatever was made of it. A file that is too large to
+/// be read as a map has none: hashing it would take as long as its maker likes.
 fn files_there(submission: &Path, scene: &SceneFile, instance: &Instance) -> Vec<(String, String)> {
     let paths = Map::ALL.into_iter().flat_map(|map| candidates(submission, &scene.id, &instance.id, map));
-    let inside = paths.filter(|path| check_place(submission, path).is_ok());
+    let is_bounded = |path: &PathBuf| path.metadata().is_ok_and(|data| data.len() <= MAX_MAP_BYTES);
+    let inside = paths.filter(|path| check_place(submission, path).is_ok() && is_bounded(path));
     inside.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
 }
 
@@ -285,6 +287,18 @@ mod tests {
         let mut room = Room { bytes: 150 };
         assert!(room.holding(texture(10)).is_some() && room.holding(texture(8)).is_none());
         assert!(room.holding(texture(7)).is_some() && room.bytes == 1);
+    }
+
+    /// Almost all of it is a hole, that takes no room on the disk.
+    #[test]
+    fn what_is_too_large_to_be_read_is_not_hashed_either() {
+        let folder = sound();
+        let path = file(&folder, "a", "roughness.png");
+        std::fs::File::options().write(true).open(&path).unwrap().set_len(1 << 30).unwrap();
+        let read = read(&folder);
+        assert_eq!(read.files.len(), 5);
+        let [finding] = read.findings.as_slice() else { panic!("{:?}", read.findings) };
+        assert!(finding.code == "unsound_map" && finding.message.contains("more than 536870912 bytes"), "{finding}");
     }
 
     /// A map, the finding's code, a word of its action, and the fault.

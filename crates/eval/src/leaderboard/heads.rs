@@ -18,7 +18,10 @@ pub(super) struct MethodHead {
     /// Only if it leads to a web page: a stranger wrote it.
     link: Option<String>,
     licence: Option<String>,
+    /// As much of it as a row of the table has room for.
+    licence_in_brief: String,
     cost: Option<Cost>,
+    hardware_in_brief: String,
     /// Its cost, rounded.
     seconds: String,
     partial: bool,
@@ -41,6 +44,8 @@ impl MethodHead {
             description: said.description.clone(),
             link: said.url.clone().filter(is_page),
             licence: said.licence.clone().filter(|licence| !licence.is_empty()),
+            licence_in_brief: in_brief(said.licence.as_deref().unwrap_or_default()),
+            hardware_in_brief: in_brief(said.cost.as_ref().map_or("", |cost| &cost.hardware)),
             seconds: said.cost.as_ref().map_or_else(String::new, |cost| seconds(cost.seconds_a_scene)),
             cost: said.cost.clone(),
             partial: ranked.partial,
@@ -51,9 +56,19 @@ impl MethodHead {
     }
 }
 
+/// What a stranger says of his cost has no bound; a column has.
 fn seconds(seconds: f64) -> String {
-    let digits = if seconds >= 100.0 { 0 } else { 1 };
-    format!("{seconds:.digits$}")
+    match seconds {
+        1e7.. => format!("{seconds:.1e}"),
+        100.0.. => format!("{seconds:.0}"),
+        _ => format!("{seconds:.1}"),
+    }
+}
+
+/// The text, or its first 60 characters.
+fn in_brief(text: &str) -> String {
+    let cut = text.char_indices().nth(60);
+    cut.map_or_else(|| text.to_owned(), |(end, _)| format!("{}…", &text[..end]))
 }
 
 /// A number of a method with all that is known of it.
@@ -97,4 +112,20 @@ pub(super) fn rank_text(rank: RankRange) -> String {
 /// The method's place by one number.
 pub(super) fn standing<'a>(ranking: &'a Ranking, key: &str, method: &str) -> Option<&'a Standing> {
     ranking.keys.get(key)?.standings.iter().find(|standing| standing.method == method)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_has_room_for_what_a_method_says_of_itself() {
+        assert_eq!(
+            [0.04, 12.34, 99.96, 123.4, 9_999_999.0, 1e300].map(seconds),
+            ["0.0", "12.3", "100.0", "123", "9999999", "1.0e300"]
+        );
+        assert_eq!(in_brief("MIT"), "MIT");
+        assert_eq!(in_brief(&"é".repeat(60)), "é".repeat(60));
+        assert_eq!(in_brief(&"é".repeat(61)), format!("{}…", "é".repeat(60)));
+    }
 }
