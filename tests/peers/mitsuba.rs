@@ -1,4 +1,4 @@
-//! The tracer against Mitsuba 3: scenes exported by `mateval_prep::mitsuba_export`, rendered by both.
+//! The tracer against Mitsuba 3: scenes exported by `mateval_audit::mitsuba_export`, rendered by both.
 //!
 //! What was measured is told, a line a scene. With `MATEVAL_TEST_PICTURES` naming a folder, both pictures of each scene
 //! are written there side by side, with their difference (grey where there is none).
@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
+use mateval_audit::mitsuba_export::export;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
-use mateval_prep::mitsuba_export::export;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Severity};
 use mateval_tracer::{RenderSettings, World, render};

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_prep::bitterli::{self, Limits};
 use mateval_scene::Camera;
 use mateval_scene::reference::ReferenceScene;
+use mateval_sources::bitterli::{self, Limits};
 
 use super::mitsuba::{Case, all_agree};
 use crate::bench_scene;
@@ -38,7 +38,7 @@ fn shared(file: &str) -> Option<PathBuf> {
 #[test]
 fn sample_room() {
     let folder = tempfile::tempdir().unwrap();
-    mateval_prep::sample::write(folder.path()).unwrap();
+    mateval_sample::write(folder.path()).unwrap();
     all_agree(vec![source("sample room", &folder.path().join("room/scene.xml"), 80, 32)]);
 }
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, LazyLock};
 
+use mateval_audit::compare::file::{CompareFile, Quantity, State};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
-use mateval_prep::compare::file::{CompareFile, Quantity, State};
 use mateval_prep::render::{BLENDER, RenderFile, RenderNoise};
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_scene::dataset::{SceneFile, View};
@@ -227,7 +227,7 @@ fn check_page(out: &Path, file: &CompareFile) {
     assert_eq!(sorted, pictures);
     // Four pictures of each light; of geometry, three of each of five.
     assert_eq!(shown.len(), 5 * (4 * 4 + 5 * 3));
-    assert!(!html.contains("http") && html.contains(&mateval_prep::compare::text::verdict(file)));
+    assert!(!html.contains("http") && html.contains(&mateval_audit::compare::text::verdict(file)));
 }
 
 /// The sample's own materials: tiles with plastic and glass stand apart; of what is left the lamp is too noisy to tell,

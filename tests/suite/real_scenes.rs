@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use mateval_prep::bitterli;
 use mateval_scene::Severity;
+use mateval_sources::bitterli;
 
 use super::command::{baseline, build, run, score, verify};
 use super::sample::{json, real_data};

@@ -6,14 +6,15 @@ use anyhow::{Context as _, bail};
 
 use mateval_baselines::estimate::EstimateSource;
 use mateval_baselines::nn::NnOptions;
-use mateval_eval::tables::{Grouping, TableFormat, tables};
+use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 
 use crate::bars::Bars;
+use crate::eval;
 use crate::eval::leaderboard::LeaderboardArgs;
 use crate::eval::pictures::StripPicture;
 use crate::outcome::{Outcome, print, say};
-use crate::{eval, prep};
+use crate::prep;
 
 /// A baseline of the demo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -58,7 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let [source, dataset, results] = ["source", "dataset", "results"].map(|name| out.join(name));
     say("1/6 sample: a house and a room that the program makes itself");
-    mateval_prep::sample::write(&source).context("cannot write the sample")?;
+    mateval_sample::write(&source).context("cannot write the sample")?;
     say("2/6 prep build: geometry, atlases, pictures of five views");
     prep::build(&prep::BuildArgs {
         recipe: source.join("recipe.toml"),

@@ -8,15 +8,15 @@ mod verify;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_eval::archive::{self, Opened};
-use mateval_eval::explain::{self, ExplainPlan};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{ScorePlan, score};
-use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_metrics::{Lpips, Net};
+use mateval_report::explain::{self, ExplainPlan};
+use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, json};
+use mateval_submission::archive::{self, Opened};
 
 use self::pictures::PicturesArgs;
 use self::verify::VerifyArgs;
@@ -190,7 +190,7 @@ fn image(args: &ImageArgs) -> anyhow::Result<Outcome> {
             mateval_eval::score::LpipsWeights::Missing { reason, .. } => missing.push((net.key(), reason)),
         }
     }
-    let values = mateval_eval::pair::compare(&args.prediction, &args.reference, args.mask.as_deref(), &nets)?;
+    let values = mateval_report::pair::compare(&args.prediction, &args.reference, args.mask.as_deref(), &nets)?;
     match args.format {
         ImageFormat::Json => print(&json::to_text(&serde_json::json!({
             "format": "mateval-image/1",
@@ -206,7 +206,7 @@ fn image(args: &ImageArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn image_text(values: &mateval_eval::pair::PairValues, missing: &[(&str, String)]) -> String {
+fn image_text(values: &mateval_report::pair::PairValues, missing: &[(&str, String)]) -> String {
     let mut lines = Vec::new();
     let mut line = |name: &str, value: Option<f64>| {
         lines.push(format!("{name:24} {}", value.map_or("none".to_owned(), |value| format!("{value:.6}"))));

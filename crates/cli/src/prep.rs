@@ -8,11 +8,11 @@ mod survey;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
+use mateval_audit::mitsuba_export::ExportOptions;
+use mateval_audit::stats;
 use mateval_image::store::write_whole;
 use mateval_prep::build::{BuildOptions, BuildReport};
-use mateval_prep::mitsuba_export::ExportOptions;
 use mateval_prep::render::{RenderOptions, Renderer};
-use mateval_prep::stats;
 use mateval_scene::open::Dataset;
 use mateval_scene::{SceneId, Severity, ViewId, json};
 
@@ -207,7 +207,7 @@ pub fn render(args: &RenderArgs) -> anyhow::Result<Outcome> {
 
 fn verify(args: &VerifyArgs) -> anyhow::Result<Outcome> {
     let bars = Bars::new();
-    let findings = mateval_prep::verify::verify(&args.dataset, &|step, done, all| bars.step(step, done, all))
+    let findings = mateval_audit::verify::verify(&args.dataset, &|step, done, all| bars.step(step, done, all))
         .with_context(|| format!("cannot verify '{}'", args.dataset.display()))?;
     drop(bars);
     let errors = findings.iter().filter(|finding| finding.severity == Severity::Error).count();
@@ -274,7 +274,7 @@ fn mitsuba(args: &MitsubaArgs) -> anyhow::Result<Outcome> {
         out: args.out.clone(),
         force: args.force,
     };
-    let findings = mateval_prep::mitsuba_export::export_view(&options).context("cannot export to Mitsuba")?;
+    let findings = mateval_audit::mitsuba_export::export_view(&options).context("cannot export to Mitsuba")?;
     say_findings(args.scene.as_str(), &findings);
     let unsaid = findings.iter().filter(|finding| finding.severity != Severity::Note).count();
     let verdict = if unsaid == 0 { "means the same" } else { "does NOT mean the same" };

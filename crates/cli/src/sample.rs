@@ -21,7 +21,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.exists() && !args.force {
         bail!("'{}' is already there; choose another folder, or add --force to write into it", args.out.display());
     }
-    mateval_prep::sample::write(&args.out).context("cannot write the sample")?;
+    mateval_sample::write(&args.out).context("cannot write the sample")?;
     print(&format!("{}\n", args.out.join("recipe.toml").display()))?;
     Ok(Outcome::Good)
 }

@@ -3,22 +3,22 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
+use mateval_audit::compare::file::CompareFile;
+use mateval_audit::stats::StatsFile;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
-use mateval_eval::explain::file::ExplainFile;
-use mateval_eval::leaderboard::errata::ErrataFile;
-use mateval_eval::leaderboard::file::LeaderboardFile;
-use mateval_eval::lint::LintFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
-use mateval_prep::compare::file::CompareFile;
 use mateval_prep::render::RenderFile;
-use mateval_prep::stats::StatsFile;
 use mateval_prep::survey::SurveyFile;
+use mateval_report::explain::file::ExplainFile;
+use mateval_report::leaderboard::errata::ErrataFile;
+use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile};
 use mateval_scene::submission::SubmissionFile;
+use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
 
 use crate::outcome::{Outcome, print};

@@ -10,13 +10,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use mateval_eval::light_fit::{fit_lights, pooled};
 use mateval_eval::light_rules::{LightRules, Track};
-use mateval_eval::light_stage;
-use mateval_eval::prediction::read_scene;
 use mateval_eval::truth::ViewTruth;
+use mateval_light::light_fit::{fit_lights, pooled};
+use mateval_light::light_stage;
 use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::{Camera, SceneId, glb, open::Dataset, reference_io};
+use mateval_submission::prediction::read_scene;
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
 };

@@ -10,11 +10,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use cpu_time::ProcessTime;
-use mateval_eval::prediction::read_scene;
 use mateval_image::Texture;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::{Camera, SceneId, glb, open::Dataset, reference_io};
+use mateval_submission::prediction::read_scene;
 use mateval_tracer::{Coat, LightGroups, Lighting, RenderSettings, Repaint, World, render_repainted};
 
 const SUBMISSIONS: usize = 8;
@@ -35,7 +35,7 @@ fn main() {
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
     let predicted = read_scene(Path::new(submission), scene);
     let coats = |count: usize| {
-        let coat = |material: &mateval_eval::prediction::PredictedMaterial| Coat {
+        let coat = |material: &mateval_submission::prediction::PredictedMaterial| Coat {
             base_colors: (0..count).map(|_| copied(&material.base_color)).collect(),
             roughness: material.roughness.clone(),
             metallic: material.metallic.clone(),

@@ -6,8 +6,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use mateval_eval::prediction::read_scene;
-use mateval_eval::texel_map::TexelMap;
 use mateval_eval::texture_space::{InstanceTexels, TexelSums, compare, texture_space};
 use mateval_eval::truth_material::TruthMaterial;
 use mateval_scene::dataset::SceneFile;
@@ -16,6 +14,8 @@ use mateval_scene::open::Dataset;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
 use mateval_scene::{TriangleMesh, glb, reference_io};
+use mateval_submission::prediction::read_scene;
+use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
 
 fn main() {
@@ -53,7 +53,7 @@ fn print_steps(
     scene: &SceneFile,
     world: &World,
     atlases: &[TriangleMesh],
-    predictions: &[mateval_eval::prediction::PredictedScene],
+    predictions: &[mateval_submission::prediction::PredictedScene],
 ) {
     let camera = &scene.view(INPUT).unwrap().camera;
     let (mut map_s, mut truth_s, mut compare_s) = (0.0, 0.0, 0.0);

@@ -15,20 +15,18 @@ pub enum EvalError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// An archive that is not unpacked.
-    #[error("'{}' is not unpacked:{}", path.display(), mateval_scene::Finding::list(findings))]
-    Archive {
-        /// The archive.
-        path: PathBuf,
-        /// What is wrong with it.
-        findings: Vec<mateval_scene::Finding>,
-    },
     /// What was asked for does not go together.
     #[error("{0}")]
     Invalid(String),
     /// The dataset or the submission could not be read.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
+    /// The submission could not be read.
+    #[error(transparent)]
+    Submission(#[from] mateval_submission::SubmissionError),
+    /// The lights could not be fitted.
+    #[error(transparent)]
+    Light(#[from] mateval_light::LightError),
     /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

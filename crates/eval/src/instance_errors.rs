@@ -9,11 +9,11 @@ use crate::result::InstancePixelErrors;
 
 /// Sums of squared errors of a scene's pixels by picture, views and instance.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct InstanceErrors(BTreeMap<(String, &'static str, u16), (f64, usize)>);
+pub struct InstanceErrors(BTreeMap<(String, &'static str, u16), (f64, usize)>);
 
 impl InstanceErrors {
     /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
-    pub(crate) fn add(
+    pub fn add(
         &mut self,
         picture: &str,
         views: &'static str,
@@ -35,7 +35,7 @@ impl InstanceErrors {
     }
 
     /// The means, by picture, views and index. What shows no instance is left out.
-    pub(crate) fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
+    pub fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
         let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
             let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;
             let (category, super_category) = categories(scene, instance);
@@ -55,7 +55,7 @@ impl InstanceErrors {
 }
 
 /// The source's categories; of 3D-FRONT's architecture its kind of mesh, the last word of its name but for a number.
-pub(crate) fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
+pub fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
     if instance.category.is_some() || scene.source.kind != "front3d" {
         return (instance.category.clone(), instance.super_category.clone());
     }

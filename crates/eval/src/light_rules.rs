@@ -1,5 +1,6 @@
 //! The part of a protocol that says by what light predictions are looked at, and how sure the numbers are to be.
 
+use mateval_light::rules::{FitRules, StageRules};
 use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -51,44 +52,6 @@ pub struct LightRules {
     pub relit: RelitRules,
     /// How many samples are taken.
     pub noise: NoiseRules,
-}
-
-/// Where the lights of a stage are; metres. Ours: nobody has published theirs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StageRules {
-    /// About the side of a ceiling cell; cells fill the rectangle that is seen from the camera at its height.
-    pub cell_m: f64,
-    /// The side of a cell's light over the cell's own.
-    pub cell_share: f64,
-    /// How far ceiling lights hang under the ceiling.
-    pub ceiling_gap_m: f64,
-    /// The side of the light behind the camera.
-    pub camera_side_m: f64,
-    /// How far behind the camera it stands.
-    pub camera_distance_m: f64,
-    /// Width and height of a wall's light over the wall's own.
-    pub wall_share: f64,
-    /// How far wall lights stand before their wall.
-    pub wall_gap_m: f64,
-    /// Plane pieces of the architecture narrower or lower than this are no walls.
-    pub least_wall_m: f64,
-}
-
-/// How radiances are fitted to the input view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FitRules {
-    /// Pixels along the side of the squares that are averaged.
-    pub pool: u32,
-    /// Samples a pixel of the light basis that the fit is made on; a stream of its own.
-    pub samples: u32,
-    /// Radiances one of which the fit starts from: the one whose picture with grey materials is nearest by luminance.
-    pub start_radiances: Vec<f64>,
-    /// Base colour, linear, of those grey materials.
-    pub start_grey: f32,
-    /// Samples a pixel of that picture: few, since the start does not move where the fit ends.
-    pub start_samples: u32,
 }
 
 /// The weights of track `relit`. Groups are ordered by the luminance of the truth's input view under each alone, over valid
@@ -146,7 +109,7 @@ impl LightRules {
                 least_wall_m: 0.5,
             },
             fit: FitRules {
-                pool: crate::light_fit::POOL as u32,
+                pool: mateval_light::light_fit::POOL as u32,
                 samples: 64,
                 start_radiances: vec![0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0],
                 start_grey: 0.5,

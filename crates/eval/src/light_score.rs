@@ -34,10 +34,11 @@ pub(crate) fn score_light(
 }
 
 /// A view's light as people see it.
-pub(crate) struct ShownLight {
-    pub(crate) truth: Picture<SrgbRgb>,
+pub struct ShownLight {
+    /// The truth, exposed and encoded.
+    pub truth: Picture<SrgbRgb>,
     /// One a submission.
-    pub(crate) predicted: Vec<Picture<SrgbRgb>>,
+    pub predicted: Vec<Picture<SrgbRgb>>,
 }
 
 /// View by view the truth's light and every submission's as people see it, in the first track of the first protocol.

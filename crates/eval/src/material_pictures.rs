@@ -7,7 +7,7 @@ use mateval_tracer::World;
 use mateval_tracer::aov::{hit_through, subpixels};
 use rayon::prelude::*;
 
-use crate::prediction::PredictedScene;
+use mateval_submission::prediction::PredictedScene;
 
 /// A submission's maps as a view shows them, each pixel a mean; the names are those of the truth's pictures.
 #[derive(Clone, Debug, PartialEq)]

@@ -67,7 +67,7 @@ pub fn albedo_metrics(
 }
 
 /// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts. Linear pictures.
-pub(crate) fn albedo_mse(
+pub fn albedo_mse(
     protocol: &Protocol,
     prediction: &Picture<LinearRgb>,
     reference: &Picture<LinearRgb>,

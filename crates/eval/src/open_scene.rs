@@ -11,7 +11,7 @@ use mateval_tracer::World;
 use crate::error::EvalError;
 
 /// The scenes of these ids, all where there are none; in the dataset's order.
-pub(crate) fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
+pub fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
     let all = &dataset.scenes;
     let unknown: Vec<String> = scenes
         .iter()
@@ -26,7 +26,7 @@ pub(crate) fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Res
 }
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
-pub(crate) fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
+pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {
     let targets = &dataset.targets.targets;
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
@@ -38,17 +38,19 @@ pub(crate) fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Resul
 }
 
 /// A scene, ready to be looked at.
-pub(crate) struct OpenScene {
-    pub(crate) folder: SceneFolder,
-    pub(crate) world: World,
+pub struct OpenScene {
+    /// Its folder.
+    pub folder: SceneFolder,
+    /// Its truth, ready for rays.
+    pub world: World,
     /// The meshes of `instances.glb`, one a surface of the world.
-    pub(crate) atlases: Vec<TriangleMesh>,
+    pub atlases: Vec<TriangleMesh>,
 }
 
 impl OpenScene {
     /// Fails where a file is not what the dataset's manifest says, or does not fit the others. `renderer` is the one whose
     /// pictures will be looked at.
-    pub(crate) fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
+    pub fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
         let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
         let is_light = |file: &str| {
             let name = file.rsplit('/').next().unwrap_or(file);

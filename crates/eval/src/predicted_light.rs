@@ -20,14 +20,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
-use crate::light_fit::{LightFit, fit_lights};
 use crate::light_rules::{LightRules, Track};
-use crate::light_stage::{self, NamedLight};
 use crate::pilot::enough_samples;
-use crate::prediction::PredictedScene;
 use crate::relit::{RelitLighting, luminance};
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
+use mateval_light::light_fit::{LightFit, fit_lights};
+use mateval_light::light_stage::{self, NamedLight};
+use mateval_submission::prediction::PredictedScene;
 
 /// A scene and the truth of its light.
 pub struct LitScene<'a> {
@@ -379,7 +379,8 @@ impl Renderer<'_> {
             mateval_image::Texture::new(1, 1, texels, mateval_image::Wrap::Clamp)
                 .expect("one texel is what one pixel needs")
         };
-        let (rough, metallic) = (crate::prediction::MISSING_ROUGHNESS, crate::prediction::MISSING_METALLIC);
+        let (rough, metallic) =
+            (mateval_submission::prediction::MISSING_ROUGHNESS, mateval_submission::prediction::MISSING_METALLIC);
         let coat = Coat { base_colors: vec![flat(grey)], roughness: flat(rough), metallic: flat(metallic) };
         let coats = self.lit.scene.instances.iter().map(|instance| instance.atlas.as_ref().map(|_| coat.clone()));
         Ok(Repaint::new(self.pass.world, self.lit.atlases, coats.collect(), self.rules.flavour)?)

@@ -91,8 +91,8 @@ impl Protocol {
             subpixels: mateval_tracer::aov::SUBPIXELS,
             psnr_cap_db: mateval_metrics::Psnr::CAP_DB,
             missing_base_color: mateval_scene::submission::GREY,
-            missing_roughness: crate::prediction::MISSING_ROUGHNESS,
-            missing_metallic: crate::prediction::MISSING_METALLIC,
+            missing_roughness: mateval_submission::prediction::MISSING_ROUGHNESS,
+            missing_metallic: mateval_submission::prediction::MISSING_METALLIC,
             light,
             scorer_version: SCORER_VERSION,
         })

@@ -3,10 +3,9 @@
 use std::collections::BTreeMap;
 
 use mateval_metrics::Psnr;
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
+use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::submission::Cost;
-use mateval_scene::{Finding, InstanceId, RendererId, SceneId, ViewId};
+use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -58,44 +57,6 @@ pub struct SubmissionId {
     /// What the method takes, as it says.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
-}
-
-/// What it was scored on.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DatasetId {
-    /// Its name.
-    pub name: String,
-    /// Its version.
-    pub version: String,
-    /// SHA-256 of its manifest, hex.
-    pub manifest_sha256: String,
-    /// The scenes that were scored, in the dataset's order.
-    pub scenes: Vec<SceneId>,
-    /// How many scenes it has.
-    pub scenes_in_all: usize,
-    /// The house of each scored scene: rankings draw scenes of one house together.
-    #[serde(default)]
-    pub houses: BTreeMap<SceneId, String>,
-    /// The renderer whose pictures light was compared with; null where there were none.
-    #[serde(default)]
-    pub scored_renderer: Option<RendererId>,
-}
-
-impl DatasetId {
-    /// Of a dataset of which `scenes` are looked at.
-    pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
-        let scenes: Vec<&SceneFile> = scenes.into_iter().collect();
-        Self {
-            name: dataset.file.name.clone(),
-            version: dataset.file.version.clone(),
-            manifest_sha256: dataset.file.manifest_sha256.clone(),
-            scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-            scenes_in_all: dataset.scenes.len(),
-            houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
-            scored_renderer: dataset.file.scored_renderer.clone(),
-        }
-    }
 }
 
 /// The scores of one protocol.

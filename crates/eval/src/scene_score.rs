@@ -19,11 +19,11 @@ use crate::light_score::score_light;
 use crate::material_pictures::{MaterialPictures, material_pictures};
 use crate::measure::{Measured, albedo_metrics, scalar_metrics};
 use crate::predicted_light::FittedRadiances;
-use crate::prediction::PredictedScene;
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValue, PsnrNoise, Region, TexelErrors, views};
 use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
 use crate::truth::{ViewTruth, intersection};
+use mateval_submission::prediction::PredictedScene;
 
 /// What one submission got in one scene under one protocol.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

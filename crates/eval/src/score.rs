@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_metrics::Lpips;
 use mateval_scene::dataset::SceneFile;
+use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SubmissionFile};
@@ -14,14 +15,12 @@ use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
-use crate::map_file::{MapFault, check_place, is_there};
 use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
-use crate::prediction::{PredictedScene, map_files, read_scene};
 use crate::protocol::Protocol;
-use crate::result::{
-    DatasetId, MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
-};
+use crate::result::{MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise};
 use crate::scene_score::{SceneOrder, SceneScore, score_scene};
+use mateval_submission::map_file::{MapFault, check_place, is_there};
+use mateval_submission::prediction::{PredictedScene, map_files, read_scene};
 
 /// The network that scores use, or why it is not there.
 pub enum LpipsWeights {
@@ -225,21 +224,17 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
 }
 
 /// What tells a submission from others.
-pub(crate) struct HashedSubmission {
+pub struct HashedSubmission {
     /// As it calls itself.
-    pub(crate) method: String,
+    pub method: String,
     /// As a result of these scenes has it.
-    pub(crate) sha256: String,
+    pub sha256: String,
     /// How many files the hash is over, `submission.json` aside.
-    pub(crate) maps: usize,
+    pub maps: usize,
 }
 
 /// Hashes the files of a submission that matter for these scenes.
-pub(crate) fn hashed_submission(
-    path: &Path,
-    dataset: &Dataset,
-    scenes: &[SceneId],
-) -> Result<HashedSubmission, EvalError> {
+pub fn hashed_submission(path: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<HashedSubmission, EvalError> {
     let file = read_submission_file(path)?;
     let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
     files.extend(chosen_scenes(dataset, scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));

@@ -11,20 +11,21 @@ use crate::error::EvalError;
 use crate::light_score::{ShownLight, shown_light};
 use crate::material_pictures::material_pictures;
 use crate::open_scene::{OpenScene, scored_views};
-use crate::prediction::{PredictedScene, read_scene};
 use crate::protocol::Protocol;
 use crate::scene_score::SceneOrder;
 use crate::truth::ViewTruth;
+use mateval_submission::prediction::{PredictedScene, read_scene};
 
 /// The truth and every submission's albedo of one view, linear.
-pub(crate) struct SceneAlbedo {
-    pub(crate) truth: ViewTruth,
+pub struct SceneAlbedo {
+    /// The truth's pictures and masks.
+    pub truth: ViewTruth,
     /// In the plan's order.
-    pub(crate) predicted: Vec<Picture<LinearRgb>>,
+    pub predicted: Vec<Picture<LinearRgb>>,
 }
 
 /// The views of a scene that are scored, in the scene's order.
-pub(crate) fn scene_albedo(
+pub fn scene_albedo(
     dataset: &Dataset,
     scene: &SceneFile,
     submissions: &[&Path],
@@ -40,14 +41,15 @@ pub(crate) fn scene_albedo(
 }
 
 /// The truth's light and every submission's of one view, as people see it.
-pub(crate) struct SceneLight {
-    pub(crate) truth: ViewTruth,
+pub struct SceneLight {
+    /// The truth's pictures and masks.
+    pub truth: ViewTruth,
     /// Submissions in the plan's order.
-    pub(crate) shown: ShownLight,
+    pub shown: ShownLight,
 }
 
 /// The views of a scene that are scored, in the scene's order, in the first of the protocol's tracks.
-pub(crate) fn scene_light(
+pub fn scene_light(
     dataset: &Dataset,
     scene: &SceneFile,
     submissions: &[&Path],

@@ -18,9 +18,9 @@ use mateval_tracer::World;
 use rayon::prelude::*;
 
 use crate::error::EvalError;
-use crate::prediction::{PredictedMaterial, PredictedScene};
-use crate::texel_map::{SurfaceTexel, TexelMap};
 use crate::truth_material::TruthMaterial;
+use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
+use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 
 /// Weighted squares over the texels of an instance (or several) that are seen, or that are not.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -180,7 +180,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::prediction::read_scene;
+    use mateval_submission::prediction::read_scene;
 
     /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left half and
     /// one as far in its right half.

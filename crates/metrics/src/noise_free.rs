@@ -21,8 +21,9 @@ use std::f64::consts::LN_10;
 
 use mateval_image::{Mask, Picture};
 
+use crate::MetricError;
+use crate::Psnr;
 use crate::pixel::{Pixel, check_finite, check_size, size_of};
-use crate::{MetricError, Psnr};
 
 /// One picture rendered twice, with as many samples but different seeds.
 #[derive(Clone, Copy, Debug)]

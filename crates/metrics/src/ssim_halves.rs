@@ -93,8 +93,10 @@ mod tests {
     use mateval_image::{LinearRgb, SrgbRgb};
 
     use super::*;
+    use crate::ssim;
+    use crate::ssim_black_fill;
+    use crate::ssim_valid_windows;
     use crate::synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves};
-    use crate::{ssim, ssim_black_fill, ssim_valid_windows};
 
     const SIDE: usize = 48;
 

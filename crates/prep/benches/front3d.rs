@@ -10,9 +10,9 @@ use cpu_time::ProcessTime;
 use glam::DVec3;
 use mateval_prep::atlas::{SizeWish, unwrap};
 use mateval_prep::bake::bake;
-use mateval_prep::front3d::room_scene::room_scene;
-use mateval_prep::front3d::{HouseFiles, Limits, furnish, read_house};
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_sources::front3d::room_scene::room_scene;
+use mateval_sources::front3d::{HouseFiles, Limits, furnish, read_house};
 use mateval_tracer::World;
 
 const STAGES: [&str; 6] =
@@ -22,7 +22,7 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let rounds: usize = words.first().map_or(3, |word| word.parse().unwrap());
     let sample = tempfile::tempdir().unwrap();
-    mateval_prep::sample::write(sample.path()).unwrap();
+    mateval_sample::write(sample.path()).unwrap();
     measure(&files(&sample.path().join("house"), "cc000000-5a3b-4e00-8000-000000000001", true), rounds);
     let Some(shared) = shared_data() else {
         println!("SKIPPED: the shared data is not here; set MATEVAL_DATA");
@@ -94,7 +94,7 @@ fn stages(files: &HouseFiles) -> [f64; 6] {
 }
 
 /// Five views from the room's first piece of furniture's far corner, as large as the benchmark's.
-fn views(house: &mateval_prep::front3d::FurnishedHouse, room: usize) -> Vec<Camera> {
+fn views(house: &mateval_sources::front3d::FurnishedHouse, room: usize) -> Vec<Camera> {
     let own = (0..house.placed.len()).filter(|&surface| house.placed[surface].room == room);
     let points: Vec<DVec3> =
         own.flat_map(|surface| house.scene.surfaces[surface].mesh.positions.iter().map(|p| p.as_dvec3())).collect();

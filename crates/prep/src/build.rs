@@ -13,8 +13,8 @@ use crate::build_scene::{self, Built};
 use crate::error::PrepError;
 use crate::part_labels;
 use crate::recipe::{self, Recipe, RecipeScene};
-use crate::source::below::relative_below;
 use mateval_scene::Progress;
+use mateval_sources::below::relative_below;
 
 /// The recipe as the dataset keeps it.
 pub const RECIPE: &str = "recipe.toml";

@@ -49,7 +49,7 @@ pub enum PrepError {
     },
     /// The source could not be read at all.
     #[error(transparent)]
-    Source(#[from] crate::source::SourceError),
+    Source(#[from] mateval_sources::SourceError),
     /// The tracer cannot work with the scene.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),

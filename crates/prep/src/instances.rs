@@ -8,8 +8,8 @@ use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{InstanceId, InstanceIndex};
 
 use crate::part_split::PartSplit;
-use crate::parts::connected_parts;
-use crate::source::InstanceOrigin;
+use mateval_sources::parts::connected_parts;
+use mateval_sources::source_scene::InstanceOrigin;
 
 /// One instance: instance k is surface k of the reference scene.
 #[derive(Clone, Debug)]

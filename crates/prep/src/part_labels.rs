@@ -12,10 +12,10 @@ use mateval_scene::{Finding, PartSetId, Severity};
 
 use crate::instances::InstanceEntry;
 use crate::part_split::PartSplit;
-use crate::parts::{MAX_PARTS, parts_of_labels};
-use crate::source::npy;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
+use mateval_sources::npy;
+use mateval_sources::parts::{MAX_PARTS, parts_of_labels};
 
 /// Largest file that is read: more than any instance's triangles need.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;

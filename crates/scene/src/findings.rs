@@ -1,5 +1,6 @@
 //! Findings: what was wrong with an input, where, and what was done instead.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use schemars::JsonSchema;
@@ -33,6 +34,31 @@ pub struct Finding {
     pub message: String,
     /// What was done instead, or what to do.
     pub action: String,
+}
+
+/// The number of findings of one severity and code.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FindingCount {
+    /// How much they weigh.
+    pub severity: Severity,
+    /// Their code.
+    pub code: String,
+    /// How many.
+    pub count: usize,
+}
+
+impl FindingCount {
+    /// Counts findings; sorted by severity, then code.
+    pub fn of<'a>(findings: impl Iterator<Item = &'a Finding>) -> Vec<Self> {
+        let mut counts = BTreeMap::new();
+        for finding in findings {
+            *counts.entry((finding.severity, finding.code.as_str())).or_insert(0) += 1;
+        }
+        let count =
+            |((severity, code), count): ((Severity, &str), usize)| Self { severity, code: code.to_owned(), count };
+        counts.into_iter().map(count).collect()
+    }
 }
 
 impl Finding {

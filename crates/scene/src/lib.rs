@@ -8,6 +8,7 @@
 
 pub mod camera;
 pub mod dataset;
+pub mod dataset_id;
 pub mod error;
 pub mod findings;
 pub mod glb;
@@ -26,13 +27,14 @@ pub mod reference;
 pub mod reference_io;
 pub mod source_folder;
 pub mod submission;
+pub mod super_categories;
 pub mod text_table;
 pub mod uv_atlas;
 pub mod work_folder;
 
 pub use camera::{Camera, Intrinsics};
 pub use error::SceneError;
-pub use findings::{Finding, Severity};
+pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;
 pub use progress::Progress;

@@ -4,7 +4,7 @@
 use std::io::Write as _;
 
 use libfuzzer_sys::fuzz_target;
-use mateval_eval::archive::unpack_tar_gz;
+use mateval_submission::archive::unpack_tar_gz;
 
 fuzz_target!(|bytes: &[u8]| {
     let packed = if bytes.starts_with(&[0x1f, 0x8b]) { bytes.to_vec() } else { gzip(bytes) };

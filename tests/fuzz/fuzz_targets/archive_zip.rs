@@ -2,7 +2,7 @@
 //! A zip, unpacked: nothing may be written outside of its folder.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_eval::archive::unpack_zip;
+use mateval_submission::archive::unpack_zip;
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("a.zip", bytes, |path| {

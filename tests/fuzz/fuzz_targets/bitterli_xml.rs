@@ -2,7 +2,7 @@
 //! A Mitsuba scene without any file beside it.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_prep::bitterli::{Limits, read};
+use mateval_sources::bitterli::{Limits, read};
 
 fuzz_target!(|bytes: &[u8]| {
     // What computed skies and spheres may take: a run must be short.

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
-use mateval_eval::map_file::read_bytes;
+use mateval_submission::map_file::read_bytes;
 use mateval_scene::submission::Map;
 
 fuzz_target!(|bytes: &[u8]| {

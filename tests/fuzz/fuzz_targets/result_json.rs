@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use mateval_eval::result::ResultFile;
-use mateval_eval::tables::{Grouping, TableFormat, tables};
+use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::json;
 
 fuzz_target!(|bytes: &[u8]| {

@@ -2,7 +2,7 @@
 //! `submission.json`, as scores read it and as `eval lint` does: both must agree on what can be read.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_eval::lint::submission_json;
+use mateval_submission::lint::submission_json;
 use mateval_scene::Severity;
 use mateval_scene::submission::{SUBMISSION, SubmissionFile};
 

@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = PathBuf::from(std::env::args().nth(1).ok_or("name the folder of the corpus")?);
     let work = tempfile::tempdir()?;
     let source = work.path().join("source");
-    mateval_prep::sample::write(&source)?;
+    mateval_sample::write(&source)?;
     for (name, bytes) in packed::files(&source) {
         let target = match name.rsplit('.').next() {
             Some("xml") => "bitterli_xml",

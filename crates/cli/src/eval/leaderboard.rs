@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
-use mateval_eval::leaderboard::errata::ErrataFile;
-use mateval_eval::leaderboard::{LeaderboardPlan, Submissions, verified, write};
 use mateval_eval::result::ResultFile;
+use mateval_report::leaderboard::errata::ErrataFile;
+use mateval_report::leaderboard::{LeaderboardPlan, Submissions, verified, write};
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
 

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use mateval_eval::EvalError;
-use mateval_eval::archive;
-use mateval_eval::lint::{LintFile, LintPlan, lint, plain, refused};
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
+use mateval_submission::SubmissionError;
+use mateval_submission::archive;
+use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -53,10 +53,10 @@ pub fn run(args: &LintArgs) -> anyhow::Result<Outcome> {
     Ok(if file.good { Outcome::Good } else { Outcome::No })
 }
 
-fn look_over(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, EvalError> {
+fn look_over(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, SubmissionError> {
     let opened = match archive::open(&args.submission, &std::env::temp_dir()) {
         // That it is no sound archive is an answer too.
-        Err(EvalError::Archive { findings, .. }) => return Ok(refused(dataset, TOOL, findings)),
+        Err(SubmissionError::Archive { findings, .. }) => return Ok(refused(dataset, TOOL, findings)),
         opened => opened?,
     };
     let bars = Bars::new();

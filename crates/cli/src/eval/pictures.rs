@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use mateval_eval::light_rules::Track;
-use mateval_eval::strips::{self, Shown, StripPlan};
+use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
 

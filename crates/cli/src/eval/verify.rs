@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use mateval_eval::archive;
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_metrics::Net;
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
+use mateval_submission::archive;
 
 use crate::TOOL;
 use crate::bars::Bars;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use mateval_prep::compare::{CompareOptions, compare, text};
+use mateval_audit::compare::{CompareOptions, compare, text};
 use mateval_scene::{SceneId, json};
 
 use super::Format;

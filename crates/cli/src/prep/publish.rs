@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use mateval_prep::publish::publish;
+use mateval_audit::publish::publish;
 
 use crate::bars::Bars;
 use crate::outcome::{Outcome, print};

@@ -3,13 +3,16 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use mateval_eval::light_fit::fit_lights;
 use mateval_image::{LinearRgb, Picture};
+use mateval_light::light_fit::fit_lights;
 use mateval_scene::Camera;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
+use crate::FIT_SIZE;
+use crate::Run;
+use crate::SAMPLES;
+use crate::bench_scene;
 use crate::stage::Stage;
-use crate::{FIT_SIZE, Run, SAMPLES, bench_scene};
 
 /// A pixel of the pictures that the fit sees.
 pub const STREAM_C_SAMPLES: u32 = 16;

@@ -3,9 +3,8 @@
 use std::collections::BTreeMap;
 
 use glam::Vec2;
-use mateval_eval::light_stage::NamedLight;
-use mateval_eval::prediction::PredictedMaterial;
 use mateval_image::Texture;
+use mateval_light::light_stage::NamedLight;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
@@ -13,6 +12,7 @@ use mateval_scene::material::{
 use mateval_scene::reference::{
     Emission, EmissionMap, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
+use mateval_submission::prediction::PredictedMaterial;
 
 use crate::room::Room;
 

@@ -4,18 +4,20 @@ use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
 
+use mateval_audit::mitsuba_export::export;
 use mateval_eval::result::ResultFile;
 use mateval_image::{LinearRgb, Picture};
 use mateval_metrics::{Lpips, Net};
-use mateval_prep::mitsuba_export::export;
 use mateval_scene::Severity;
 use mateval_scene::dataset::View;
 use serde_json::{Value, json};
 
+use crate::Run;
+use crate::TRACKS;
+use crate::peer_scene;
 use crate::pictures::{Linear, radiances};
 use crate::room::Room;
 use crate::stage::Stage;
-use crate::{Run, TRACKS, peer_scene};
 
 /// Samples a pixel and iteration of the fit.
 const FIT_SAMPLES: u32 = 8;

@@ -61,7 +61,7 @@ pub fn ours(
             (&staged, radiances(room, scored))
         }
     };
-    let coat = |material: &mateval_eval::prediction::PredictedMaterial| Coat {
+    let coat = |material: &mateval_submission::prediction::PredictedMaterial| Coat {
         base_colors: vec![material.base_color.clone()],
         roughness: material.roughness.clone(),
         metallic: material.metallic.clone(),

@@ -7,12 +7,14 @@ use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::reference::ReferenceScene;
 use mateval_tracer::World;
 
+use crate::ITERATIONS;
+use crate::Run;
+use crate::TRACKS;
 use crate::noise::disagreement;
 use crate::peer_scene::without_maps;
 use crate::pictures::{self, Pair, samples};
 use crate::room::Room;
 use crate::stage::{Stage, find};
-use crate::{ITERATIONS, Run, TRACKS};
 
 /// Prints everything.
 pub fn print(room: &Room, scored: &ResultFile, own: &[Run], theirs: &[Run]) {

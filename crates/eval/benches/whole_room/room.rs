@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mateval_eval::light_stage::{self, NamedLight};
-use mateval_eval::prediction::{PredictedScene, read_scene};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::truth::{RgbTruth, ViewTruth};
+use mateval_light::light_stage::{self, NamedLight};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::Emission;
 use mateval_scene::{Camera, RendererId, SceneId, TriangleMesh, glb, reference_io};
+use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::World;
 
 /// One scene of a dataset and one submission.

@@ -2,14 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use mateval_eval::EvalError;
-use mateval_eval::archive::{ALWAYS_ALLOWED, Opened, open};
+use mateval_submission::SubmissionError;
+use mateval_submission::archive::{ALWAYS_ALLOWED, Opened, open};
 use proptest::prelude::*;
 
 use super::packed::{ZipEntry, end, files, gzip, tar_entry, tar_header, tarred, zip, zipped};
 
 /// Opens these bytes; what was left in the folder for work must be nothing but what is open.
-fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, EvalError>) {
+fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, SubmissionError>) {
     let folder = tempfile::tempdir().unwrap();
     let archive = folder.path().join(name);
     std::fs::write(&archive, bytes).unwrap();
@@ -31,7 +31,7 @@ fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, EvalEr
 #[track_caller]
 fn codes(bytes: &[u8]) -> Vec<String> {
     match opened("a.any", bytes).1 {
-        Err(EvalError::Archive { findings, .. }) => findings.into_iter().map(|finding| finding.code).collect(),
+        Err(SubmissionError::Archive { findings, .. }) => findings.into_iter().map(|finding| finding.code).collect(),
         other => panic!("{other:?}"),
     }
 }
@@ -179,8 +179,8 @@ fn cut_and_changed_archives_are_errors_that_are_told() {
     let checksum = changed.len() - 8;
     changed[checksum] ^= 1;
     assert_eq!(codes(&changed), ["damaged_archive"]);
-    assert!(matches!(opened("a.zip", b"no archive").1, Err(EvalError::Invalid(_))));
-    assert!(matches!(opened("a.zip", b"").1, Err(EvalError::Invalid(_))));
+    assert!(matches!(opened("a.zip", b"no archive").1, Err(SubmissionError::Invalid(_))));
+    assert!(matches!(opened("a.zip", b"").1, Err(SubmissionError::Invalid(_))));
 }
 
 proptest! {

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use mateval_eval::map_file::{MapFault, MapFile, read_bytes};
 use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::submission::Map;
+use mateval_submission::map_file::{MapFault, MapFile, read_bytes};
 use proptest::prelude::*;
 
 use super::lint::written::{chunk, exr_header, png, rows};

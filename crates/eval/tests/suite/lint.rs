@@ -9,8 +9,8 @@ pub mod written;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use mateval_eval::lint::{LintFile, LintPlan, lint};
 use mateval_scene::Severity;
+use mateval_submission::lint::{LintFile, LintPlan, lint};
 
 use super::sample::{dataset, write_truth};
 

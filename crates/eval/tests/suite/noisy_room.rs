@@ -7,11 +7,11 @@ use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::noise_blocks::noise_blocks;
-use mateval_eval::prediction::{PredictedMaterial, read_scene};
 use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, Texels, Texture};
 use mateval_metrics::Halves;
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
+use mateval_submission::prediction::{PredictedMaterial, read_scene};
 use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
 
 use super::kept_folder::kept_folder;

@@ -5,17 +5,17 @@
 
 use std::sync::{Arc, LazyLock};
 
-use mateval_eval::light_fit::fit_lights;
 use mateval_eval::light_rules::{LightRules, Track};
-use mateval_eval::light_stage::{self, NamedLight};
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::predicted_light::{FittedRadiances, LitScene, Photo, predicted_light};
-use mateval_eval::prediction::{PredictedScene, read_scene};
 use mateval_eval::rgb::LightReference;
 use mateval_eval::truth::{RgbTruth, ViewTruth};
 use mateval_image::{LinearRgb, Picture};
+use mateval_light::light_fit::fit_lights;
+use mateval_light::light_stage::{self, NamedLight};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::{Camera, TriangleMesh, glb, reference_io};
+use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
 };

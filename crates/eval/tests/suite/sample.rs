@@ -9,7 +9,6 @@ use mateval_baselines::{grey, submission, truth};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
-use mateval_eval::texel_map::TexelMap;
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
@@ -21,6 +20,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
 use mateval_scene::{SceneId, glb, reference_io};
+use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
 
 use super::kept_folder::kept_folder;
@@ -39,7 +39,7 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
 pub fn built() -> PathBuf {
     let folder = kept_folder("dataset");
     let (source, out) = (folder.join("source"), folder.join("dataset"));
-    mateval_prep::sample::write(&source).unwrap();
+    mateval_sample::write(&source).unwrap();
     let recipe = source.join("recipe.toml");
     let whole = std::fs::read_to_string(&recipe).unwrap();
     assert!(whole.contains(HEAD[0]), "{whole}");

@@ -20,11 +20,11 @@ use crate::instances::{self, InstanceEntry};
 use crate::part_labels;
 use crate::part_split::PartSplit;
 use crate::recipe::{Recipe, RecipeScene};
-use crate::source::{LicenceText, SourceScene};
 use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
 use materials::InstanceAtlas;
 use mateval_scene::Progress;
 use mateval_scene::source_folder::SourceFolder;
+use mateval_sources::source_scene::{LicenceText, SourceScene};
 
 /// A scene, its instances numbered and its cameras placed.
 struct Plan {

@@ -6,12 +6,12 @@ use glam::DVec3;
 use mateval_scene::camera::{Camera, Intrinsics};
 
 use super::views_of;
-use crate::bitterli;
 use crate::error::PrepError;
-use crate::front3d::camera_sampler::{self, SamplerRules};
-use crate::front3d::{self, FurnishedHouse, HouseFiles};
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
-use crate::source::{InstanceOrigin, SourceScene};
+use mateval_sources::bitterli;
+use mateval_sources::front3d::camera_sampler::{self, SamplerRules};
+use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
+use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 
 /// Pictures of a room where the recipe names no size.
 const DEFAULT_RESOLUTION: [u32; 2] = [480, 270];

@@ -12,7 +12,7 @@ use super::store::{self, ViewRender};
 use super::{BLENDER, BlenderOptions, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
 use crate::blender::{BlenderResult, BlenderView, JobPlan, JobView, News, Workplace, tail};
 use crate::error::PrepError;
-use crate::verify;
+use crate::scene_meshes;
 
 /// Where jobs lie while they are rendered, in the dataset's folder: names with a dot are no part of a dataset.
 const WORK: &str = ".render";
@@ -79,7 +79,7 @@ impl BlenderScene<'_> {
             std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?;
         }
         let reference = reference_io::read(&folder)?;
-        let parts = verify::part_values(&folder, &scene)?;
+        let parts = scene_meshes::part_values(&folder, &scene)?;
         let mut failure = None;
         for attempt in 1..=self.options.attempts.max(1) {
             let plan = JobPlan {

@@ -17,9 +17,9 @@ use super::intersect::intersecting_pairs;
 use super::rules::{Rejection, RoomFacts};
 use super::{CandidateCamera, SurveyOptions, SurveyedRoom, THUMBNAILS};
 use crate::error::PrepError;
-use crate::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
-use crate::front3d::{FurnishedHouse, Role};
 use crate::recipe::Offset;
+use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
+use mateval_sources::front3d::{FurnishedHouse, Role};
 
 /// sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;

@@ -24,10 +24,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::build::{RECIPE, holds_only};
 use crate::error::PrepError;
-use crate::front3d::{self, HouseFiles};
-use crate::source::below::{common_folder, relative_below};
-use crate::stats::{FindingCount, finding_counts};
 use candidates::HouseSurvey;
+use mateval_scene::FindingCount;
+use mateval_sources::below::{common_folder, relative_below};
+use mateval_sources::front3d::{self, HouseFiles};
 use rules::{Rejection, RejectionLists, SelectionRules};
 
 /// The word for this version of the file.
@@ -273,7 +273,7 @@ fn survey_house(
         file: shown,
         uid: Some(furnished.house.uid.clone()),
         error: None,
-        findings: finding_counts(furnished.findings.iter()),
+        findings: FindingCount::of(furnished.findings.iter()),
         rooms,
     })
 }

@@ -1,0 +1,179 @@
+//! Pictures without light: base colours, ids, depths, normals.
+
+use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
+use mateval_metrics::{Psnr, mse};
+use mateval_scene::dataset::View;
+use mateval_scene::layout::SceneFolder;
+use mateval_tracer::World;
+
+use super::bounds::{BASE_COLOR_PSNR_DB, DEPTH_MEDIAN_M, EQUAL_ID_SHARE, NORMAL_MEDIAN_DEG};
+use super::file::{Check, Quantity, State};
+use super::theirs::TheirView;
+use super::tiles::median;
+use mateval_prep::views::base_color_at_centres;
+
+/// The dataset's own pictures of a view.
+pub(super) struct OurGeometry {
+    pub(super) base_color: Picture<LinearRgb>,
+    pub(super) instance: Picture<u16>,
+    pub(super) part: Picture<u16>,
+    pub(super) depth: Picture<f32>,
+    pub(super) normal: Picture<Normal>,
+    pub(super) valid: Mask,
+}
+
+/// Theirs; what could not be read is not there.
+#[derive(Default)]
+pub(super) struct TheirGeometry {
+    pub(super) base_color: Option<Picture<LinearRgb>>,
+    pub(super) instance: Option<Picture<u16>>,
+    pub(super) part: Option<Picture<u16>>,
+    pub(super) depth: Option<Picture<f32>>,
+    pub(super) normal: Option<Picture<Normal>>,
+}
+
+impl OurGeometry {
+    /// Reads the view's pictures; base colours are looked up anew, at pixel centres as theirs are.
+    pub(super) fn read(folder: &SceneFolder, view: &View, world: &World) -> Result<Self, ImageError> {
+        let shown = folder.view(&view.id);
+        Ok(Self {
+            base_color: base_color_at_centres(world, &view.camera),
+            instance: png_io::read_ids(&shown.join("instance.png"))?,
+            part: png_io::read_ids(&shown.join("part.png"))?,
+            depth: exr_io::read_scalar(&shown.join("depth.exr"))?,
+            normal: exr_io::read_normal(&shown.join("normal.exr"))?,
+            valid: png_io::read_mask(&shown.join("valid.png"))?,
+        })
+    }
+
+    /// Whether all are of one size.
+    pub(super) fn has_size(&self, (width, height): (usize, usize)) -> bool {
+        let sizes = [
+            (self.base_color.width(), self.base_color.height()),
+            (self.instance.width(), self.instance.height()),
+            (self.part.width(), self.part.height()),
+            (self.depth.width(), self.depth.height()),
+            (self.normal.width(), self.normal.height()),
+            (self.valid.width(), self.valid.height()),
+        ];
+        sizes.iter().all(|size| *size == (width, height))
+    }
+}
+
+impl TheirGeometry {
+    /// Reads what is there, and says what is not.
+    pub(super) fn read(view: &TheirView, checks: &mut Vec<Check>) -> Self {
+        Self {
+            base_color: view.linear("base_color", "base_color.exr").map_err(|check| checks.push(check)).ok(),
+            instance: view.read("instance", "instance.png", png_io::read_ids).map_err(|c| checks.push(c)).ok(),
+            part: view.read("part", "part.png", png_io::read_ids).map_err(|check| checks.push(check)).ok(),
+            depth: view.read("depth", "depth.exr", exr_io::read_scalar).map_err(|check| checks.push(check)).ok(),
+            normal: view.read("normal", "normal.exr", exr_io::read_normal).map_err(|check| checks.push(check)).ok(),
+        }
+    }
+}
+
+/// A check of each picture that is there. All pictures must be of one size.
+pub(super) fn compare(ours: &OurGeometry, theirs: &TheirGeometry) -> Vec<Check> {
+    let checks = [
+        theirs.base_color.as_ref().map(|theirs| base_color(&ours.base_color, theirs, &ours.valid)),
+        theirs.instance.as_ref().map(|theirs| ids("instance", &ours.instance, theirs)),
+        theirs.part.as_ref().map(|theirs| ids("part", &ours.part, theirs)),
+        theirs.depth.as_ref().map(|depth| depths(ours, depth, theirs.instance.as_ref())),
+        theirs.normal.as_ref().map(|normal| normals(ours, normal, theirs.instance.as_ref())),
+    ];
+    checks.into_iter().flatten().collect()
+}
+
+fn base_color(ours: &Picture<LinearRgb>, theirs: &Picture<LinearRgb>, valid: &Mask) -> Check {
+    let count = valid.pixels().iter().filter(|valid| **valid).count();
+    // Sizes are equal and numbers finite, since the files were read; so there is an error wherever a pixel is valid.
+    let error = mse(theirs, ours, Some(valid)).ok().flatten();
+    let psnr = error.and_then(|mse| Psnr::from_mse(mse).ok()).map(|psnr| psnr.db);
+    let message = psnr.map_or("no pixel is valid".to_owned(), |db| {
+        format!("PSNR {db:.1} dB over valid pixels, expected at least {BASE_COLOR_PSNR_DB} dB")
+    });
+    let agrees = psnr.map(|db| db >= BASE_COLOR_PSNR_DB);
+    check("base_color", Quantity::PsnrDb, agrees, (psnr, BASE_COLOR_PSNR_DB), count, message)
+}
+
+fn ids(picture: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Check {
+    let inner = away_from_edges(ours);
+    let pairs = || ours.pixels().iter().zip(theirs.pixels()).zip(&inner).filter(|(_, inner)| **inner);
+    let count = pairs().count();
+    let equal = pairs().filter(|((ours, theirs), _)| ours == theirs).count();
+    let share = (count > 0).then(|| equal as f64 / count as f64);
+    let message = share.map_or("no pixel is away from edges".to_owned(), |share| {
+        format!(
+            "{:.2} % of {count} ids away from edges are equal, expected at least {} %",
+            100.0 * share,
+            100.0 * EQUAL_ID_SHARE
+        )
+    });
+    let agrees = share.map(|share| share >= EQUAL_ID_SHARE);
+    check(picture, Quantity::EqualShare, agrees, (share, EQUAL_ID_SHARE), count, message)
+}
+
+fn depths(ours: &OurGeometry, theirs: &Picture<f32>, instance: Option<&Picture<u16>>) -> Check {
+    let off = |at: usize| f64::from((ours.depth.pixels()[at] - theirs.pixels()[at]).abs());
+    let common = common(ours, instance);
+    let off = median(common.iter().map(|at| off(*at)).collect());
+    let message = off.map_or("no pixel shows the same instance".to_owned(), |off| {
+        format!("median difference {:.3} mm, expected at most {} mm", 1e3 * off, 1e3 * DEPTH_MEDIAN_M)
+    });
+    let agrees = off.map(|off| off <= DEPTH_MEDIAN_M);
+    check("depth", Quantity::MedianM, agrees, (off, DEPTH_MEDIAN_M), common.len(), message)
+}
+
+fn normals(ours: &OurGeometry, theirs: &Picture<Normal>, instance: Option<&Picture<u16>>) -> Check {
+    let common = common(ours, instance);
+    let angles = common.iter().map(|at| angle_deg(ours.normal.pixels()[*at], theirs.pixels()[*at]));
+    let off = median(angles.collect());
+    let message = off.map_or("no pixel shows the same instance".to_owned(), |off| {
+        format!("median angle {off:.2} degrees, expected at most {NORMAL_MEDIAN_DEG}")
+    });
+    let agrees = off.map(|off| off <= NORMAL_MEDIAN_DEG);
+    check("normal", Quantity::MedianDeg, agrees, (off, NORMAL_MEDIAN_DEG), common.len(), message)
+}
+
+/// The angle between two normals of any length, degrees; 180 where one has none.
+pub(super) fn angle_deg(a: Normal, b: Normal) -> f64 {
+    let [a, b] = [a, b].map(|Normal(v)| glam::DVec3::from(v.map(f64::from)));
+    if a.length_squared() * b.length_squared() == 0.0 {
+        return 180.0;
+    }
+    // The arc tangent, since the arc cosine knows no small angles.
+    libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees()
+}
+
+/// Pixels that show the same instance, and not nothing; without their ids, all that show one in ours.
+fn common(ours: &OurGeometry, theirs: Option<&Picture<u16>>) -> Vec<usize> {
+    let same = |at: usize, id: u16| theirs.is_none_or(|theirs| theirs.pixels()[at] == id);
+    let ids = ours.instance.pixels().iter().enumerate();
+    ids.filter(|(at, id)| **id > 0 && same(*at, **id)).map(|(at, _)| at).collect()
+}
+
+/// Pixels whose id is that of all their neighbours, up to eight.
+pub(super) fn away_from_edges(ids: &Picture<u16>) -> Vec<bool> {
+    let (width, height) = (ids.width(), ids.height());
+    let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
+    let inner =
+        |x: usize, y: usize| around(y, height).all(|v| around(x, width).all(|u| ids.get(u, v) == ids.get(x, y)));
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| inner(x, y)).collect()
+}
+
+fn check(
+    picture: &str,
+    quantity: Quantity,
+    agrees: Option<bool>,
+    (measured, bound): (Option<f64>, f64),
+    count: usize,
+    message: String,
+) -> Check {
+    let state = match agrees {
+        Some(true) => State::Agrees,
+        Some(false) => State::Differs,
+        None => State::Undecided,
+    };
+    Check { picture: picture.to_owned(), quantity, state, measured, bound: Some(bound), count, message }
+}

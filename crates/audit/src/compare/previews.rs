@@ -1,0 +1,284 @@
+//! What people look at: both pictures and their difference as 8-bit PNG.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::png_io::write_rgb_bytes;
+use mateval_image::transfer::byte_from_unit;
+use mateval_image::{LinearRgb, Normal, Picture};
+use mateval_scene::ViewId;
+use mateval_scene::dataset::SceneFile;
+use serde::Serialize;
+
+use super::file::LightComparison;
+use super::geometry::{OurGeometry, TheirGeometry, angle_deg, away_from_edges};
+use super::light::ShownKinds;
+use super::tiles::{Halves, difference};
+use crate::error::AuditError;
+
+/// Ends of the difference's scale: a pixel of light, of its picture's mean over valid pixels that decide.
+const LIGHT_PIXEL: f64 = 0.5;
+/// A tile of light, in bounds.
+const LIGHT_TILE: f64 = 5.0;
+/// A base colour.
+const BASE_COLOR: f64 = 0.1;
+/// A depth, metres.
+const DEPTH_M: f64 = 0.01;
+/// A normal, degrees.
+const NORMAL_DEG: f64 = 5.0;
+/// What a group of lights is brightened to in its preview: linear, the same mean.
+const GROUP_MEAN: f64 = 0.2;
+
+/// Theirs is darker, equal, brighter (ColorBrewer's RdBu, whose ends all people tell apart).
+const DIVERGING: [[u8; 3]; 3] = [[33, 102, 172], [247, 247, 247], [178, 24, 43]];
+/// Tiles that decide nothing, and pixels at edges.
+const APART: [u8; 3] = [150, 150, 150];
+
+/// The previews of a view.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct ViewPreviews {
+    /// Folder of the page.
+    #[serde(skip)]
+    out: PathBuf,
+    /// Folder of the pictures, relative to the page.
+    folder: String,
+    #[serde(skip)]
+    exposure: f64,
+    /// The view.
+    pub(super) view: String,
+    /// A row each.
+    rows: Vec<Row>,
+}
+
+/// One picture: files relative to the page.
+#[derive(Clone, Debug, Serialize)]
+struct Row {
+    picture: String,
+    /// How both previews were made.
+    note: String,
+    ours: String,
+    theirs: String,
+    differences: Vec<DifferencePreview>,
+}
+
+/// A signed difference.
+#[derive(Clone, Debug, Serialize)]
+struct DifferencePreview {
+    file: String,
+    title: String,
+    /// What the scale's ends mean.
+    low: String,
+    high: String,
+}
+
+/// A difference picture and the words of its scale.
+struct Shown {
+    suffix: &'static str,
+    title: String,
+    low: String,
+    high: String,
+    picture: Picture<[u8; 3]>,
+}
+
+impl ViewPreviews {
+    /// Makes the view's folder below `out`.
+    pub(super) fn new(out: &Path, scene: &SceneFile, view: &ViewId) -> Result<Self, AuditError> {
+        let folder = format!("pictures/{}/{view}", scene.id);
+        let place = out.join(&folder);
+        std::fs::create_dir_all(&place).map_err(AuditError::io("make", &place))?;
+        let (out, view) = (out.to_owned(), view.to_string());
+        Ok(Self { out, folder, exposure: scene.exposure, view, rows: Vec::new() })
+    }
+
+    /// RGB, or a group of lights; what the halves' mean shows, not the denoised picture.
+    pub(super) fn add_light(
+        &mut self,
+        light: &LightComparison,
+        [ours, theirs]: [&Halves; 2],
+        kinds: &ShownKinds,
+        bound: f64,
+    ) -> Result<(), AuditError> {
+        let scale = light.means[0];
+        let level = scale.iter().sum::<f64>() / 3.0;
+        let (gain, note) = self.gain(light, level);
+        let means = [ours.mean(), theirs.mean()];
+        let off = |at: usize| {
+            let [a, b] = [0, 1].map(|side: usize| grey(means[side].pixels()[at]));
+            if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { f64::from(a != b) }
+        };
+        let (width, height) = (means[0].width(), means[0].height());
+        let title = "theirs minus ours, of our mean";
+        let by_pixel = scaled("pixels", title, 100.0 * LIGHT_PIXEL, " %", signed(width, height, off));
+        let title = format!(
+            "tiles, worst channel; dark frame: over the bound of {} %; grey frame: decides nothing",
+            100.0 * bound
+        );
+        let map = tile_map((width, height), [ours, theirs], kinds, bound, scale);
+        let by_tile = scaled("tiles", &title, 100.0 * LIGHT_TILE * bound, " %", map);
+        let previews = means.map(|picture| to_bytes(&picture, gain));
+        self.add(&light.picture, note, previews, vec![by_pixel, by_tile])
+    }
+
+    /// What a picture of light is multiplied by in its preview, and the words for that.
+    fn gain(&self, light: &LightComparison, level: f64) -> (f64, String) {
+        match light.light.as_ref().map(|name| crate::stats::shown(name, 60)) {
+            None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
+            Some(name) if level > 0.0 => (GROUP_MEAN / level, format!("{name}, times {:.3}", GROUP_MEAN / level)),
+            Some(name) => (1.0, format!("{name}, black")),
+        }
+    }
+
+    /// What both have without light.
+    pub(super) fn add_geometry(&mut self, ours: &OurGeometry, theirs: &TheirGeometry) -> Result<(), AuditError> {
+        if let Some(base_color) = &theirs.base_color {
+            self.add_base_color(ours, base_color)?;
+        }
+        if let Some(depth) = &theirs.depth {
+            self.add_depth(&ours.depth, depth)?;
+        }
+        if let Some(normal) = &theirs.normal {
+            self.add_normal(&ours.normal, normal)?;
+        }
+        let ids = [("instance", &ours.instance, &theirs.instance), ("part", &ours.part, &theirs.part)];
+        for (name, ours, theirs) in ids {
+            if let Some(theirs) = theirs {
+                self.add_ids(name, ours, theirs)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add_base_color(&mut self, ours: &OurGeometry, theirs: &Picture<LinearRgb>) -> Result<(), AuditError> {
+        let off = |at: usize| {
+            let [a, b] = [&ours.base_color, theirs].map(|picture| grey(picture.pixels()[at]));
+            if ours.valid.pixels()[at] { (b - a) / BASE_COLOR } else { 0.0 }
+        };
+        let map = signed(theirs.width(), theirs.height(), off);
+        let shown = scaled("difference", "theirs minus ours, mean of channels, valid pixels", BASE_COLOR, "", map);
+        let previews = [&ours.base_color, theirs].map(|picture| to_bytes(picture, 1.0));
+        self.add("base_color", "linear values, sRGB-encoded".to_owned(), previews, vec![shown])
+    }
+
+    fn add_depth(&mut self, ours: &Picture<f32>, theirs: &Picture<f32>) -> Result<(), AuditError> {
+        let off = |at: usize| f64::from(theirs.pixels()[at] - ours.pixels()[at]) / DEPTH_M;
+        let map = signed(ours.width(), ours.height(), off);
+        let shown = scaled("difference", "theirs minus ours", 1e3 * DEPTH_M, " mm", map);
+        let far = ours.pixels().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let previews = [ours, theirs].map(|picture| picture.map(|depth| [byte_from_unit(depth / far); 3]));
+        self.add("depth", format!("white is {far:.2} m"), previews, vec![shown])
+    }
+
+    fn add_normal(&mut self, ours: &Picture<Normal>, theirs: &Picture<Normal>) -> Result<(), AuditError> {
+        let off = |at: usize| {
+            let (a, b) = (ours.pixels()[at], theirs.pixels()[at]);
+            if a == b { 0.0 } else { angle_deg(a, b) / NORMAL_DEG }
+        };
+        let map = signed(ours.width(), ours.height(), off);
+        let mut shown = scaled("difference", "angle between them", NORMAL_DEG, " degrees", map);
+        shown.low = "0".to_owned();
+        let previews = [ours, theirs].map(|p| p.map(|Normal(v)| v.map(|v| byte_from_unit(0.5 * v + 0.5))));
+        self.add("normal", "world space, 0.5 + 0.5 n".to_owned(), previews, vec![shown])
+    }
+
+    fn add_ids(&mut self, name: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Result<(), AuditError> {
+        let inner = away_from_edges(ours);
+        let color = |at: usize| match (ours.pixels()[at] == theirs.pixels()[at], inner[at]) {
+            (true, _) => DIVERGING[1],
+            (false, true) => DIVERGING[2],
+            (false, false) => APART,
+        };
+        let width = ours.width();
+        let picture = Picture::from_fn(width, ours.height(), |x, y| color(y * width + x));
+        let title = "red: another id; grey: another at an edge, where it does not count".to_owned();
+        let shown = Shown { suffix: "difference", title, low: String::new(), high: String::new(), picture };
+        self.add(name, "a colour an id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
+    }
+
+    fn add(
+        &mut self,
+        picture: &str,
+        note: String,
+        [ours, theirs]: [Picture<[u8; 3]>; 2],
+        differences: Vec<Shown>,
+    ) -> Result<(), AuditError> {
+        let file = |suffix: &str, shown: &Picture<[u8; 3]>| {
+            let file = format!("{}/{picture}_{suffix}.png", self.folder);
+            write_rgb_bytes(&self.out.join(&file), shown)?;
+            Ok::<_, AuditError>(file)
+        };
+        let (ours, theirs) = (file("ours", &ours)?, file("theirs", &theirs)?);
+        let mut shown = Vec::new();
+        for Shown { suffix, title, low, high, picture } in differences {
+            shown.push(DifferencePreview { file: file(suffix, &picture)?, title, low, high });
+        }
+        self.rows.push(Row { picture: picture.to_owned(), note, ours, theirs, differences: shown });
+        Ok(())
+    }
+}
+
+/// A picture whose scale ends at plus and minus `end`.
+fn scaled(suffix: &'static str, title: &str, end: f64, unit: &str, picture: Picture<[u8; 3]>) -> Shown {
+    let (low, high) = (format!("-{end}{unit}"), format!("+{end}{unit}"));
+    Shown { suffix, title: title.to_owned(), low, high, picture }
+}
+
+fn grey(LinearRgb(rgb): LinearRgb) -> f64 {
+    rgb.into_iter().map(f64::from).sum::<f64>() / 3.0
+}
+
+fn to_bytes(picture: &Picture<LinearRgb>, gain: f64) -> Picture<[u8; 3]> {
+    let brightened = picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * gain) as f32)));
+    brightened.to_srgb().map(|srgb| srgb.0.map(byte_from_unit))
+}
+
+/// The colour of -1 (or less) to 1 (or more).
+fn diverging(value: f64) -> [u8; 3] {
+    let share = value.abs().min(1.0);
+    let end = if value < 0.0 { DIVERGING[0] } else { DIVERGING[2] };
+    std::array::from_fn(|c| {
+        let [from, to] = [DIVERGING[1][c], end[c]].map(f64::from);
+        (from + (to - from) * share).round() as u8
+    })
+}
+
+fn signed(width: usize, height: usize, value: impl Fn(usize) -> f64) -> Picture<[u8; 3]> {
+    Picture::from_fn(width, height, |x, y| diverging(value(y * width + x)))
+}
+
+/// Each tile in one colour; those over the bound have a dark frame, those apart a grey one.
+fn tile_map(
+    (width, height): (usize, usize),
+    [ours, theirs]: [&Halves; 2],
+    kinds: &ShownKinds,
+    bound: f64,
+    scale: [f64; 3],
+) -> Picture<[u8; 3]> {
+    let mut map = Picture::filled(width, height, DIVERGING[1]);
+    for (tile, decides) in kinds.all() {
+        let off = difference(ours, theirs, tile.pixels());
+        let channel = off.worst_channel(bound, scale);
+        let value = match scale[channel] > 0.0 {
+            true => off.mean[channel] / scale[channel] / (LIGHT_TILE * bound),
+            false => f64::from(off.mean[channel] != 0.0),
+        };
+        let frame = match (decides, off.is_over(bound, scale)) {
+            (false, _) => Some(APART),
+            (true, true) => Some([20; 3]),
+            (true, false) => None,
+        };
+        for (x, y) in tile.pixels() {
+            let at_rim =
+                x == tile.columns.start || x + 1 == tile.columns.end || y == tile.rows.start || y + 1 == tile.rows.end;
+            map.set(x, y, frame.filter(|_| at_rim).unwrap_or_else(|| diverging(value)));
+        }
+    }
+    map
+}
+
+/// Colours far apart for ids next to each other.
+fn id_color(id: u16) -> [u8; 3] {
+    if id == 0 {
+        return [0; 3];
+    }
+    let hash = u32::from(id).wrapping_mul(0x9e37_79b1);
+    [hash >> 24, hash >> 16, hash >> 8].map(|byte| 40 + (byte as u8 % 200))
+}

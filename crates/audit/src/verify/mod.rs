@@ -1,0 +1,128 @@
+//! A dataset held against its own rules: every fault is named, none is mended.
+
+mod geometry;
+mod pictures;
+mod renders;
+mod scene_file;
+mod schema;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use mateval_prep::faults::Faults;
+use mateval_prep::scene_meshes;
+use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
+use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_scene::{Finding, json, manifest, reference_io};
+use mateval_tracer::World;
+
+use crate::error::AuditError;
+use mateval_scene::Progress;
+
+/// Looks for faults: hashes, schemas, cameras, meshes against ids, masks, reprojection. Sorted; errors only where the
+/// dataset is unsound. Fails where there is no dataset at all.
+pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, AuditError> {
+    let dataset_path = root.join(DATASET);
+    if !dataset_path.is_file() {
+        let what = "holds no dataset.json: no dataset, or an unfinished `prep build` (run it again)".to_owned();
+        return Err(AuditError::Output { path: root.to_owned(), what });
+    }
+    let mut faults = Faults::default();
+    progress("hashes", 0, 1);
+    check_manifest(root, &mut faults);
+    schema::check::<DatasetFile>(root, DATASET, &mut faults);
+    schema::check::<TargetsFile>(root, TARGETS, &mut faults);
+    let dataset = faults.read(DATASET, json::read::<DatasetFile>(&dataset_path));
+    if let Some(dataset) = &dataset {
+        check_dataset(root, dataset, &mut faults);
+        for (at, id) in dataset.scenes.iter().enumerate() {
+            progress(&format!("scene {id}"), at, dataset.scenes.len());
+            let folder = SceneFolder::of(root, id);
+            faults.prefix = format!("scenes/{id}/");
+            check_scene(&folder, dataset, id.as_str(), &mut faults);
+            faults.prefix.clear();
+        }
+        check_targets(root, dataset, &mut faults);
+    }
+    faults.all.sort();
+    Ok(faults.all)
+}
+
+fn check_manifest(root: &Path, faults: &mut Faults) {
+    if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
+        faults.all.extend(found.into_iter().filter(|finding| !is_withheld(root, finding)));
+    }
+}
+
+/// Whether a file is missing because its scene's ground truth is withheld as a whole, which is no fault.
+fn is_withheld(root: &Path, finding: &Finding) -> bool {
+    let inside = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
+    finding.code == "missing_file" && inside.is_some_and(|folder| !folder.exists())
+}
+
+fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
+    if dataset.format != FORMAT {
+        faults.add("wrong_format", DATASET, "/format", format!("'{}', expected '{FORMAT}'", dataset.format));
+    }
+    match manifest::sha256_of_file(&root.join(MANIFEST)) {
+        Ok(found) if found != dataset.manifest_sha256 => {
+            let message = format!("{}, but MANIFEST.sha256 hashes to {found}", dataset.manifest_sha256);
+            faults.add("wrong_manifest", DATASET, "/manifest_sha256", message);
+        }
+        // A manifest that is not there has been named already.
+        _ => {}
+    }
+    for (at, licence) in dataset.licences.iter().enumerate() {
+        if !dataset.scenes.contains(&licence.scene) {
+            let message = format!("there is no scene '{}'", licence.scene);
+            faults.add("dangling_reference", DATASET, format!("/licences/{at}/scene"), message);
+        }
+    }
+}
+
+fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
+    let Some(file) = faults.read(TARGETS, json::read::<TargetsFile>(&root.join(TARGETS))) else { return };
+    let mut seen = std::collections::BTreeSet::new();
+    for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
+        faults.add("no_target", TARGETS, "/targets", format!("no view of the scene '{scene}' is scored"));
+    }
+    for (at, target) in file.targets.iter().enumerate() {
+        let place = format!("/targets/{at}");
+        if !seen.insert(target) {
+            faults.add("duplicate_target", TARGETS, &place, format!("{} {} is there twice", target.scene, target.view));
+        }
+        let view_is_there = SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
+        if !dataset.scenes.contains(&target.scene) || !view_is_there {
+            let message = format!("there is no view '{}' of a scene '{}'", target.view, target.scene);
+            faults.add("dangling_reference", TARGETS, &place, message);
+        }
+    }
+}
+
+fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
+    schema::check::<SceneFile>(folder.path(), "scene.json", faults);
+    let Some(scene) = faults.read("scene.json", json::read::<SceneFile>(&folder.scene_file())) else { return };
+    if scene.id.as_str() != id {
+        faults.add("wrong_id", "scene.json", "/id", format!("'{}', but its folder is '{id}'", scene.id));
+    }
+    scene_file::check(&scene, faults);
+    let Some(meshes) = scene_meshes::check(folder, &scene, faults) else { return };
+    let world = match folder.truth().is_dir() {
+        true => {
+            schema::check::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
+            schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
+            let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
+            geometry::check_materials(folder, &scene, faults);
+            if !geometry::is_reference(&reference, &meshes, faults) {
+                return;
+            }
+            World::new(Arc::new(reference))
+        }
+        false => World::new(Arc::new(geometry::opaque(&meshes))),
+    };
+    let Some(world) = faults.read("ground_truth/reference", world) else { return };
+    pictures::check(folder, &scene, &meshes, &world, faults);
+    if let Some(renderer) = &dataset.scored_renderer {
+        renders::check(folder, &scene, renderer, faults);
+    }
+}

@@ -1,0 +1,97 @@
+//! `scene.json` against itself: numbers, references, cameras.
+
+use std::collections::BTreeSet;
+
+use glam::DMat3;
+use mateval_scene::dataset::{FORMAT, Part, SceneFile};
+use mateval_scene::layout::INPUT;
+
+use mateval_prep::faults::Faults;
+
+const FILE: &str = "scene.json";
+/// How far a camera's rotation may be from one, and a view's camera from the turned input camera.
+const CAMERA_SLACK: f64 = 1e-9;
+
+pub(super) fn check(scene: &SceneFile, faults: &mut Faults) {
+    if scene.format != FORMAT {
+        faults.add("wrong_format", FILE, "/format", format!("'{}', expected '{FORMAT}'", scene.format));
+    }
+    check_views(scene, faults);
+    check_numbers(scene, faults);
+}
+
+fn check_views(scene: &SceneFile, faults: &mut Faults) {
+    let Some(input) = scene.views.first().filter(|view| view.id.as_str() == INPUT) else {
+        faults.add("bad_view", FILE, "/views/0", "the first view must be 'input'");
+        return;
+    };
+    let mut ids = BTreeSet::new();
+    for (at, view) in scene.views.iter().enumerate() {
+        let place = format!("/views/{at}/camera");
+        if !ids.insert(&view.id) {
+            faults.add("bad_view", FILE, format!("/views/{at}/id"), format!("'{}' is there twice", view.id));
+        }
+        let rotation = view.camera.rotation();
+        let turned_back = rotation.transpose() * rotation;
+        let is_rotation = turned_back.abs_diff_eq(DMat3::IDENTITY, CAMERA_SLACK) && rotation.determinant() > 0.0;
+        if !is_rotation || view.camera.world_from_camera[3] != [0.0, 0.0, 0.0, 1.0] {
+            faults.add("bad_camera", FILE, &place, "world_from_camera is no rotation and translation");
+        }
+        let k = view.camera.intrinsics;
+        let sound = k.fx > 0.0 && k.fy > 0.0 && k.cx.is_finite() && k.cy.is_finite() && k.width > 0 && k.height > 0;
+        if !sound {
+            faults.add("bad_camera", FILE, format!("{place}/intrinsics"), "expected focal lengths and a size above 0");
+        }
+        let expected = input.camera.turned(view.x_deg, view.y_deg);
+        let same_place = view.camera.matrix().abs_diff_eq(expected.matrix(), CAMERA_SLACK);
+        if !same_place || view.camera.intrinsics != input.camera.intrinsics {
+            let message = format!("not the input camera turned by {} and {} degrees", view.x_deg, view.y_deg);
+            faults.add("bad_camera", FILE, &place, message);
+        }
+    }
+}
+
+fn check_numbers(scene: &SceneFile, faults: &mut Faults) {
+    let mut ids = BTreeSet::new();
+    for (at, instance) in scene.instances.iter().enumerate() {
+        if usize::from(instance.index.0.get()) != at + 1 {
+            faults.add("bad_index", FILE, format!("/instances/{at}/index"), format!("expected {}", at + 1));
+        }
+        if !ids.insert(&instance.id) {
+            faults.add("duplicate_id", FILE, format!("/instances/{at}/id"), format!("'{}'", instance.id));
+        }
+    }
+    check_parts(scene, &scene.parts, "/parts", faults);
+    let mut sets = BTreeSet::new();
+    for (at, set) in scene.part_sets.iter().enumerate() {
+        if !sets.insert(&set.id) {
+            faults.add("duplicate_id", FILE, format!("/part_sets/{at}/id"), format!("'{}'", set.id));
+        }
+        check_parts(scene, &set.parts, &format!("/part_sets/{at}/parts"), faults);
+    }
+}
+
+/// One set of parts, which is at `pointer`.
+fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Faults) {
+    let instances: BTreeSet<_> = scene.instances.iter().map(|instance| &instance.id).collect();
+    let mut ids = BTreeSet::new();
+    for (at, part) in parts.iter().enumerate() {
+        if usize::from(part.index.0.get()) != at + 1 {
+            faults.add("bad_index", FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
+        }
+        if !ids.insert(&part.id) {
+            faults.add("duplicate_id", FILE, format!("{pointer}/{at}/id"), format!("'{}'", part.id));
+        }
+        if !instances.contains(&part.instance) {
+            let message = format!("there is no instance '{}'", part.instance);
+            faults.add("dangling_reference", FILE, format!("{pointer}/{at}/instance"), message);
+        }
+    }
+    for (at, instance) in scene.instances.iter().enumerate() {
+        let of_parts: usize = parts.iter().filter(|part| part.instance == instance.id).map(|part| part.triangles).sum();
+        if of_parts != instance.triangles {
+            let message = format!("{} triangles, its parts have {of_parts} in {pointer}", instance.triangles);
+            faults.add("bad_parts", FILE, format!("/instances/{at}"), message);
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The meshes of a finished scene, held against its `scene.json`: one an instance, one a part.
+
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::glb::{self, GlbNode};
+use mateval_scene::layout::{SceneFolder, parts_file};
+
+use crate::error::PrepError;
+use crate::faults::Faults;
+
+const INSTANCES: &str = "geometry/instances.glb";
+
+/// The meshes of a scene: one an instance, one a part.
+pub struct Meshes {
+    /// The nodes of `instances.glb`.
+    pub instances: Vec<GlbNode>,
+    /// For every set of parts and every instance the place in the set of each of its triangles.
+    pub part_sets: Vec<Vec<Vec<usize>>>,
+}
+
+/// None where the meshes do not fit `scene.json`, so that nothing can be held against them.
+pub fn check(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) -> Option<Meshes> {
+    let instances = faults.read(INSTANCES, glb::read(&folder.instances()))?;
+    let known = scene.instances.iter().map(|instance| (instance.id.as_str(), instance.triangles));
+    let mut fits = same_nodes(INSTANCES, &instances, known, faults);
+    let mut nodes_of_sets = Vec::new();
+    for (set, parts) in scene.all_part_sets() {
+        let file = parts_file(set);
+        let nodes = faults.read(&file, glb::read(&folder.parts(set)))?;
+        let known = parts.iter().map(|part| (part.id.as_str(), part.triangles));
+        fits &= same_nodes(&file, &nodes, known, faults);
+        nodes_of_sets.push(nodes);
+    }
+    if !fits {
+        return None;
+    }
+    for (instance, node) in scene.instances.iter().zip(&instances) {
+        check_uv(instance.atlas.is_some(), node, faults);
+    }
+    let mut part_sets = Vec::new();
+    for ((set, parts), nodes) in scene.all_part_sets().zip(&nodes_of_sets) {
+        let owned = scene.instances.iter().map(|instance| {
+            let is_own = |part: &usize| parts[*part].instance == instance.id;
+            (0..parts.len()).filter(is_own).collect::<Vec<_>>()
+        });
+        part_sets.push(parts_of_triangles(&instances, owned, nodes, &parts_file(set), faults)?);
+    }
+    Some(Meshes { instances, part_sets })
+}
+
+/// The nodes have the ids and numbers of triangles that `scene.json` tells, in its order.
+fn same_nodes<'a>(
+    file: &str,
+    nodes: &[GlbNode],
+    known: impl ExactSizeIterator<Item = (&'a str, usize)>,
+    faults: &mut Faults,
+) -> bool {
+    let before = faults.all.len();
+    if nodes.len() != known.len() {
+        faults.add("wrong_nodes", file, "", format!("{} nodes, scene.json tells of {}", nodes.len(), known.len()));
+    }
+    for (node, (id, triangles)) in nodes.iter().zip(known) {
+        if node.name != id || node.mesh.triangles.len() != triangles {
+            let found = format!("'{}' of {} triangles", node.name, node.mesh.triangles.len());
+            faults.add("wrong_nodes", file, format!("node '{id}'"), format!("found {found}, expected {triangles}"));
+        }
+    }
+    faults.all.len() == before
+}
+
+fn check_uv(has_atlas: bool, node: &GlbNode, faults: &mut Faults) {
+    let place = format!("node '{}'", node.name);
+    match (&node.mesh.uvs, has_atlas) {
+        (None, false) => {}
+        (None, true) => faults.add("bad_uv", INSTANCES, place, "it has an atlas but no TEXCOORD_0"),
+        (Some(_), false) => faults.add("bad_uv", INSTANCES, place, "it has TEXCOORD_0 but no atlas"),
+        (Some(uvs), true) => {
+            if let Some(at) = uvs.iter().position(|uv| uv.min_element() < 0.0 || uv.max_element() > 1.0) {
+                faults.add("bad_uv", INSTANCES, place, format!("vertex {at} has uv {}, expected 0 to 1", uvs[at]));
+            }
+        }
+    }
+}
+
+/// The parts of an instance hold its triangles in their order: each triangle is the next one of exactly one part. `owned`
+/// tells each instance's places in `parts`.
+fn parts_of_triangles(
+    instances: &[GlbNode],
+    owned: impl Iterator<Item = Vec<usize>>,
+    parts: &[GlbNode],
+    file: &str,
+    faults: &mut Faults,
+) -> Option<Vec<Vec<usize>>> {
+    let mut used = vec![0_usize; parts.len()];
+    let mut all = Vec::new();
+    for (node, own) in instances.iter().zip(owned) {
+        let mut of_triangles = Vec::with_capacity(node.mesh.triangles.len());
+        for triangle in 0..node.mesh.triangles.len() {
+            let corners = node.mesh.corners(triangle);
+            let found = own.iter().copied().find(|part| {
+                used[*part] < parts[*part].mesh.triangles.len() && parts[*part].mesh.corners(used[*part]) == corners
+            });
+            let Some(part) = found else {
+                let message = format!("triangle {triangle} of '{}' is in none of its parts", node.name);
+                faults.add("bad_parts", file, format!("node '{}'", node.name), message);
+                return None;
+            };
+            used[part] += 1;
+            of_triangles.push(part);
+        }
+        all.push(of_triangles);
+    }
+    Some(all)
+}
+
+/// The value in `part.png` of every triangle of every instance, from the meshes. Fails where these are not those of
+/// `scene.json`.
+pub fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u16>>, PrepError> {
+    let mut faults = Faults::default();
+    let Some(meshes) = check(folder, scene, &mut faults) else {
+        let path = folder.path().to_owned();
+        return Err(mateval_scene::SceneError::Invalid { path, findings: faults.all }.into());
+    };
+    let value = |part: &usize| scene.parts[*part].index.0.get();
+    Ok(meshes.part_sets[0].iter().map(|of_triangles| of_triangles.iter().map(value).collect()).collect())
+}

@@ -1,0 +1,161 @@
+//! What scales alone would mend: of pictures, instances, the scene.
+
+use std::collections::BTreeMap;
+
+use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_metrics::{MetricError, Psnr};
+use mateval_scene::SceneId;
+
+use super::file::{AlignedBy, AlignmentScores};
+use super::scales::best_scale;
+use crate::error::ReportError;
+use mateval_eval::alignment::scaled;
+use mateval_eval::measure::albedo_mse;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::shown_scene::SceneAlbedo;
+
+const ALL: [AlignedBy; 6] = [
+    AlignedBy::None,
+    AlignedBy::PictureAndChannel,
+    AlignedBy::Scene,
+    AlignedBy::SceneAndChannel,
+    AlignedBy::Instance,
+    AlignedBy::InstanceAndChannel,
+];
+
+/// Scales by what has one of its own.
+type Scales = BTreeMap<Owner, [f64; 3]>;
+
+/// Number of the view and index of the instance; 0 where all of them share.
+type Owner = (usize, u16);
+
+/// The scores of each kind of scales, first of the input view, then of the novel ones, then of what is unobserved in
+/// those.
+pub(super) fn alignments(
+    scene: &SceneId,
+    protocol: &Protocol,
+    views: &[SceneAlbedo],
+) -> Result<Vec<AlignmentScores>, ReportError> {
+    let named = |source| ReportError::Metric { what: format!("scene '{scene}'"), source };
+    let mut scores = Vec::new();
+    for by in ALL {
+        scores.extend(of_kind(by, protocol, views).map_err(named)?);
+    }
+    Ok(scores)
+}
+
+fn of_kind(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Result<Vec<AlignmentScores>, MetricError> {
+    let scales = scales(by, views);
+    let mut values: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (number, view) in views.iter().enumerate() {
+        let aligned = aligned(by, &scales, number, view);
+        // Only the input view has no unobserved pixels.
+        let whole = if view.truth.unobserved.is_none() { "input" } else { "novel" };
+        let regions = [(whole, Some(&view.truth.valid)), ("unobserved", view.truth.unobserved.as_ref())];
+        for (name, mask) in regions {
+            let Some(mask) = mask else { continue };
+            let mse = albedo_mse(protocol, &aligned, &view.truth.albedo, mask)?;
+            values.entry(name).or_default().extend(mse);
+        }
+    }
+    let score = |(views, values): (&str, Vec<f64>)| {
+        let psnr = values.iter().map(|mse| Ok(Psnr::from_mse(*mse)?.db)).collect::<Result<Vec<f64>, MetricError>>()?;
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        Ok(AlignmentScores { scales: by, views: views.to_owned(), mse: mean(&values), psnr: mean(&psnr) })
+    };
+    values.into_iter().filter(|(_, values)| !values.is_empty()).map(score).collect()
+}
+
+fn owner(by: AlignedBy, view: usize, instance: u16) -> Owner {
+    match by {
+        AlignedBy::None | AlignedBy::Scene | AlignedBy::SceneAndChannel => (0, 0),
+        AlignedBy::PictureAndChannel => (view, 0),
+        AlignedBy::Instance | AlignedBy::InstanceAndChannel => (0, instance),
+    }
+}
+
+/// The best for squares over the valid pixels.
+fn scales(by: AlignedBy, views: &[SceneAlbedo]) -> Scales {
+    let mut sums: BTreeMap<Owner, [[f64; 3]; 2]> = BTreeMap::new();
+    for (number, view) in views.iter().enumerate() {
+        for at in counting(&view.truth.valid) {
+            let sums = sums.entry(owner(by, number, view.truth.instances.pixels()[at])).or_default();
+            let (truth, predicted) = (view.truth.albedo.pixels()[at].0, view.predicted[0].pixels()[at].0);
+            for c in 0..3 {
+                sums[0][c] += f64::from(truth[c]) * f64::from(predicted[c]);
+                sums[1][c] += f64::from(predicted[c]) * f64::from(predicted[c]);
+            }
+        }
+    }
+    let best = |[products, squares]: [[f64; 3]; 2]| match by {
+        AlignedBy::None => [1.0; 3],
+        AlignedBy::Scene | AlignedBy::Instance => [best_scale(products.iter().sum(), squares.iter().sum()); 3],
+        _ => std::array::from_fn(|c| best_scale(products[c], squares[c])),
+    };
+    sums.into_iter().map(|(owner, sums)| (owner, best(sums))).collect()
+}
+
+fn counting(mask: &Mask) -> impl Iterator<Item = usize> {
+    mask.pixels().iter().enumerate().filter(|(_, counts)| **counts).map(|(at, _)| at)
+}
+
+fn aligned(by: AlignedBy, scales: &Scales, number: usize, view: &SceneAlbedo) -> Picture<LinearRgb> {
+    let predicted = &view.predicted[0];
+    if by == AlignedBy::None {
+        return predicted.clone();
+    }
+    if by == AlignedBy::PictureAndChannel {
+        return scaled(predicted, scales.get(&(number, 0)).copied().unwrap_or([1.0; 3]));
+    }
+    let mut aligned = predicted.clone();
+    for at in counting(&view.truth.valid) {
+        let scales = scales[&owner(by, number, view.truth.instances.pixels()[at])];
+        let LinearRgb(rgb) = predicted.pixels()[at];
+        aligned.pixels_mut()[at] = LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * scales[c]) as f32));
+    }
+    aligned
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mateval_eval::truth::ViewTruth;
+
+    /// Two views; instances 1 and 2 are half and a fourth as bright as they should be.
+    fn views() -> Vec<SceneAlbedo> {
+        let view = |number: usize| {
+            let albedo = Picture::from_fn(6, 4, |x, y| LinearRgb([0.1 * (1 + x) as f32, 0.2 * (1 + y) as f32, 0.5]));
+            let factor = |x: usize| if x < 3 { 0.5 } else { 0.25 };
+            let predicted = Picture::from_fn(6, 4, |x, y| LinearRgb(albedo.get(x, y).0.map(|v| v * factor(x))));
+            let scalar = Picture::filled(6, 4, 0.0);
+            let truth = ViewTruth {
+                albedo,
+                roughness: scalar.clone(),
+                metallic: scalar,
+                valid: Picture::filled(6, 4, true),
+                unobserved: (number > 0).then(|| Picture::from_fn(6, 4, |x, _| x == 5)),
+                specular: None,
+                instances: Picture::from_fn(6, 4, |x, _| if x < 3 { 1 } else { 2 }),
+            };
+            SceneAlbedo { truth, predicted: vec![predicted] }
+        };
+        vec![view(0), view(1)]
+    }
+
+    #[test]
+    fn scales_of_instances_mend_what_those_of_the_scene_cannot() {
+        let protocol = Protocol::named("mateval-1").unwrap();
+        let scores = alignments(&SceneId::new("s").unwrap(), &protocol, &views()).unwrap();
+        assert_eq!(scores.len(), 6 * 3);
+        let mse = |by: AlignedBy, views: &str| {
+            scores.iter().find(|score| score.scales == by && score.views == views).unwrap().mse
+        };
+        for views in ["input", "novel", "unobserved"] {
+            assert!(mse(AlignedBy::Instance, views) < 1e-12);
+            assert!(mse(AlignedBy::InstanceAndChannel, views) < 1e-12);
+            assert!(mse(AlignedBy::Scene, views) > 1e-3);
+        }
+        assert!(mse(AlignedBy::SceneAndChannel, "input") <= mse(AlignedBy::Scene, "input"));
+        assert!(mse(AlignedBy::Scene, "input") < mse(AlignedBy::None, "input"));
+    }
+}

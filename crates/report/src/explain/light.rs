@@ -1,0 +1,39 @@
+//! The worst instances of each track of light, from the result alone.
+
+use std::collections::BTreeMap;
+
+use mateval_scene::{InstanceId, SceneId};
+
+use super::WORST;
+use super::file::LightShare;
+use mateval_eval::result::ProtocolResult;
+
+/// Of each track in turn the instances with the largest shares of the scene's squared error in the input view and the
+/// novel ones, the largest first.
+pub(super) fn worst(scores: &ProtocolResult, scene: &SceneId) -> Vec<LightShare> {
+    ["rgb_true", "rgb_fitted"].into_iter().flat_map(|picture| of_track(scores, scene, picture)).collect()
+}
+
+fn of_track(scores: &ProtocolResult, scene: &SceneId, picture: &str) -> Vec<LightShare> {
+    let mut sums: BTreeMap<&InstanceId, (f64, usize, Option<String>)> = BTreeMap::new();
+    let of_scene = scores.instances.iter().filter(|errors| errors.scene == *scene && errors.picture == picture);
+    for errors in of_scene.filter(|errors| errors.views == "input" || errors.views == "novel") {
+        let sum = sums.entry(&errors.instance).or_insert_with(|| (0.0, 0, errors.category.clone()));
+        sum.0 += errors.mse * errors.pixels as f64;
+        sum.1 += errors.pixels;
+    }
+    let total: f64 = sums.values().map(|(sum, ..)| sum).sum();
+    let share = |(instance, (sum, pixels, category)): (&InstanceId, (f64, usize, Option<String>))| LightShare {
+        picture: picture.to_owned(),
+        instance: instance.clone(),
+        category,
+        pixels,
+        mse: sum / pixels as f64,
+        share: sum / total,
+    };
+    // Where noise is all there is, shares would say nothing.
+    let mut shares: Vec<LightShare> = if total > 0.0 { sums.into_iter().map(share).collect() } else { Vec::new() };
+    shares.sort_by(|a, b| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
+    shares.truncate(WORST);
+    shares
+}

@@ -1,0 +1,214 @@
+//! Where a submission's albedo errs in one scene, and how.
+//!
+//! In: a result, the dataset and the submission it was made of. Out: an [`ExplainFile`], and pictures of the worst
+//! instances.
+//!
+//! Between: `belongs` makes sure that all three belong together, `patch` takes the pictures apart by instance, `kinds`
+//! takes each instance's error apart (`scales`, `smooth_field`, `shift`, `lost_detail`), `alignments` says what
+//! scales alone would mend, `light` looks up light's worst instances, `crops` shows, [`text`] tells.
+
+mod alignments;
+mod belongs;
+mod crops;
+pub mod file;
+mod kinds;
+mod light;
+mod lost_detail;
+mod patch;
+mod scales;
+mod shift;
+mod smooth_field;
+#[cfg(test)]
+mod tests;
+pub mod text;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mateval_metrics::Psnr;
+use mateval_scene::dataset::{Instance, SceneFile};
+use mateval_scene::open::Dataset;
+use mateval_scene::{Finding, Progress, SceneError, SceneId, ViewId};
+use rayon::prelude::*;
+
+use self::file::{EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};
+use self::kinds::{Explained, explained};
+use self::patch::{Patch, patches};
+use crate::error::ReportError;
+use mateval_eval::instance_errors::categories;
+use mateval_eval::open_scene::{chosen_scenes, scored_views};
+use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
+
+/// Instances that are told and shown.
+pub const WORST: usize = 10;
+
+/// The page that links the pictures.
+const PAGE: &str = "explain.md";
+
+/// What to explain.
+pub struct ExplainPlan<'a> {
+    /// The scores.
+    pub result: &'a ResultFile,
+    /// Their protocol.
+    pub protocol: &'a str,
+    /// What they were taken on.
+    pub dataset: &'a Dataset,
+    /// What was scored.
+    pub submission: &'a Path,
+    /// One of its scenes.
+    pub scene: &'a SceneId,
+    /// Name and version of the tool, for the file.
+    pub tool: String,
+}
+
+/// What was found, and what it takes to show it.
+pub struct Explanation {
+    /// The numbers.
+    pub file: ExplainFile,
+    views: Vec<SceneAlbedo>,
+    /// By index of the instance.
+    patches: BTreeMap<u16, Vec<Patch>>,
+    /// Indices of the worst instances, worst first.
+    worst: Vec<u16>,
+}
+
+/// Takes the scene's albedo apart. Fails where result, dataset and submission do not belong together.
+pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explanation, ReportError> {
+    let scores = belongs::check(plan)?;
+    let scene = chosen_scenes(plan.dataset, std::slice::from_ref(plan.scene))?[0];
+    progress("pictures", 0, 2);
+    let views = scene_albedo(plan.dataset, scene, &[plan.submission])?;
+    progress("kinds of error", 1, 2);
+    let patches = patches(&views);
+    let found: Vec<(u16, Explained)> =
+        patches.par_iter().map(|(index, patches)| (*index, explained(patches))).collect();
+    let ids: Vec<ViewId> = scored_views(plan.dataset, scene)?.into_iter().map(|view| view.id.clone()).collect();
+    let whole = Explained::sum(found.iter().map(|(_, explained)| explained));
+    let instances = worst_first(scene, &ids, &found, &whole);
+    let worst = instances.iter().filter(|(_, i)| i.mse > 0.0).take(WORST).map(|(index, _)| *index).collect();
+    let named = |source| ReportError::Metric { what: format!("scene '{}'", scene.id), source };
+    let file = ExplainFile {
+        format: EXPLAIN_FORMAT.to_owned(),
+        tool: plan.tool.clone(),
+        method: plan.result.method.clone(),
+        submission_sha256: plan.result.submission.sha256.clone(),
+        dataset_manifest_sha256: plan.result.dataset.manifest_sha256.clone(),
+        protocol: plan.protocol.to_owned(),
+        fingerprint: scores.fingerprint.clone(),
+        scene: plan.scene.clone(),
+        views: ids,
+        pixels: whole.pixels,
+        mse: whole.mse(),
+        psnr: Psnr::from_mse(whole.mse()).map_err(named)?.db,
+        kinds: whole.kinds(),
+        instances: instances.into_iter().map(|(_, instance)| instance).collect(),
+        alignments: alignments::alignments(plan.scene, &scores.protocol, &views)?,
+        light: light::worst(scores, plan.scene),
+        findings: plan.findings(),
+    };
+    belongs::check_scores(scores, &file)?;
+    progress("kinds of error", 2, 2);
+    Ok(Explanation { file, views, patches, worst })
+}
+
+/// What was found of each instance, with its index.
+fn worst_first(
+    scene: &SceneFile,
+    views: &[ViewId],
+    found: &[(u16, Explained)],
+    whole: &Explained,
+) -> Vec<(u16, InstanceExplanation)> {
+    let told = |(index, found): &(u16, Explained)| {
+        let instance = scene.instances.iter().find(|instance| instance.index.0.get() == *index)?;
+        Some((*index, instance_explanation(scene, views, instance, found, whole)))
+    };
+    let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(told).collect();
+    instances.sort_by(|(_, a), (_, b)| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
+    instances
+}
+
+fn instance_explanation(
+    scene: &SceneFile,
+    views: &[ViewId],
+    instance: &Instance,
+    found: &Explained,
+    whole: &Explained,
+) -> InstanceExplanation {
+    let (category, super_category) = categories(scene, instance);
+    let shift = |shift: &shift::Shift| ViewShift { view: views[shift.view].clone(), pixels: shift.pixels };
+    InstanceExplanation {
+        instance: instance.id.clone(),
+        category,
+        super_category,
+        pixels: found.pixels,
+        mse: found.mse(),
+        share: if whole.squared_error > 0.0 { found.squared_error / whole.squared_error } else { 0.0 },
+        kinds: found.kinds(),
+        scale: found.scale,
+        channel_scales: found.channel_scales,
+        shifts: found.shifts.iter().map(shift).collect(),
+        blur_sigma_pixels: found.blur_sigma_pixels,
+    }
+}
+
+impl ExplainPlan<'_> {
+    /// The result's findings of this scene.
+    fn findings(&self) -> Vec<Finding> {
+        let folder = format!("scenes/{}/", self.scene);
+        self.result.findings.iter().filter(|finding| finding.file.starts_with(&folder)).cloned().collect()
+    }
+}
+
+impl Explanation {
+    /// Writes a PNG for each of the worst instances and `explain.md` into the folder `out`; gives their paths.
+    pub fn write(&self, out: &Path, force: bool) -> Result<Vec<PathBuf>, ReportError> {
+        let names: Vec<String> = self.file.instances[..self.worst.len()]
+            .iter()
+            .enumerate()
+            .map(|(at, instance)| format!("{}-{:02}-{}.png", self.file.scene, at + 1, instance.instance))
+            .collect();
+        let page = out.join(PAGE);
+        let paths: Vec<PathBuf> = names.iter().map(|name| out.join(name)).chain([page.clone()]).collect();
+        paths.iter().try_for_each(|path| check_free(path, force))?;
+        std::fs::create_dir_all(out).map_err(SceneError::io("make", out))?;
+        for (index, path) in self.worst.iter().zip(&paths) {
+            mateval_image::png_io::write_rgb_bytes(path, &crops::crop(&self.views, &self.patches[index]))?;
+        }
+        let crops: Vec<text::Crop> = names
+            .iter()
+            .zip(&self.worst)
+            .map(|(name, index)| {
+                let view = crops::worst_view(&self.patches[index]);
+                text::Crop { file: name.clone(), view: self.file.views[view].clone() }
+            })
+            .collect();
+        mateval_image::store::write_whole(&page, text::markdown(&self.file, &crops).as_bytes())?;
+        Ok(paths)
+    }
+}
+
+/// Fails where the folder `out` holds an explanation already and may not be overwritten. Pictures, whose names are not known
+/// before, are looked at when they are written.
+pub fn check_out(out: &Path, force: bool) -> Result<(), ReportError> {
+    check_free(&out.join(PAGE), force)
+}
+
+fn check_free(path: &Path, force: bool) -> Result<(), ReportError> {
+    if force || !path.exists() {
+        return Ok(());
+    }
+    let what = format!("'{}' is already there; choose another --out, or add --force to replace it", path.display());
+    Err(ReportError::Invalid(what))
+}
+
+/// The scores of a protocol, or what the result has instead.
+fn protocol_of<'a>(result: &'a ResultFile, protocol: &str) -> Result<&'a ProtocolResult, ReportError> {
+    result.protocols.get(protocol).ok_or_else(|| {
+        let known: Vec<&str> = result.protocols.keys().map(String::as_str).collect();
+        ReportError::Invalid(format!(
+            "the result has no scores under protocol '{protocol}'; it has: {}; choose one by --protocol",
+            known.join(", ")
+        ))
+    })
+}

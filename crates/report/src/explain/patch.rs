@@ -1,0 +1,77 @@
+//! The pixels of one instance in one view.
+
+use std::collections::BTreeMap;
+
+use mateval_eval::shown_scene::SceneAlbedo;
+
+/// A patch of fewer pixels has neither a smooth factor nor a shift of its own: both would fit what is chance. (Eight for
+/// each term of the factor.)
+pub(super) const FEWEST_PIXELS: usize = 48;
+
+/// The valid pixels of one instance in one view; a box around them says which is where.
+pub(super) struct Patch {
+    /// Number of the view.
+    pub(super) view: usize,
+    /// Column and row of the box's top left pixel in the picture.
+    pub(super) corner: [usize; 2],
+    /// Columns and rows of the box.
+    pub(super) size: [usize; 2],
+    /// Pixel by place in the box, row by row.
+    index: Vec<Option<u32>>,
+    /// Column and row in the picture, row by row.
+    pub(super) places: Vec<[usize; 2]>,
+    /// Linear.
+    pub(super) truth: Vec<[f64; 3]>,
+    /// Linear.
+    pub(super) predicted: Vec<[f64; 3]>,
+}
+
+/// By index of the instance, then by view; only those that have pixels. Pixels that show no instance are left out.
+pub(super) fn patches(views: &[SceneAlbedo]) -> BTreeMap<u16, Vec<Patch>> {
+    let mut all: BTreeMap<u16, Vec<Patch>> = BTreeMap::new();
+    for (number, view) in views.iter().enumerate() {
+        let width = view.truth.valid.width();
+        let mut places: BTreeMap<u16, Vec<[usize; 2]>> = BTreeMap::new();
+        for (at, instance) in view.truth.instances.pixels().iter().enumerate() {
+            if *instance != 0 && view.truth.valid.pixels()[at] {
+                places.entry(*instance).or_default().push([at % width, at / width]);
+            }
+        }
+        for (instance, places) in places {
+            let values = |picture: &mateval_image::Picture<mateval_image::LinearRgb>| {
+                places.iter().map(|&[x, y]| picture.get(x, y).0.map(f64::from)).collect()
+            };
+            let (truth, predicted) = (values(&view.truth.albedo), values(&view.predicted[0]));
+            all.entry(instance).or_default().push(Patch::new(number, places, truth, predicted));
+        }
+    }
+    all
+}
+
+impl Patch {
+    /// At least one place, each once; a value of the truth and the prediction for each.
+    pub(super) fn new(view: usize, places: Vec<[usize; 2]>, truth: Vec<[f64; 3]>, predicted: Vec<[f64; 3]>) -> Self {
+        let least = |axis: usize| places.iter().map(|place| place[axis]).min().unwrap_or(0);
+        let most = |axis: usize| places.iter().map(|place| place[axis]).max().unwrap_or(0);
+        let corner = [0, 1].map(least);
+        let size = [0, 1].map(|axis| most(axis) - corner[axis] + 1);
+        let mut index = vec![None; size[0] * size[1]];
+        for (at, [x, y]) in places.iter().enumerate() {
+            index[(y - corner[1]) * size[0] + x - corner[0]] = Some(at as u32);
+        }
+        Self { view, corner, size, index, places, truth, predicted }
+    }
+
+    /// The pixel at a place of the box, if it is one of the instance's.
+    pub(super) fn at(&self, x: isize, y: isize) -> Option<usize> {
+        let inside = |v: isize, axis: usize| usize::try_from(v).ok().filter(|v| *v < self.size[axis]);
+        let (x, y) = (inside(x, 0)?, inside(y, 1)?);
+        self.index[y * self.size[0] + x].map(|at| at as usize)
+    }
+
+    /// Column and row in the box.
+    pub(super) fn in_box(&self, pixel: usize) -> [isize; 2] {
+        let place = self.places[pixel];
+        [0, 1].map(|axis| (place[axis] - self.corner[axis]) as isize)
+    }
+}

@@ -1,0 +1,113 @@
+//! The board itself: a row a method, a column a number.
+
+use std::collections::BTreeMap;
+
+use minijinja::context;
+use minijinja::value::Serde;
+use serde::Serialize;
+
+use super::Board;
+use super::columns::{Choices, Column, choices};
+use super::heads::{Cell, MethodHead, rank_text, standing};
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
+
+#[derive(Serialize)]
+struct BoardPage<'a> {
+    columns: &'a [Column],
+    choices: Choices,
+    first: &'a Column,
+    rows: Vec<Row<'a>>,
+    has_intervals: bool,
+    has_tables: bool,
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    method: &'a MethodHead,
+    rank: String,
+    cells: Vec<Option<Cell>>,
+    #[serde(skip)]
+    value: Option<f64>,
+}
+
+/// `index.html`, and for each number who beats whom.
+pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let Some(first) = board.first() else {
+        return Err(ReportError::Invalid("the results hold nothing that a leaderboard shows".to_owned()));
+    };
+    let mut rows: Vec<Row<'_>> = board.heads.iter().map(|head| row(board, head, first)).collect();
+    let order = |row: &Row<'_>| row.value.map_or(f64::INFINITY, |value| -first.better.sign() * value);
+    rows.sort_by(|a, b| order(a).total_cmp(&order(b)));
+    let standings = || board.ranking().keys.values().flat_map(|key| &key.standings);
+    let page = BoardPage {
+        columns: &board.columns,
+        choices: choices(&board.columns),
+        first,
+        rows,
+        has_intervals: standings().any(|standing| standing.interval.is_some()),
+        has_tables: site.path(super::downloads::TABLES).exists(),
+    };
+    site.page(&Page {
+        file: "index.html",
+        template: "board.j2",
+        title: &format!("{} {} leaderboard", board.file.dataset.name, board.file.dataset.version),
+        scripts: &["sort.js", "board.js"],
+        values: context! { board => Serde(&page) },
+    })?;
+    for column in &board.columns {
+        if let Some(key) = board.ranking().keys.get(&column.key) {
+            site.file(&format!("wins/{}.js", column.key), &wins(&column.key, key, &board.ranking().methods))?;
+        }
+    }
+    Ok(())
+}
+
+fn row<'a>(board: &'a Board<'_>, head: &'a MethodHead, first: &Column) -> Row<'a> {
+    let of = |column: &Column| standing(board.ranking(), &column.key, &head.id);
+    let cells = board.columns.iter().map(|column| of(column).map(|standing| Cell::new(column, standing)));
+    let first = of(first);
+    Row {
+        method: head,
+        rank: first.map_or_else(String::new, |standing| rank_text(standing.rank)),
+        cells: cells.collect(),
+        value: first.map(|standing| standing.value),
+    }
+}
+
+/// Shares in percent, and 1 where the row's method is surely better, -1 where it is surely worse.
+#[derive(Serialize)]
+struct Wins<'a> {
+    names: Vec<&'a str>,
+    wins: Vec<Vec<Option<u32>>>,
+    sure: Vec<Vec<i32>>,
+}
+
+/// A script that hands the page who beats whom, the best first.
+fn wins(key: &str, ranking: &KeyRanking, methods: &[RankedMethod]) -> String {
+    let mut standings: Vec<&Standing> = ranking.standings.iter().collect();
+    standings.sort_by(|a, b| (ranking.better.sign() * b.value).total_cmp(&(ranking.better.sign() * a.value)));
+    let ids: Vec<&str> = standings.iter().map(|standing| standing.method.as_str()).collect();
+    let known: BTreeMap<&str, &str> =
+        methods.iter().map(|method| (method.id.as_str(), method.method.as_str())).collect();
+    let mut told = Wins {
+        names: ids.iter().map(|id| known.get(id).copied().unwrap_or(id)).collect(),
+        wins: vec![vec![None; ids.len()]; ids.len()],
+        sure: vec![vec![0; ids.len()]; ids.len()],
+    };
+    let place = |id: &str| ids.iter().position(|known| *known == id);
+    for pair in &ranking.pairs {
+        let (Some(a), Some(b), Some(win)) = (place(&pair.first), place(&pair.second), pair.win) else { continue };
+        let percent = (100.0 * win).round() as u32;
+        told.wins[a][b] = Some(percent);
+        told.wins[b][a] = Some(100 - percent);
+        if pair.is_sure() {
+            let sign = if win > 0.5 { 1 } else { -1 };
+            told.sure[a][b] = sign;
+            told.sure[b][a] = -sign;
+        }
+    }
+    // JSON is JavaScript.
+    format!("boardWins({}, {});\n", serde_json::Value::from(key), serde_json::json!(told))
+}

@@ -1,0 +1,91 @@
+//! The leaderboard's numbers as files.
+
+use std::borrow::Cow;
+
+use mateval_scene::{SceneId, json};
+
+use super::file::LeaderboardFile;
+use super::site::SiteWriter;
+use super::{Board, LEADERBOARD};
+use crate::error::ReportError;
+use crate::tables::csv::quoted;
+use crate::tables::{Grouping, TableFormat, tables};
+use mateval_eval::result::{ProtocolResult, ResultFile};
+
+/// The tables in the paper's layout; not there where no two results cover the same scenes.
+pub(super) const TABLES: &str = "downloads/tables.tex";
+
+/// Writes them all.
+pub(super) fn write(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    site.file(LEADERBOARD, &json::to_text(&board.file))?;
+    site.file("downloads/leaderboard.csv", &standings_csv(&board.file))?;
+    // Tables hold results side by side only if these cover the same scenes.
+    let scenes = &board.ranking().scenes;
+    let is_whole = |result: &&ResultFile| result.dataset.scenes == *scenes;
+    let whole: Cow<'_, [ResultFile]> = match board.results.iter().all(|result| is_whole(&result)) {
+        true => board.results.into(),
+        false => board.results.iter().filter(is_whole).cloned().collect(),
+    };
+    if !whole.is_empty() {
+        for (file, format) in [(TABLES, TableFormat::Latex), ("downloads/tables.csv", TableFormat::Csv)] {
+            site.file(file, &tables(&whole, protocol, Grouping::Dataset, format)?)?;
+        }
+    }
+    for (head, scores) in board.heads.iter().zip(&board.scores) {
+        site.file(&format!("methods/{}.csv", head.id), &scenes_csv(scenes, scores))?;
+    }
+    Ok(())
+}
+
+/// A line a method and number.
+fn standings_csv(file: &LeaderboardFile) -> String {
+    let mut lines =
+        vec!["id,method,key,better,value,low,high,rank_best,rank_worst,scenes,houses,verified,partial".to_owned()];
+    for (ranked, said) in file.ranking.methods.iter().zip(&file.methods) {
+        for (key, ranking) in &file.ranking.keys {
+            let Some(standing) = ranking.standings.iter().find(|standing| standing.method == ranked.id) else {
+                continue;
+            };
+            let end = |of: fn(&crate::ranking::file::Interval) -> f64| {
+                standing.interval.as_ref().map_or_else(String::new, |interval| of(interval).to_string())
+            };
+            lines.push(format!(
+                "{},{},{key},{},{},{},{},{},{},{},{},{},{}",
+                ranked.id,
+                quoted(&ranked.method),
+                word(&ranking.better),
+                standing.value,
+                end(|interval| interval.low),
+                end(|interval| interval.high),
+                standing.rank.best,
+                standing.rank.worst,
+                standing.scenes,
+                standing.houses,
+                word(&said.verified),
+                ranked.partial
+            ));
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// As JSON says it.
+fn word<T: serde::Serialize>(value: &T) -> String {
+    serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
+}
+
+/// A line a scene, a column a key.
+fn scenes_csv(scenes: &[SceneId], scores: &ProtocolResult) -> String {
+    let keys: std::collections::BTreeSet<&String> =
+        scores.scenes.values().flat_map(std::collections::BTreeMap::keys).collect();
+    let mut lines =
+        vec![std::iter::once("scene").chain(keys.iter().map(|key| key.as_str())).collect::<Vec<_>>().join(",")];
+    for scene in scenes {
+        let values = scores.scenes.get(scene);
+        let cells = keys
+            .iter()
+            .map(|key| values.and_then(|values| values.get(*key)).map_or_else(String::new, |value| value.to_string()));
+        lines.push(std::iter::once(scene.to_string()).chain(cells).collect::<Vec<_>>().join(","));
+    }
+    lines.join("\n") + "\n"
+}

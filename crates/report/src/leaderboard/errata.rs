@@ -1,0 +1,45 @@
+//! What was found wrong after it was published, from a file that the leaderboard's keeper writes.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::error::ReportError;
+
+/// The word for this version of errata.
+pub const ERRATA_FORMAT: &str = "mateval-errata/1";
+
+/// Errata, as they are to be shown.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ErrataFile {
+    /// Always `mateval-errata/1`.
+    pub format: String,
+    /// One a fault.
+    pub entries: Vec<Erratum>,
+}
+
+/// One fault.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Erratum {
+    /// When it was found, as in `2026-03-01`.
+    pub date: String,
+    /// In a few words.
+    pub title: String,
+    /// What was wrong, and what was done.
+    pub text: String,
+    /// Names of methods and scenes that it touches; all where empty.
+    #[serde(default)]
+    pub affects: Vec<String>,
+}
+
+impl ErrataFile {
+    /// Fails where the file is of another format.
+    pub fn check(&self) -> Result<(), ReportError> {
+        if self.format == ERRATA_FORMAT {
+            return Ok(());
+        }
+        let what = format!("errata of format '{}'; this version reads '{ERRATA_FORMAT}'", self.format);
+        Err(ReportError::Invalid(what))
+    }
+}

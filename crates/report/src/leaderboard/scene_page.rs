@@ -1,0 +1,182 @@
+//! A scene's page: all methods side by side in all views, the slider between prediction and truth, and scores.
+
+use std::collections::BTreeSet;
+
+use mateval_scene::SceneId;
+use mateval_scene::layout::INPUT;
+use minijinja::context;
+use minijinja::value::Serde;
+use serde::Serialize;
+
+use super::Board;
+use super::columns::{Column, headlines};
+use super::heads::MethodHead;
+use super::pictures::{Kind, kinds_in_order};
+use super::site::{Page, SiteWriter};
+use crate::error::ReportError;
+use crate::picture_set::{TRUTH, png_size};
+use crate::strips::WHITE_ERROR;
+
+#[derive(Serialize)]
+struct ScenePage<'a> {
+    id: &'a str,
+    house: &'a str,
+    siblings: Vec<&'a str>,
+    before: Option<&'a str>,
+    next: Option<&'a str>,
+    kinds: Vec<Kind>,
+    views: Vec<&'a str>,
+    gallery: Vec<GalleryRow<'a>>,
+    /// What the slider shows before a script runs.
+    start: Option<String>,
+    start_truth: Option<String>,
+    width: u32,
+    height: u32,
+    white_error: f32,
+    columns: Vec<&'a Column>,
+    rows: Vec<ScoreRow<'a>>,
+}
+
+#[derive(Serialize)]
+struct GalleryRow<'a> {
+    id: &'a str,
+    name: &'a str,
+    cells: Vec<Option<GalleryCell<'a>>>,
+}
+
+#[derive(Serialize)]
+struct GalleryCell<'a> {
+    view: &'a str,
+    base: String,
+    kinds: String,
+    src: String,
+}
+
+#[derive(Serialize)]
+struct ScoreRow<'a> {
+    method: &'a MethodHead,
+    cells: Vec<Option<String>>,
+}
+
+/// An entry of the list of scenes.
+#[derive(Serialize)]
+struct SceneCard<'a> {
+    id: &'a str,
+    house: &'a str,
+    thumbnail: Option<String>,
+    width: u32,
+    height: u32,
+    best: Option<String>,
+}
+
+/// `scenes/<scene>.html` of the scene at this place.
+pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let scenes = &board.ranking().scenes;
+    let scene = &scenes[at];
+    let columns = headlines(&board.columns);
+    let views = views_in_order(board.pictures.views(scene));
+    let gallery = gallery(board, scene, &views);
+    let start = |is_truth: bool| {
+        let row = gallery.iter().find(|row| (row.id == TRUTH) == is_truth)?;
+        Some(row.cells.iter().flatten().next()?.src.clone())
+    };
+    let words: BTreeSet<&str> =
+        gallery.iter().flat_map(|row| row.cells.iter().flatten()).flat_map(|cell| cell.kinds.split(' ')).collect();
+    let [width, height] = size(site, start(true).or_else(|| start(false)));
+    let page = ScenePage {
+        id: scene.as_str(),
+        house: house(board, scene),
+        siblings: scenes
+            .iter()
+            .filter(|s| *s != scene && house(board, s) == house(board, scene))
+            .map(SceneId::as_str)
+            .collect(),
+        before: at.checked_sub(1).map(|at| scenes[at].as_str()),
+        next: scenes.get(at + 1).map(SceneId::as_str),
+        kinds: kinds_in_order(words),
+        start: start(false),
+        start_truth: start(true),
+        gallery,
+        views,
+        width,
+        height,
+        white_error: WHITE_ERROR,
+        rows: score_rows(board, scene, &columns),
+        columns,
+    };
+    site.page(&Page {
+        file: &format!("scenes/{scene}.html"),
+        template: "scene.j2",
+        title: scene.as_str(),
+        scripts: &["sort.js", "scene.js"],
+        values: context! { page => Serde(&page), truth => TRUTH },
+    })
+}
+
+/// `scenes.html`.
+pub(super) fn write_list<'a>(board: &'a Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+    let card = |scene: &'a SceneId| {
+        let kinds = board.pictures.kinds(TRUTH, scene, INPUT);
+        let kind = kinds.iter().find(|kind| kind.starts_with("rgb")).or(kinds.first());
+        let thumbnail = kind.map(|kind| format!("pictures/{TRUTH}/{scene}/{INPUT}/{kind}.png"));
+        let [width, height] = size(site, thumbnail.clone());
+        let (id, house) = (scene.as_str(), house(board, scene));
+        SceneCard { id, house, thumbnail, width, height, best: best(board, scene) }
+    };
+    let cards: Vec<SceneCard<'_>> = board.ranking().scenes.iter().map(card).collect();
+    site.page(&Page {
+        file: "scenes.html",
+        template: "scenes.j2",
+        title: "Scenes",
+        scripts: &[],
+        values: context! { scenes => Serde(&cards) },
+    })
+}
+
+fn house<'a>(board: &'a Board<'_>, scene: &SceneId) -> &'a str {
+    board.ranking().houses.get(scene).map_or("", String::as_str)
+}
+
+/// The input view, then the novel ones as the format lists them, then any others.
+fn views_in_order(views: BTreeSet<&str>) -> Vec<&str> {
+    const KNOWN: [&str; 5] = [INPUT, "up_left", "up_right", "down_left", "down_right"];
+    let mut views: Vec<&str> = views.into_iter().collect();
+    views.sort_by_key(|view| KNOWN.iter().position(|known| known == view).unwrap_or(KNOWN.len()));
+    views
+}
+
+/// The truth, then the methods, as far as there are pictures.
+fn gallery<'a>(board: &'a Board<'_>, scene: &SceneId, views: &[&'a str]) -> Vec<GalleryRow<'a>> {
+    let methods = board.heads.iter().map(|head| (head.id.as_str(), head.name.as_str()));
+    let row = |(id, name): (&'a str, &'a str)| {
+        let cell = |view: &&'a str| {
+            let kinds = board.pictures.kinds(id, scene, view);
+            let base = format!("../pictures/{id}/{scene}/{view}/");
+            let src = format!("{base}{}.png", kinds.first()?);
+            Some(GalleryCell { view, kinds: kinds.join(" "), base, src })
+        };
+        GalleryRow { id, name, cells: views.iter().map(cell).collect() }
+    };
+    let rows = std::iter::once((TRUTH, "Truth")).chain(methods).map(row);
+    rows.filter(|row| row.cells.iter().any(Option::is_some)).collect()
+}
+
+/// Of the picture that a page in a folder names; 4 by 3 where there is none.
+fn size(site: &SiteWriter<'_>, file: Option<String>) -> [u32; 2] {
+    file.and_then(|file| png_size(&site.path(file.trim_start_matches("../")))).unwrap_or([4, 3])
+}
+
+fn score_rows<'a>(board: &'a Board<'_>, scene: &SceneId, columns: &[&Column]) -> Vec<ScoreRow<'a>> {
+    let row = |(at, method)| ScoreRow { method, cells: board.texts(at, scene, columns) };
+    board.heads.iter().enumerate().map(row).collect()
+}
+
+/// Which method does best by the board's first number, and how well.
+fn best(board: &Board<'_>, scene: &SceneId) -> Option<String> {
+    let column = board.first()?;
+    let sign = column.better.sign();
+    let values = board.heads.iter().zip(&board.scores);
+    let values = values.filter_map(|(head, scores)| Some((head, *scores.scenes.get(scene)?.get(&column.key)?)));
+    let (head, value) = values.max_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1)))?;
+    Some(format!("{}, {} {}", head.name, column.text(value), column.metric_title))
+}

@@ -1,0 +1,114 @@
+//! The files of a site: templates filled and written, and what every page has.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::store::write_whole;
+use mateval_scene::SceneError;
+use minijinja::value::{Serde, Value};
+use minijinja::{AutoEscape, Environment, context};
+use serde::Serialize;
+
+use crate::error::ReportError;
+
+/// What is written as it stands.
+const ASSETS: [(&str, &str); 5] = [
+    ("site.css", include_str!("templates/site.css")),
+    ("sort.js", include_str!("templates/sort.js")),
+    ("board.js", include_str!("templates/board.js")),
+    ("scene.js", include_str!("templates/scene.js")),
+    ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
+];
+
+const TEMPLATES: [(&str, &str); 9] = [
+    ("base.j2", include_str!("templates/base.j2")),
+    ("marks.j2", include_str!("templates/marks.j2")),
+    ("board.j2", include_str!("templates/board.j2")),
+    ("method.j2", include_str!("templates/method.j2")),
+    ("scenes.j2", include_str!("templates/scenes.j2")),
+    ("scene.j2", include_str!("templates/scene.j2")),
+    ("protocol.j2", include_str!("templates/protocol.j2")),
+    ("paper.j2", include_str!("templates/paper.j2")),
+    ("errata.j2", include_str!("templates/errata.j2")),
+];
+
+/// What every page says.
+#[derive(Clone, Serialize)]
+pub(super) struct Site {
+    pub(super) title: String,
+    pub(super) tool: String,
+    pub(super) protocol: String,
+    pub(super) fingerprint: String,
+    pub(super) scenes: usize,
+    pub(super) houses: usize,
+    pub(super) pages: [PageLink; 5],
+}
+
+/// An entry of the menu.
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct PageLink {
+    file: &'static str,
+    title: &'static str,
+}
+
+/// The menu.
+pub(super) const PAGES: [PageLink; 5] = [
+    PageLink { file: "index.html", title: "Leaderboard" },
+    PageLink { file: "scenes.html", title: "Scenes" },
+    PageLink { file: "protocol.html", title: "Protocol" },
+    PageLink { file: "paper.html", title: "The paper's numbers" },
+    PageLink { file: "errata.html", title: "Errata" },
+];
+
+/// One page.
+pub(super) struct Page<'a> {
+    /// Its file in the site, at most one folder deep.
+    pub(super) file: &'a str,
+    pub(super) template: &'static str,
+    pub(super) title: &'a str,
+    pub(super) scripts: &'static [&'static str],
+    /// What it has beyond what all have.
+    pub(super) values: Value,
+}
+
+/// Writes files into a folder.
+pub(super) struct SiteWriter<'a> {
+    folder: &'a Path,
+    site: Site,
+    environment: Environment<'static>,
+}
+
+impl<'a> SiteWriter<'a> {
+    pub(super) fn new(folder: &'a Path, site: Site) -> Self {
+        let mut environment = Environment::new();
+        environment.set_auto_escape_callback(|_| AutoEscape::Html);
+        for (name, text) in TEMPLATES {
+            environment.add_template(name, text).expect("the templates are ours");
+        }
+        Self { folder, site, environment }
+    }
+
+    pub(super) fn assets(&self) -> Result<(), ReportError> {
+        ASSETS.iter().try_for_each(|(file, text)| self.file(file, text))
+    }
+
+    pub(super) fn page(&self, page: &Page<'_>) -> Result<(), ReportError> {
+        let root = if page.file.contains('/') { "../" } else { "" };
+        let (scripts, site) = (Serde(page.scripts), Serde(&self.site));
+        let shared = context! { site, root, title => page.title, current => page.file, scripts };
+        let template = self.environment.get_template(page.template).expect("it is among ours");
+        let text = template.render(context! { ..page.values.clone(), ..shared });
+        self.file(page.file, &text.expect("the template is ours, and all its values are there"))
+    }
+
+    pub(super) fn file(&self, file: &str, text: &str) -> Result<(), ReportError> {
+        let path = self.path(file);
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+        }
+        Ok(write_whole(&path, text.as_bytes())?)
+    }
+
+    pub(super) fn path(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+}

@@ -1,0 +1,129 @@
+//! The metrics of two picture files, with both mask rules.
+
+use std::path::Path;
+
+use mateval_image::{Mask, Picture, SrgbRgb, exr_io, png_io};
+use mateval_metrics::{Lpips, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::error::ReportError;
+
+/// What `eval image` gives. Values are null where no pixel or window counts; LPIPS is absent where its weights are.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct PairValues {
+    /// Mean squared error over all pixels.
+    pub mse: Option<f64>,
+    /// Its PSNR, dB.
+    pub psnr: Option<f64>,
+    /// SSIM of the whole picture.
+    pub ssim: Option<f64>,
+    /// LPIPS of the whole picture.
+    pub lpips: Vec<NetValue>,
+    /// The same inside a mask.
+    pub masked: Option<MaskedValues>,
+}
+
+/// What `eval image` gives for a mask.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MaskedValues {
+    /// Pixels of the mask.
+    pub pixels: usize,
+    /// Mean squared error over them.
+    pub mse: Option<f64>,
+    /// Its PSNR, dB.
+    pub psnr: Option<f64>,
+    /// SSIM over the windows wholly inside (`mateval-1`).
+    pub ssim_inside: Option<f64>,
+    /// How many those are.
+    pub ssim_windows: usize,
+    /// SSIM of both pictures blacked out outside (`paper`).
+    pub ssim_black_fill: Option<f64>,
+    /// LPIPS of the prediction with the reference's pixels outside, over the mask's pixels (`mateval-1`).
+    pub lpips_inside: Vec<NetValue>,
+    /// LPIPS of both pictures blacked out outside (`paper`).
+    pub lpips_black_fill: Vec<NetValue>,
+}
+
+/// A network's distance.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct NetValue {
+    /// `lpips_alex` or `lpips_vgg`.
+    pub metric: String,
+    /// Its distance.
+    pub value: Option<f64>,
+}
+
+/// A picture to compare: sRGB-encoded, with the bytes that it was made of where it was 8-bit.
+struct Loaded {
+    srgb: Picture<SrgbRgb>,
+    bytes: Option<Picture<SrgbRgb>>,
+}
+
+/// Reads both pictures (PNG as it stands; EXR clipped to 0..1 and sRGB-encoded) and compares them.
+pub fn compare(
+    prediction: &Path,
+    reference: &Path,
+    mask: Option<&Path>,
+    nets: &[Lpips],
+) -> Result<PairValues, ReportError> {
+    let what = format!("'{}' against '{}'", prediction.display(), reference.display());
+    let (prediction, reference) = (load(prediction)?, load(reference)?);
+    let mask = mask.map(png_io::read_mask).transpose()?;
+    values(&prediction, &reference, mask.as_ref(), nets).map_err(|source| ReportError::Metric { what, source })
+}
+
+fn load(path: &Path) -> Result<Loaded, ReportError> {
+    if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr")) {
+        return Ok(Loaded { srgb: exr_io::read_linear(path)?.to_srgb(), bytes: None });
+    }
+    let bytes = png_io::read_rgb_bytes(path)?.map(|rgb| SrgbRgb(rgb.map(f32::from)));
+    Ok(Loaded { srgb: bytes.map(|p| SrgbRgb(p.0.map(|v| v / 255.0))), bytes: Some(bytes) })
+}
+
+fn values(
+    prediction: &Loaded,
+    reference: &Loaded,
+    mask: Option<&Mask>,
+    nets: &[Lpips],
+) -> Result<PairValues, mateval_metrics::MetricError> {
+    let (p, r) = (&prediction.srgb, &reference.srgb);
+    let (mse, psnr) = errors(prediction, reference, None)?;
+    let each = |value: &dyn Fn(&Lpips) -> Result<Option<f64>, mateval_metrics::MetricError>| {
+        nets.iter()
+            .map(|net| Ok(NetValue { metric: net.net().key().to_owned(), value: value(net)? }))
+            .collect::<Result<Vec<_>, mateval_metrics::MetricError>>()
+    };
+    let masked = match mask {
+        None => None,
+        Some(mask) => {
+            let (mse, psnr) = errors(prediction, reference, Some(mask))?;
+            let inside = ssim_valid_windows(p, r, mask)?;
+            Some(MaskedValues {
+                pixels: mateval_metrics::mask::pixel_count(mask),
+                mse,
+                psnr,
+                ssim_inside: inside.as_ref().map(|s| s.ssim),
+                ssim_windows: inside.map_or(0, |s| s.windows),
+                ssim_black_fill: ssim_black_fill(p, r, mask)?,
+                lpips_inside: each(&|net| net.masked(p, r, mask))?,
+                lpips_black_fill: each(&|net| net.black_fill(p, r, mask))?,
+            })
+        }
+    };
+    Ok(PairValues { mse, psnr, ssim: Some(ssim(p, r)?), lpips: each(&|net| net.whole(p, r).map(Some))?, masked })
+}
+
+/// MSE and PSNR. Bytes are compared as whole numbers: value / 255 would round in f32 and cost the ninth digit.
+fn errors(
+    prediction: &Loaded,
+    reference: &Loaded,
+    mask: Option<&Mask>,
+) -> Result<(Option<f64>, Option<f64>), mateval_metrics::MetricError> {
+    let error = match (&prediction.bytes, &reference.bytes) {
+        (Some(p), Some(r)) => mse(p, r, mask)?.map(|error| error / (255.0 * 255.0)),
+        _ => mse(&prediction.srgb, &reference.srgb, mask)?,
+    };
+    let psnr = error.map(Psnr::from_mse).transpose()?;
+    Ok((error, psnr.map(|psnr| psnr.db)))
+}

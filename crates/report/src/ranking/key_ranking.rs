@@ -1,0 +1,178 @@
+//! The ranking by one number: each two methods on the scenes that both have.
+
+use super::bootstrap::{Duel, duels, intervals};
+use super::clusters::Clusters;
+use super::draws::DrawTable;
+use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankingRules, Standing};
+use super::holm::{corrected, rank_ranges};
+use mateval_eval::metric_kind::Better;
+
+/// Values of one key.
+pub(super) struct KeyValues<'a> {
+    pub(super) better: Better,
+    /// Ids of the methods that have any.
+    pub(super) methods: Vec<&'a str>,
+    /// A method's value of each scene; none where the method does not cover it, or it has none.
+    pub(super) values: Vec<Vec<Option<f64>>>,
+}
+
+/// Ranks the methods; `house` holds the number of each scene's house.
+pub(super) fn rank_key(key: &KeyValues<'_>, house: &[usize], rules: &RankingRules, draws: &DrawTable) -> KeyRanking {
+    let groups = groups_of_equal_cover(&key.values);
+    let mut means: Vec<Option<GroupMean>> = vec![None; key.methods.len()];
+    let mut met = Vec::new();
+    for (at, group) in groups.iter().enumerate() {
+        let shared = Shared::of(&key.values, house, group);
+        for (method, mean) in group.iter().zip(shared.means(rules, draws)) {
+            means[*method] = Some(mean);
+        }
+        let within = (0..group.len()).flat_map(|a| (a + 1..group.len()).map(move |b| (a, b)));
+        met.extend(shared.meetings(&within.collect::<Vec<_>>(), rules, draws));
+        for other in &groups[at + 1..] {
+            let both = [group.as_slice(), other].concat();
+            let shared = Shared::of(&key.values, house, &both);
+            let across = (0..group.len()).flat_map(|a| (0..other.len()).map(move |b| (a, group.len() + b)));
+            met.extend(shared.meetings(&across.collect::<Vec<_>>(), rules, draws));
+        }
+    }
+    met.sort_by_key(|met| (met.first, met.second));
+    let chances: Vec<f64> = met.iter().map(|met| met.duel.map_or(1.0, |duel| duel.p)).collect();
+    let corrected = corrected(&chances);
+    let beaten: Vec<(usize, usize)> =
+        met.iter().zip(&corrected).filter(|(_, p)| **p < rules.level).map(|(met, _)| met.winner(key.better)).collect();
+    let ranks = rank_ranges(key.methods.len(), &beaten);
+    let rows = key.methods.iter().zip(means).zip(ranks);
+    let standings = rows.filter_map(|((method, mean), rank)| {
+        let GroupMean { value, interval, scenes, houses } = mean?;
+        Some(Standing { method: (*method).to_owned(), value, interval, scenes, houses, rank })
+    });
+    KeyRanking {
+        better: key.better,
+        standings: standings.collect(),
+        pairs: met.iter().zip(corrected).map(|(met, p_holm)| met.pair(key, p_holm)).collect(),
+    }
+}
+
+/// Methods that have values of the very same scenes; they are drawn together.
+fn groups_of_equal_cover(values: &[Vec<Option<f64>>]) -> Vec<Vec<usize>> {
+    let is_alike = |a: usize, b: usize| values[a].iter().zip(&values[b]).all(|(a, b)| a.is_some() == b.is_some());
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    for method in 0..values.len() {
+        match groups.iter_mut().find(|group| is_alike(group[0], method)) {
+            Some(group) => group.push(method),
+            None => groups.push(vec![method]),
+        }
+    }
+    groups
+}
+
+/// A method's mean over all scenes that it has.
+#[derive(Clone)]
+struct GroupMean {
+    value: f64,
+    interval: Option<Interval>,
+    scenes: usize,
+    houses: usize,
+}
+
+/// Some methods on the scenes that all of them have.
+struct Shared<'a> {
+    members: &'a [usize],
+    scenes: usize,
+    clusters: Clusters,
+}
+
+impl<'a> Shared<'a> {
+    fn of(values: &[Vec<Option<f64>>], house: &[usize], members: &'a [usize]) -> Self {
+        let has_all = |scene: &usize| members.iter().all(|&method| values[method][*scene].is_some());
+        let scenes: Vec<usize> = (0..house.len()).filter(has_all).collect();
+        let column = |method: &usize| scenes.iter().filter_map(|&scene| values[*method][scene]).collect();
+        let columns: Vec<Vec<f64>> = members.iter().map(column).collect();
+        let houses: Vec<usize> = scenes.iter().map(|&scene| house[scene]).collect();
+        Self { members, scenes: scenes.len(), clusters: Clusters::gather(&columns, &houses) }
+    }
+
+    /// None where there are too few houses to draw from.
+    fn kind(&self, rules: &RankingRules) -> Option<IntervalKind> {
+        match self.clusters.len() {
+            few if few < rules.least_houses => None,
+            some if some < rules.student_below => Some(IntervalKind::Student),
+            _ => Some(IntervalKind::Percentile),
+        }
+    }
+
+    fn means(&self, rules: &RankingRules, draws: &DrawTable) -> Vec<GroupMean> {
+        let found = match self.kind(rules) {
+            Some(kind) => intervals(&self.clusters, &draws.of(self.clusters.len()), kind),
+            None => self.clusters.means().iter().map(|mean| (mean.value, None)).collect(),
+        };
+        let mean = |(value, interval)| GroupMean { value, interval, scenes: self.scenes, houses: self.clusters.len() };
+        found.into_iter().map(mean).collect()
+    }
+
+    /// `pairs` are places among the members.
+    fn meetings(&self, pairs: &[(usize, usize)], rules: &RankingRules, draws: &DrawTable) -> Vec<Meeting> {
+        if pairs.is_empty() {
+            return Vec::new();
+        }
+        let found: Vec<Option<Duel>> = match self.kind(rules) {
+            Some(kind) => {
+                duels(&self.clusters, pairs, &draws.of(self.clusters.len()), kind).into_iter().map(Some).collect()
+            }
+            None => vec![None; pairs.len()],
+        };
+        let means = self.clusters.means();
+        let meeting = |(&(a, b), duel): (&(usize, usize), Option<Duel>)| {
+            let difference = (self.scenes > 0).then(|| means[a].value - means[b].value);
+            let (first, second) = (self.members[a], self.members[b]);
+            Meeting { first, second, scenes: self.scenes, difference, duel }.in_order()
+        };
+        pairs.iter().zip(found).map(meeting).collect()
+    }
+}
+
+/// Two methods, by their places among the key's.
+struct Meeting {
+    first: usize,
+    second: usize,
+    scenes: usize,
+    difference: Option<f64>,
+    duel: Option<Duel>,
+}
+
+impl Meeting {
+    /// With the method that stands first as the first.
+    fn in_order(self) -> Self {
+        if self.first < self.second {
+            return self;
+        }
+        Self {
+            first: self.second,
+            second: self.first,
+            scenes: self.scenes,
+            difference: self.difference.map(|difference| -difference),
+            duel: self.duel.map(|duel| Duel { first_higher: 1.0 - duel.first_higher, ..duel }),
+        }
+    }
+
+    fn winner(&self, better: Better) -> (usize, usize) {
+        let is_higher = self.difference > Some(0.0);
+        if is_higher == (better == Better::Higher) { (self.first, self.second) } else { (self.second, self.first) }
+    }
+
+    fn pair(&self, key: &KeyValues<'_>, p_holm: f64) -> Pair {
+        let win = |duel: Duel| match key.better {
+            Better::Higher => duel.first_higher,
+            Better::Lower => 1.0 - duel.first_higher,
+        };
+        Pair {
+            first: key.methods[self.first].to_owned(),
+            second: key.methods[self.second].to_owned(),
+            scenes: self.scenes,
+            difference: self.difference,
+            win: self.duel.map(win),
+            p: self.duel.map(|duel| duel.p),
+            p_holm: self.duel.map(|_| p_holm),
+        }
+    }
+}

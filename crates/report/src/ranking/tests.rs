@@ -1,0 +1,341 @@
+//! Rankings of simulated leaderboards, whose truth is known.
+
+use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::{Finding, InstanceId, Severity};
+
+use super::bootstrap::{duels, intervals};
+use super::clusters::Clusters;
+use super::draws::mixed;
+use super::file::{IntervalKind, RankRange, Standing};
+use super::*;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::{InstanceTexelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId, TexelErrors};
+
+/// Standard normals and even numbers, in a row.
+struct Chance(u64, u64);
+
+impl Chance {
+    fn even(&mut self) -> f64 {
+        self.1 += 1;
+        (mixed(self.0, self.1) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Box and Muller 1958.
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.even()).ln()).sqrt();
+        radius * (2.0 * std::f64::consts::PI * self.even()).cos()
+    }
+}
+
+const METHODS: usize = 4;
+const VIEWS: usize = 4;
+
+/// One simulated board: PSNR of each method, scene by scene (the mean of its views) and picture by picture.
+struct Simulated {
+    scenes: Vec<Vec<f64>>,
+    houses: Vec<usize>,
+    pictures: Vec<Vec<f64>>,
+}
+
+/// What every method's mean is, over all houses that there could be.
+const TRUTH: f64 = 25.0;
+
+/// Houses of one to four scenes; PSNR varies by 2 dB from house to house and by 1 dB from scene to scene for all methods
+/// alike, by 1 dB from house to house for each method of its own, and by 1 dB from view to view. All methods are equally good.
+fn simulate(houses: usize, seed: u64) -> Simulated {
+    let mut chance = Chance(seed, 0);
+    let mut board =
+        Simulated { scenes: vec![Vec::new(); METHODS], houses: Vec::new(), pictures: vec![Vec::new(); METHODS] };
+    for house in 0..houses {
+        let of_house = 2.0 * chance.normal();
+        let of_method: Vec<f64> = (0..METHODS).map(|_| chance.normal()).collect();
+        for _ in 0..1 + (4.0 * chance.even()) as usize {
+            let of_scene = chance.normal();
+            board.houses.push(house);
+            for (method, own) in of_method.iter().enumerate() {
+                let views: Vec<f64> = (0..VIEWS).map(|_| TRUTH + of_house + of_scene + own + chance.normal()).collect();
+                board.scenes[method].push(views.iter().sum::<f64>() / VIEWS as f64);
+                board.pictures[method].extend(views);
+            }
+        }
+    }
+    board
+}
+
+/// Share, over boards and methods, of intervals that hold the truth.
+fn coverage(boards: u64, houses: usize, kind: IntervalKind, by: impl Fn(Simulated) -> Clusters) -> f64 {
+    let mut held = 0;
+    for board in 0..boards {
+        let clusters = by(simulate(houses, board));
+        let draws = Draws::new(board, BOARD_DRAWS, clusters.len());
+        let found = intervals(&clusters, &draws, kind);
+        held +=
+            found.iter().filter_map(|(_, interval)| *interval).filter(|i| i.low <= TRUTH && TRUTH <= i.high).count();
+    }
+    held as f64 / (boards as usize * METHODS) as f64
+}
+
+const BOARDS: u64 = 1000;
+
+/// Of the twins, which miss by far.
+const FEW_BOARDS: u64 = 200;
+
+/// Fewer than [`DRAWS`], for the test's sake: an interval's ends vary a little more from board to board.
+const BOARD_DRAWS: usize = 1000;
+
+fn by_house(board: Simulated) -> Clusters {
+    Clusters::gather(&board.scenes, &board.houses)
+}
+
+fn by_picture(board: Simulated) -> Clusters {
+    let pictures: Vec<usize> = (0..board.pictures[0].len()).collect();
+    Clusters::gather(&board.pictures, &pictures)
+}
+
+#[test]
+fn intervals_cover_the_truth() {
+    let covered = coverage(BOARDS, 60, IntervalKind::Percentile, by_house);
+    assert!((0.93..=0.97).contains(&covered), "{covered}");
+    // The twin: pictures of one house drawn as if they had nothing in common.
+    let covered = coverage(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
+    assert!(covered < 0.7, "{covered}");
+}
+
+#[test]
+fn students_intervals_cover_the_truth_of_few_houses() {
+    let covered = coverage(BOARDS, 12, IntervalKind::Student, by_house);
+    assert!((0.92..=0.98).contains(&covered), "{covered}");
+    // The twins: what they are for, and pictures.
+    let covered = coverage(BOARDS, 12, IntervalKind::Percentile, by_house);
+    assert!(covered < 0.92, "{covered}");
+    let covered = coverage(FEW_BOARDS, 12, IntervalKind::Student, by_picture);
+    assert!(covered < 0.7, "{covered}");
+}
+
+/// Equal methods are held different in one pair of twenty; drawn by picture much more often.
+#[test]
+fn chances_are_what_they_say() {
+    let refused = |boards: u64, houses, kind, by: fn(Simulated) -> Clusters| {
+        let one = |board| {
+            let clusters = by(simulate(houses, board));
+            let draws = Draws::new(board, BOARD_DRAWS, clusters.len());
+            duels(&clusters, &[(0, 1), (2, 3)], &draws, kind).iter().filter(|duel| duel.p < 0.05).count()
+        };
+        (0..boards).map(one).sum::<usize>() as f64 / (2 * boards) as f64
+    };
+    for (houses, kind) in [(60, IntervalKind::Percentile), (12, IntervalKind::Student)] {
+        let share = refused(BOARDS, houses, kind, by_house);
+        assert!((0.03..=0.07).contains(&share), "{houses} houses: {share}");
+    }
+    let share = refused(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
+    assert!(share > 0.15, "{share}");
+}
+
+fn scene(number: usize) -> SceneId {
+    SceneId::new(format!("s{number:02}")).unwrap()
+}
+
+fn summary(scenes: &BTreeMap<SceneId, BTreeMap<String, f64>>) -> BTreeMap<String, f64> {
+    let mut summary = BTreeMap::new();
+    for (key, value) in scenes.values().flatten() {
+        *summary.entry(key.clone()).or_insert(0.0) += value / scenes.len() as f64;
+    }
+    summary
+}
+
+/// A method's result with these PSNR, a house a scene.
+pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
+    let scenes: BTreeMap<_, _> = psnr
+        .iter()
+        .enumerate()
+        .map(|(at, psnr)| {
+            let values = [("albedo.input.psnr", *psnr), ("albedo.input.mse", 10_f64.powf(-psnr / 10.0))];
+            (scene(at), values.map(|(key, value)| (key.to_owned(), value)).into())
+        })
+        .collect();
+    let protocol = Protocol::named("mateval-1").unwrap();
+    let ids: Vec<SceneId> = scenes.keys().cloned().collect();
+    let scores = ProtocolResult {
+        fingerprint: protocol.fingerprint("m", &ids.iter().collect::<Vec<_>>(), None, None),
+        protocol,
+        summary: summary(&scenes),
+        scenes,
+        summary_noise: BTreeMap::new(),
+        noise: BTreeMap::new(),
+        fits: BTreeMap::new(),
+        pictures: Vec::new(),
+        texels: Vec::new(),
+        instances: Vec::new(),
+    };
+    ResultFile {
+        format: RESULT_FORMAT.to_owned(),
+        tool: String::new(),
+        method: method.to_owned(),
+        submission: SubmissionId {
+            sha256: String::new(),
+            description: String::new(),
+            url: None,
+            licence: None,
+            cost: None,
+        },
+        dataset: DatasetId {
+            name: "d".to_owned(),
+            version: "1".to_owned(),
+            manifest_sha256: "m".to_owned(),
+            scenes_in_all: ids.len(),
+            houses: ids.iter().map(|id| (id.clone(), format!("house of {id}"))).collect(),
+            scenes: ids,
+            scored_renderer: None,
+        },
+        lpips_weights: BTreeMap::from([("alex".to_owned(), None)]),
+        protocols: BTreeMap::from([("mateval-1".to_owned(), scores)]),
+        missing: Vec::new(),
+        findings: Vec::new(),
+    }
+}
+
+/// So many scenes around a mean, all methods alike but for `wobble`.
+pub(crate) fn scores(mean: f64, wobble: f64) -> Vec<f64> {
+    (0..12).map(|at| mean + 0.7 * f64::from(at % 5) + wobble * f64::from(at * 7 % 11 - 5)).collect()
+}
+
+fn standings<'a>(ranking: &'a Ranking, key: &str) -> &'a [Standing] {
+    &ranking.keys[key].standings
+}
+
+#[test]
+fn copies_share_a_rank() {
+    let results =
+        [result("Good", &scores(30.0, 0.1)), result("bad", &scores(20.0, 0.0)), result("good!", &scores(30.0, 0.1))];
+    let ranking = rank(&results, "mateval-1", false).unwrap();
+    let ids: Vec<&str> = ranking.methods.iter().map(|method| method.id.as_str()).collect();
+    assert_eq!(ids, ["good", "bad", "good-2"]);
+    for key in ["albedo.input.psnr", "albedo.input.mse"] {
+        let ranks: Vec<RankRange> = standings(&ranking, key).iter().map(|standing| standing.rank).collect();
+        let [first, last] = [RankRange { best: 1, worst: 2 }, RankRange { best: 3, worst: 3 }];
+        assert_eq!(ranks, [first, last, first], "{key}");
+        let pair = &ranking.keys[key].pairs[1];
+        assert_eq!((pair.first.as_str(), pair.second.as_str()), ("good", "good-2"));
+        assert_eq!((pair.difference, pair.win, pair.p_holm), (Some(0.0), Some(0.5), Some(1.0)));
+        // More is better of PSNR, less of MSE: the better one wins either way.
+        assert_eq!(ranking.keys[key].pairs[0].win, Some(1.0), "{key}");
+    }
+}
+
+#[test]
+fn the_same_bytes_whatever_the_threads() {
+    let results = [result("a", &scores(25.0, 0.3)), result("b", &scores(25.1, -0.2)), result("c", &scores(24.0, 0.5))];
+    let text = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-1", false)).unwrap())
+    };
+    assert_eq!(text(1), text(3));
+}
+
+/// Fifty methods are 1225 pairs: with 10,000 draws none of them could be told apart.
+#[test]
+fn many_methods_ask_for_more_draws() {
+    for methods in [2, 22, 23, 50] {
+        let pairs = methods * (methods - 1) / 2;
+        let least = 2.0 / (rules(methods).draws + 1) as f64;
+        assert!(least * (pairs as f64) < holm::LEVEL, "{methods}");
+    }
+    assert_eq!(rules(22).draws, DRAWS);
+}
+
+#[test]
+fn few_houses_say_nothing() {
+    let [four, five] = [4, 5].map(|scenes| {
+        let cut = |method: &str, mean| result(method, &scores(mean, 0.1)[..scenes]);
+        rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-1", false).unwrap()
+    });
+    let first = |ranking: &Ranking| standings(ranking, "albedo.input.psnr")[0].clone();
+    assert!(first(&four).interval.is_none() && first(&five).interval.is_some());
+    let pair = &four.keys["albedo.input.psnr"].pairs[0];
+    assert_eq!((pair.win, pair.p, first(&four).rank), (None, None, RankRange { best: 1, worst: 2 }));
+}
+
+#[test]
+fn partial_results_are_let_in_only_when_asked() {
+    let part = result("part", &scores(40.0, 0.0)[..6]);
+    let results = [result("whole", &scores(30.0, 0.0)), part.clone(), result("low", &scores(20.0, 0.0))];
+    let error = rank(&results, "mateval-1", false).unwrap_err().to_string();
+    assert!(error.contains("'part' was scored on 6 of 12 scenes") && error.contains("--partial"), "{error}");
+    let ranking = rank(&results, "mateval-1", true).unwrap();
+    let partial: Vec<bool> = ranking.methods.iter().map(|method| method.partial).collect();
+    assert_eq!((partial, ranking.methods[1].not_scored.len()), (vec![false, true, false], 6));
+    let standings = standings(&ranking, "albedo.input.psnr");
+    assert_eq!([standings[0].scenes, standings[1].scenes], [12, 6]);
+    let pairs: Vec<usize> = ranking.keys["albedo.input.psnr"].pairs.iter().map(|pair| pair.scenes).collect();
+    assert_eq!(pairs, [6, 12, 6]);
+    // What the whole ones get does not depend on the part.
+    let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-1", false).unwrap();
+    let interval = |ranking: &Ranking| ranking.keys["albedo.input.psnr"].standings[0].interval;
+    assert_eq!(interval(&ranking), interval(&alone));
+}
+
+/// A scene without any base colour is grey by default, and not there where only what is covered counts.
+#[test]
+fn scenes_left_out_of_a_submission() {
+    let mut gaps = result("gaps", &scores(30.0, 0.0));
+    let instance = InstanceId::new("sofa").unwrap();
+    let texels = |scene| InstanceTexelErrors {
+        scene,
+        instance: instance.clone(),
+        observed: TexelErrors::default(),
+        unobserved: TexelErrors::default(),
+    };
+    gaps.protocols.get_mut("mateval-1").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
+    let missing = |file: &str| Finding {
+        severity: Severity::Warning,
+        code: "missing_map".to_owned(),
+        file: file.to_owned(),
+        place: String::new(),
+        message: String::new(),
+        action: String::new(),
+    };
+    gaps.findings = vec![missing("scenes/s03/sofa/base_color.png"), missing("scenes/s04/sofa/roughness.png")];
+    let results = [gaps, result("whole", &scores(31.0, 0.0))];
+    for (partial, scenes) in [(false, 12), (true, 11)] {
+        let ranking = rank(&results, "mateval-1", partial).unwrap();
+        assert_eq!(ranking.methods[0].left_out, [scene(3)]);
+        assert_eq!(standings(&ranking, "albedo.input.psnr")[0].scenes, scenes);
+        assert_eq!(ranking.methods[0].partial, partial);
+    }
+}
+
+#[test]
+fn what_cannot_be_ranked_together() {
+    let good = result("good", &scores(30.0, 0.0));
+    let refused = |change: fn(&mut ResultFile)| {
+        let mut other = result("other", &scores(20.0, 0.0));
+        change(&mut other);
+        rank(&[good.clone(), other], "mateval-1", true).unwrap_err().to_string()
+    };
+    let scored_anew = |result: &mut ResultFile, manifest: &str| {
+        result.dataset.manifest_sha256 = manifest.to_owned();
+        let ids: Vec<&SceneId> = result.dataset.scenes.iter().collect();
+        let scores = result.protocols.get_mut("mateval-1").unwrap();
+        scores.fingerprint = scores.protocol.fingerprint(manifest, &ids, None, None);
+    };
+    let mut other = result("other", &scores(20.0, 0.0));
+    scored_anew(&mut other, "another");
+    let error = rank(&[good.clone(), other], "mateval-1", true).unwrap_err().to_string();
+    assert!(error.contains("'good' and 'other' have different fingerprints"), "{error}");
+    let error = refused(|other| other.dataset.manifest_sha256 = "another".to_owned());
+    assert!(error.contains("it has been changed"), "{error}");
+    let error = refused(|other| other.dataset.houses.clear());
+    assert!(error.contains("of which house scene 's00' is"), "{error}");
+    for (key, value) in [("albedo.input.psnr", 1e300), ("albedo.input./../../evil.psnr", 1.0), ("a\nb.psnr", 1.0)] {
+        let mut other = result("other", &scores(20.0, 0.0));
+        let scenes = &mut other.protocols.get_mut("mateval-1").unwrap().scenes;
+        scenes.get_mut(&scene(3)).unwrap().insert(key.to_owned(), value);
+        let error = rank(&[good.clone(), other], "mateval-1", false).unwrap_err().to_string();
+        assert!(error.contains("which is no score"), "{error}");
+    }
+    let error = refused(|other| other.dataset.houses.values_mut().for_each(|house| house.push('2')));
+    assert!(error.contains("put scene 's00' into different houses"), "{error}");
+    let error = refused(|other| other.protocols.clear());
+    assert!(error.contains("score it with --protocol mateval-1"), "{error}");
+    assert!(rank(&[], "mateval-1", false).is_err());
+}

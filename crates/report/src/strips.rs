@@ -1,0 +1,263 @@
+//! Pictures side by side, as the paper's Figures 4 to 7: a row a view, the truth's column first, then one a submission.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::transfer::byte_from_unit;
+use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::open::Dataset;
+use mateval_scene::{Progress, SceneError, SceneId};
+
+use crate::error::ReportError;
+use mateval_eval::light_rules::Track;
+use mateval_eval::open_scene::chosen_scenes;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
+use mateval_eval::truth::ViewTruth;
+
+/// What the input view shows is darkened to this share in the other views (of the sRGB value).
+const OBSERVED_SHARE: f32 = 0.4;
+/// The error that is white: root mean square over the channels.
+pub const WHITE_ERROR: f32 = 0.5;
+/// Pixels between pictures, and their colour.
+const GAP: usize = 4;
+pub(crate) const GAP_COLOR: [u8; 3] = [255; 3];
+/// Rows of the scale beneath error maps.
+pub(crate) const SCALE_ROWS: usize = 12;
+
+/// What strips show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// base_color; errors are of linear values.
+    Albedo,
+    /// The scene lit as a track of protocol `mateval-1` lights it; errors are of sRGB values. Not [`Track::Relit`], which
+    /// has many lights.
+    Light {
+        /// Which.
+        track: Track,
+        /// Samples a pixel of each of two halves.
+        samples: u32,
+    },
+}
+
+/// What strips are made of.
+pub struct StripPlan<'a> {
+    /// With its ground truth.
+    pub dataset: &'a Dataset,
+    /// Folders; a column each.
+    pub submissions: &'a [&'a Path],
+    /// All where there are none.
+    pub scenes: &'a [SceneId],
+    /// A pair of files each.
+    pub shown: &'a [Shown],
+    /// The folder of the pictures.
+    pub out: &'a Path,
+    /// Whether pictures that are there are replaced.
+    pub force: bool,
+}
+
+/// A view's row: masks, and pictures of the truth and then of every submission.
+pub(crate) struct StripRow {
+    pub(crate) truth: ViewTruth,
+    pub(crate) shown: Vec<Picture<SrgbRgb>>,
+    /// What errors are taken of.
+    compared: Vec<Picture<[f32; 3]>>,
+}
+
+impl Shown {
+    /// As in the keys of a result.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Albedo => "albedo",
+            Self::Light { track, .. } => track.picture(),
+        }
+    }
+}
+
+/// Writes `<scene>-<name>.png` and `<scene>-<name>-error.png` of all that shall be shown. Gives their paths.
+///
+/// Views are rows in the dataset's order; columns are the truth, then the submissions in the plan's. In views other
+/// than the input what it shows is darkened, and what is not valid is black. Error maps leave the truth's column out;
+/// their last row is the scale, black 0 to white [`WHITE_ERROR`] from left to right.
+pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, ReportError> {
+    let chosen = chosen_scenes(plan.dataset, plan.scenes)?;
+    let paths = |scene: &SceneId, shown: Shown| {
+        ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.name())))
+    };
+    let jobs: Vec<(&SceneFile, Shown)> =
+        chosen.iter().flat_map(|scene| plan.shown.iter().map(|shown| (*scene, *shown))).collect();
+    let there = jobs.iter().flat_map(|(scene, shown)| paths(&scene.id, *shown)).find(|path| path.exists());
+    if let Some(path) = there.filter(|_| !plan.force) {
+        let what = format!("'{}' is already there; choose another --out, or add --force to replace it", path.display());
+        return Err(ReportError::Invalid(what));
+    }
+    std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
+    let mut written = Vec::new();
+    for (done, &(scene, shown)) in jobs.iter().enumerate() {
+        progress("pictures", done, jobs.len());
+        let rows = rows(plan, scene, shown, progress)?;
+        let files = paths(&scene.id, shown);
+        let strips: Vec<Vec<Picture<[u8; 3]>>> = rows.iter().map(strip).collect();
+        png_io::write_rgb_bytes(&files[0], &grid(&strips))?;
+        let mut errors: Vec<Vec<Picture<[u8; 3]>>> = rows.iter().map(errors).collect();
+        if let Some(row) = errors.first() {
+            errors.push(row.iter().map(|picture| scale(picture.width())).collect());
+        }
+        png_io::write_rgb_bytes(&files[1], &grid(&errors))?;
+        written.extend(files);
+    }
+    Ok(written)
+}
+
+/// One scene's views.
+pub(crate) fn rows(
+    plan: &StripPlan<'_>,
+    scene: &SceneFile,
+    shown: Shown,
+    progress: Progress<'_>,
+) -> Result<Vec<StripRow>, ReportError> {
+    match shown {
+        Shown::Albedo => Ok(scene_albedo(plan.dataset, scene, plan.submissions)?.into_iter().map(albedo_row).collect()),
+        Shown::Light { track: Track::Relit, .. } => {
+            Err(ReportError::Invalid("track 'relit' has many lights; show 'true' or 'fitted'".to_owned()))
+        }
+        Shown::Light { track, samples } => {
+            let mut protocol = Protocol::named("mateval-1")?;
+            protocol.light.tracks = vec![track];
+            (protocol.light.noise.least_samples, protocol.light.noise.most_samples) = (samples, samples);
+            let renderer = plan.dataset.file.scored_renderer.as_ref().ok_or_else(|| {
+                let what = "the dataset has no pictures of light to compare with; run `mateval prep render DATASET`";
+                ReportError::Invalid(what.to_owned())
+            })?;
+            let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, renderer, progress)?;
+            Ok(views.into_iter().map(light_row).collect())
+        }
+    }
+}
+
+fn albedo_row(view: SceneAlbedo) -> StripRow {
+    let pictures: Vec<Picture<LinearRgb>> = std::iter::once(view.truth.albedo.clone()).chain(view.predicted).collect();
+    StripRow {
+        truth: view.truth,
+        shown: pictures.iter().map(Picture::to_srgb).collect(),
+        compared: pictures.iter().map(|picture| picture.map(|LinearRgb(rgb)| rgb)).collect(),
+    }
+}
+
+fn light_row(view: SceneLight) -> StripRow {
+    let shown: Vec<Picture<SrgbRgb>> = std::iter::once(view.shown.truth).chain(view.shown.predicted).collect();
+    let compared = shown.iter().map(|picture| picture.map(|SrgbRgb(rgb)| rgb)).collect();
+    StripRow { truth: view.truth, shown, compared }
+}
+
+/// The truth and the predictions of one view.
+fn strip(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
+    row.shown.iter().map(|picture| darkened(&row.truth, picture)).collect()
+}
+
+fn darkened(truth: &ViewTruth, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
+    Picture::from_fn(picture.width(), picture.height(), |x, y| {
+        let is_observed = truth.unobserved.as_ref().is_some_and(|mask| !mask.get(x, y));
+        let share = match (truth.valid.get(x, y), is_observed) {
+            (false, _) => 0.0,
+            (true, true) => OBSERVED_SHARE,
+            (true, false) => 1.0,
+        };
+        picture.get(x, y).0.map(|v| byte_from_unit(v * share))
+    })
+}
+
+/// Where each submission errs.
+pub(crate) fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
+    let Some((reference, predicted)) = row.compared.split_first() else { return Vec::new() };
+    let error = |picture: &Picture<[f32; 3]>| {
+        Picture::from_fn(picture.width(), picture.height(), |x, y| {
+            if !row.truth.valid.get(x, y) {
+                return [0; 3];
+            }
+            error_color(picture.get(x, y), reference.get(x, y))
+        })
+    };
+    predicted.iter().map(error).collect()
+}
+
+/// The colour of a pixel's error.
+pub(crate) fn error_color(a: [f32; 3], b: [f32; 3]) -> [u8; 3] {
+    let squares: f32 = (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum();
+    glow((squares / 3.0).sqrt() / WHITE_ERROR)
+}
+
+/// Black, red, yellow, white for 0 to 1: brighter is worse, in print and to the colour-blind too.
+fn glow(share: f32) -> [u8; 3] {
+    [0.0, 1.0, 2.0].map(|start| byte_from_unit(share.clamp(0.0, 1.0) * 3.0 - start))
+}
+
+/// The colours of errors from 0 to [`WHITE_ERROR`], left to right.
+pub(crate) fn scale(width: usize) -> Picture<[u8; 3]> {
+    Picture::from_fn(width, SCALE_ROWS, |x, _| glow((x as f32 + 0.5) / width as f32))
+}
+
+/// Rows of pictures with gaps between them; pictures of one row are of one height, of one column of one width.
+pub(crate) fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
+    let starts = |sizes: &mut dyn Iterator<Item = usize>| {
+        let mut starts = vec![0];
+        sizes.for_each(|size| starts.push(starts[starts.len() - 1] + size + GAP));
+        starts
+    };
+    let lefts = starts(&mut rows.first().into_iter().flatten().map(Picture::width));
+    let tops = starts(&mut rows.iter().map(|row| row.first().map_or(0, Picture::height)));
+    let size = |starts: &[usize]| starts[starts.len() - 1].saturating_sub(GAP).max(1);
+    let mut whole = Picture::filled(size(&lefts), size(&tops), GAP_COLOR);
+    for (row, top) in rows.iter().zip(&tops) {
+        for (picture, left) in row.iter().zip(&lefts) {
+            for (at, pixel) in picture.pixels().iter().enumerate() {
+                whole.set(left + at % picture.width(), top + at / picture.width(), *pixel);
+            }
+        }
+    }
+    whole
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::Mask;
+
+    use super::*;
+
+    fn row() -> StripRow {
+        let truth = Picture::filled(4, 3, LinearRgb([1.0; 3]));
+        let predicted = vec![truth.clone(), Picture::filled(4, 3, LinearRgb([0.5; 3]))];
+        let unobserved = Some(Mask::from_fn(4, 3, |x, _| x == 3));
+        let truth = ViewTruth {
+            albedo: truth,
+            roughness: Picture::filled(4, 3, 0.5),
+            metallic: Picture::filled(4, 3, 0.0),
+            valid: Mask::from_fn(4, 3, |_, y| y > 0),
+            unobserved,
+            specular: None,
+            instances: Picture::filled(4, 3, 1),
+        };
+        albedo_row(SceneAlbedo { truth, predicted })
+    }
+
+    #[test]
+    fn observed_is_dark_and_invalid_black() {
+        let shown = strip(&row());
+        assert_eq!(shown.len(), 3);
+        assert_eq!((shown[0].get(3, 1), shown[0].get(0, 1), shown[0].get(3, 0)), ([255; 3], [102; 3], [0; 3]));
+    }
+
+    #[test]
+    fn no_error_is_black_and_half_is_white() {
+        let errors = errors(&row());
+        assert_eq!((errors[0].get(2, 2), errors[1].get(2, 2), errors[1].get(2, 0)), ([0; 3], [255; 3], [0; 3]));
+        assert_eq!((glow(1.0 / 3.0), glow(2.0 / 3.0)), ([255, 0, 0], [255, 255, 0]));
+    }
+
+    #[test]
+    fn grids_have_gaps_inside_only() {
+        let grid = grid(&[strip(&row()), strip(&row())]);
+        assert_eq!((grid.width(), grid.height()), (3 * 4 + 2 * GAP, 2 * 3 + GAP));
+        assert_eq!((grid.get(4, 1), grid.get(4 + GAP + 3, 1)), (GAP_COLOR, [255; 3]));
+    }
+}

@@ -1,0 +1,153 @@
+//! A table before it is written: heads, cells, and which of them are best.
+
+use super::Grouping;
+use super::layouts::Layout;
+use super::rows::{Group, Value};
+use mateval_eval::metric_kind::{Better, Metric};
+
+/// A table whose every column has a value somewhere.
+pub(super) struct Table<'a> {
+    pub(super) title: &'a str,
+    /// Head of the column of groups; none where the whole dataset is the only one.
+    pub(super) group_head: Option<&'static str>,
+    /// Titles of blocks and how many columns each has left.
+    pub(super) blocks: Vec<(&'static str, usize)>,
+    pub(super) columns: Vec<Column<'a>>,
+    pub(super) groups: Vec<TableGroup<'a>>,
+}
+
+/// A column.
+pub(super) struct Column<'a> {
+    pub(super) block: &'static str,
+    pub(super) metric: &'a Metric,
+    /// Whether any of its values says how sure it is.
+    pub(super) has_errors: bool,
+    key: String,
+}
+
+/// Rows that are held against each other.
+pub(super) struct TableGroup<'a> {
+    pub(super) name: &'a str,
+    /// Methods and their cells.
+    pub(super) rows: Vec<(&'a str, Vec<Cell>)>,
+}
+
+/// One value as it is shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Cell {
+    /// Scaled; none where it is missing.
+    pub(super) value: Option<Value>,
+    /// Whether another method of the group has one; if none has, there was nothing to measure.
+    pub(super) has_rivals: bool,
+    pub(super) digits: usize,
+    pub(super) mark: Mark,
+}
+
+/// How well a value does among those of its group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mark {
+    Best,
+    Second,
+    None,
+}
+
+impl<'a> Table<'a> {
+    /// Fills a layout. Columns without any value are left out, and so are groups; none where nothing is left.
+    pub(super) fn fill(layout: &'a Layout, grouping: Grouping, groups: &'a [Group]) -> Option<Self> {
+        let mut columns: Vec<Column<'a>> = Vec::new();
+        let mut blocks = Vec::new();
+        for block in &layout.blocks {
+            let of_block = block.metrics.iter().filter_map(|metric| {
+                let key = format!("{}.{}", block.key, metric.key);
+                let mut values = groups.iter().flat_map(|g| &g.rows).filter_map(|row| row.values.get(&key)).peekable();
+                values.peek()?;
+                let has_errors = values.any(|value| value.standard_error.is_some());
+                Some(Column { block: block.title, metric, has_errors, key })
+            });
+            let before = columns.len();
+            columns.extend(of_block);
+            if columns.len() > before {
+                blocks.push((block.title, columns.len() - before));
+            }
+        }
+        let filled = groups.iter().filter_map(|group| TableGroup::fill(group, &columns)).collect();
+        let group_head = match grouping {
+            Grouping::Dataset => None,
+            Grouping::Scene => Some("Scene"),
+            Grouping::Category => Some("Category"),
+            Grouping::SuperCategory => Some("Super-category"),
+        };
+        (!columns.is_empty()).then_some(Self { title: &layout.title, group_head, blocks, columns, groups: filled })
+    }
+}
+
+impl<'a> TableGroup<'a> {
+    fn fill(group: &'a Group, columns: &[Column<'_>]) -> Option<Self> {
+        let by_column: Vec<Vec<Cell>> = columns
+            .iter()
+            .map(|column| {
+                let scaled = |value: &Value| Value { value: value.value * column.metric.scale, ..*value };
+                let values: Vec<_> = group.rows.iter().map(|row| row.values.get(&column.key).map(scaled)).collect();
+                marked(&values, column.metric)
+            })
+            .collect();
+        if by_column.iter().flatten().all(|cell| cell.value.is_none()) {
+            return None;
+        }
+        let cells = |row: usize| by_column.iter().map(|column| column[row]).collect();
+        let rows = group.rows.iter().enumerate().map(|(at, row)| (row.method.as_str(), cells(at))).collect();
+        Some(Self { name: &group.name, rows })
+    }
+}
+
+/// Marks the best and the second best value; equal values share a mark, and a value that is alone has none.
+fn marked(values: &[Option<Value>], metric: &Metric) -> Vec<Cell> {
+    let mut distinct: Vec<f64> = values.iter().flatten().map(|value| value.value).collect();
+    let is_contest = distinct.len() > 1;
+    distinct.sort_by(f64::total_cmp);
+    if metric.better == Some(Better::Higher) {
+        distinct.reverse();
+    }
+    distinct.dedup();
+    let mark = |value: f64| match distinct.iter().position(|other| *other == value) {
+        Some(0) if is_contest && metric.better.is_some() => Mark::Best,
+        Some(1) if metric.better.is_some() => Mark::Second,
+        _ => Mark::None,
+    };
+    let cell = |value: &Option<Value>| Cell {
+        value: *value,
+        has_rivals: values.iter().flatten().count() > usize::from(value.is_some()),
+        digits: metric.digits,
+        mark: value.map_or(Mark::None, |value| mark(value.value)),
+    };
+    values.iter().map(cell).collect()
+}
+
+impl Column<'_> {
+    /// Title of block and metric, and an arrow to what is better.
+    pub(super) fn head(&self) -> String {
+        let arrow = match self.metric.better {
+            Some(Better::Lower) => " ↓",
+            Some(Better::Higher) => " ↑",
+            None => "",
+        };
+        format!("{} {}{arrow}", self.block, self.metric.title)
+    }
+}
+
+impl Cell {
+    /// The rounded value between the marks, and its standard error behind `plus_minus`.
+    pub(super) fn text(&self, best: (&str, &str), second: (&str, &str), plus_minus: &str) -> String {
+        let Some(Value { value, standard_error }) = self.value else {
+            return if self.has_rivals { "missing" } else { "-" }.to_owned();
+        };
+        let digits = self.digits;
+        let (before, after) = match self.mark {
+            Mark::Best => best,
+            Mark::Second => second,
+            Mark::None => ("", ""),
+        };
+        let error = standard_error.map_or_else(String::new, |error| format!(" {plus_minus} {error:.digits$}"));
+        format!("{before}{value:.digits$}{after}{error}")
+    }
+}

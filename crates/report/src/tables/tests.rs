@@ -1,0 +1,230 @@
+use std::collections::BTreeMap;
+
+use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::{InstanceId, SceneId};
+
+use super::*;
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::{InstancePixelErrors, NoiseState, ProtocolResult, PsnrNoise, SubmissionId};
+
+fn scene(name: &str) -> SceneId {
+    SceneId::new(name).unwrap()
+}
+
+fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
+    let summary: BTreeMap<String, f64> = summary.iter().map(|(key, value)| ((*key).to_owned(), *value)).collect();
+    let key = "rgb_true.input.psnr";
+    let summary_noise = summary.keys().filter(|other| *other == key).map(|key| (key.clone(), 0.016)).collect();
+    let noise = PsnrNoise {
+        standard_error_db: Some(0.25),
+        own_db: None,
+        truth_db: None,
+        samples: 16,
+        state: NoiseState::Certified,
+    };
+    let scores = ProtocolResult {
+        protocol: Protocol::named("paper").unwrap(),
+        fingerprint: "f".to_owned(),
+        scenes: BTreeMap::from([(scene("b"), summary.clone()), (scene("a"), BTreeMap::new())]),
+        noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key.to_owned(), noise)]))]),
+        summary,
+        summary_noise,
+        fits: BTreeMap::new(),
+        pictures: Vec::new(),
+        texels: Vec::new(),
+        instances: Vec::new(),
+    };
+    ResultFile {
+        format: RESULT_FORMAT.to_owned(),
+        tool: String::new(),
+        method: method.to_owned(),
+        submission: SubmissionId {
+            sha256: String::new(),
+            description: String::new(),
+            url: None,
+            licence: None,
+            cost: None,
+        },
+        dataset: DatasetId {
+            name: String::new(),
+            version: String::new(),
+            manifest_sha256: String::new(),
+            scenes: vec![scene("b"), scene("a")],
+            scenes_in_all: 2,
+            houses: BTreeMap::new(),
+            scored_renderer: None,
+        },
+        lpips_weights: BTreeMap::new(),
+        protocols: BTreeMap::from([("paper".to_owned(), scores)]),
+        missing: Vec::new(),
+        findings: Vec::new(),
+    }
+}
+
+/// Three methods; the second has no SSIM, none has LPIPS.
+fn three() -> [ResultFile; 3] {
+    let of = |method, psnr: f64, rest: &[(&str, f64)]| {
+        let light = [("rgb_true.input.psnr", psnr), ("rgb_true.novel.mse", 1.0 / psnr)];
+        result(method, &[&light[..], rest].concat())
+    };
+    let ssim = |value| [("rgb_true.input.ssim", value)];
+    [of("a|1", 10.0, &ssim(0.5)), of("b_2", 40.0, &[]), of("c\"3", 20.0, &ssim(0.5))]
+}
+
+fn shown(results: &[ResultFile], grouping: Grouping, format: TableFormat) -> String {
+    tables(results, "paper", grouping, format).unwrap()
+}
+
+#[test]
+fn markdown_by_the_byte() {
+    let expected = "\
+### RGB, true light
+
+| Method | Input view PSNR ↑ | Input view SSIM ↑ | Novel views MSE (1e-3) ↓ |
+|---|---:|---:|---:|
+| a\\|1 | 10.00 ± 0.02 | **0.5000** | 100.000 |
+| b_2 | **40.00** ± 0.02 | missing | **25.000** |
+| c\"3 | <u>20.00</u> ± 0.02 | **0.5000** | <u>50.000</u> |
+
+";
+    assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Markdown), expected);
+}
+
+#[test]
+fn latex_by_the_byte() {
+    let expected = r#"% RGB, true light
+\begin{tabular}{lrrr}
+\toprule
+& \multicolumn{2}{c}{Input view} & \multicolumn{1}{c}{Novel views} \\
+Method & PSNR $\uparrow$ & SSIM $\uparrow$ & MSE ($10^{-3}$) $\downarrow$ \\
+\midrule
+a|1 & 10.00 $\pm$ 0.02 & \textbf{0.5000} & 100.000 \\
+b\_2 & \textbf{40.00} $\pm$ 0.02 & missing & \textbf{25.000} \\
+c"3 & \underline{20.00} $\pm$ 0.02 & \textbf{0.5000} & \underline{50.000} \\
+\bottomrule
+\end{tabular}
+
+"#;
+    assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Latex), expected);
+}
+
+#[test]
+fn csv_by_the_byte() {
+    let expected = "\
+\"RGB, true light\",\"Input view PSNR ↑\",\"Input view PSNR standard error\",\"Input view SSIM ↑\",\"Novel views MSE (1e-3) ↓\"
+\"a|1\",10,0.016,0.5,100
+\"b_2\",40,0.016,,25
+\"c\"\"3\",20,0.016,0.5,50
+
+";
+    assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Csv), expected);
+}
+
+/// Scene a has no values and is left out; a scene's noise is its own.
+#[test]
+fn by_scene_in_the_datasets_order() {
+    let markdown = shown(&three(), Grouping::Scene, TableFormat::Markdown);
+    assert!(markdown.contains("| Scene | Method | Input view PSNR ↑"), "{markdown}");
+    assert!(markdown.contains("| b | b_2 | **40.00** ± 0.25 | missing | **25.000** |"), "{markdown}");
+    assert!(!markdown.contains("| a | "), "{markdown}");
+    let latex = shown(&three(), Grouping::Scene, TableFormat::Latex);
+    assert!(latex.contains("{llrrr}\n\\toprule\n&  & \\multicolumn{2}"), "{latex}");
+    assert!(latex.contains("\\midrule\nb & a|1 & 10.00 $\\pm$ 0.25"), "{latex}");
+}
+
+/// The paper's four come first, in its order; columns without values are not there, tables without columns neither.
+#[test]
+fn papers_tables_then_ours() {
+    let keys = ["rgb_fitted.novel", "albedo_aligned.unobserved", "albedo.novel", "albedo.input", "roughness.input"];
+    let ours = ["texture_base_color.observed", "rgb_relit.input", "albedo_specular.input"];
+    let values: Vec<(String, f64)> = keys.iter().chain(&ours).map(|key| (format!("{key}.mse"), 0.01)).collect();
+    let values: Vec<(&str, f64)> = values.iter().map(|(key, value)| (key.as_str(), *value)).collect();
+    let markdown = shown(&[result("a", &values)], Grouping::Dataset, TableFormat::Markdown);
+    let titles: Vec<&str> = markdown.lines().filter_map(|line| line.strip_prefix("### ")).collect();
+    let expected = [
+        "RGB, fitted light",
+        "Albedo, input view",
+        "Albedo, novel views",
+        "Aligned albedo, unobserved regions",
+        "RGB, relit",
+        "Roughness and metallic, input view",
+        "Base colour, texture space",
+        "Albedo, input view, specular regions only",
+    ];
+    assert_eq!(titles, expected);
+    // A value without rivals is not the best of any.
+    assert!(!markdown.contains("**") && !markdown.contains("missing"), "{markdown}");
+}
+
+fn errors(of: &str, category: Option<&str>, picture: &str, pixels: usize, mse: f64) -> InstancePixelErrors {
+    InstancePixelErrors {
+        scene: scene(of),
+        instance: InstanceId::new("i").unwrap(),
+        category: category.map(str::to_owned),
+        super_category: category.map(|_| "Seat".to_owned()),
+        picture: picture.to_owned(),
+        views: "input".to_owned(),
+        pixels,
+        mse,
+    }
+}
+
+fn with_instances() -> ResultFile {
+    let mut result = result("m", &[]);
+    result.protocols.get_mut("paper").unwrap().instances = vec![
+        errors("a", Some("Sofa"), "albedo", 100, 0.04),
+        errors("b", Some("Sofa"), "albedo", 300, 0.0),
+        errors("b", Some("Zebra"), "albedo", 600, 0.11),
+        errors("b", None, "albedo", 10, 0.1),
+        errors("b", None, "rgb_true", 10, -1e-6),
+    ];
+    result
+}
+
+/// (100 * 0.04 + 300 * 0) / 400 = 0.01, which is 20 dB; with 600 * 0.11 it is 70 / 1000.
+#[test]
+fn pools_by_pixels_over_scenes() {
+    let markdown = shown(&[with_instances()], Grouping::Category, TableFormat::Markdown);
+    assert!(markdown.contains("| Category | Method | Input view Pixels | Input view MSE (1e-3) ↓ |"), "{markdown}");
+    assert!(markdown.contains("| Sofa | m | 400 | 10.000 | 20.00 |\n| Zebra | m | 600 | 110.000"), "{markdown}");
+    assert!(markdown.contains("\n| other | m | 10 | 100.000 | 10.00 |"), "{markdown}");
+    let csv = shown(&[with_instances()], Grouping::SuperCategory, TableFormat::Csv);
+    assert!(csv.contains("\"Seat\",\"m\",1000,70,11.54901959985743"), "{csv}");
+}
+
+/// An error freed of noise that is below 0 has no PSNR.
+#[test]
+fn pooled_noise_has_no_psnr() {
+    let markdown = shown(&[with_instances()], Grouping::Category, TableFormat::Markdown);
+    let light = markdown.split("### RGB, true light").nth(1).unwrap();
+    assert!(light.contains("| other | m | 10 | -0.001 |\n"), "{light}");
+}
+
+/// What some method has is missing of another; of what nobody has there was nothing to measure.
+#[test]
+fn missing_or_nothing_to_measure() {
+    let mut both = [with_instances(), with_instances()];
+    both[0].protocols.get_mut("paper").unwrap().instances.push(errors("b", None, "albedo", 10, 0.1));
+    both[1].protocols.get_mut("paper").unwrap().instances.retain(|errors| errors.category.is_some());
+    both.iter_mut().for_each(|result| {
+        let scores = result.protocols.get_mut("paper").unwrap();
+        scores
+            .instances
+            .push(InstancePixelErrors { views: "novel".to_owned(), ..errors("b", Some("Sofa"), "albedo", 1, 0.1) });
+    });
+    let markdown = shown(&both, Grouping::Category, TableFormat::Markdown);
+    assert!(markdown.contains("| other | m | missing | missing | missing | - | - | - |"), "{markdown}");
+}
+
+#[test]
+fn fingerprints_are_not_mixed() {
+    let mut other = result("b", &[]);
+    other.protocols.get_mut("paper").unwrap().fingerprint = "g".to_owned();
+    let csv = |results: &[ResultFile], protocol| tables(results, protocol, Grouping::Dataset, TableFormat::Csv);
+    let error = csv(&[result("a", &[]), other], "paper").unwrap_err();
+    assert!(error.to_string().contains("different fingerprints"));
+    let error = csv(&[result("a", &[])], "mateval-1").unwrap_err();
+    assert!(error.to_string().contains("--protocol mateval-1"));
+    let error = csv(&[result("a", &[])], "paper").unwrap_err();
+    assert!(error.to_string().contains("nothing under protocol 'paper'"));
+}

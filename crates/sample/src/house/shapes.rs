@@ -1,0 +1,254 @@
+//! Shapes of the house's furniture, in metres, y up, front towards +z, about the middle of the footprint on the floor.
+//!
+//! A shape is a list of parts: the field of the model's picture that covers one, and its solid.
+
+use glam::{DVec2, DVec3};
+
+use crate::furniture;
+use crate::solid::Solid;
+
+/// Fields of a model's picture and what they cover.
+pub(super) type Parts = Vec<(usize, Solid)>;
+
+fn v(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+fn boxed(low: DVec3, high: DVec3) -> Solid {
+    Solid::default().boxed(low, high, 1.0)
+}
+
+fn cushion(low: DVec3, high: DVec3, radius: f64) -> Solid {
+    Solid::default().cushion(low, high, radius, 1.0)
+}
+
+fn turned(profile: &[(f64, f64)]) -> Solid {
+    Solid::default().turned(DVec3::ZERO, profile, 20, 1.0)
+}
+
+/// A rectangle that shows a field of letters from edge to edge.
+fn label(corner: DVec3, right: DVec3, up: DVec3) -> Solid {
+    Solid::default().rectangle(corner, right, up, DVec2::new(right.length(), up.length()))
+}
+
+/// Four legs `wide` across that reach up to `top`, in the corners of a footprint of half size `x`, `z`.
+fn legs(x: f64, z: f64, wide: f64, top: f64) -> Solid {
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].into_iter().fold(Solid::default(), |legs, (sx, sz)| {
+        let middle = v(sx * (x - wide / 2.0), top / 2.0, sz * (z - wide / 2.0));
+        let half = v(wide / 2.0, top / 2.0, wide / 2.0);
+        legs.boxed(middle - half, middle + half, 1.0)
+    })
+}
+
+/// 2.4 m wide; the long seat is on the right of who sits in it looking at +z, that is on the side of +x.
+pub(super) fn l_sofa() -> Parts {
+    let feet = [(-1.15, -0.72), (1.15, -0.72), (1.15, 0.72), (0.35, 0.72), (-1.15, 0.07)];
+    let feet = feet
+        .into_iter()
+        .fold(Solid::default(), |feet, (x, z)| feet.boxed(v(x - 0.03, 0.0, z - 0.03), v(x + 0.03, 0.1, z + 0.03), 1.0));
+    let base = boxed(v(-1.19, 0.1, -0.765), v(0.3, 0.26, 0.115)).boxed(v(0.3, 0.1, -0.765), v(1.19, 0.26, 0.765), 1.0);
+    vec![
+        (1, feet),
+        (0, base),
+        (0, cushion(v(-1.2, 0.1, -0.775), v(-1.02, 0.6, 0.125), 0.05)),
+        (0, cushion(v(-1.02, 0.1, -0.775), v(1.2, 0.8, -0.55), 0.07)),
+        (0, cushion(v(-1.015, 0.25, -0.55), v(-0.36, 0.44, 0.12), 0.05)),
+        (0, cushion(v(-0.355, 0.25, -0.55), v(0.3, 0.44, 0.12), 0.05)),
+        (0, cushion(v(0.305, 0.25, -0.55), v(1.195, 0.44, 0.775), 0.05)),
+        (2, cushion(v(-0.9, 0.44, -0.55), v(-0.45, 0.84, -0.42), 0.05)),
+        (3, label(v(-0.85, 0.49, -0.418), v(0.35, 0.0, 0.0), v(0.0, 0.3, 0.0))),
+    ]
+}
+
+/// 0.8 m wide and deep.
+pub(super) fn armchair() -> Parts {
+    vec![
+        (1, legs(0.36, 0.36, 0.05, 0.12)),
+        (0, boxed(v(-0.38, 0.12, -0.38), v(0.38, 0.26, 0.36))),
+        (0, cushion(v(-0.4, 0.12, -0.4), v(-0.26, 0.58, 0.4), 0.05)),
+        (0, cushion(v(0.26, 0.12, -0.4), v(0.4, 0.58, 0.4), 0.05)),
+        (0, cushion(v(-0.26, 0.12, -0.4), v(0.26, 0.88, -0.22), 0.06)),
+        (0, cushion(v(-0.255, 0.25, -0.22), v(0.255, 0.44, 0.38), 0.05)),
+    ]
+}
+
+/// 1.1 m by 0.6 m.
+pub(super) fn coffee_table() -> Parts {
+    vec![(0, furniture::table())]
+}
+
+/// 1.6 m wide, with three compartments.
+pub(super) fn tv_stand() -> Parts {
+    let mut doors = Solid::default();
+    for x in [-0.78, -0.25, 0.28] {
+        doors = doors.boxed(v(x, 0.12, 0.18), v(x + 0.5, 0.42, 0.2), 1.0);
+    }
+    vec![
+        (1, legs(0.76, 0.16, 0.04, 0.1)),
+        (0, boxed(v(-0.8, 0.1, -0.2), v(0.8, 0.44, 0.18))),
+        (0, boxed(v(-0.8, 0.44, -0.2), v(0.8, 0.47, 0.2))),
+        (2, doors),
+    ]
+}
+
+/// 1.6 m by 0.9 m.
+pub(super) fn dining_table() -> Parts {
+    let apron = boxed(v(-0.74, 0.64, -0.39), v(0.74, 0.71, 0.39));
+    vec![(0, boxed(v(-0.8, 0.71, -0.45), v(0.8, 0.75, 0.45))), (0, apron), (0, legs(0.76, 0.41, 0.07, 0.71))]
+}
+
+/// 0.45 m wide.
+pub(super) fn dining_chair() -> Parts {
+    let back =
+        boxed(v(-0.22, 0.46, -0.25), v(-0.18, 0.92, -0.21)).boxed(v(0.18, 0.46, -0.25), v(0.22, 0.92, -0.21), 1.0);
+    vec![
+        (0, legs(0.225, 0.25, 0.04, 0.43)),
+        (0, back.boxed(v(-0.18, 0.72, -0.245), v(0.18, 0.9, -0.215), 1.0)),
+        (1, cushion(v(-0.225, 0.42, -0.25), v(0.225, 0.48, 0.25), 0.025)),
+    ]
+}
+
+/// Hangs 0.95 m down from where its upper side is fixed.
+pub(super) fn pendant_lamp() -> Parts {
+    let shade = [(0.26, 0.0), (0.24, 0.08), (0.16, 0.18), (0.04, 0.24), (0.0, 0.24)];
+    let bulb = [(0.0, 0.06), (0.03, 0.07), (0.045, 0.1), (0.03, 0.14), (0.0, 0.15)];
+    vec![
+        (0, turned(&shade)),
+        (1, turned(&[(0.0, 0.93), (0.06, 0.93), (0.06, 0.95), (0.0, 0.95)])),
+        (1, boxed(v(-0.004, 0.24, -0.004), v(0.004, 0.93, 0.004))),
+        (2, turned(&bulb)),
+    ]
+}
+
+/// 1.64 m high.
+pub(super) fn floor_lamp() -> Parts {
+    vec![(1, furniture::lamp_stand()), (0, furniture::lamp_shade())]
+}
+
+/// A base and a dome of glass below it, 0.15 m high.
+pub(super) fn ceiling_lamp() -> Parts {
+    let dome = [(0.0, 0.0), (0.12, 0.01), (0.22, 0.04), (0.28, 0.09), (0.28, 0.12)];
+    vec![(0, turned(&[(0.0, 0.11), (0.3, 0.11), (0.3, 0.15), (0.0, 0.15)])), (1, turned(&dome))]
+}
+
+/// 0.9 m by 0.65 m, to be hung on a wall behind it.
+pub(super) fn picture() -> Parts {
+    let mut bars = furniture::frame(DVec2::new(0.8, 0.55), 0.05, -0.02, 0.02);
+    bars.positions.iter_mut().for_each(|p| *p += v(-0.4, 0.05, 0.0));
+    vec![
+        (1, bars),
+        (1, boxed(v(-0.4, 0.05, -0.02), v(0.4, 0.6, 0.0))),
+        (0, label(v(-0.4, 0.05, 0.004), v(0.8, 0.0, 0.0), v(0.0, 0.55, 0.0))),
+    ]
+}
+
+/// For two, 1.9 m wide and 2.15 m long, the head towards -z.
+pub(super) fn bed() -> Parts {
+    vec![
+        (0, boxed(v(-0.95, 0.0, -1.075), v(0.95, 1.1, -0.995))),
+        (0, legs(0.9, 1.06, 0.06, 0.1)),
+        (0, boxed(v(-0.92, 0.1, -0.995), v(0.92, 0.3, 1.075))),
+        (2, cushion(v(-0.9, 0.3, -0.99), v(0.9, 0.52, 1.05), 0.05)),
+        (1, cushion(v(-0.95, 0.36, -0.35), v(0.95, 0.56, 1.07), 0.04)),
+        (2, cushion(v(-0.8, 0.51, -0.96), v(-0.1, 0.66, -0.5), 0.07)),
+        (2, cushion(v(0.1, 0.51, -0.96), v(0.8, 0.66, -0.5), 0.07)),
+        (3, label(v(-0.6, 0.562, 0.85), v(1.2, 0.0, 0.0), v(0.0, 0.0, -0.8))),
+    ]
+}
+
+/// 0.5 m wide, with two drawers.
+pub(super) fn nightstand() -> Parts {
+    let drawer = |y: f64| boxed(v(-0.22, y, 0.18), v(0.22, y + 0.17, 0.195));
+    vec![
+        (0, legs(0.24, 0.18, 0.03, 0.1)),
+        (0, boxed(v(-0.25, 0.1, -0.2), v(0.25, 0.5, 0.18))),
+        (1, drawer(0.12)),
+        (1, drawer(0.31)),
+        (2, boxed(v(-0.05, 0.195, 0.195), v(0.05, 0.21, 0.2)).boxed(v(-0.05, 0.385, 0.195), v(0.05, 0.4, 0.2), 1.0)),
+    ]
+}
+
+/// 1.8 m wide, 2.2 m high, with three doors.
+pub(super) fn wardrobe() -> Parts {
+    let (mut doors, mut handles) = (Solid::default(), Solid::default());
+    for x in [-0.895, -0.295, 0.305] {
+        doors = doors.boxed(v(x, 0.1, 0.27), v(x + 0.59, 2.18, 0.29), 1.0);
+        handles = handles.boxed(v(x + 0.5, 0.95, 0.29), v(x + 0.52, 1.2, 0.3), 1.0);
+    }
+    vec![(0, boxed(v(-0.9, 0.0, -0.3), v(0.9, 2.2, 0.27))), (1, doors), (2, handles)]
+}
+
+/// 1.2 m wide, with a cushion on it.
+pub(super) fn bed_end_stool() -> Parts {
+    vec![
+        (1, legs(0.58, 0.18, 0.05, 0.3)),
+        (1, boxed(v(-0.59, 0.28, -0.19), v(0.59, 0.33, 0.19))),
+        (0, cushion(v(-0.6, 0.32, -0.2), v(0.6, 0.45, 0.2), 0.05)),
+    ]
+}
+
+/// 1 m wide, 2 m high, with books.
+pub(super) fn bookcase() -> Parts {
+    let mut case = boxed(v(-0.5, 0.0, -0.16), v(0.5, 2.0, -0.15))
+        .boxed(v(-0.5, 0.0, -0.15), v(-0.475, 2.0, 0.16), 1.0)
+        .boxed(v(0.475, 0.0, -0.15), v(0.5, 2.0, 0.16), 1.0);
+    let mut books = [Solid::default(), Solid::default()];
+    for level in 0..5 {
+        let y = 0.05 + 0.39 * f64::from(level);
+        case = case.boxed(v(-0.475, y, -0.15), v(0.475, y + 0.025, 0.155), 1.0);
+        for book in 0..(4 + level) {
+            let x = -0.46 + 0.06 * f64::from(book);
+            let high = 0.22 + 0.02 * f64::from((book * 3 + level) % 5);
+            let pile = &mut books[usize::from((book + level) % 2 == 0)];
+            *pile = std::mem::take(pile).boxed(v(x, y + 0.025, -0.1), v(x + 0.05, y + 0.025 + high, 0.1), 1.0);
+        }
+    }
+    let [first, second] = books;
+    vec![(0, case.boxed(v(-0.475, 1.975, -0.15), v(0.475, 2.0, 0.155), 1.0)), (1, first), (2, second)]
+}
+
+/// 0.9 m wide, with three drawers and letters on the lowest.
+pub(super) fn chest() -> Parts {
+    let drawer = |y: f64| boxed(v(-0.42, y, 0.2), v(0.42, y + 0.22, 0.22));
+    vec![
+        (0, boxed(v(-0.45, 0.0, -0.225), v(0.45, 0.8, 0.2))),
+        (1, drawer(0.04)),
+        (1, drawer(0.29)),
+        (1, drawer(0.54)),
+        (2, label(v(-0.3, 0.08, 0.225), v(0.6, 0.0, 0.0), v(0.0, 0.14, 0.0))),
+    ]
+}
+
+/// 1.2 m wide, open, 0.8 m high, on a patch of shadow 6 m wide.
+pub(super) fn shelf() -> Parts {
+    vec![(0, furniture::shelf()), (1, label(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0)))]
+}
+
+/// A round top on one leg.
+pub(super) fn side_table() -> Parts {
+    let foot = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.02), (0.03, 0.04), (0.025, 0.5), (0.0, 0.5)];
+    vec![
+        (1, turned(&foot)),
+        (0, turned(&[(0.0, 0.5), (0.3, 0.5), (0.3, 0.525), (0.0, 0.525)])),
+        (0, boxed(v(-0.12, 0.525, -0.08), v(0.12, 0.555, 0.08))),
+    ]
+}
+
+/// 0.6 m wide, low, leaning back.
+pub(super) fn lounge_chair() -> Parts {
+    vec![
+        (1, legs(0.28, 0.3, 0.04, 0.34)),
+        (0, cushion(v(-0.3, 0.32, -0.3), v(0.3, 0.42, 0.325), 0.04)),
+        (0, cushion(v(-0.28, 0.4, -0.325), v(0.28, 0.82, -0.22), 0.04)),
+    ]
+}
+
+/// 0.4 m wide.
+pub(super) fn stool() -> Parts {
+    vec![(1, legs(0.18, 0.18, 0.04, 0.4)), (0, cushion(v(-0.2, 0.38, -0.2), v(0.2, 0.45, 0.2), 0.03))]
+}
+
+/// Half a metre each way.
+pub(super) fn crate_box() -> Parts {
+    vec![(0, boxed(v(-0.25, 0.0, -0.25), v(0.25, 0.5, 0.25)))]
+}

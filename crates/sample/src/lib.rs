@@ -1,0 +1,182 @@
+//! A small room and a house that the program makes itself, under CC0: what one can try everything on without a download.
+//!
+//! In: a folder. Out: in it `recipe.toml`; `room/`, a Mitsuba scene as Bitterli's are: `scene.xml`, OBJ files, textures,
+//! `LICENSE.txt`; and `house/`, three rooms in the layout of 3D-FRONT and 3D-FUTURE, with their faults. The bytes are the
+//! same on every machine.
+//!
+//! Between: `solid` builds meshes, `furniture` makes things of them, `pattern` paints the textures, `room` says what
+//! stands where and writes it as XML. `house` uses the first three.
+
+mod error;
+mod furniture;
+pub mod house;
+mod pattern;
+mod room;
+mod solid;
+
+use std::path::Path;
+
+use mateval_image::png_io::write_rgb_bytes;
+
+pub use error::SampleError;
+
+/// CC0 1.0, and what it covers.
+const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
+This scene was released under a CC0 license and is in the public domain.\n\
+It may be copied, modified and used commercially, without permission or\n\
+attribution.\n\n\
+For more information about the license, please see\n\
+https://creativecommons.org/publicdomain/zero/1.0/\n";
+
+/// One scene of each source.
+const RECIPE: &str = r#"name = "sample"
+resolution = [320, 240]
+
+[[scene]]
+id = "living"
+camera = { designer = 0 }
+
+[scene.front3d]
+house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json"
+room = "LivingDiningRoom-101"
+models = "house/3D-FUTURE-model"
+textures = "house/3D-FRONT-texture"
+
+[[scene]]
+id = "room"
+bitterli = "room/scene.xml"
+"#;
+
+/// Writes the sample into the folder `out`, which is made if it is not there; files of the same name are replaced.
+pub fn write(out: &Path) -> Result<(), SampleError> {
+    write_room(out)?;
+    house::write(out)?;
+    // The recipe comes last: where it is, the sample is whole.
+    write_text(&out.join("recipe.toml"), RECIPE)
+}
+
+fn write_room(out: &Path) -> Result<(), SampleError> {
+    let room = out.join("room");
+    for folder in ["models", "textures"] {
+        let path = room.join(folder);
+        std::fs::create_dir_all(&path).map_err(SampleError::io("create", &path))?;
+    }
+    for (name, picture) in pattern::all() {
+        write_rgb_bytes(&room.join("textures").join(format!("{name}.png")), &picture)?;
+    }
+    for item in room::items() {
+        write_text(&room.join("models").join(format!("{}.obj", item.name)), &item.solid.to_obj())?;
+    }
+    write_text(&room.join("LICENSE.txt"), LICENSE)?;
+    write_text(&room.join("scene.xml"), &room::xml())
+}
+
+fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
+    std::fs::write(path, text).map_err(SampleError::io("write", path))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use mateval_scene::Severity;
+    use mateval_scene::material::{ConductorIor, MaterialModel};
+    use mateval_scene::reference::Emission;
+
+    use super::*;
+    use mateval_sources::bitterli::{self, BitterliScene, Limits};
+
+    fn sample() -> BitterliScene {
+        let folder = tempfile::tempdir().unwrap();
+        write_room(folder.path()).unwrap();
+        bitterli::read(&folder.path().join("room/scene.xml"), &Limits::default()).unwrap()
+    }
+
+    #[test]
+    fn it_reads_back_without_a_warning() {
+        let room = sample();
+        let warnings: Vec<_> = room.findings.iter().filter(|f| f.severity != Severity::Note).collect();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!(room.title, "'The Sample Room' by the MatEval authors");
+        assert_eq!((room.camera.intrinsics.width, room.camera.intrinsics.height), (320, 240));
+    }
+
+    #[test]
+    fn it_holds_what_it_is_for_and_stays_small() {
+        let BitterliScene { scene, .. } = sample();
+        let triangles: usize = scene.surfaces.iter().map(|s| s.mesh.triangles.len()).sum();
+        assert!((500..5000).contains(&triangles), "{triangles}");
+        let models: Vec<_> = scene.materials.iter().map(|m| m.model).collect();
+        let mirror = |m: &MaterialModel| matches!(m, MaterialModel::Conductor { ior: ConductorIor::PerfectMirror, .. });
+        assert!(models.iter().any(mirror));
+        assert!(models.iter().any(|m| matches!(m, MaterialModel::ThinDielectric { .. })));
+        assert!(models.iter().any(|m| matches!(m, MaterialModel::Conductor { microfacets: Some(_), .. })));
+        let kinds = |wanted: fn(&Emission) -> bool| scene.lights.iter().filter(|light| wanted(&light.emission)).count();
+        assert_eq!(kinds(|e| matches!(e, Emission::Area { .. })), 2);
+        assert_eq!(kinds(|e| matches!(e, Emission::Environment { .. })), 1);
+    }
+
+    /// The middle of the mirror and of the window are in the picture.
+    #[test]
+    fn mirror_and_window_are_in_view() {
+        let room = sample();
+        for name in ["mirror", "window_glass", "table", "sofa", "shelf", "rug", "lamp_stand"] {
+            let surface = room.scene.surfaces.iter().find(|s| s.name == name).unwrap();
+            let sum: glam::Vec3 = surface.mesh.positions.iter().sum();
+            let middle = (sum / surface.mesh.positions.len() as f32).as_dvec3();
+            let (pixel, _) = room.camera.project(middle).unwrap();
+            assert!(room.camera.holds(pixel), "{name} {pixel}");
+        }
+    }
+
+    /// Faces look into the room or out of their thing: the floor up, the ceiling down.
+    #[test]
+    fn floor_and_ceiling_face_the_room() {
+        let room = sample();
+        for (name, up) in [("floor", 1.0), ("ceiling", -1.0), ("ceiling_light", -1.0)] {
+            let mesh = &room.scene.surfaces.iter().find(|s| s.name == name).unwrap().mesh;
+            let [a, b, c] = mesh.corners(0);
+            assert_eq!((b - a).cross(c - a).normalize().y.round(), up, "{name}");
+        }
+    }
+
+    #[test]
+    fn every_run_writes_the_same_bytes() {
+        let files = || {
+            let folder = tempfile::tempdir().unwrap();
+            write_room(folder.path()).unwrap();
+            let mut files = BTreeMap::new();
+            for part in ["room", "room/models", "room/textures"] {
+                for entry in std::fs::read_dir(folder.path().join(part)).unwrap() {
+                    let path = entry.unwrap().path();
+                    if path.is_file() {
+                        files.insert(
+                            path.strip_prefix(folder.path()).unwrap().to_owned(),
+                            std::fs::read(&path).unwrap(),
+                        );
+                    }
+                }
+            }
+            files
+        };
+        let first = files();
+        assert!(first.len() > 25, "{}", first.len());
+        assert_eq!(first, files());
+    }
+
+    /// One hash over what was drawn and built, so that a change of any platform's arithmetic shows.
+    #[test]
+    fn the_bytes_are_these() {
+        use sha2::{Digest as _, Sha256};
+        let mut hash = Sha256::new();
+        for (_, picture) in pattern::all() {
+            picture.pixels().iter().for_each(|pixel| hash.update(pixel));
+        }
+        for item in room::items() {
+            hash.update(item.solid.to_obj());
+        }
+        hash.update(room::xml());
+        let hex: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!(hex, "777a39359a062564d3e311817f14b1f2d3cefea7e69dd971ea1162ade6141195");
+    }
+}

@@ -1,0 +1,48 @@
+//! Which dataset, and which of its scenes, a result or a report of lint is about.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::dataset::SceneFile;
+use crate::open::Dataset;
+use crate::{RendererId, SceneId};
+
+/// What it was scored on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DatasetId {
+    /// Its name.
+    pub name: String,
+    /// Its version.
+    pub version: String,
+    /// SHA-256 of its manifest, hex.
+    pub manifest_sha256: String,
+    /// The scenes that were scored, in the dataset's order.
+    pub scenes: Vec<SceneId>,
+    /// How many scenes it has.
+    pub scenes_in_all: usize,
+    /// The house of each scored scene: rankings draw scenes of one house together.
+    #[serde(default)]
+    pub houses: BTreeMap<SceneId, String>,
+    /// The renderer whose pictures light was compared with; null where there were none.
+    #[serde(default)]
+    pub scored_renderer: Option<RendererId>,
+}
+
+impl DatasetId {
+    /// Of a dataset of which `scenes` are looked at.
+    pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
+        let scenes: Vec<&SceneFile> = scenes.into_iter().collect();
+        Self {
+            name: dataset.file.name.clone(),
+            version: dataset.file.version.clone(),
+            manifest_sha256: dataset.file.manifest_sha256.clone(),
+            scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
+            scenes_in_all: dataset.scenes.len(),
+            houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
+            scored_renderer: dataset.file.scored_renderer.clone(),
+        }
+    }
+}

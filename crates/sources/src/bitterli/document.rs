@@ -1,0 +1,375 @@
+//! The XML as a tree of plain elements: variables put in, names in snake_case, depth and size checked first.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::limits::Limits;
+use crate::SourceError;
+use crate::log::Log;
+use mateval_scene::findings::shortened;
+
+/// One XML element.
+#[derive(Debug)]
+pub(super) struct Element {
+    /// Its tag; every spelling of `lookat` is `lookat`.
+    pub(super) tag: String,
+    /// Its line, from 1.
+    pub(super) line: usize,
+    /// Its number in the document; tells elements apart.
+    pub(super) serial: usize,
+    attributes: Vec<(String, String)>,
+    /// What it contains, `<default>`s left out.
+    pub(super) children: Vec<Element>,
+}
+
+impl Element {
+    /// An attribute's value.
+    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+
+    /// The plugin's kind, as in `roughplastic`; empty where none is given.
+    pub(super) fn kind(&self) -> &str {
+        self.attribute("type").unwrap_or("")
+    }
+
+    /// The parameter's name in snake_case; empty where none is given.
+    pub(super) fn name(&self) -> &str {
+        self.attribute("name").unwrap_or("")
+    }
+
+    /// The element for a finding's place: `bsdf 'Wood'`, or `line 12` where it has no id.
+    pub(super) fn place(&self) -> String {
+        match self.attribute("id") {
+            Some(id) => format!("{} '{}'", self.tag, shortened(id)),
+            None => format!("line {}", self.line),
+        }
+    }
+}
+
+/// The whole scene file.
+#[derive(Debug)]
+pub(super) struct Document {
+    /// The `<scene>`.
+    pub(super) root: Element,
+    /// First number of the scene's version: 0 for Mitsuba 0.5 and 0.6, 3 for Mitsuba 3.
+    pub(super) major_version: u32,
+}
+
+/// Elements by their id, aliases included.
+pub(super) type Ids<'a> = BTreeMap<&'a str, &'a Element>;
+
+impl Document {
+    /// Reads the XML `text` of `path`. Fails where it is not a sound `<scene>` or breaks a limit.
+    pub(super) fn parse(path: &Path, text: &str, limits: &Limits, log: &mut Log) -> Result<Self, SourceError> {
+        let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
+        check_depth(text, limits.xml_depth).map_err(invalid)?;
+        let xml = roxmltree::Document::parse(text).map_err(|error| invalid(format!("not sound XML: {error}")))?;
+        let mut builder = Builder::new(text, limits, log);
+        let root = builder.element(xml.root_element(), 0).map_err(invalid)?;
+        if root.tag != "scene" {
+            let found = shortened(&root.tag);
+            return Err(invalid(format!("expected a Mitsuba scene, so the root element <scene>, found <{found}>")));
+        }
+        let major_version = major_version(&root, log);
+        Ok(Self { root, major_version })
+    }
+
+    /// Every element that has an id; the first of equal ones.
+    pub(super) fn ids<'a>(&'a self, log: &mut Log) -> Ids<'a> {
+        let mut ids = Ids::new();
+        let mut aliases = Vec::new();
+        collect_ids(&self.root, &mut ids, &mut aliases, log);
+        for (id, new, element) in aliases {
+            match ids.get(id).copied() {
+                Some(target) => drop(ids.entry(new).or_insert(target)),
+                None => log.warn("unknown_id", &element.place(), format!("no element '{}'", shortened(id)), "ignored"),
+            }
+        }
+        ids
+    }
+}
+
+fn collect_ids<'a>(
+    element: &'a Element,
+    ids: &mut Ids<'a>,
+    aliases: &mut Vec<(&'a str, &'a str, &'a Element)>,
+    log: &mut Log,
+) {
+    match (element.tag.as_str(), element.attribute("id"), element.attribute("as")) {
+        ("ref", ..) | (_, None, _) => {}
+        ("alias", Some(id), new) => aliases.extend(new.map(|new| (id, new, element))),
+        (_, Some(id), _) => {
+            if ids.contains_key(id) {
+                let message = format!("the id '{}' is used before, line {} has it again", shortened(id), element.line);
+                log.warn("duplicate_id", &element.place(), message, "references mean the first");
+            } else {
+                ids.insert(id, element);
+            }
+        }
+    }
+    for child in &element.children {
+        collect_ids(child, ids, aliases, log);
+    }
+}
+
+fn major_version(root: &Element, log: &mut Log) -> u32 {
+    let text = root.attribute("version").unwrap_or("");
+    let major = text.split('.').next().and_then(|first| first.trim().parse().ok());
+    match major {
+        Some(major @ (0 | 2 | 3)) => major,
+        _ => {
+            let message = format!("expected a scene version 0.5, 0.6 or 3, found '{}'", shortened(text));
+            log.warn("unknown_version", "", message, "read as version 3");
+            3
+        }
+    }
+}
+
+/// Refuses XML nested deeper than `limit` without building anything: a parser may recurse.
+fn check_depth(text: &str, limit: usize) -> Result<(), String> {
+    let bytes = text.as_bytes();
+    let (mut at, mut depth) = (0, 0_usize);
+    while let Some(step) = bytes[at..].iter().position(|&b| b == b'<') {
+        at += step;
+        let rest = &bytes[at..];
+        if rest.starts_with(b"<!--") {
+            at += after(rest, b"-->", 4);
+        } else if rest.starts_with(b"<![CDATA[") {
+            at += after(rest, b"]]>", 9);
+        } else if rest.starts_with(b"<?") {
+            at += after(rest, b"?>", 2);
+        } else {
+            let length = tag_length(rest);
+            if rest.starts_with(b"</") {
+                depth = depth.saturating_sub(1);
+            } else if !rest[..length].ends_with(b"/>") {
+                depth += 1;
+            }
+            at += length;
+        }
+        if depth > limit {
+            let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
+            return Err(format!("line {line}: elements are nested more than {limit} deep"));
+        }
+    }
+    Ok(())
+}
+
+/// Bytes up to and with `end`, looked for from `from`; all of them where it does not come.
+fn after(bytes: &[u8], end: &[u8], from: usize) -> usize {
+    let from = from.min(bytes.len());
+    bytes[from..].windows(end.len()).position(|window| window == end).map_or(bytes.len(), |at| from + at + end.len())
+}
+
+/// Bytes of a tag up to and with its `>`, quoted ones passed over.
+fn tag_length(bytes: &[u8]) -> usize {
+    let mut quote = None;
+    for (at, &byte) in bytes.iter().enumerate() {
+        match quote {
+            Some(open) if byte == open => quote = None,
+            Some(_) => {}
+            None if byte == b'"' || byte == b'\'' => quote = Some(byte),
+            None if byte == b'>' => return at + 1,
+            None => {}
+        }
+    }
+    bytes.len()
+}
+
+/// Turns roxmltree's nodes into elements, in document order, so that a `<default>` serves what follows it.
+struct Builder<'l> {
+    line_starts: Vec<usize>,
+    variables: BTreeMap<String, String>,
+    budget: u64,
+    depth_limit: usize,
+    serial: usize,
+    log: &'l mut Log,
+}
+
+impl<'l> Builder<'l> {
+    fn new(text: &str, limits: &Limits, log: &'l mut Log) -> Self {
+        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+        Self {
+            line_starts: std::iter::once(0).chain(ends).collect(),
+            variables: BTreeMap::new(),
+            budget: limits.xml_bytes,
+            depth_limit: limits.xml_depth,
+            serial: 0,
+            log,
+        }
+    }
+
+    fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, String> {
+        if depth > self.depth_limit {
+            return Err(format!("elements are nested more than {} deep", self.depth_limit));
+        }
+        let line = self.line_starts.partition_point(|&start| start <= node.range().start);
+        self.serial += 1;
+        let serial = self.serial;
+        let attributes = node.attributes().map(|a| self.attribute(&a, line)).collect::<Result<_, _>>()?;
+        let tag = match node.tag_name().name() {
+            "lookAt" | "look_at" => "lookat",
+            other => other,
+        };
+        let mut element = Element { tag: tag.to_owned(), line, serial, attributes, children: Vec::new() };
+        for child in node.children().filter(roxmltree::Node::is_element) {
+            let child = self.element(child, depth + 1)?;
+            if child.tag == "default" { self.define(&child) } else { element.children.push(child) }
+        }
+        Ok(element)
+    }
+
+    fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), String> {
+        let value = self.with_variables(attribute.value(), line)?;
+        let key = attribute.name();
+        Ok((key.to_owned(), if key == "name" { snake_case(&value) } else { value }))
+    }
+
+    /// A variable keeps the value that it has first, as in Mitsuba. Its name is compared as written.
+    fn define(&mut self, default: &Element) {
+        match (default.attribute("name"), default.attribute("value")) {
+            (Some(name), Some(value)) if !name.is_empty() => {
+                self.variables.entry(name.to_owned()).or_insert_with(|| value.to_owned());
+            }
+            _ => self.log.warn("bad_default", &default.place(), "a <default> needs a name and a value", "ignored"),
+        }
+    }
+
+    /// `text` with every `$name` replaced by the longest variable of such a name.
+    fn with_variables(&mut self, text: &str, line: usize) -> Result<String, String> {
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(at) = rest.find('$') {
+            out.push_str(&rest[..at]);
+            rest = &rest[at + 1..];
+            match self.longest_variable(rest) {
+                Some((length, value)) => {
+                    out.push_str(value);
+                    rest = &rest[length..];
+                    self.spend(out.len(), line)?;
+                }
+                None => {
+                    let message = format!("'${}' is not defined before it is used", shortened(rest));
+                    self.log.warn("unknown_variable", &format!("line {line}"), message, "kept as it stands");
+                    out.push('$');
+                }
+            }
+        }
+        out.push_str(rest);
+        Ok(out)
+    }
+
+    /// The variable whose spelling in the file begins `text`: how much of it, and its value.
+    fn longest_variable(&self, text: &str) -> Option<(usize, &str)> {
+        let word = text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
+        let ends = text[..word].char_indices().map(|(at, c)| at + c.len_utf8()).take(256);
+        let longest = ends.filter_map(|end| Some((end, self.variables.get(&snake_case(&text[..end]))?))).last();
+        longest.map(|(end, value)| (end, value.as_str()))
+    }
+
+    /// Variables within variables can double with each line; their total is bounded.
+    fn spend(&mut self, bytes: usize, line: usize) -> Result<(), String> {
+        match self.budget.checked_sub(bytes as u64) {
+            Some(left) => self.budget = left,
+            None => return Err(format!("line {line}: the variables put in make the scene too large")),
+        }
+        Ok(())
+    }
+}
+
+/// `diffuseReflectance` as `diffuse_reflectance`; what is snake_case already stays.
+pub(super) fn snake_case(name: &str) -> String {
+    let mut out = String::with_capacity(name.len() + 4);
+    let mut after_small = false;
+    for c in name.chars() {
+        if c.is_ascii_uppercase() && after_small {
+            out.push('_');
+        }
+        after_small = c.is_ascii_lowercase() || c.is_ascii_digit();
+        out.push(c.to_ascii_lowercase());
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> (Result<Document, SourceError>, Vec<mateval_scene::Finding>) {
+        let mut log = Log::new("scene.xml".into(), 100);
+        let document = Document::parse(Path::new("scene.xml"), text, &Limits::default(), &mut log);
+        (document, log.into_findings())
+    }
+
+    #[test]
+    fn names_become_snake_case() {
+        for (name, snake) in [
+            ("toWorld", "to_world"),
+            ("intIOR", "int_ior"),
+            ("extEta", "ext_eta"),
+            ("diffuse_reflectance", "diffuse_reflectance"),
+            ("id", "id"),
+        ] {
+            assert_eq!(snake_case(name), snake);
+        }
+    }
+
+    #[test]
+    fn variables_take_the_longest_name_and_their_first_value() {
+        let (document, findings) = parse(
+            r#"<scene version="3.0.0"><default name="s" value="1"/><default name="sampleCount" value="9"/>
+            <default name="s" value="2"/><integer name="a" value="$sampleCount/$s"/><integer name="b" value="$no"/></scene>"#,
+        );
+        let root = document.unwrap().root;
+        assert_eq!(root.children[0].attribute("value"), Some("9/1"));
+        assert_eq!(root.children[1].attribute("value"), Some("$no"));
+        assert_eq!(findings.iter().map(|f| f.code.as_str()).collect::<Vec<_>>(), ["unknown_variable"]);
+        assert_eq!(findings[0].place, "line 2");
+    }
+
+    #[test]
+    fn variables_cannot_explode() {
+        let mut text = r#"<scene version="3.0.0"><default name="a0" value="xxxxxxxxxxxxxxxx"/>"#.to_owned();
+        for step in 1..64 {
+            text += &format!(r#"<default name="a{step}" value="$a{p}$a{p}"/>"#, p = step - 1);
+        }
+        let error = parse(&(text + "</scene>")).0.unwrap_err();
+        assert!(error.to_string().contains("too large"), "{error}");
+    }
+
+    #[test]
+    fn ten_thousand_deep_is_an_error() {
+        let deep = format!("{}{}", "<scene>".repeat(10_000), "</scene>".repeat(10_000));
+        assert!(parse(&deep).0.unwrap_err().to_string().contains("deep"));
+        // Twin: as many elements side by side are no trouble, nor are brackets in comments and quotes.
+        let wide = format!("<scene version='3.0.0'>{}</scene>", "<a b='>'/><!-- <a><a> -->".repeat(10_000));
+        assert_eq!(parse(&wide).0.unwrap().root.children.len(), 10_000);
+    }
+
+    #[test]
+    fn entities_and_other_roots_are_refused() {
+        for text in [
+            "<!DOCTYPE s [<!ENTITY a 'aa'>]><scene version='3.0.0'>&a;</scene>",
+            "<house/>",
+            "",
+            "<scene",
+            "<scene></house>",
+        ] {
+            assert!(parse(text).0.is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn ids_and_aliases() {
+        let (document, _) = parse(
+            r#"<scene version="0.6.0"><bsdf id="a" type="x"/><alias id="a" as="b"/><bsdf id="a" type="y"/><ref id="a"/></scene>"#,
+        );
+        let document = document.unwrap();
+        let mut log = Log::new("scene.xml".into(), 100);
+        let ids = document.ids(&mut log);
+        assert_eq!(ids["a"].kind(), "x");
+        assert_eq!(ids["b"].serial, ids["a"].serial);
+        assert_eq!(log.into_findings()[0].code, "duplicate_id");
+    }
+}

@@ -1,0 +1,186 @@
+//! Reads Bitterli's scenes: Mitsuba XML of versions 0.5, 0.6 and 3, with OBJ meshes and textures beside it.
+//!
+//! In: the path of a scene's XML; nothing outside of its folder is read. Out: a [`BitterliScene`]. Whatever is not known,
+//! missing or faulty is a finding, and the scene goes on without it; an error is left for what is no scene at all.
+//!
+//! Between: `document` makes a tree of the XML (depth and size checked, variables put in, names in snake_case),
+//! `parameters` takes what a plugin knows and reports the rest, and each kind of plugin has its file: `sensor`, `shape`
+//! (with `primitives`), `bsdf` (with `bsdf_model`, `ior`), `texture`, `emitter` (with `sun_sky`, `sun`). Where the documentation of Mitsuba leaves room, Mitsuba 3.9.1 was asked; the tests cite its answers.
+
+mod bsdf;
+mod bsdf_model;
+mod document;
+mod emitter;
+mod ior;
+mod limits;
+mod parameters;
+pub mod primitives;
+mod reader;
+mod sensor;
+mod shape;
+mod sun;
+mod sun_sky;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod tests_real;
+mod texture;
+mod transform;
+mod value;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::{Camera, Finding};
+
+use crate::error::SourceError;
+use crate::log::Log;
+use crate::source_scene::LicenceText;
+use document::Document;
+pub use limits::Limits;
+use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
+use reader::{Reader, Totals};
+
+/// A scene of Bitterli's resources.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BitterliScene {
+    /// The scene's name and author as its licence tells them, as in `'Modern Hall' by NewSee2l035`; else the folder's.
+    pub title: String,
+    /// Everything in it, world space.
+    pub scene: ReferenceScene,
+    /// Its first sensor; the picture's size is that of the film's crop window.
+    pub camera: Camera,
+    /// What was left out, replaced or approximated; sorted.
+    pub findings: Vec<Finding>,
+    /// `LICENSE.txt` beside the XML, if there is one.
+    pub licence: Option<LicenceText>,
+    /// Every file read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
+    pub source_files: Vec<(String, String)>,
+    /// Every file that was looked for and was not there; sorted.
+    pub absent_files: Vec<String>,
+}
+
+/// Reads the scene whose XML is at `xml_path`.
+///
+/// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
+pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceError> {
+    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
+    let (mut source, name, text) = read_xml_file(xml_path, limits)?;
+    let mut log = Log::new(name, limits.findings);
+    let document = Document::parse(xml_path, &text, limits, &mut log)?;
+    let ids = document.ids(&mut log);
+    let licence = read_licence(&mut source, &mut log);
+    let mut reader = Reader {
+        ids,
+        major_version: document.major_version,
+        limits: *limits,
+        log,
+        source,
+        scene: ReferenceScene::default(),
+        textures: BTreeMap::new(),
+        texels: 0,
+        alphas: BTreeMap::new(),
+        materials: BTreeMap::new(),
+        totals: Totals::default(),
+        has_environment: false,
+        light_names: BTreeSet::new(),
+        light_numbers: BTreeMap::new(),
+    };
+    let camera = read_elements(&mut reader, &document).map_err(invalid)?;
+    report_unused(&mut reader, &document);
+    let title = title(licence.as_ref(), xml_path);
+    let Reader { scene, log, source, .. } = reader;
+    let files = source.into_files();
+    Ok(BitterliScene {
+        title,
+        scene,
+        camera,
+        findings: log.into_findings(),
+        licence,
+        source_files: files.hashes,
+        absent_files: files.absent,
+    })
+}
+
+fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
+    let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
+    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
+    let text = String::from_utf8(bytes).map_err(|_| invalid("expected UTF-8, found other bytes".to_owned()))?;
+    Ok((source, name, text))
+}
+
+/// The licence beside the scene. It must travel with it, so one that cannot be read is a finding.
+fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<LicenceText> {
+    let file = ["LICENSE.txt", "LICENSE", "license.txt"].into_iter().find(|name| source.path(name).is_ok())?;
+    match source.read(file) {
+        Ok(bytes) => Some(LicenceText { file: file.to_owned(), text: String::from_utf8_lossy(&bytes).into_owned() }),
+        Err(fault) => {
+            let action = "left it out; carry it along by hand";
+            log.push(mateval_scene::Severity::Warning, fault.code, file, "", fault.message, action);
+            None
+        }
+    }
+}
+
+fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
+    let first = licence.and_then(|licence| licence.text.lines().next()).unwrap_or("");
+    let named = first.split_once("version of ").map(|(_, rest)| rest.split(',').next().unwrap_or(rest).trim());
+    if let Some(named) = named.filter(|named| !named.is_empty()) {
+        return shortened(named).replace("\\'", "'");
+    }
+    let folder = xml_path.canonicalize().ok().and_then(|path| path.parent()?.file_name().map(|n| n.to_owned()));
+    folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
+}
+
+/// Reads everything at the top of the scene; the camera is what it must have.
+fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<Camera, String> {
+    let mut camera = None;
+    let mut shapes = 0;
+    for element in &document.root.children {
+        match element.tag.as_str() {
+            "shape" if shapes < reader.limits.shapes => {
+                shapes += 1;
+                reader.shape(element);
+            }
+            "shape" => {
+                let message = format!("the scene has more than {} shapes", reader.limits.shapes);
+                reader.log.warn("limit", "", message, "left the rest out");
+            }
+            "sensor" if camera.is_none() => camera = Some(reader.sensor(element)?),
+            "sensor" => reader.log.warn("unsupported", &element.place(), "a second sensor", "used the first one"),
+            "emitter" => reader.scene_emitter(element),
+            "medium" => reader.log.warn("unsupported", &element.place(), "a medium", "ignored it"),
+            "bsdf" | "texture" | "integrator" | "sampler" | "film" | "alias" => {}
+            "include" => {
+                let message = format!("line {}: <include> is not followed", element.line);
+                reader.log.warn("unsupported", &element.place(), message, "left out what it includes");
+            }
+            other => {
+                let message = format!("line {}: <{}> is not known", element.line, shortened(other));
+                reader.log.warn("unknown_element", &element.place(), message, "ignored");
+            }
+        }
+    }
+    camera.ok_or_else(|| "expected a <sensor>, found none: there is nothing to look through".to_owned())
+}
+
+/// BSDFs that no shape uses. A `bumpmap` around the BSDF with the id is one: references mean what has the id, so in
+/// Mitsuba, too, such bumps do not show.
+fn report_unused(reader: &mut Reader, document: &Document) {
+    for element in document.root.children.iter().filter(|e| e.tag == "bsdf") {
+        if reader.materials.contains_key(&element.serial) {
+            continue;
+        }
+        let inner = element.children.iter().find(|c| c.tag == "bsdf" && reader.materials.contains_key(&c.serial));
+        let (message, action) = match inner {
+            Some(inner) => (
+                format!("shapes refer to the {} within, not to this {}", inner.place(), element.kind()),
+                format!("left the {} out, as Mitsuba does", element.kind()),
+            ),
+            None => ("no shape uses this bsdf".to_owned(), "left it out".to_owned()),
+        };
+        reader.log.note("unused_bsdf", &element.place(), message, action);
+    }
+}

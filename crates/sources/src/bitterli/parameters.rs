@@ -1,0 +1,139 @@
+//! The parameters of one plugin: taken by name, with defaults; what nobody took is reported at the end.
+
+use glam::DMat4;
+
+use super::document::{Element, Ids};
+use super::{transform, value};
+use crate::log::Log;
+use mateval_scene::findings::shortened;
+
+/// A plugin's children, references followed.
+pub(super) struct Parameters<'a> {
+    /// For findings: `bsdf 'Wood'`.
+    pub(super) place: String,
+    kind: String,
+    children: Vec<Child<'a>>,
+}
+
+struct Child<'a> {
+    name: &'a str,
+    element: &'a Element,
+    taken: bool,
+}
+
+/// Tags of parameters that hold one value and those of objects.
+const VALUES: [&str; 11] =
+    ["float", "integer", "boolean", "string", "rgb", "srgb", "spectrum", "vector", "point", "transform", "blackbody"];
+
+impl<'a> Parameters<'a> {
+    /// The children of `element`; a reference to nothing is a finding.
+    pub(super) fn new(element: &'a Element, place: String, ids: &Ids<'a>, log: &mut Log) -> Self {
+        let mut children = Vec::new();
+        for child in &element.children {
+            let target = if child.tag == "ref" { resolve(child, &place, ids, log) } else { Some(child) };
+            children.extend(target.map(|target| Child { name: child.name(), element: target, taken: false }));
+        }
+        Self { place, kind: format!("{} '{}'", element.tag, shortened(element.kind())), children }
+    }
+
+    /// Takes the first child of one of these names.
+    pub(super) fn take(&mut self, names: &[&str]) -> Option<&'a Element> {
+        let child = self.children.iter_mut().find(|c| !c.taken && names.contains(&c.name))?;
+        child.taken = true;
+        Some(child.element)
+    }
+
+    /// Takes every object with this tag, in order.
+    pub(super) fn objects(&mut self, tag: &str) -> Vec<&'a Element> {
+        let found = self.children.iter_mut().filter(|c| !c.taken && c.element.tag == tag);
+        found.map(|child| (child.taken = true, child.element).1).collect()
+    }
+
+    /// Known, and of no meaning here.
+    pub(super) fn ignore(&mut self, names: &[&str]) {
+        for child in &mut self.children {
+            child.taken |= names.contains(&child.name);
+        }
+    }
+
+    /// Everything that is left, of a plugin that is not known.
+    pub(super) fn take_all(&mut self) {
+        self.children.iter_mut().for_each(|child| child.taken = true);
+    }
+
+    fn value<T>(&mut self, name: &str, read: impl Fn(&str) -> Result<T, String>, log: &mut Log) -> Option<T> {
+        let element = self.take(&[name])?;
+        match read(element.attribute("value").unwrap_or("")) {
+            Ok(value) => Some(value),
+            Err(what) => {
+                let message = format!("line {}: '{name}': {what}", element.line);
+                log.warn("bad_value", &self.place, message, "used the default");
+                None
+            }
+        }
+    }
+
+    /// A finite number.
+    pub(super) fn number(&mut self, name: &str, log: &mut Log) -> Option<f64> {
+        self.value(name, value::number, log)
+    }
+
+    /// A finite number from `least` to `most`; beyond it is a finding.
+    pub(super) fn number_within(&mut self, name: &str, least: f64, most: f64, log: &mut Log) -> Option<f64> {
+        let within = |text: &str| match value::number(text)? {
+            number if number < least || number > most => Err(format!("expected {least} to {most}, found {number}")),
+            number => Ok(number),
+        };
+        self.value(name, within, log)
+    }
+
+    /// `true` or `false`.
+    pub(super) fn boolean(&mut self, name: &str, default: bool, log: &mut Log) -> bool {
+        self.value(name, value::boolean, log).unwrap_or(default)
+    }
+
+    /// A text.
+    pub(super) fn string(&mut self, name: &str) -> Option<&'a str> {
+        self.take(&[name]).and_then(|element| element.attribute("value"))
+    }
+
+    /// A vector or point.
+    pub(super) fn vector(&mut self, name: &str, log: &mut Log) -> Option<[f64; 3]> {
+        let element = self.take(&[name])?;
+        let found = value::vector(element, 0.0);
+        found
+            .map_err(|what| {
+                let message = format!("line {}: '{name}': {what}", element.line);
+                log.warn("bad_value", &self.place, message, "used the default");
+            })
+            .ok()
+    }
+
+    /// A transform; the identity where there is none.
+    pub(super) fn transform(&mut self, name: &str, log: &mut Log) -> DMat4 {
+        self.take(&[name]).map_or(DMat4::IDENTITY, |element| transform::read(element, &self.place, log))
+    }
+
+    /// Reports what nobody took.
+    pub(super) fn finish(self, log: &mut Log) {
+        for child in self.children.iter().filter(|c| !c.taken) {
+            let (line, tag) = (child.element.line, shortened(&child.element.tag));
+            let (code, what) = if VALUES.contains(&child.element.tag.as_str()) {
+                ("unknown_parameter", format!("'{}'", shortened(child.name)))
+            } else {
+                ("unknown_element", format!("<{tag} type='{}'>", shortened(child.element.kind())))
+            };
+            log.warn(code, &self.place, format!("line {line}: {} does not take {what} here", self.kind), "ignored");
+        }
+    }
+}
+
+fn resolve<'a>(reference: &Element, place: &str, ids: &Ids<'a>, log: &mut Log) -> Option<&'a Element> {
+    let id = reference.attribute("id").unwrap_or("");
+    let found = ids.get(id).copied();
+    if found.is_none() {
+        let message = format!("line {}: no element has the id '{}'", reference.line, shortened(id));
+        log.warn("unknown_id", place, message, "went on without it");
+    }
+    found
+}

@@ -1,0 +1,70 @@
+//! What the parts of the reader share: the scene that grows, its sources and its findings.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mateval_scene::Severity;
+use mateval_scene::material::TextureIndex;
+use mateval_scene::reference::{LightGroup, MaterialIndex, ReferenceScene};
+
+use super::document::{Element, Ids};
+use super::limits::Limits;
+use super::parameters::Parameters;
+use super::texture::TextureKey;
+use crate::log::Log;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
+
+/// A scene while it is read.
+pub(super) struct Reader<'a> {
+    pub(super) ids: Ids<'a>,
+    /// 0 for Mitsuba 0.5 and 0.6.
+    pub(super) major_version: u32,
+    pub(super) limits: Limits,
+    pub(super) log: Log,
+    pub(super) source: SourceFolder,
+    pub(super) scene: ReferenceScene,
+    /// None: the file could not be used, which was reported.
+    pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
+    pub(super) texels: usize,
+    /// By file: whether its alpha channel is more than 1 everywhere.
+    pub(super) alphas: BTreeMap<String, bool>,
+    /// By the serial number of the BSDF's element.
+    pub(super) materials: BTreeMap<usize, MaterialIndex>,
+    pub(super) totals: Totals,
+    pub(super) has_environment: bool,
+    pub(super) light_names: BTreeSet<String>,
+    /// By name: the last number that was added to it.
+    pub(super) light_numbers: BTreeMap<String, usize>,
+}
+
+/// What the shapes read so far come to.
+#[derive(Debug, Default)]
+pub(super) struct Totals {
+    pub(super) triangles: usize,
+    pub(super) vertices: usize,
+    pub(super) mesh_bytes: u64,
+}
+
+impl<'a> Reader<'a> {
+    /// The parameters of `element`, for findings at `place`.
+    pub(super) fn parameters(&mut self, element: &'a Element, place: String) -> Parameters<'a> {
+        Parameters::new(element, place, &self.ids, &mut self.log)
+    }
+
+    /// Reports that the file `name` could not be used, as a fault of that file where it is one.
+    pub(super) fn report_file(&mut self, name: &str, place: &str, line: usize, fault: &FileFault, action: &str) {
+        let about = SourceFolder::relative(name).unwrap_or_else(|_| self.log.file().to_owned());
+        let message = format!("{} (named in '{}' line {line})", fault.message, self.log.file());
+        self.log.push(Severity::Warning, fault.code, &about, place, message, action);
+    }
+
+    /// Adds a light; its name is made unique by a number.
+    pub(super) fn add_light(&mut self, mut light: LightGroup) {
+        let stem = light.name.clone();
+        while !self.light_names.insert(light.name.clone()) {
+            let number = self.light_numbers.entry(stem.clone()).or_insert(1);
+            *number += 1;
+            light.name = format!("{stem}-{number}");
+        }
+        self.scene.lights.push(light);
+    }
+}

@@ -1,0 +1,210 @@
+//! Shapes: each becomes one surface in world space, and one light where it emits.
+
+use glam::{DMat3, DMat4, DVec3};
+use mateval_scene::TriangleMesh;
+use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
+
+use super::document::Element;
+use super::parameters::Parameters;
+use super::primitives;
+use super::reader::Reader;
+use crate::surface_mesh::{Repairs, smooth_normals, to_world};
+use mateval_scene::findings::shortened;
+use mateval_scene::obj::{self, Materials, ObjLimits};
+use mateval_scene::source_folder::{FileFault, SourceFolder};
+
+const LEFT_OUT: &str = "left the shape out";
+
+impl<'a> Reader<'a> {
+    /// Adds the shape `element` to the scene, unless there is nothing of it.
+    pub(super) fn shape(&mut self, element: &'a Element) {
+        let name = shape_name(element);
+        let place = format!("shape '{}'", shortened(&name));
+        let mut from = self.parameters(element, place);
+        self.report_medium(element, &mut from);
+        let world_from_object = from.transform("to_world", &mut self.log);
+        let flip = from.boolean("flip_normals", false, &mut self.log);
+        let (bsdfs, emitters) = (from.objects("bsdf"), from.objects("emitter"));
+        // Also for a shape that is left out: what its material lacks is to be told too.
+        let material = self.shape_material(&bsdfs, &name, &from);
+        if let Some(mesh) = self.mesh(element, &mut from, world_from_object, flip) {
+            let material = material.unwrap_or_else(|| self.default_material(&name, !emitters.is_empty()));
+            self.add_surface(name, mesh, material, &emitters);
+        }
+        from.finish(&mut self.log);
+    }
+
+    fn add_surface(&mut self, name: String, mesh: TriangleMesh, material: MaterialIndex, emitters: &[&'a Element]) {
+        self.totals.triangles += mesh.triangles.len();
+        self.totals.vertices += mesh.positions.len();
+        let surface = SurfaceIndex(self.scene.surfaces.len());
+        for emitter in emitters {
+            self.area_light(emitter, surface, &name);
+        }
+        self.scene.surfaces.push(Surface { name, mesh, material });
+    }
+
+    fn shape_material(&mut self, bsdfs: &[&'a Element], name: &str, from: &Parameters<'a>) -> Option<MaterialIndex> {
+        if bsdfs.len() > 1 {
+            let message = format!("{} bsdfs on one shape", bsdfs.len());
+            self.log.warn("unsupported", &from.place, message, "used the first one");
+        }
+        bsdfs.first().map(|bsdf| self.material(bsdf, name))
+    }
+
+    fn report_medium(&mut self, element: &Element, from: &mut Parameters<'a>) {
+        if !from.objects("medium").is_empty() {
+            let message = format!("line {}: a medium in the shape", element.line);
+            self.log.warn("unsupported", &from.place, message, "ignored it: the inside is clear");
+        }
+    }
+
+    /// The shape's triangles in world space; none, after a finding, where there are none.
+    fn mesh(
+        &mut self,
+        element: &'a Element,
+        from: &mut Parameters<'a>,
+        world_from_object: DMat4,
+        flip: bool,
+    ) -> Option<TriangleMesh> {
+        let object = self.object_mesh(element, from)?;
+        let smooth = from.boolean("face_normals", false, &mut self.log);
+        let mirrored = DMat3::from_mat4(world_from_object).determinant() < 0.0;
+        let (object, smooth) = (TriangleMesh { normals: object.normals.filter(|_| !smooth), ..object }, !smooth);
+        if mirrored && object.normals.is_none() {
+            let message = "a mirroring transform of a mesh without normals";
+            self.log.note("mirrored", &from.place, message, "kept its front side, which Mitsuba turns over");
+        }
+        let (mut mesh, repairs) = to_world(object, world_from_object, flip);
+        self.report_repairs(&from.place, &repairs, &mesh);
+        if mesh.triangles.is_empty() {
+            self.log.warn("empty_mesh", &from.place, "expected triangles, found none", LEFT_OUT);
+            return None;
+        }
+        if smooth && mesh.normals.is_none() {
+            mesh.normals = Some(smooth_normals(&mesh));
+        }
+        let over = self.totals.triangles + mesh.triangles.len() > self.limits.triangles
+            || self.totals.vertices + mesh.positions.len() > self.limits.vertices;
+        if over {
+            self.log.warn("limit", &from.place, "the scene has more triangles or vertices than the limit", LEFT_OUT);
+        }
+        (!over).then_some(mesh)
+    }
+
+    fn report_repairs(&mut self, place: &str, repairs: &Repairs, mesh: &TriangleMesh) {
+        let of = mesh.triangles.len() + repairs.not_finite;
+        if repairs.not_finite > 0 {
+            let message =
+                format!("{} of {of} triangles have corners that are not finite or far off", repairs.not_finite);
+            self.log.warn("not_finite", place, message, "left them out");
+        }
+        if repairs.degenerate > 0 {
+            let message = format!("{} of {of} triangles have no area", repairs.degenerate);
+            self.log.note("degenerate_triangles", place, message, "kept them");
+        }
+        if repairs.normals > 0 {
+            let message = format!("{} normals are zero or not finite", repairs.normals);
+            self.log.note("bad_normals", place, message, "took those of the faces around");
+        }
+        if repairs.uvs > 0 {
+            let message = format!("{} texture coordinates are not finite", repairs.uvs);
+            self.log.warn("not_finite", place, message, "used (0, 0)");
+        }
+    }
+
+    fn object_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<TriangleMesh> {
+        match element.kind() {
+            "obj" => self.obj_mesh(element, from),
+            "rectangle" => Some(primitives::rectangle()),
+            "cube" => Some(primitives::cube()),
+            "disk" => {
+                self.tessellated(from);
+                Some(primitives::disk())
+            }
+            "sphere" => {
+                self.tessellated(from);
+                let center = from.vector("center", &mut self.log).unwrap_or([0.0; 3]);
+                let radius = self.radius(from);
+                Some(primitives::sphere(DVec3::from_array(center), radius))
+            }
+            "cylinder" => {
+                self.tessellated(from);
+                let start = from.vector("p0", &mut self.log).unwrap_or([0.0; 3]);
+                let end = from.vector("p1", &mut self.log).unwrap_or([0.0, 0.0, 1.0]);
+                let radius = self.radius(from);
+                Some(primitives::cylinder(DVec3::from_array(start), DVec3::from_array(end), radius))
+            }
+            other => {
+                let message = format!("line {}: the shape '{}' is not known", element.line, shortened(other));
+                self.log.warn("unknown_plugin", &from.place, message, LEFT_OUT);
+                from.take_all();
+                None
+            }
+        }
+    }
+
+    fn radius(&mut self, from: &mut Parameters<'a>) -> f64 {
+        from.number_within("radius", 1e-9, 1e9, &mut self.log).unwrap_or(1.0)
+    }
+
+    fn tessellated(&mut self, from: &Parameters<'a>) {
+        let message = "a round shape";
+        let action = format!("made it of straight pieces, {} to a full circle", primitives::SEGMENTS);
+        self.log.note("tessellated", &from.place, message, action);
+    }
+
+    fn obj_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<TriangleMesh> {
+        let name = from.string("filename").unwrap_or("");
+        let flip_v = !from.boolean("flip_tex_coords", true, &mut self.log);
+        from.ignore(&["collapse", "max_smooth_angle"]);
+        match self.read_obj(name) {
+            Ok(obj) => {
+                let mut mesh = obj.mesh;
+                let mixed = [(obj.mixed_uvs, "texture coordinates"), (obj.mixed_normals, "normals")];
+                for (_, what) in mixed.iter().filter(|(is_mixed, _)| *is_mixed) {
+                    let message = format!("only some faces of '{}' have {what}", shortened(name));
+                    self.log.warn("mixed_faces", &from.place, message, format!("left all {what} out"));
+                }
+                if flip_v {
+                    mesh.uvs.iter_mut().flatten().for_each(|uv| uv.y = 1.0 - uv.y);
+                }
+                Some(mesh)
+            }
+            Err(fault) => {
+                self.report_file(name, &from.place, element.line, &fault, LEFT_OUT);
+                // Whatever else the element says is of no use now.
+                from.take_all();
+                None
+            }
+        }
+    }
+
+    fn read_obj(&mut self, name: &str) -> Result<obj::ObjMesh, FileFault> {
+        let relative = SourceFolder::relative(name)?;
+        if self.totals.mesh_bytes > self.limits.mesh_bytes {
+            let message = format!("the OBJ files before have more than {} bytes", self.limits.mesh_bytes);
+            return Err(FileFault { code: "limit", message });
+        }
+        let bytes = self.source.read(&relative)?;
+        self.totals.mesh_bytes = self.totals.mesh_bytes.saturating_add(bytes.len() as u64);
+        let triangles = self.limits.triangles.saturating_sub(self.totals.triangles);
+        let limits = ObjLimits { triangles, corners: triangles.saturating_mul(3) };
+        obj::read(&bytes, limits, Materials::Ignored).map_err(|fault| {
+            let line = if fault.line > 0 { format!("line {}: ", fault.line) } else { String::new() };
+            let message = format!("'{}': {line}{}", shortened(&relative), fault.what);
+            FileFault { code: if fault.limit { "limit" } else { "bad_mesh" }, message }
+        })
+    }
+}
+
+/// The shape's id, or its file's name without folder and ending, or its kind.
+fn shape_name(element: &Element) -> String {
+    if let Some(id) = element.attribute("id") {
+        return id.to_owned();
+    }
+    let file = element.children.iter().find(|c| c.name() == "filename").and_then(|c| c.attribute("value"));
+    let base = file.map(|name| name.rsplit(['/', '\\']).next().unwrap_or(name));
+    let stem = base.map(|base| base.rsplit_once('.').map_or(base, |(stem, _)| stem)).filter(|stem| !stem.is_empty());
+    stem.unwrap_or(element.kind()).to_owned()
+}

@@ -1,0 +1,256 @@
+//! Places a house room by room: architecture by mesh type and material, furniture by its models.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use mateval_scene::reference::{ReferenceScene, Surface};
+use mateval_scene::{Severity, TriangleMesh};
+
+use super::appearance::{Appearances, MISSING};
+use super::coincident;
+use super::furnish::{Placed, Role, world_from_layout};
+use super::house::{Child, ChildKind, House};
+use super::limits::Limits;
+use super::model::{self, Library, Model, is_folder_name};
+use super::model_info::ModelInfo;
+use crate::log::Log;
+use crate::parts::parts_of_labels;
+use crate::source_scene::InstanceOrigin;
+use crate::surface_mesh::{Repairs, to_world};
+use mateval_scene::findings::shortened;
+
+/// Below this a scale makes a piece a speck (ATISS drops such rooms).
+const SMALLEST_SCALE: f64 = 1e-5;
+
+/// A house on its way to its scene.
+pub(super) struct Furnisher<'a> {
+    house: &'a House,
+    info: ModelInfo,
+    models: Library,
+    textures: Option<Library>,
+    limits: Limits,
+    compat: bool,
+    log: Log,
+    /// None: it is not there or not sound, and that has been told.
+    known_models: BTreeMap<String, Option<Rc<Model>>>,
+    appearances: Appearances,
+    triangles: usize,
+    surfaces: Vec<Surface>,
+    placed: Vec<Placed>,
+}
+
+/// What came of it.
+pub(super) struct Furnished {
+    /// Without lights.
+    pub(super) scene: ReferenceScene,
+    /// Of each surface.
+    pub(super) placed: Vec<Placed>,
+    pub(super) log: Log,
+    /// For their hashes.
+    pub(super) libraries: Vec<Library>,
+}
+
+impl<'a> Furnisher<'a> {
+    pub(super) fn new(
+        house: &'a House,
+        mut models: Library,
+        textures: Option<Library>,
+        limits: &Limits,
+        compat: bool,
+        mut log: Log,
+    ) -> Self {
+        Self {
+            house,
+            info: read_model_info(&mut models, limits, &mut log),
+            models,
+            textures,
+            limits: *limits,
+            compat,
+            log,
+            known_models: BTreeMap::new(),
+            appearances: Appearances::new(limits.texels),
+            triangles: 0,
+            surfaces: Vec::new(),
+            placed: Vec::new(),
+        }
+    }
+
+    /// The scene, after the findings that tell of all rooms at once.
+    pub(super) fn finish(mut self) -> Furnished {
+        self.note_private_pieces();
+        self.appearances.note_untextured(&mut self.log);
+        coincident::separate(&mut self.surfaces, &self.placed, &mut self.log);
+        let Appearances { materials, textures, .. } = self.appearances;
+        let scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
+        let libraries = [Some(self.models), self.textures].into_iter().flatten().collect();
+        Furnished { scene, placed: self.placed, log: self.log, libraries }
+    }
+
+    /// Places all that is in a room. Gives how many valid pieces it should have.
+    pub(super) fn room(&mut self, room: usize) -> usize {
+        self.architecture(room);
+        let mut wanted = 0;
+        for child in &self.house.rooms[room].children {
+            if let ChildKind::Furniture(record) = child.what
+                && self.house.furniture[record].valid
+            {
+                wanted += 1;
+                self.piece(room, child, record);
+            }
+        }
+        wanted
+    }
+
+    /// One surface for each mesh type and material of the room, its meshes as parts.
+    fn architecture(&mut self, room: usize) {
+        let house = self.house;
+        let mut groups: Vec<((&str, Option<usize>), Merged)> = Vec::new();
+        for child in &house.rooms[room].children {
+            let ChildKind::Mesh(mesh) = child.what else { continue };
+            let source = &house.meshes[mesh];
+            if !self.has_room_for(&source.mesh, &source.place) {
+                continue;
+            }
+            let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * child.placement.matrix();
+            let (mesh, repairs) = to_world(source.mesh.clone(), matrix, false);
+            if self.is_too_far(&repairs, &child.place) {
+                continue;
+            }
+            let key = (source.kind.as_str(), source.material);
+            let at = groups.iter().position(|(other, _)| *other == key).unwrap_or_else(|| {
+                groups.push((key, Merged::default()));
+                groups.len() - 1
+            });
+            groups[at].1.append(&mesh);
+        }
+        for ((kind, material), merged) in groups {
+            let (index, color) = self.appearances.of_layout(house, material, self.textures.as_mut(), &mut self.log);
+            let parts = parts_of_labels(&merged.mesh, &merged.mesh_of_triangle);
+            let origin = InstanceOrigin { part_of_triangle: Some(parts), ..InstanceOrigin::default() };
+            let role = Role::Architecture { kind: kind.to_owned() };
+            self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });
+            self.placed.push(Placed { room, role, origin, color });
+        }
+    }
+
+    fn has_room_for(&mut self, mesh: &TriangleMesh, place: &str) -> bool {
+        self.triangles += mesh.triangles.len();
+        let fits = self.triangles <= self.limits.triangles;
+        if !fits {
+            let message = format!("the house has more than {} triangles", self.limits.triangles);
+            self.log.warn("limit", place, message, "left it out");
+        }
+        fits
+    }
+
+    /// Whether its room's and its own transform lead to no place at all; that is told.
+    fn is_too_far(&mut self, repairs: &Repairs, place: &str) -> bool {
+        if repairs.not_finite > 0 {
+            let message = format!("{} triangles lie absurdly far away", repairs.not_finite);
+            self.log.warn("bad_placement", place, message, "left it out");
+        }
+        repairs.not_finite > 0
+    }
+
+    fn piece(&mut self, room: usize, child: &Child, record: usize) {
+        let house = self.house;
+        let record = &house.furniture[record];
+        if child.placement.scale.abs().min_element() < SMALLEST_SCALE {
+            let message = format!("a scale of {}", child.placement.scale);
+            return self.log.warn("scale_tiny", &format!("{}/scale", child.place), message, "left the piece out");
+        }
+        let Some(model) = self.model(&record.jid, &record.place) else { return };
+        if !self.has_room_for(&model.mesh, &child.place) {
+            return;
+        }
+        let own = if self.compat { child.placement.mirrored_matrix() } else { child.placement.matrix() };
+        let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * own;
+        let (mesh, repairs) = to_world(model.mesh.clone(), matrix, false);
+        if self.is_too_far(&repairs, &child.place) {
+            return;
+        }
+        // Two negative signs are half a turn.
+        if child.placement.scale.element_product() < 0.0 {
+            let message = format!("a scale of {}", child.placement.scale);
+            let place = format!("{}/scale", child.place);
+            self.log.note("mirrored_piece", &place, message, "mirrored it, its front sides outwards");
+        }
+        let (material, complete) = self.appearances.of_model(&record.jid, &mut self.models, &mut self.log);
+        let kind = self.info.kind(record);
+        if !kind.known {
+            let message = format!("model_info.json does not list '{}'", shortened(&record.jid));
+            let action = format!("took it for '{}'", kind.super_category);
+            self.log.note("unlisted_model", &record.place, message, action);
+        }
+        let name = kind.category.clone().unwrap_or_else(|| kind.super_category.clone());
+        let title = || record.title.as_deref().and_then(|title| title.split('/').next()).map(str::to_owned);
+        let blenderproc_name = record.category.clone().or_else(title).unwrap_or_else(|| "others".to_owned());
+        self.surfaces.push(Surface { name, mesh, material });
+        self.placed.push(Placed {
+            room,
+            role: Role::Furniture { jid: record.jid.clone(), name: blenderproc_name.to_lowercase(), complete },
+            origin: InstanceOrigin {
+                category: kind.category,
+                super_category: Some(kind.super_category),
+                part_of_triangle: Some(model.part_of_triangle.clone()),
+            },
+            color: MISSING,
+        });
+    }
+
+    fn model(&mut self, jid: &str, place: &str) -> Option<Rc<Model>> {
+        if !is_folder_name(jid) {
+            let message = format!("'{}' is no folder's name", shortened(jid));
+            self.log.warn("bad_jid", &format!("{place}/jid"), message, "left its pieces out");
+            return None;
+        }
+        if let Some(known) = self.known_models.get(jid) {
+            return known.clone();
+        }
+        let left = self.limits.triangles.saturating_sub(self.triangles);
+        let limits = Limits { triangles: left, ..self.limits };
+        let model = model::read(jid, &mut self.models, &limits, &mut self.log).map(Rc::new);
+        self.known_models.insert(jid.to_owned(), model.clone());
+        model
+    }
+
+    /// Windows, doors and cabinets whose models are not public are no fault of anybody: one finding for all.
+    fn note_private_pieces(&mut self) {
+        let house = self.house;
+        let is_private = |child: &&Child| matches!(child.what, ChildKind::Furniture(k) if !house.furniture[k].valid);
+        let count = house.rooms.iter().flat_map(|room| &room.children).filter(is_private).count();
+        if count > 0 {
+            let message = format!("{count} children are pieces that are not valid: their models are not public");
+            self.log.note("not_public", "/furniture", message, "left them out");
+        }
+    }
+}
+
+fn read_model_info(models: &mut Library, limits: &Limits, log: &mut Log) -> ModelInfo {
+    const FILE: &str = "model_info.json";
+    let shown = models.shown(FILE);
+    match models.folder.read(FILE) {
+        Ok(bytes) => ModelInfo::parse(&bytes, &shown, limits, log),
+        Err(fault) => {
+            let action = "guessed categories from names";
+            log.push(Severity::Warning, fault.code, &shown, "", fault.message, action);
+            ModelInfo::default()
+        }
+    }
+}
+
+/// Meshes one behind the other, and of which of them each triangle is.
+#[derive(Default)]
+struct Merged {
+    mesh: TriangleMesh,
+    mesh_of_triangle: Vec<usize>,
+    meshes: usize,
+}
+
+impl Merged {
+    fn append(&mut self, mesh: &TriangleMesh) {
+        self.mesh.append(mesh);
+        self.mesh_of_triangle.extend(std::iter::repeat_n(self.meshes, mesh.triangles.len()));
+        self.meshes += 1;
+    }
+}

@@ -1,0 +1,148 @@
+//! A 3D-FUTURE model: its mesh in metres and its parts; and what had to be mended.
+
+use glam::{DMat4, DVec3, Vec3};
+use mateval_scene::{Severity, TriangleMesh};
+
+use super::limits::Limits;
+use crate::log::Log;
+use crate::parts::labelled_parts;
+use crate::surface_mesh::{has_area, to_world};
+use mateval_scene::findings::shortened;
+use mateval_scene::obj::{self, Materials, ObjLimits, ObjMesh};
+use mateval_scene::source_folder::{LookedFor, SourceFolder};
+
+/// A larger model is in centimetres: no furniture is ten metres long.
+const LARGEST_M: f32 = 10.0;
+
+/// A model as it stands in its own space: metres, +Y up, origin on the floor under its middle.
+#[derive(Clone, Debug)]
+pub(super) struct Model {
+    pub(super) mesh: TriangleMesh,
+    /// By group, then by connected component.
+    pub(super) part_of_triangle: Vec<usize>,
+}
+
+/// Where files of models or textures lie, and what that folder is called in findings and hashes.
+#[derive(Debug)]
+pub(super) struct Library {
+    pub(super) folder: SourceFolder,
+    /// As the recipe names it.
+    pub(super) name: String,
+}
+
+impl Library {
+    /// The name of a file of it, as findings and hashes tell it.
+    pub(super) fn shown(&self, relative: &str) -> String {
+        if self.name.is_empty() { relative.to_owned() } else { format!("{}/{relative}", self.name) }
+    }
+}
+
+/// Whether an id may be a folder's name: those of the data are UUIDs.
+pub(super) fn is_folder_name(id: &str) -> bool {
+    (1..=64).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_'))
+}
+
+/// Reads `<jid>/raw_model.obj`; none, after a finding, where there is no sound mesh in it.
+pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut Log) -> Option<Model> {
+    let relative = format!("{jid}/raw_model.obj");
+    let file = library.shown(&relative);
+    let mut warn = |code: &str, place: &str, message: String, action: &str| {
+        log.push(Severity::Warning, code, &file, place, message, action);
+    };
+    let bytes = match library.folder.read(&relative) {
+        Ok(bytes) => bytes,
+        Err(fault) => {
+            warn(missing_model(fault.code), "", fault.message, "left its pieces out");
+            return None;
+        }
+    };
+    let limit = ObjLimits { triangles: limits.triangles, corners: 3 * limits.triangles };
+    let read = match obj::read(&bytes, limit, Materials::Ignored) {
+        Ok(read) => read,
+        Err(fault) => {
+            let place = if fault.line > 0 { format!("line {}", fault.line) } else { String::new() };
+            let code = if fault.limit { "limit" } else { "bad_model" };
+            warn(code, &place, fault.what, "left its pieces out");
+            return None;
+        }
+    };
+    if read.mixed_uvs || read.mixed_normals {
+        warn("mixed_faces", "", "some faces have uvs or normals and some have none".to_owned(), "dropped them for all");
+    }
+    let (mesh, group_of_triangle) = without_shadows(read, &file, log);
+    let model = in_metres(mesh, group_of_triangle, &file, log);
+    if model.is_none() {
+        log.push(Severity::Warning, "bad_model", &file, "", "it has no triangle", "left its pieces out");
+    }
+    model
+}
+
+fn missing_model(code: &'static str) -> &'static str {
+    if code == "missing_file" { "missing_model" } else { code }
+}
+
+/// Groups named after a shadow are flat pictures on the floor that break a model's size (3D-FRONT-ToolBox issue 7).
+fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, Vec<usize>) {
+    let ObjMesh { mut mesh, groups, .. } = read;
+    let (mut triangles, mut kept, mut first) = (Vec::new(), Vec::new(), 0);
+    for (at, group) in groups.iter().enumerate() {
+        let (name, count) = (&group.name, group.triangles);
+        let own = &mesh.triangles[first..first + count];
+        first += count;
+        if name.to_lowercase().contains("shadow") {
+            let place = format!("group '{}'", shortened(name));
+            log.push(Severity::Note, "shadow_group", file, &place, "a painted shadow", "left it out");
+        } else {
+            triangles.extend_from_slice(own);
+            kept.extend(std::iter::repeat_n(at, count));
+        }
+    }
+    mesh.triangles = triangles;
+    (mesh, kept)
+}
+
+/// Drops what is not finite or has no area, scales what is then still too large, and finds its parts.
+fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<Model> {
+    // One triangle a group number: `to_world` keeps the order, so what it drops is found again by counting.
+    let sound: Vec<bool> = (0..mesh.triangles.len()).map(|t| has_area(mesh.corners(t))).collect();
+    let dropped = sound.iter().filter(|sound| !**sound).count();
+    if dropped > 0 {
+        let message = format!("{dropped} of {} triangles have no area or are not finite", sound.len());
+        log.push(Severity::Note, "zero_area", file, "", message, "left them out");
+    }
+    let pick = |all: &[[u32; 3]]| all.iter().zip(&sound).filter(|(_, s)| **s).map(|(t, _)| *t).collect();
+    let groups: Vec<usize> = groups.iter().zip(&sound).filter(|(_, sound)| **sound).map(|(g, _)| *g).collect();
+    let mesh = TriangleMesh { triangles: pick(&mesh.triangles), ..mesh };
+    let size = size_of_used(&mesh);
+    let centimetres = size > LARGEST_M;
+    if centimetres {
+        let message = format!("it is {size:.1} m large");
+        log.push(Severity::Note, "centimetres", file, "", message, "took its numbers for centimetres");
+    }
+    let scale = if centimetres { 0.01 } else { 1.0 };
+    let (mesh, repairs) = to_world(mesh, DMat4::from_scale(DVec3::splat(scale)), false);
+    if repairs.normals > 0 || repairs.uvs > 0 {
+        let message = format!("{} normals and {} uvs are not sound", repairs.normals, repairs.uvs);
+        log.push(Severity::Note, "bad_normals", file, "", message, "made new normals, took uv 0");
+    }
+    if mesh.triangles.is_empty() || mesh.triangles.len() != groups.len() {
+        return None;
+    }
+    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh })
+}
+
+/// The longest side of the box around all triangles, in the file's unit.
+fn size_of_used(mesh: &TriangleMesh) -> f32 {
+    let corners = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]).filter(|p| p.is_finite());
+    let low = corners().reduce(Vec3::min).unwrap_or_default();
+    let high = corners().reduce(Vec3::max).unwrap_or_default();
+    (high - low).max_element()
+}
+
+impl Library {
+    /// Every file looked for in it, as findings tell it.
+    pub(super) fn into_files(self) -> LookedFor {
+        let name = self.name;
+        self.folder.into_files().renamed(|file| if name.is_empty() { file } else { format!("{name}/{file}") })
+    }
+}

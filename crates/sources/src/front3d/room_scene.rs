@@ -1,0 +1,121 @@
+//! One room of a house as a scene: its furniture, its architecture, and what the views see of other rooms.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use mateval_scene::Camera;
+use mateval_scene::ids::id_text_from;
+use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
+use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_tracer::aov::{hit_through, subpixels};
+use mateval_tracer::{TracerError, World};
+use rayon::prelude::*;
+
+use super::furnish::{FurnishedHouse, Role};
+use super::lights;
+use crate::source_scene::SourceScene;
+
+/// Characters of a name that has a number behind it.
+const LONGEST_NAME: usize = 40;
+
+/// The scene of room number `room`, seen from `views`, the input view first.
+///
+/// Of another room that any of them sees, the architecture is kept (its ceiling lights what is seen), and the furniture
+/// that is seen. Everything else of the house is left out.
+pub fn room_scene(house: &FurnishedHouse, room: usize, views: &[Camera]) -> Result<SourceScene, TracerError> {
+    let world = World::new(Arc::new(house.scene.clone()))?;
+    let kept = kept(house, room, &seen(&world, views));
+    let names = names(house, room, &kept);
+    let mut scene = only(&house.scene, &kept);
+    for (surface, name) in scene.surfaces.iter_mut().zip(&names) {
+        surface.name.clone_from(name);
+    }
+    scene.lights = lights::groups(house, &kept, &scene);
+    Ok(SourceScene {
+        kind: "front3d",
+        house: house.house.uid.clone(),
+        file: house.file.clone(),
+        scene,
+        origins: kept.iter().map(|&surface| house.placed[surface].origin.clone()).collect(),
+        camera: views[0],
+        findings: house.findings.clone(),
+        licence: None,
+        files: house.files.clone(),
+        absent: house.absent.clone(),
+    })
+}
+
+/// Surfaces that show at any place of any view where pictures are taken.
+fn seen(world: &World, views: &[Camera]) -> BTreeSet<usize> {
+    let rows: Vec<(&Camera, usize)> =
+        views.iter().flat_map(|view| (0..view.intrinsics.height as usize).map(move |y| (view, y))).collect();
+    let seen_in_row = |(view, y): (&Camera, usize)| {
+        let places = (0..view.intrinsics.width as usize).flat_map(|x| subpixels(x, y));
+        places.filter_map(|place| hit_through(world, view, place)).map(|hit| hit.surface.0).collect::<BTreeSet<usize>>()
+    };
+    rows.into_par_iter().map(seen_in_row).reduce(BTreeSet::new, |mut all, more| {
+        all.extend(more);
+        all
+    })
+}
+
+fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usize> {
+    let rooms: BTreeSet<usize> = seen.iter().map(|&surface| house.placed[surface].room).chain([room]).collect();
+    let is_kept = |surface: &usize| {
+        let placed = &house.placed[*surface];
+        let is_architecture = matches!(placed.role, Role::Architecture { .. });
+        placed.room == room || seen.contains(surface) || is_architecture && rooms.contains(&placed.room)
+    };
+    (0..house.placed.len()).filter(is_kept).collect()
+}
+
+/// Names of what is kept: what it is, with the room's id before it for other rooms, and a number behind the second. No two
+/// are one as ids, and none is the world's.
+fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
+    let mut taken = BTreeSet::from([id_text_from(lights::WORLD_NAME, "")]);
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    let name = |surface: &usize| {
+        let placed = &house.placed[*surface];
+        let own = &house.scene.surfaces[*surface].name;
+        let name = match placed.room == room {
+            true => own.clone(),
+            false => format!("{} {own}", house.house.rooms[placed.room].id),
+        };
+        // An id is cut: what is behind a long name would not show in it.
+        let stem: String = name.chars().take(LONGEST_NAME).collect();
+        let count = count.entry(id_text_from(&name, "object")).or_insert(0);
+        loop {
+            *count += 1;
+            let name = if *count == 1 { name.clone() } else { format!("{stem} {count}") };
+            if taken.insert(id_text_from(&name, "object")) {
+                return name;
+            }
+        }
+    };
+    kept.iter().map(name).collect()
+}
+
+/// Those surfaces, with the materials and textures that they use.
+fn only(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
+    let mut part = ReferenceScene::default();
+    let (mut materials, mut textures) = (BTreeMap::new(), BTreeMap::new());
+    for &surface in kept {
+        let source = &scene.surfaces[surface];
+        let material = *materials.entry(source.material.0).or_insert_with(|| {
+            let mut material = scene.materials[source.material.0].clone();
+            if let MaterialModel::Principled { base_color: ColorInput::Texture { texture, .. }, .. } =
+                &mut material.model
+            {
+                let index = *textures.entry(texture.0).or_insert_with(|| {
+                    part.textures.push(scene.textures[texture.0].clone());
+                    TextureIndex(part.textures.len() - 1)
+                });
+                *texture = index;
+            }
+            part.materials.push(material);
+            MaterialIndex(part.materials.len() - 1)
+        });
+        part.surfaces.push(Surface { material, ..source.clone() });
+    }
+    part
+}

@@ -1,0 +1,191 @@
+//! The reader against the sample house and its faults, made houses, hostile files, and real data where there is some.
+
+mod cameras;
+mod faults;
+mod hostile;
+mod models;
+mod pieces;
+mod placement;
+mod releases;
+mod rooms;
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use glam::{DVec3, Vec3};
+use mateval_scene::reference::Surface;
+use mateval_scene::{Severity, TriangleMesh};
+use serde_json::{Value, json};
+
+use super::*;
+use crate::SourceError;
+use mateval_sample::house as sample_house;
+
+/// The sample's house, below the folder that [`sample_house::write`] fills.
+const HOUSE: &str = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
+const LIVING: usize = 0;
+const LIBRARY: usize = 2;
+
+/// The sample on disk, and its JSON.
+struct Disk {
+    folder: tempfile::TempDir,
+    json: Value,
+}
+
+impl Disk {
+    fn new() -> Self {
+        Self::written(true)
+    }
+
+    /// Without pictures, which take the most time: every piece and wall is there, in plain colours.
+    fn bare() -> Self {
+        Self::written(false)
+    }
+
+    fn written(pictures: bool) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let written = if pictures {
+            sample_house::write(folder.path())
+        } else {
+            sample_house::write_without_pictures(folder.path())
+        };
+        written.unwrap();
+        let json = serde_json::from_slice(&std::fs::read(folder.path().join(HOUSE)).unwrap()).unwrap();
+        Self { folder, json }
+    }
+
+    fn files(&self) -> HouseFiles {
+        HouseFiles {
+            root: self.folder.path().to_owned(),
+            house: HOUSE.into(),
+            models: "house/3D-FUTURE-model".into(),
+            textures: Some("house/3D-FRONT-texture".into()),
+            cameras: None,
+            blenderproc_compat: false,
+        }
+    }
+
+    fn model(&self, number: u32) -> PathBuf {
+        self.folder.path().join("house/3D-FUTURE-model").join(jid(number))
+    }
+
+    /// As it is on disk.
+    fn furnish(&self) -> FurnishedHouse {
+        furnish(&self.files(), &Limits::default()).unwrap()
+    }
+
+    /// With another JSON.
+    fn furnish_json(&self, json: &Value) -> Result<FurnishedHouse, SourceError> {
+        std::fs::write(self.folder.path().join(HOUSE), json.to_string()).unwrap();
+        furnish(&self.files(), &Limits::default())
+    }
+}
+
+/// The sample with all its faults, made once a process.
+fn furnished() -> &'static FurnishedHouse {
+    static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
+    HOUSE.get_or_init(|| Disk::new().furnish())
+}
+
+/// The same without pictures, for what is about shapes.
+fn bare() -> &'static FurnishedHouse {
+    static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
+    HOUSE.get_or_init(|| Disk::bare().furnish())
+}
+
+/// A model's id by the last digits.
+fn jid(number: u32) -> String {
+    format!("cc0f0000-5a3b-4e00-8000-{number:012}")
+}
+
+/// A house read from JSON alone, and the findings.
+fn read_house(json: &Value) -> (Result<House, String>, Vec<mateval_scene::Finding>) {
+    let mut log = crate::log::Log::new("house.json".into(), 5_000);
+    let house = house_reader::read(json, "stem", &Limits::default(), &mut log);
+    (house, log.into_findings())
+}
+
+/// Findings above notes, as code, file and place.
+fn warnings(house: &FurnishedHouse) -> Vec<String> {
+    let above_note = house.findings.iter().filter(|finding| finding.severity != Severity::Note);
+    above_note.map(|f| format!("{} {} {}", f.code, f.file, f.place).trim().to_owned()).collect()
+}
+
+/// The surfaces of a model in a room, in the order of its children.
+fn pieces_of(house: &FurnishedHouse, room: usize, number: u32) -> Vec<&Surface> {
+    let wanted = jid(number);
+    let is_it =
+        |placed: &Placed| placed.room == room && matches!(&placed.role, Role::Furniture { jid, .. } if *jid == wanted);
+    house.placed.iter().zip(&house.scene.surfaces).filter(|(placed, _)| is_it(placed)).map(|(_, s)| s).collect()
+}
+
+/// The box around a mesh's triangles.
+fn bounds(mesh: &TriangleMesh) -> [Vec3; 2] {
+    let corners = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]);
+    [corners().reduce(Vec3::min).unwrap(), corners().reduce(Vec3::max).unwrap()]
+}
+
+fn size(mesh: &TriangleMesh) -> Vec3 {
+    let [low, high] = bounds(mesh);
+    high - low
+}
+
+/// Positive where triangles look outwards. Seen from the middle, so that a mesh that is not quite closed has one too.
+fn signed_volume(mesh: &TriangleMesh) -> f64 {
+    let [low, high] = bounds(mesh);
+    let middle = (low + high).as_dvec3() / 2.0;
+    let of = |triangle| {
+        let [a, b, c]: [DVec3; 3] = mesh.corners(triangle).map(|p| p.as_dvec3() - middle);
+        a.dot(b.cross(c)) / 6.0
+    };
+    (0..mesh.triangles.len()).map(of).sum()
+}
+
+/// Everything that whoever takes a furnished house relies on.
+fn assert_sound(house: &FurnishedHouse) {
+    let scene = &house.scene;
+    assert_eq!(house.placed.len(), scene.surfaces.len());
+    assert_eq!(house.wanted_pieces.len(), house.house.rooms.len());
+    for (placed, surface) in house.placed.iter().zip(&scene.surfaces) {
+        let mesh = &surface.mesh;
+        assert!(!mesh.triangles.is_empty(), "'{}' has no triangle", surface.name);
+        assert!(mesh.positions.iter().all(|p| p.is_finite() && p.abs().max_element() <= 1e9), "{}", surface.name);
+        assert!(mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.positions.len()));
+        for all in [mesh.uvs.as_ref().map(Vec::len), mesh.normals.as_ref().map(Vec::len)].into_iter().flatten() {
+            assert_eq!(all, mesh.positions.len());
+        }
+        assert!(mesh.uvs.iter().flatten().all(|uv| uv.is_finite()));
+        assert!(surface.material.0 < scene.materials.len());
+        assert!(placed.room < house.house.rooms.len());
+        let parts = placed.origin.part_of_triangle.as_ref().unwrap();
+        assert_eq!(parts.len(), mesh.triangles.len(), "parts of '{}'", surface.name);
+    }
+    let mut sorted = house.findings.clone();
+    sorted.sort();
+    assert_eq!(sorted, house.findings);
+}
+
+/// The smallest house: a square floor in one room.
+fn small_house() -> Value {
+    json!({
+        "uid": "h", "furniture": [], "material": [{"uid": "m", "jid": "", "color": [255, 255, 255, 255]}],
+        "mesh": [{"uid": "f", "xyz": [0, 0, 0, 0, 0, 4, 4, 0, 4, 4, 0, 0], "normal": [0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0],
+            "uv": [0, 0, 0, 1, 1, 1, 1, 0], "faces": [0, 1, 2, 0, 2, 3], "material": "m", "type": "Floor"}],
+        "scene": {"room": [{"type": "Bedroom", "instanceid": "Bedroom-1",
+            "children": [{"ref": "f", "instanceid": "mesh/1"}]}]},
+    })
+}
+
+/// A folder with one house and no models.
+fn lone_house(folder: &Path, text: &[u8]) -> HouseFiles {
+    std::fs::create_dir_all(folder.join("models")).unwrap();
+    std::fs::write(folder.join("h.json"), text).unwrap();
+    HouseFiles {
+        root: folder.to_owned(),
+        house: "h.json".into(),
+        models: "models".into(),
+        textures: None,
+        cameras: None,
+        blenderproc_compat: false,
+    }
+}
