@@ -98,16 +98,7 @@ impl LightRules {
             roulette_start: settings.roulette_start,
             roulette_survival: settings.roulette_survival,
             stage_roughness: mateval_tracer::bsdf::STAGE_ROUGHNESS,
-            stage: StageRules {
-                cell_m: 1.0,
-                cell_share: 0.5,
-                ceiling_gap_m: 1e-3,
-                camera_side_m: 1.5,
-                camera_distance_m: 0.5,
-                wall_share: 0.8,
-                wall_gap_m: 1e-3,
-                least_wall_m: 0.5,
-            },
+            stage: StageRules::default(),
             fit: FitRules {
                 pool: mateval_light::light_fit::POOL as u32,
                 samples: 64,

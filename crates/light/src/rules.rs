@@ -25,6 +25,22 @@ pub struct StageRules {
     pub least_wall_m: f64,
 }
 
+impl Default for StageRules {
+    /// What every protocol has today.
+    fn default() -> Self {
+        Self {
+            cell_m: 1.0,
+            cell_share: 0.5,
+            ceiling_gap_m: 1e-3,
+            camera_side_m: 1.5,
+            camera_distance_m: 0.5,
+            wall_share: 0.8,
+            wall_gap_m: 1e-3,
+            least_wall_m: 0.5,
+        }
+    }
+}
+
 /// How radiances are fitted to the input view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -82,6 +82,7 @@ mod tests {
     use glam::Vec3;
     use mateval_scene::TriangleMesh;
     use mateval_scene::reference::MaterialIndex;
+    use mateval_sources::front3d::{HouseFiles, Limits, furnish};
 
     use super::*;
 
@@ -108,5 +109,32 @@ mod tests {
         assert_eq!(split.instances[1].of_triangle, [1, 0]);
         let parts: Vec<u16> = split.instances.iter().flat_map(|e| e.parts.iter().map(|p| p.index.0.get())).collect();
         assert_eq!(parts, (1..=10).collect::<Vec<u16>>());
+    }
+
+    /// A whole house: ids of instances and parts exist once, and every instance has the parts that its source states.
+    #[test]
+    fn ids_of_the_sample_house_are_unique() {
+        let folder = tempfile::tempdir().unwrap();
+        mateval_sample::house::write_without_pictures(folder.path()).unwrap();
+        let files = HouseFiles {
+            root: folder.path().to_owned(),
+            house: "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json".into(),
+            models: "house/3D-FUTURE-model".into(),
+            textures: None,
+            cameras: None,
+            blenderproc_compat: false,
+        };
+        let house = furnish(&files, &Limits::default()).unwrap();
+        let origins: Vec<_> = house.placed.iter().map(|placed| placed.origin.clone()).collect();
+        let list = list(&house.scene, &origins).unwrap();
+        let split = own_parts(&house.scene, &origins, &list).unwrap();
+        let mut ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
+        ids.extend(split.instances.iter().flat_map(|entry| entry.parts.iter().map(|part| part.id.as_str())));
+        let count = ids.len();
+        assert!(count > 100, "only {count} ids");
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), count);
+        assert!(split.instances.iter().all(|entry| entry.parts.len() == 1 + entry.of_triangle.iter().max().unwrap()));
     }
 }

@@ -8,7 +8,6 @@ use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 
 use super::*;
-use mateval_eval::protocol::Protocol;
 
 fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
     let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
@@ -50,7 +49,7 @@ fn camera() -> Camera {
 }
 
 fn rules() -> StageRules {
-    Protocol::named("mateval-1").unwrap().light.stage
+    StageRules::default()
 }
 
 fn named(lights: &[NamedLight], start: &str) -> Vec<NamedLight> {
