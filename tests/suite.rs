@@ -10,6 +10,7 @@ mod suite {
     mod arrows;
     mod bad_input;
     mod blender;
+    mod circles;
     mod command;
     mod compare;
     mod determinism;
@@ -21,6 +22,7 @@ mod suite {
     mod kept_folder;
     mod lifting;
     mod linting;
+    mod map;
     mod mitsuba_export;
     #[path = "../../crates/eval/tests/suite/packed.rs"]
     mod packed;

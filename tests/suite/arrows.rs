@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
-/// Which of our crates each may use, from user to used.
-const ARROWS: [(&str, &[&str]); 14] = [
+/// Which of our crates each may use, from user to used; names without `mateval-`.
+pub const ARROWS: [(&str, &[&str]); 14] = [
     ("mateval-image", &[]),
     ("mateval-scene", &["image"]),
     ("mateval-metrics", &["image"]),

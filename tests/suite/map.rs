@@ -1,0 +1,74 @@
+//! `crates/README.md`, the map of the code, against the code: paths that it names, arrows that it draws, first lines.
+
+use std::path::{Path, PathBuf};
+
+use super::arrows::ARROWS;
+use super::sample::files_below;
+
+fn crates() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("crates")
+}
+
+/// The paths that a text names: words in backticks that hold a slash, without blanks, below `crates/`.
+fn named_paths(text: &str) -> Vec<&str> {
+    let words = text.split('`').skip(1).step_by(2);
+    words.filter(|word| word.contains('/') && !word.contains([' ', '<', '*'])).collect()
+}
+
+/// Those of them that do not exist.
+fn missing(paths: &[&str]) -> Vec<String> {
+    let exists = |path: &&&str| crates().join(path).exists();
+    paths.iter().filter(|path| !exists(path)).map(|path| (*path).to_owned()).collect()
+}
+
+#[test]
+fn every_path_on_the_map_exists() {
+    let map = std::fs::read_to_string(crates().join("README.md")).unwrap();
+    let paths = named_paths(&map);
+    assert!(paths.len() > 40, "only {} paths on the map", paths.len());
+    assert_eq!(missing(&paths), [""; 0], "crates/README.md names files that do not exist");
+}
+
+/// The twin.
+#[test]
+fn a_path_to_nowhere_is_found() {
+    let text = "| a metric | `metrics/src/`, `metrics/src/nowhere.rs`, `cargo run -- schema` |";
+    assert_eq!(missing(&named_paths(text)), ["metrics/src/nowhere.rs"]);
+}
+
+#[test]
+fn the_map_draws_the_arrows() {
+    let map = std::fs::read_to_string(crates().join("README.md")).unwrap();
+    for (package, used) in ARROWS.iter().filter(|(package, used)| *package != "mateval" && !used.is_empty()) {
+        let name = package.trim_start_matches("mateval-");
+        let drawn = map.lines().find_map(|line| line.split_once(" -> ").filter(|(user, _)| user.trim() == name));
+        let drawn = drawn.unwrap_or_else(|| panic!("no arrows of '{name}' in crates/README.md")).1;
+        let mut drawn: Vec<&str> = drawn.split(", ").map(str::trim).collect();
+        let mut used = used.to_vec();
+        drawn.sort_unstable();
+        used.sort_unstable();
+        assert_eq!(drawn, used, "{name}");
+    }
+}
+
+/// Whether a file begins with a line that says what it holds.
+fn introduces_itself(text: &str) -> bool {
+    text.lines().next().is_some_and(|line| line.strip_prefix("//! ").is_some_and(|words| words.len() > 10))
+}
+
+#[test]
+fn every_source_file_says_what_it_holds() {
+    let files = files_below(&crates());
+    let sources = files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    let mut seen = 0;
+    let mut silent = Vec::new();
+    for path in sources.filter(|path| path.components().any(|part| part.as_os_str() == "src")) {
+        seen += 1;
+        if !introduces_itself(&std::fs::read_to_string(crates().join(path)).unwrap()) {
+            silent.push(path);
+        }
+    }
+    assert!(seen > 350, "only {seen} files seen");
+    assert!(silent.is_empty(), "begin with a line of what they hold: {silent:?}");
+    assert!(!introduces_itself("use std::path::Path;") && !introduces_itself("//! Tests.\n"));
+}
