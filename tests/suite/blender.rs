@@ -87,9 +87,9 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     assert!(!dataset.join(".render").exists());
     let first = manifest(dataset);
     // What is there is kept; asked for again it is the same.
-    run(&mut by_blender(dataset, Path::new("/nowhere"), &[])).ends_with(2).says("which is not there");
+    run(&mut by_blender(dataset, Path::new("/nowhere"), &[])).ends_with(2).says("which does not exist");
     let kept = run(&mut by_blender(dataset, &python, &[])).ends_with(0);
-    assert!(kept.stdout.contains("0 views rendered, 2 were there"), "{}", kept.stdout);
+    assert!(kept.stdout.contains("0 views rendered, 2 kept"), "{}", kept.stdout);
     run(&mut by_blender(dataset, &python, &["--force"])).ends_with(0);
     assert!(manifest(dataset) == first);
 
@@ -137,12 +137,12 @@ fn a_killed_blender_is_a_finding_and_the_next_call_goes_on() {
         python.display()
     );
     let failed = run(&mut by_blender(copy.path(), &stand_in(tools.path(), &body), &[]));
-    assert!(failed.stdout.contains("1 views rendered, 0 were there"), "{}", failed.stdout);
+    assert!(failed.stdout.contains("1 views rendered, 0 kept"), "{}", failed.stdout);
     fails(failed, &["exit status: 137", "Killed"]);
     assert!(renders(copy.path()).join("input/render.json").is_file());
     assert!(!renders(copy.path()).join("left/render.json").exists());
     let whole = run(&mut by_blender(copy.path(), &python, &[])).ends_with(0);
-    assert!(whole.stdout.contains("1 views rendered, 1 were there"), "{}", whole.stdout);
+    assert!(whole.stdout.contains("1 views rendered, 1 kept"), "{}", whole.stdout);
     run(&mut verify(copy.path())).ends_with(0);
 }
 
@@ -187,7 +187,7 @@ fn attempts_are_counted_and_other_scenes_go_on() {
     let mut command = render(&dataset, 2);
     command.args(["--renderer", "blender", "--attempts", "2", "--blender"]).arg(stand_in(folder.path(), &body));
     let whole = run(&mut command).ends_with(0).says("scene 'one': attempt 1 failed");
-    assert!(whole.stdout.contains("1 views rendered, 1 were there"), "{}", whole.stdout);
+    assert!(whole.stdout.contains("1 views rendered, 1 kept"), "{}", whole.stdout);
 }
 
 /// A texture that goes missing or is no picture, and files that cannot be written.

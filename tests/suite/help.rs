@@ -60,7 +60,7 @@ fn words_that_are_not_known() {
     let error = "error: unrecognized subcommand 'gray'\n\n  tip: a similar subcommand exists: 'grey'\n\n\
                  Usage: mateval baseline <COMMAND>\n\nFor more information, try '--help'.\n";
     check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
-    let error = "error: invalid value '../up' for '--scene <SCENES>': '../up' is not an id: expected \
+    let error = "error: invalid value '../up' for '--scene <SCENE>': '../up' is not an id: expected \
                  ^[a-z0-9][a-z0-9_-]{0,63}$\n\nFor more information, try '--help'.\n";
     check(&["prep", "render", "d", "--scene", "../up"], 2, "", error);
 }
@@ -68,7 +68,7 @@ fn words_that_are_not_known() {
 #[test]
 fn words_that_are_missing() {
     let error = "error: the following required arguments were not provided:\n  --dataset <DATASET>\n  --out <OUT>\n  \
-                 <SUBMISSIONS>...\n\nUsage: mateval eval score --dataset <DATASET> --out <OUT> <SUBMISSIONS>...\n\n\
+                 <SUBMISSION>...\n\nUsage: mateval eval score --dataset <DATASET> --out <OUT> <SUBMISSION>...\n\n\
                  For more information, try '--help'.\n";
     check(&["eval", "score"], 2, "", error);
 }

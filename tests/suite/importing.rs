@@ -236,7 +236,7 @@ fn a_textured_gltf_is_rebaked_node_by_node() {
     let unnamed = folder.path().join("unnamed");
     import(&dataset, &files, &unnamed, &[])
         .ends_with(0)
-        .prints("mirror: nothing in room.gltf is near enough, the nearest 116.978 mm away");
+        .prints("mirror: nothing in 'room.gltf' is near enough, the nearest is 116.978 mm away");
     assert!(
         !is_all(&dataset, &unnamed, "red", srgb([188, 10, 99]))
             || !is_all(&dataset, &unnamed, "green", [0.0, 128.0 / 255.0, 1.0])
@@ -291,7 +291,7 @@ fn one_material_a_part() {
     let write = |text: Value| std::fs::write(files.join("room.json"), text.to_string()).unwrap();
     write(json!({ "red": { "base_color": [0.1, 0.2, 0.3], "roughness": 0.5 }, "blue": { "base_color": [1, 1, 0] } }));
     let out = folder.path().join("out");
-    import(&dataset, &files, &out, &[]).ends_with(0).prints("2 of").prints("green: nothing tells of it");
+    import(&dataset, &files, &out, &[]).ends_with(0).prints("2 of").prints("green: no file describes it");
     assert!(is_all(&dataset, &out, "red", [0.1, 0.2, 0.3]) && is_all(&dataset, &out, "blue", [1.0, 1.0, 0.0]));
     // By part, which goes before its instance.
     let scene: Value = super::sample::json(&dataset.join("scenes/room/scene.json"));

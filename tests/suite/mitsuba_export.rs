@@ -15,8 +15,7 @@ fn the_sample_means_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let done = export(dataset(), "room", "up_left", &out, &[]).ends_with(0);
-    let expected =
-        format!("{}: means the same in Mitsuba, 0 things that it cannot say\n", out.join("scene.xml").display());
+    let expected = format!("{}: means the same in Mitsuba, 0 differences\n", out.join("scene.xml").display());
     assert_eq!(done.stdout, expected);
     let files = files_below(&out);
     let text = std::fs::read_to_string(out.join("scene.xml")).unwrap();

@@ -210,7 +210,7 @@ fn places_that_a_picture_must_not_have() {
     let cases = [
         (mine.clone(), "is already there; choose another --picture, or add --force to replace it"),
         (out.path().to_owned(), "is a folder; expected the name of a picture file"),
-        (out.path().join("no/a.svg"), "is not there; make it, or choose another --picture"),
+        (out.path().join("no/a.svg"), "does not exist; make it, or choose another --picture"),
         (
             copy.path().join("a.svg"),
             "would lie in the dataset, whose manifest does not list it; choose another --picture",

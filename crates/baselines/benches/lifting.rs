@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use glam::{DVec2, DVec3};
-use mateval_baselines::estimate::EstimateSource;
+use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::fill::fill;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::lift::{PartialAtlas, Texel, lift, place_of};

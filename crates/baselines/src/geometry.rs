@@ -5,13 +5,12 @@ use std::sync::Arc;
 use mateval_image::png_io;
 use mateval_image::{Mask, Picture};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::layout::{SceneFolder, part_picture};
+use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::{PartSetId, SceneError, TriangleMesh, plain_instances};
 use mateval_tracer::World;
 
 use crate::error::BaselineError;
-use crate::estimate::input_view;
 
 /// The public part of one scene. Surface k of the world is instance k of `scene.json`.
 pub struct SceneGeometry<'a> {
@@ -67,4 +66,10 @@ impl<'a> SceneGeometry<'a> {
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
         Err(SceneError::Unsupported { path, what }.into())
     }
+}
+
+/// The view that estimates are of.
+pub(crate) fn input_view<'a>(folder: &SceneFolder, scene: &'a SceneFile) -> Result<&'a View, BaselineError> {
+    let missing = || BaselineError::NoInputView(folder.scene_file());
+    scene.view(INPUT).ok_or_else(missing)
 }

@@ -9,7 +9,8 @@ use mateval_scene::PartSetId;
 use mateval_scene::open::Dataset;
 
 use crate::error::BaselineError;
-use crate::estimate::{Estimate, EstimateSource, Values};
+use crate::estimate::{Estimate, Values};
+use crate::estimate_source::EstimateSource;
 use crate::geometry::SceneGeometry;
 use crate::maps::Maps;
 use crate::median::{Medians, median};

@@ -12,6 +12,7 @@
 pub mod adapter;
 pub mod error;
 pub mod estimate;
+pub mod estimate_source;
 pub mod fill;
 pub mod geometry;
 pub mod grey;

@@ -12,7 +12,8 @@ use mateval_scene::submission::MAP_SIZES;
 use rayon::prelude::*;
 
 use crate::error::BaselineError;
-use crate::estimate::{Estimate, EstimateSource, Values};
+use crate::estimate::{Estimate, Values};
+use crate::estimate_source::EstimateSource;
 use crate::fill::fill;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift};

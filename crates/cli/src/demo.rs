@@ -1,155 +1,142 @@
-//! `mateval demo`: everything on the built-in sample.
+//! `mateval demo`: every step from the built-in sample to a leaderboard.
+//!
+//! The steps are other commands, given as words, so that their defaults are those of the command line.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
-use mateval_baselines::estimate::EstimateSource;
-use mateval_baselines::nn::NnOptions;
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 
-use crate::bars::Bars;
-use crate::eval;
-use crate::eval::leaderboard::LeaderboardArgs;
-use crate::eval::pictures::StripPicture;
+use crate::eval::leaderboard::{self, LeaderboardArgs};
+use crate::eval::score::{self, ScoreArgs};
 use crate::outcome::{Outcome, print, say};
-use crate::prep;
+use crate::parsing::{parse_args, parse_subcommand, path_option};
+use crate::prep::build::{self, BuildArgs};
+use crate::prep::render::{self, RenderArgs, RendererArgs};
+use crate::{baseline, sample};
 
-/// A baseline of the demo.
+/// A baseline of the demo; its name is that of the subcommand of `baseline`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum DemoBaseline {
-    /// The truth, baked to the atlases.
+    /// The ground truth, baked to the atlases.
     Gt,
-    /// The truth of the photo, lifted by nearest neighbours.
+    /// The ground truth of the input view, lifted by nearest neighbours.
     Nn,
-    /// One colour an instance, that of the photo.
+    /// One colour per instance: its median in the input picture.
     Median,
-    /// 0.5 everywhere.
+    /// Base colour 0.5 everywhere.
     Grey,
 }
 
-/// What it is given.
+impl DemoBaseline {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Gt => "gt",
+            Self::Nn => "nn",
+            Self::Median => "median",
+            Self::Grey => "grey",
+        }
+    }
+}
+
+/// Arguments of `demo`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder for everything that it makes.
+    /// Folder for everything that the demo makes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
-    /// Samples a pixel of each half of a rendered picture.
+    /// Samples per pixel of each half of a rendered picture.
     #[arg(long, default_value_t = 16)]
     samples: u32,
-    /// What renders the truth.
-    #[arg(long, value_enum, default_value = "blender")]
-    renderer: prep::RendererWord,
-    /// Which baselines are made and scored.
+    #[command(flatten)]
+    by: RendererArgs,
+    /// Baselines to make and score.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["gt", "nn", "median", "grey"])]
     baselines: Vec<DemoBaseline>,
-    #[command(flatten)]
-    blender: prep::blender::BlenderArgs,
-    /// Replace what an earlier demo left there.
+    /// Replace what an earlier demo wrote.
     #[arg(long)]
     force: bool,
 }
 
-/// Sample, dataset, renders, baselines, scores, leaderboard, table.
+/// The arguments of all steps.
+struct Plan {
+    sample: sample::Args,
+    build: BuildArgs,
+    render: RenderArgs,
+    baselines: Vec<baseline::Command>,
+    score: ScoreArgs,
+    leaderboard: LeaderboardArgs,
+}
+
+/// Runs the steps one after the other and prints the results in tables.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.out.as_path();
     if out.exists() && !args.force {
         bail!("'{}' is already there; choose another --out, or add --force to replace what a demo left", out.display());
     }
-    let [source, dataset, results] = ["source", "dataset", "results"].map(|name| out.join(name));
-    say("1/6 sample: a house and a room that the program makes itself");
-    mateval_sample::write(&source).context("cannot write the sample")?;
-    say("2/6 prep build: geometry, atlases, pictures of five views");
-    prep::build(&prep::BuildArgs {
-        recipe: source.join("recipe.toml"),
-        out: dataset.clone(),
-        source: None,
-        force: args.force,
-    })?;
+    args.by.checked()?;
+    let plan = plan(args)?;
+    say("1/6 sample: the source scenes, a house and a room that the program generates");
+    sample::run(&plan.sample)?;
+    say("2/6 prep build: geometry, atlases and the pictures of five views");
+    build::run(&plan.build)?;
     say("3/6 prep render: RGB truth");
-    prep::render(&prep::RenderArgs {
-        dataset: dataset.clone(),
-        renderer: args.renderer,
-        blender: args.blender.clone(),
-        samples: Some(args.samples),
-        scenes: Vec::new(),
-        force: args.force,
-    })?;
+    render::run(&plan.render)?;
     say("4/6 baselines");
-    let opened = Dataset::open(&dataset)?;
-    let submissions = make_baselines(&opened, &args.baselines, &out.join("submissions"), args.force)?;
+    let submissions = out.join("submissions");
+    std::fs::create_dir_all(&submissions).with_context(|| format!("cannot create '{}'", submissions.display()))?;
+    for baseline in &plan.baselines {
+        baseline::run(baseline)?;
+    }
     say("5/6 eval score");
-    let files = eval::score_submissions(&eval::ScoreArgs {
-        submissions: submissions.clone(),
-        dataset: dataset.clone(),
-        out: results,
-        scenes: Vec::new(),
-        protocols: vec!["mateval-1".to_owned()],
-        jobs: 1,
-        cache: None,
-        force: args.force,
-    })?;
+    score::run(&plan.score)?;
     say("6/6 eval leaderboard");
-    eval::leaderboard::run(&LeaderboardArgs {
-        results: files.clone(),
-        out: out.join("leaderboard"),
-        protocol: "mateval-1".to_owned(),
-        partial: false,
-        dataset: Some(dataset),
-        submissions,
-        shown: vec![StripPicture::Albedo],
-        samples: 64,
-        pictures: None,
-        errata: None,
-        force: args.force,
-    })?;
-    print_closing(&opened, out, &files)?;
+    leaderboard::run(&plan.leaderboard)?;
+    print_closing(out, &plan.score.result_paths())?;
     Ok(Outcome::Good)
 }
 
-fn make_baselines(
-    dataset: &Dataset,
-    baselines: &[DemoBaseline],
-    folder: &Path,
-    force: bool,
-) -> anyhow::Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).with_context(|| format!("cannot make '{}'", folder.display()))?;
-    baselines.iter().map(|&baseline| make_baseline(dataset, baseline, folder, force)).collect()
+fn plan(args: &Args) -> anyhow::Result<Plan> {
+    let [source, dataset, results] = ["source", "dataset", "results"].map(|name| args.out.join(name));
+    let submission = |baseline: &DemoBaseline| args.out.join("submissions").join(baseline.name());
+    let submissions: Vec<PathBuf> = args.baselines.iter().map(submission).collect();
+    // The demo's own folder is checked once; a file of an earlier demo is replaced.
+    let words = |options: Vec<OsString>, paths: &[PathBuf]| -> Vec<OsString> {
+        let force = args.force.then(|| OsString::from("--force"));
+        let separator = OsString::from("--");
+        let paths = paths.iter().map(|path| path.as_os_str().to_owned());
+        options.into_iter().chain(force).chain([separator]).chain(paths).collect()
+    };
+    let baseline = |baseline: &DemoBaseline| {
+        let places = vec![path_option("dataset", &dataset), path_option("out", &submission(baseline))];
+        parse_subcommand(&[vec![OsString::from(baseline.name())], words(places, &[])].concat())
+    };
+    let score_words = words(vec![path_option("dataset", &dataset), path_option("out", &results)], &submissions);
+    let score: ScoreArgs = parse_args(&score_words)?;
+    let mut shown = vec![path_option("dataset", &dataset), path_option("out", &args.out.join("leaderboard"))];
+    shown.extend(submissions.iter().map(|submission| path_option("submission", submission)));
+    let render_words = words(vec![format!("--samples={}", args.samples).into()], std::slice::from_ref(&dataset));
+    let mut render: RenderArgs = parse_args(&render_words)?;
+    render.by = args.by.clone();
+    Ok(Plan {
+        sample: parse_args(&words(Vec::new(), &[source.clone()]))?,
+        build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
+        render,
+        baselines: args.baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,
+        leaderboard: parse_args(&words(shown, &score.result_paths()))?,
+        score,
+    })
 }
 
-fn make_baseline(dataset: &Dataset, baseline: DemoBaseline, folder: &Path, force: bool) -> anyhow::Result<PathBuf> {
-    match baseline {
-        DemoBaseline::Gt => {
-            let out = folder.join("gt");
-            mateval_baselines::truth::write(dataset, &out, force)?;
-            Ok(out)
-        }
-        DemoBaseline::Nn => {
-            let out = folder.join("nn");
-            let bars = Bars::new();
-            let progress = |step: &str, done: usize, all: usize| bars.step(step, done, all);
-            let (source, options) = (EstimateSource::Truth, NnOptions::default());
-            mateval_baselines::nn::write(dataset, &out, force, &source, &options, &progress)?;
-            Ok(out)
-        }
-        DemoBaseline::Median => {
-            let out = folder.join("median");
-            mateval_baselines::homogeneous::write_by_instance(dataset, &out, force, &EstimateSource::Input)?;
-            Ok(out)
-        }
-        DemoBaseline::Grey => {
-            let out = folder.join("grey");
-            mateval_baselines::grey::write(dataset, &out, force)?;
-            Ok(out)
-        }
-    }
-}
-
-fn print_closing(dataset: &Dataset, out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
+/// Prints the tables, and where to find what was made.
+fn print_closing(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
     let results = files.iter().map(|path| mateval_scene::json::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
     print(&tables(&results, "mateval-1", Grouping::Dataset, TableFormat::Markdown)?)?;
+    let dataset = Dataset::open(&out.join("dataset"))?;
     for id in &dataset.file.scenes {
         let scene = dataset.folder(id);
         print(&format!("input picture:  {}\n", scene.path().join("views/input/rgb.png").display()))?;

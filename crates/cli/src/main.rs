@@ -1,24 +1,26 @@
-//! `mateval`: the command line. The only part that prints, reads the environment and ends the process.
+//! The `mateval` command. Only this crate prints, reads the environment and ends the process.
 //!
-//! Results go to stdout, progress, log and warnings to stderr. Exit codes: 0 done and good, 1 done and the answer is no,
-//! 2 could not be done.
+//! Each subcommand has a file. It parses its arguments, checks them and everything else that can fail early, and then
+//! calls a library, which returns values. Results go to stdout; progress and warnings go to stderr. Exit codes: 0 the
+//! command did its work and the answer is good, 1 it did its work and the answer is no, 2 it could not do its work.
 
 mod bars;
 mod baseline;
 mod demo;
 mod eval;
+mod format;
 mod outcome;
+mod output_file;
+mod parsing;
 mod prep;
 mod sample;
 mod schema;
+mod tool;
 mod weights;
 
 use clap::{Parser, Subcommand};
 
 use outcome::Outcome;
-
-/// Name and version, as results and datasets are marked with.
-const TOOL: &str = concat!("mateval ", env!("CARGO_PKG_VERSION"));
 
 /// Makes and scores a benchmark for recovering the materials of an indoor room from one photo.
 #[derive(Parser)]
@@ -30,17 +32,17 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Everything on the built-in sample: dataset, renders, baselines, scores.
+    /// Runs everything on the built-in sample: dataset, renders, baselines, scores and leaderboard.
     Demo(demo::Args),
-    /// Writes the built-in sample: a small CC0 room and a house as source scenes, with a recipe.
+    /// Writes the built-in sample: the source scenes of a small CC0 room and a house, and a recipe for them.
     Sample(sample::Args),
-    /// Makes datasets.
+    /// Makes, checks and describes datasets.
     #[command(subcommand)]
     Prep(prep::Command),
-    /// Makes a submission by a baseline that comes with the tool.
+    /// Makes a submission by a method that comes with the tool, or from another method's files.
     #[command(subcommand)]
     Baseline(baseline::Command),
-    /// Scores submissions.
+    /// Checks, scores and compares submissions.
     #[command(subcommand)]
     Eval(eval::Command),
     /// Writes the JSON Schemas of the format's files.
@@ -49,7 +51,7 @@ enum Command {
 }
 
 fn main() -> std::process::ExitCode {
-    // A bug that panics has said so by itself; what it was about to do could not be done.
+    // A panic is a bug and has printed its own message.
     std::panic::catch_unwind(run).unwrap_or(std::process::ExitCode::from(2))
 }
 
@@ -66,7 +68,7 @@ fn run() -> std::process::ExitCode {
         Ok(Outcome::Good) => std::process::ExitCode::from(0),
         Ok(Outcome::No) => std::process::ExitCode::from(1),
         Err(error) => {
-            outcome::say(&format!("error: {}", outcome::told(&error)));
+            outcome::say(&format!("error: {}", outcome::error_text(&error)));
             std::process::ExitCode::from(2)
         }
     }

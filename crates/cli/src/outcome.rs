@@ -1,19 +1,20 @@
-//! How a command ends, and the two ways to print.
+//! How a command ends, and the functions that print.
 
 use std::io::Write as _;
 
 use anyhow::Context as _;
+use mateval_scene::{Finding, Severity};
 
-/// How a command ended.
+/// How a command ended that could do its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Done and good.
+    /// Exit code 0: the answer is good, or the command asks no question.
     Good,
-    /// Done, and the answer is no.
+    /// Exit code 1: the answer is no.
     No,
 }
 
-/// A result, to stdout. A reader that has gone away is no error; a full disk behind it is.
+/// Prints a result to stdout. That the reader has closed the pipe is no error; that the disk behind it is full is one.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -22,8 +23,8 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// An error and its causes in one text; our errors tell their cause themselves, and it is not told twice.
-pub fn told(error: &anyhow::Error) -> String {
+/// An error and its causes on one line. Our own errors end with their cause, which is then not repeated.
+pub fn error_text(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |text, cause| match text.is_empty() {
         true => cause,
         false if text.ends_with(&cause) => text,
@@ -31,18 +32,18 @@ pub fn told(error: &anyhow::Error) -> String {
     })
 }
 
-/// A word about the work, to stderr.
+/// Prints a line about the work to stderr.
 pub fn say(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// The findings that ask for attention, to stderr; notes are only counted.
-pub fn say_findings(title: &str, findings: &[mateval_scene::Finding]) {
-    let notes = findings.iter().filter(|finding| finding.severity == mateval_scene::Severity::Note).count();
-    for finding in findings.iter().filter(|finding| finding.severity != mateval_scene::Severity::Note) {
+/// Prints warnings and errors to stderr, each after `title`; notes are only counted.
+pub fn say_findings(title: &str, findings: &[Finding]) {
+    let notes = findings.iter().filter(|finding| finding.severity == Severity::Note).count();
+    for finding in findings.iter().filter(|finding| finding.severity != Severity::Note) {
         say(&format!("{title}: {finding}"));
     }
     if notes > 0 {
-        say(&format!("{title}: {notes} notes more"));
+        say(&format!("{title}: {notes} more notes"));
     }
 }

@@ -1,4 +1,4 @@
-//! `mateval sample`.
+//! `mateval sample`: the built-in sample as source scenes and a recipe.
 
 use std::path::PathBuf;
 
@@ -6,17 +6,17 @@ use anyhow::{Context as _, bail};
 
 use crate::outcome::{Outcome, print};
 
-/// What it is given.
+/// Arguments of `sample`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder to write it to.
+    /// Folder that the sample is written to.
     out: PathBuf,
-    /// Write into a folder that is there already, replacing files of the same name.
+    /// Write into a folder that already exists and replace files of the same name.
     #[arg(long)]
     force: bool,
 }
 
-/// Writes the sample.
+/// Writes the sample and prints the path of its recipe.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.exists() && !args.force {
         bail!("'{}' is already there; choose another folder, or add --force to write into it", args.out.display());

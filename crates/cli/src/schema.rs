@@ -1,4 +1,4 @@
-//! `mateval schema`: the JSON Schemas of the format's files, from the Rust types that read and write them.
+//! `mateval schema`: the JSON Schemas of the format's files, made from the Rust types that read and write them.
 
 use std::path::PathBuf;
 
@@ -23,12 +23,12 @@ use schemars::{Schema, schema_for};
 
 use crate::outcome::{Outcome, print};
 
-/// What it is given.
+/// Arguments of `schema`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder to write them to, as in `dataset_spec/schema`.
+    /// Folder that the schemas are written to, such as `dataset_spec/schema`.
     out: PathBuf,
-    /// Replace schemas that are there.
+    /// Replace schemas that already exist.
     #[arg(long)]
     force: bool,
 }
@@ -39,7 +39,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !args.force) {
         bail!("'{}' is already there; choose another folder, or add --force to replace it", path.display());
     }
-    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make '{}'", args.out.display()))?;
+    std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create '{}'", args.out.display()))?;
     for (path, schema) in &schemas {
         json::write(path, schema)?;
         print(&format!("{}\n", path.display()))?;

@@ -1,4 +1,4 @@
-//! Where LPIPS' weights are, and what to say where they are not.
+//! The cache folder, and the LPIPS weights in it.
 
 use std::path::PathBuf;
 
@@ -7,10 +7,10 @@ use mateval_metrics::{Lpips, Net};
 
 use crate::outcome::say;
 
-/// The command that mends missing weights, from the project's folder.
+/// The command that downloads missing weights, run from the project's folder.
 pub const MEND: &str = "python3 tools/fetch_lpips_weights.py";
 
-/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`: the same as `tools/fetch_lpips_weights.py`.
+/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`, as in `tools/fetch_lpips_weights.py`.
 pub fn cache_folder() -> PathBuf {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     set("MATEVAL_CACHE")
@@ -19,7 +19,7 @@ pub fn cache_folder() -> PathBuf {
         .unwrap_or_default()
 }
 
-/// The network, or why it is not there (which is said too).
+/// The network, or why it could not be loaded, which is printed as a warning too.
 pub fn load(net: Net) -> LpipsWeights {
     match Lpips::load(net, &cache_folder().join(net.file_name())) {
         Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),

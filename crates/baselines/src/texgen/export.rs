@@ -14,7 +14,8 @@ use serde_json::json;
 
 use super::{TEXELS, object_folder};
 use crate::error::BaselineError;
-use crate::estimate::{Estimate, EstimateSource};
+use crate::estimate::Estimate;
+use crate::estimate_source::EstimateSource;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift, place_of};
 use crate::maps::srgb_bytes;

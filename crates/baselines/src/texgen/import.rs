@@ -8,7 +8,7 @@ use mateval_scene::Progress;
 use mateval_scene::open::Dataset;
 
 use crate::error::BaselineError;
-use crate::estimate::EstimateSource;
+use crate::estimate_source::EstimateSource;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;

@@ -1,4 +1,4 @@
-//! `mateval eval leaderboard`.
+//! `mateval eval leaderboard`: ranks results and writes a site.
 
 use std::path::{Path, PathBuf};
 
@@ -9,50 +9,47 @@ use mateval_report::leaderboard::{LeaderboardPlan, Submissions, verified, write}
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
 
-use super::pictures::StripPicture;
-use crate::TOOL;
-use crate::bars::Bars;
+use super::strip_picture::StripArgs;
+use crate::bars::with_progress;
 use crate::outcome::{Outcome, print, say};
+use crate::tool::TOOL;
 
-/// What it is given.
+/// Arguments of `eval leaderboard`.
 #[derive(clap::Args)]
 pub struct LeaderboardArgs {
-    /// RESULT.json files; RESULT.verified.json beside one, from `eval verify`, gives it its mark.
-    #[arg(required = true)]
-    pub results: Vec<PathBuf>,
-    /// The folder of the site; its index.html opens from the disk.
+    /// RESULT.json files. One is marked as verified if RESULT.verified.json, written by `eval verify`, lies beside it.
+    #[arg(required = true, value_name = "RESULT.json")]
+    results: Vec<PathBuf>,
+    /// Folder of the site; its index.html opens from the disk.
     #[arg(long)]
-    pub out: PathBuf,
-    /// Under which rules.
+    out: PathBuf,
+    /// Protocol whose scores are ranked.
     #[arg(long, default_value = "mateval-1")]
-    pub protocol: String,
-    /// Let in results of fewer scenes, and rank each on the scenes that it covers; they are marked.
+    protocol: String,
+    /// Accept results that lack scenes, and rank each on the scenes that it covers; they are marked.
     #[arg(long)]
-    pub partial: bool,
-    /// The dataset's folder, to show pictures of each `--submission`.
+    partial: bool,
+    /// Folder of the dataset, to draw pictures of each `--submission`.
     #[arg(long, requires = "submissions")]
-    pub dataset: Option<PathBuf>,
-    /// A submission's folder, to be shown beside the truth; may be given several times.
-    #[arg(long = "submission", requires = "dataset")]
-    pub submissions: Vec<PathBuf>,
-    /// What is shown of them; may be given several times.
-    #[arg(long = "picture", value_enum, default_values_t = [StripPicture::Albedo])]
-    pub shown: Vec<StripPicture>,
-    /// Samples a pixel of pictures of light, half of them in each of two halves.
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=65536))]
-    pub samples: u32,
-    /// A folder of more pictures to show: `<method>/<scene>/<view>/<kind>.png`, and `_truth` for the method's name.
+    dataset: Option<PathBuf>,
+    /// Folder of a submission to show beside the truth; may be given several times.
+    #[arg(long = "submission", value_name = "SUBMISSION", requires = "dataset")]
+    submissions: Vec<PathBuf>,
+    #[command(flatten)]
+    strips: StripArgs,
+    /// Folder of further pictures to show: `<method>/<scene>/<view>/<kind>.png`, with `_truth` as the method of the
+    /// truth's pictures.
     #[arg(long)]
-    pub pictures: Option<PathBuf>,
-    /// A JSON file of what was found wrong later.
+    pictures: Option<PathBuf>,
+    /// JSON file of errors that were found after publication.
     #[arg(long)]
-    pub errata: Option<PathBuf>,
-    /// Replace a leaderboard that is there.
+    errata: Option<PathBuf>,
+    /// Replace a leaderboard that already exists.
     #[arg(long)]
-    pub force: bool,
+    force: bool,
 }
 
-/// Writes the site.
+/// Writes the site and prints the path of its first page.
 pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
     let errata = args.errata.as_deref().map(read_errata).transpose()?;
     let mut results = Vec::new();
@@ -60,17 +57,20 @@ pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
     for path in &args.results {
         let mut result: ResultFile = json::read(path)?;
         marks.push(verified::read(path, &result)?);
-        // Most of a result's memory, and of no use here.
+        // Single pictures are most of a result's memory, and the site does not show them.
         result.protocols.values_mut().for_each(|scores| scores.pictures = Vec::new());
         results.push(result);
     }
     for (path, _) in args.results.iter().zip(&marks).filter(|(_, mark)| **mark == verified::Verified::Stale) {
         let sidecar = verified::sidecar(path);
-        say(&format!("warning: '{}' is not of this result as it is now; run `eval verify` again", sidecar.display()));
+        say(&format!(
+            "warning: '{}' verifies an earlier version of the result; run `eval verify` again",
+            sidecar.display()
+        ));
     }
     let dataset = args.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
     if let Some(pictures) = args.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
-        bail!("'{}' is no folder; expected one of pictures", pictures.display());
+        bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
     }
     let plan = LeaderboardPlan {
         results: &results,
@@ -82,14 +82,11 @@ pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
         submissions: dataset.as_ref().map(|dataset| Submissions {
             dataset,
             folders: args.submissions.clone(),
-            shown: args.shown.iter().map(|picture| picture.shown(args.samples)).collect(),
+            shown: args.strips.shown(),
         }),
         tool: TOOL.to_owned(),
     };
-    let bars = Bars::new();
-    write(&plan, &args.out, args.force, &|step, done, all| bars.step(step, done, all))
-        .context("cannot write the leaderboard")?;
-    drop(bars);
+    with_progress(|progress| write(&plan, &args.out, args.force, progress)).context("cannot write the leaderboard")?;
     print(&format!("{}\n", args.out.join("index.html").display()))?;
     Ok(Outcome::Good)
 }

@@ -1,65 +1,58 @@
-//! `mateval eval lint`.
+//! `mateval eval lint`: checks a submission before it is scored.
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
 use mateval_submission::SubmissionError;
 use mateval_submission::archive;
 use mateval_submission::lint::{LintFile, LintPlan, lint, plain, refused};
 
-use crate::TOOL;
-use crate::bars::Bars;
+use crate::bars::with_progress;
+use crate::format::Format;
 use crate::outcome::{Outcome, print};
+use crate::output_file::check_output_file;
+use crate::tool::TOOL;
 
-/// What it is given.
+/// Arguments of `eval lint`.
 #[derive(clap::Args)]
 pub struct LintArgs {
-    /// The submission: a folder, a .zip or a .tar.gz.
+    /// The submission: a folder, a .zip or a .tar.gz archive.
     submission: PathBuf,
-    /// The dataset's folder; its ground truth is not needed.
+    /// Folder of the dataset; its ground truth is not needed.
     #[arg(long)]
     dataset: PathBuf,
-    /// A file for the report, as JSON.
+    /// File for the report, as JSON.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// How to print.
+    /// How to print the report.
     #[arg(long, value_enum, default_value = "text")]
-    format: LintFormat,
-    /// Replace a file that is there.
+    format: Format,
+    /// Replace a report that already exists.
     #[arg(long)]
     force: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum LintFormat {
-    Text,
-    Json,
-}
-
-/// Looks a submission over; the answer is no where there is an error.
+/// Checks the submission; the answer is no where it has an error.
 pub fn run(args: &LintArgs) -> anyhow::Result<Outcome> {
-    if let Some(out) = args.out.as_ref().filter(|out| out.exists() && !args.force) {
-        bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
-    }
+    args.out.iter().try_for_each(|out| check_output_file(out, "--out", "report", args.force))?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
-    let file = look_over(args, &dataset).context("cannot look the submission over")?;
+    let file = report(args, &dataset).context("cannot check the submission")?;
     args.out.iter().try_for_each(|out| json::write(out, &file))?;
     print(&match args.format {
-        LintFormat::Json => json::to_text(&file),
-        LintFormat::Text => plain(&file),
+        Format::Json => json::to_text(&file),
+        Format::Text => plain(&file),
     })?;
     Ok(if file.good { Outcome::Good } else { Outcome::No })
 }
 
-fn look_over(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, SubmissionError> {
+fn report(args: &LintArgs, dataset: &Dataset) -> Result<LintFile, SubmissionError> {
     let opened = match archive::open(&args.submission, &std::env::temp_dir()) {
-        // That it is no sound archive is an answer too.
+        // An unsound archive is a result of the check, not a failure to check.
         Err(SubmissionError::Archive { findings, .. }) => return Ok(refused(dataset, TOOL, findings)),
         opened => opened?,
     };
-    let bars = Bars::new();
     let plan = LintPlan { dataset, submission: opened.root(), tool: TOOL.to_owned() };
-    lint(&plan, &|step, done, all| bars.step(step, done, all))
+    with_progress(|progress| lint(&plan, progress))
 }

@@ -1,55 +1,51 @@
-//! `mateval eval verify`.
+//! `mateval eval verify`: computes every number of a result again.
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_metrics::Net;
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
 use mateval_submission::archive;
 
-use crate::TOOL;
-use crate::bars::Bars;
+use crate::bars::with_progress;
+use crate::format::Format;
 use crate::outcome::{Outcome, print};
+use crate::output_file::check_output_file;
+use crate::tool::TOOL;
 use crate::weights;
 
-/// What it is given.
+/// Arguments of `eval verify`.
 #[derive(clap::Args)]
 pub struct VerifyArgs {
-    /// RESULT.json.
+    /// The RESULT.json file.
+    #[arg(value_name = "RESULT.json")]
     result: PathBuf,
-    /// The submission that it was made of: a folder, a .zip or a .tar.gz.
+    /// The submission that was scored: a folder, a .zip or a .tar.gz archive.
     #[arg(long)]
     submission: PathBuf,
-    /// The dataset that it was made on.
+    /// Folder of the dataset that it was scored on.
     #[arg(long)]
     dataset: PathBuf,
-    /// A file for the verification; beside `NAME.json`, `NAME.verified.json` is what a leaderboard looks for.
+    /// File for the verification. A leaderboard finds that of `NAME.json` by the name `NAME.verified.json`, in the same
+    /// folder.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Scenes that are scored at once.
+    /// Number of scenes that are scored at once.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     jobs: u8,
-    /// How to print.
+    /// How to print the verification.
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
-    /// Replace a file that is there.
+    /// Replace a verification that already exists.
     #[arg(long)]
     force: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Format {
-    Text,
-    Json,
-}
-
-/// Makes every number anew, and tells whether they are the result's.
+/// Scores again and compares; the answer is no where a number differs.
 pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
-    if let Some(out) = args.out.as_ref().filter(|out| out.exists() && !args.force) {
-        bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
-    }
+    args.out.iter().try_for_each(|out| check_output_file(out, "--out", "verification", args.force))?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let opened = archive::open(&args.submission, &std::env::temp_dir())?;
     let plan = VerifyPlan {
@@ -60,9 +56,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
         tool: TOOL.to_owned(),
         jobs: usize::from(args.jobs),
     };
-    let bars = Bars::new();
-    let found = verify(plan, &|step, done, all| bars.step(step, done, all)).context("cannot verify")?;
-    drop(bars);
+    let found = with_progress(|progress| verify(plan, progress)).context("cannot verify")?;
     args.out.iter().try_for_each(|out| json::write(out, &found))?;
     print(&match args.format {
         Format::Json => json::to_text(&found),
@@ -73,13 +67,13 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
 
 fn text(found: &VerificationFile) -> String {
     let mut lines: Vec<String> = found.findings.iter().map(ToString::to_string).collect();
-    let untold = found.differences.saturating_sub(found.findings.len());
-    if untold > 0 {
-        lines.push(format!("{untold} values more differ"));
+    let unlisted = found.differences.saturating_sub(found.findings.len());
+    if unlisted > 0 {
+        lines.push(format!("{unlisted} more values differ"));
     }
     lines.push(match (found.confirmed, found.differences) {
-        (true, _) => "confirmed: every number was made anew".to_owned(),
-        (false, 0) => "not confirmed: it was not made of this".to_owned(),
+        (true, _) => "confirmed: every number was computed again and is the same".to_owned(),
+        (false, 0) => "not confirmed: the result was not made from this submission and dataset".to_owned(),
         (false, count) => format!("not confirmed: {count} values differ"),
     });
     lines.join("\n") + "\n"

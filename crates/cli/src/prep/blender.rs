@@ -1,4 +1,4 @@
-//! Which Blender renders, and what it may take.
+//! Arguments that choose the Blender that renders, and its limits.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -8,31 +8,32 @@ use mateval_prep::render::{BlenderOptions, BlenderProgram};
 
 use crate::weights::cache_folder;
 
-/// The command that installs Blender as a Python module, from the project's folder.
-const MEND: &str = "tools/setup.sh";
+/// The command that installs Blender as a Python module, run from the project's folder.
+const INSTALL: &str = "tools/setup.sh";
 
-/// What concerns Blender alone.
+/// Arguments that concern Blender alone.
 #[derive(clap::Args, Clone, Debug)]
 pub struct BlenderArgs {
-    /// A Blender 4.5, or a Python whose `bpy` module is one; else $MATEVAL_BLENDER, else what tools/setup.sh installed.
+    /// Blender 4.5, or a Python with that version's `bpy` module [default: $MATEVAL_BLENDER, else the one that
+    /// tools/setup.sh installed].
     #[arg(long, value_name = "PATH")]
-    pub blender: Option<PathBuf>,
-    /// Scenes that Blender renders at once.
+    blender: Option<PathBuf>,
+    /// Number of scenes that Blender renders at once.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
-    pub jobs: u16,
-    /// Seconds that Blender may take for a scene.
+    jobs: u16,
+    /// Longest time that Blender may take for a scene, in seconds.
     #[arg(long, value_name = "SECONDS", default_value_t = 7200, value_parser = clap::value_parser!(u32).range(1..))]
-    pub time_limit: u32,
-    /// GiB of memory that Blender may take.
+    time_limit: u32,
+    /// Most memory that Blender may take, in GiB.
     #[arg(long, value_name = "GIB", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub memory_limit: u32,
-    /// How often a scene is tried.
+    memory_limit: u32,
+    /// How often Blender is run for a scene before the scene counts as failed.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=10))]
-    pub attempts: u32,
+    attempts: u32,
 }
 
 impl BlenderArgs {
-    /// What they ask for; fails where there is no Blender.
+    /// How Blender is run; fails where it cannot be found.
     pub fn options(&self) -> anyhow::Result<BlenderOptions> {
         let mut options = BlenderOptions::new(BlenderProgram(self.program()?));
         options.jobs = usize::from(self.jobs);
@@ -43,25 +44,23 @@ impl BlenderArgs {
     }
 
     fn program(&self) -> anyhow::Result<PathBuf> {
-        let named = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty()).map(PathBuf::from);
+        let from_environment = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty()).map(PathBuf::from);
         let installed = cache_folder().join("blender/bin/python");
-        let (program, named) = match (&self.blender, named) {
+        let (program, origin) = match (&self.blender, from_environment) {
             (Some(path), _) => (path.clone(), "--blender"),
             (None, Some(path)) => (path, "MATEVAL_BLENDER"),
-            (None, None) if installed.exists() => (installed, ""),
+            (None, None) if installed.exists() => return Ok(installed),
             (None, None) => {
                 let place = installed.display();
                 bail!(
-                    "there is no Blender: neither --blender nor MATEVAL_BLENDER names one, and '{place}' is not there; run: {MEND}"
+                    "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{place}' does not exist; run: {INSTALL}"
                 );
             }
         };
-        // A name without a folder is looked for on the PATH.
+        // A name without a folder is searched for in PATH when it is run.
         if program.components().count() > 1 && !program.is_file() {
-            bail!(
-                "{named} names '{}', which is not there; expected a Blender, or a Python with bpy",
-                program.display()
-            );
+            let shown = program.display();
+            bail!("{origin} is '{shown}', which does not exist; expected Blender, or a Python with bpy");
         }
         Ok(program)
     }

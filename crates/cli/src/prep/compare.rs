@@ -1,4 +1,4 @@
-//! `mateval prep compare`.
+//! `mateval prep compare`: Blender's pictures against those of the built-in path tracer.
 
 use std::path::PathBuf;
 
@@ -6,34 +6,34 @@ use anyhow::Context as _;
 use mateval_audit::compare::{CompareOptions, compare, text};
 use mateval_scene::{SceneId, json};
 
-use super::Format;
-use crate::TOOL;
-use crate::bars::Bars;
+use crate::bars::with_progress;
+use crate::format::Format;
 use crate::outcome::{Outcome, print, say};
+use crate::tool::TOOL;
 
-/// What it is given.
+/// Arguments of `prep compare`.
 #[derive(clap::Args)]
 pub struct CompareArgs {
-    /// The dataset's folder.
+    /// Folder of the dataset.
     dataset: PathBuf,
-    /// Only this scene; may be given several times.
-    #[arg(long = "scene")]
+    /// Compare this scene only; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
-    /// Samples a pixel of each half of our own pictures; as many as Blender's if absent.
+    /// Samples per pixel of each half of the built-in tracer's pictures [default: as many as Blender's have].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     samples: Option<u32>,
-    /// How to print what was found.
+    /// How to print the comparison.
     #[arg(long, value_enum, default_value = "text")]
     format: Format,
-    /// Folder for compare.json and a page with the pictures side by side.
+    /// Folder for compare.json and a page that shows both pictures side by side.
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Replace a comparison that is there.
+    /// Replace a comparison that already exists.
     #[arg(long, requires = "out")]
     force: bool,
 }
 
-/// Runs it.
+/// Compares and prints the checks.
 pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     let options = CompareOptions {
         dataset: args.dataset.clone(),
@@ -42,10 +42,8 @@ pub fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
         out: args.out.clone(),
         force: args.force,
     };
-    let bars = Bars::new();
-    let file = compare(&options, TOOL, &|step, done, all| bars.step(step, done, all))
-        .context("cannot compare the dataset's pictures")?;
-    drop(bars);
+    let file =
+        with_progress(|progress| compare(&options, TOOL, progress)).context("cannot compare the dataset's pictures")?;
     match args.format {
         Format::Json => print(&json::to_text(&file))?,
         Format::Text => print(&text::text(&file))?,

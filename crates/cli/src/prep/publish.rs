@@ -1,54 +1,52 @@
-//! `mateval prep publish`.
+//! `mateval prep publish`: a dataset as a public and a withheld folder.
 
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use mateval_audit::publish::publish;
 
-use crate::bars::Bars;
+use crate::bars::with_progress;
 use crate::outcome::{Outcome, print};
 
-/// What it is given.
+/// Arguments of `prep publish`.
 #[derive(clap::Args)]
 pub struct PublishArgs {
-    /// The dataset's folder, with its ground truth.
+    /// Folder of the dataset, with its ground truth.
     dataset: PathBuf,
-    /// What the public tree leaves out.
+    /// The part that the public folder leaves out.
     #[arg(long, value_enum)]
-    withhold: Part,
-    /// The folder for everybody: the dataset without it.
+    withhold: Withheld,
+    /// Folder for the public files: the dataset without the withheld part.
     #[arg(long)]
     public: PathBuf,
-    /// The folder to keep: what is withheld. Laid over the public one it gives the dataset again.
+    /// Folder for the withheld files. Copied over the public folder they give the dataset again.
     #[arg(long)]
     private: PathBuf,
-    /// Replace folders that are there.
+    /// Replace folders that already exist.
     #[arg(long)]
     force: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Part {
-    /// All of `scenes/<scene>/ground_truth`.
+enum Withheld {
+    /// All files in `scenes/<scene>/ground_truth`.
     #[value(name = "ground_truth")]
     GroundTruth,
 }
 
-/// Writes both trees and prints the commitment.
+/// Writes both folders and prints the commitment, a hash of the withheld files.
 pub fn run(args: &PublishArgs) -> anyhow::Result<Outcome> {
-    let Part::GroundTruth = args.withhold;
+    let Withheld::GroundTruth = args.withhold;
     if args.public == args.private {
-        bail!("--public and --private are one folder; the ground truth would not be withheld");
+        bail!("--public and --private are the same folder; the ground truth would not be withheld");
     }
     for place in [&args.public, &args.private] {
         if place.exists() && !args.force {
             bail!("'{}' is already there; choose another folder, or add --force to replace it", place.display());
         }
     }
-    let bars = Bars::new();
-    let found = publish(&args.dataset, &args.public, &args.private, &|step, done, all| bars.step(step, done, all))
+    let found = with_progress(|progress| publish(&args.dataset, &args.public, &args.private, progress))
         .context("cannot publish the dataset")?;
-    drop(bars);
     print(&format!(
         "{}: {} files\n{}: {} files\ncommitment {}\n",
         args.public.display(),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
-use mateval_baselines::estimate::EstimateSource;
+use mateval_baselines::estimate_source::EstimateSource;
 use mateval_baselines::nn::{self, NnOptions};
 use mateval_baselines::{grey, submission, truth};
 use mateval_eval::protocol::Protocol;

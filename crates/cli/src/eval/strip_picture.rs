@@ -1,0 +1,40 @@
+//! What the pictures of `eval pictures` and `eval leaderboard` show: `--picture` and `--samples`.
+
+use mateval_eval::light_rules::Track;
+use mateval_report::strips::Shown;
+
+/// Pictures to draw, and how exactly.
+#[derive(clap::Args)]
+pub struct StripArgs {
+    /// What the pictures show; may be given several times.
+    #[arg(long = "picture", value_name = "PICTURE", value_enum, default_values_t = [StripPicture::Albedo])]
+    shown: Vec<StripPicture>,
+    /// Samples per pixel of lit pictures; each of the two halves of a picture has half of them.
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=65536))]
+    samples: u32,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum StripPicture {
+    /// base_color.
+    Albedo,
+    /// RGB under the scene's own lights.
+    #[value(name = "rgb_true")]
+    RgbTrue,
+    /// RGB under lights fitted to the input view.
+    #[value(name = "rgb_fitted")]
+    RgbFitted,
+}
+
+impl StripArgs {
+    /// The pictures as the library draws them.
+    pub fn shown(&self) -> Vec<Shown> {
+        let light = |track| Shown::Light { track, samples: self.samples / 2 };
+        let shown = |picture: &StripPicture| match picture {
+            StripPicture::Albedo => Shown::Albedo,
+            StripPicture::RgbTrue => light(Track::True),
+            StripPicture::RgbFitted => light(Track::Fitted),
+        };
+        self.shown.iter().map(shown).collect()
+    }
+}

@@ -1,0 +1,67 @@
+//! `mateval eval tables`: tables of several results.
+
+use std::path::PathBuf;
+
+use mateval_eval::result::ResultFile;
+use mateval_report::tables::{Grouping, TableFormat, tables};
+use mateval_scene::json;
+
+use crate::outcome::{Outcome, print, say};
+
+/// Arguments of `eval tables`.
+#[derive(clap::Args)]
+pub struct TablesArgs {
+    /// RESULT.json files.
+    #[arg(required = true, value_name = "RESULT.json")]
+    results: Vec<PathBuf>,
+    /// Protocol whose scores are shown.
+    #[arg(long, default_value = "mateval-1")]
+    protocol: String,
+    /// Format of the tables.
+    #[arg(long, value_enum, default_value = "markdown")]
+    format: FormatName,
+    /// One row per scene, or per category of instances, whose errors are pooled over all their pixels [default: one row
+    /// per result, over the whole dataset].
+    #[arg(long, value_enum)]
+    by: Option<GroupName>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum GroupName {
+    Scene,
+    Category,
+    SuperCategory,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum FormatName {
+    Markdown,
+    Latex,
+    Csv,
+}
+
+/// Prints the tables, and a warning for each metric that a result lacks.
+pub fn run(args: &TablesArgs) -> anyhow::Result<Outcome> {
+    let results = args.results.iter().map(|path| json::read(path)).collect::<Result<Vec<ResultFile>, _>>()?;
+    let format = match args.format {
+        FormatName::Markdown => TableFormat::Markdown,
+        FormatName::Latex => TableFormat::Latex,
+        FormatName::Csv => TableFormat::Csv,
+    };
+    let grouping = match args.by {
+        None => Grouping::Dataset,
+        Some(GroupName::Scene) => Grouping::Scene,
+        Some(GroupName::Category) => Grouping::Category,
+        Some(GroupName::SuperCategory) => Grouping::SuperCategory,
+    };
+    print(&tables(&results, &args.protocol, grouping, format)?)?;
+    for result in &results {
+        for missing in &result.missing {
+            say(&format!(
+                "warning: '{}': {} is missing: {}; run: {}",
+                result.method, missing.metric, missing.reason, missing.mend
+            ));
+        }
+    }
+    Ok(Outcome::Good)
+}

@@ -1,0 +1,77 @@
+//! `mateval prep render`: the RGB pictures of a dataset.
+
+use std::path::PathBuf;
+
+use anyhow::{Context as _, bail};
+use mateval_prep::render::{RenderOptions, Renderer};
+use mateval_scene::SceneId;
+
+use super::blender::BlenderArgs;
+use crate::bars::with_progress;
+use crate::outcome::{Outcome, print, say};
+
+/// Arguments of `prep render`.
+#[derive(clap::Args)]
+pub struct RenderArgs {
+    /// Folder of the dataset.
+    dataset: PathBuf,
+    #[command(flatten)]
+    pub by: RendererArgs,
+    /// Samples per pixel of each of the two halves of a picture [default: as the recipe says].
+    #[arg(long)]
+    samples: Option<u32>,
+    /// Render this scene only; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    scenes: Vec<SceneId>,
+    /// Render pictures again that already exist.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Which program renders, and how.
+#[derive(clap::Args, Clone)]
+pub struct RendererArgs {
+    /// What renders.
+    #[arg(long, value_enum, default_value = "builtin")]
+    renderer: RendererName,
+    #[command(flatten)]
+    blender: BlenderArgs,
+}
+
+/// A renderer by its name on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum RendererName {
+    /// The built-in path tracer.
+    Builtin,
+    /// Blender's Cycles: denoised, and each light group in pictures of its own.
+    Blender,
+}
+
+impl RendererArgs {
+    /// The renderer; fails where Blender is to render and cannot be found.
+    pub fn checked(&self) -> anyhow::Result<Renderer> {
+        Ok(match self.renderer {
+            RendererName::Builtin => Renderer::Builtin,
+            RendererName::Blender => Renderer::Blender(self.blender.options()?),
+        })
+    }
+}
+
+/// Renders the dataset.
+pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
+    let renderer = args.by.checked()?;
+    let options = RenderOptions { renderer, samples: args.samples, scenes: args.scenes.clone(), force: args.force };
+    let report = with_progress(|progress| mateval_prep::render::render(&args.dataset, &options, progress))
+        .context("cannot render the dataset")?;
+    for line in &report.remarks {
+        say(line);
+    }
+    for failure in &report.failures {
+        say(&failure.to_string());
+    }
+    print(&format!("{}: {} views rendered, {} kept\n", args.dataset.display(), report.rendered, report.kept))?;
+    if !report.failures.is_empty() {
+        bail!("{} scenes could not be rendered; the others were", report.failures.len());
+    }
+    Ok(Outcome::Good)
+}
