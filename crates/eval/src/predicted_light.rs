@@ -25,7 +25,7 @@ use crate::light_rules::{LightRules, Track};
 use crate::light_stage::{self, NamedLight};
 use crate::pilot::enough_samples;
 use crate::prediction::PredictedScene;
-use crate::relit::{RelitLighting, luminance};
+use crate::relit::RelitLighting;
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
 
@@ -291,7 +291,7 @@ impl Renderer<'_> {
         let error = |radiance: f64| -> f64 {
             let pairs = grey.pixels().iter().zip(light.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
             pairs
-                .map(|((g, t), _)| radiance * luminance(*g) - luminance(*t))
+                .map(|((g, t), _)| radiance * g.luminance() - t.luminance())
                 .map(|difference| difference * difference)
                 .sum()
         };

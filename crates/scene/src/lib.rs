@@ -25,8 +25,10 @@ pub mod progress;
 pub mod reference;
 pub mod reference_io;
 pub mod source_folder;
+pub mod splitmix64;
 pub mod submission;
 pub mod text_table;
+pub mod triangle;
 pub mod uv_atlas;
 pub mod work_folder;
 
