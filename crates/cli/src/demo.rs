@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 
 use mateval_baselines::estimate::EstimateSource;
 use mateval_baselines::nn::NnOptions;
 use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 
 use crate::bars::Bars;
 use crate::eval::leaderboard::LeaderboardArgs;
@@ -53,9 +54,7 @@ pub struct Args {
 /// Sample, dataset, renders, baselines, scores, leaderboard, table.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.out.as_path();
-    if out.exists() && !args.force {
-        bail!("'{}' is already there; choose another --out, or add --force to replace what a demo left", out.display());
-    }
+    check_free(out, args.force, "--out")?;
     let [source, dataset, results] = ["source", "dataset", "results"].map(|name| out.join(name));
     say("1/6 sample: a house and a room that the program makes itself");
     mateval_prep::sample::write(&source).context("cannot write the sample")?;

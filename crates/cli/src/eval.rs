@@ -16,6 +16,7 @@ use mateval_eval::score::{ScorePlan, score};
 use mateval_eval::tables::{Grouping, TableFormat, tables};
 use mateval_metrics::{Lpips, Net};
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 use mateval_scene::{SceneId, json};
 
 use self::pictures::PicturesArgs;
@@ -289,9 +290,7 @@ fn result_paths(args: &ScoreArgs) -> anyhow::Result<Vec<PathBuf>> {
         if out.is_dir() {
             bail!("'{}' is a folder; expected the name of a result file", out.display());
         }
-        if out.exists() && !args.force {
-            bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
-        }
+        check_free(out, args.force, "--out")?;
         if outs[..at].contains(out) {
             bail!("two submissions would be written to '{}'; rename one of the folders", out.display());
         }

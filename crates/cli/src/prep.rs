@@ -14,6 +14,7 @@ use mateval_prep::mitsuba_export::ExportOptions;
 use mateval_prep::render::{RenderOptions, Renderer};
 use mateval_prep::stats;
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 use mateval_scene::{SceneId, Severity, ViewId, json};
 
 use crate::TOOL;
@@ -252,9 +253,7 @@ fn check_picture_place(picture: &Path, args: &StatsArgs) -> anyhow::Result<()> {
     if picture.is_dir() {
         bail!("'{shown}' is a folder; expected the name of a picture file");
     }
-    if picture.exists() && !args.force {
-        bail!("'{shown}' is already there; choose another --picture, or add --force to replace it");
-    }
+    check_free(picture, args.force, "--picture")?;
     let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(folder) = folder.canonicalize() else {
         bail!("the folder of '{shown}' is not there; make it, or choose another --picture");

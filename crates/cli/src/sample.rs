@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
+use mateval_scene::work_folder::check_free;
 
 use crate::outcome::{Outcome, print};
 
@@ -18,9 +19,7 @@ pub struct Args {
 
 /// Writes the sample.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if args.out.exists() && !args.force {
-        bail!("'{}' is already there; choose another folder, or add --force to write into it", args.out.display());
-    }
+    check_free(&args.out, args.force, "folder")?;
     mateval_prep::sample::write(&args.out).context("cannot write the sample")?;
     print(&format!("{}\n", args.out.join("recipe.toml").display()))?;
     Ok(Outcome::Good)

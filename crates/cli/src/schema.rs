@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::explain::file::ExplainFile;
 use mateval_eval::leaderboard::errata::ErrataFile;
@@ -19,6 +19,7 @@ use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile};
 use mateval_scene::submission::SubmissionFile;
+use mateval_scene::work_folder::check_free;
 use schemars::{Schema, schema_for};
 
 use crate::outcome::{Outcome, print};
@@ -36,9 +37,7 @@ pub struct Args {
 /// Writes `NAME.schema.json` for every kind of JSON file.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let schemas = schemas().map(|(name, schema)| (args.out.join(name).with_extension("schema.json"), schema));
-    if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !args.force) {
-        bail!("'{}' is already there; choose another folder, or add --force to replace it", path.display());
-    }
+    schemas.iter().try_for_each(|(path, _)| check_free(path, args.force, "folder"))?;
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot make '{}'", args.out.display()))?;
     for (path, schema) in &schemas {
         json::write(path, schema)?;

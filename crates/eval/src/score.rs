@@ -15,7 +15,7 @@ use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 use crate::error::EvalError;
 use crate::light_rules::Track;
 use crate::map_file::{MapFault, check_place, is_there};
-use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
+use crate::open_scene::{OpenScene, scored_views};
 use crate::prediction::{PredictedScene, map_files, read_scene};
 use crate::protocol::Protocol;
 use crate::result::{
@@ -85,7 +85,7 @@ struct Outcome {
 /// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them, and so
 /// are paths of light for those that agree in roughness and metallic.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
-    let scenes = chosen_scenes(plan.dataset, &plan.scenes)?;
+    let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
     for (scene, outcomes) in scenes.iter().zip(score_scenes(plan, &scenes, progress)?) {
@@ -242,7 +242,7 @@ pub(crate) fn hashed_submission(
 ) -> Result<HashedSubmission, EvalError> {
     let file = read_submission_file(path)?;
     let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    files.extend(chosen_scenes(dataset, scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
+    files.extend(dataset.chosen_scenes(scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
     Ok(HashedSubmission { method: file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
 }
 

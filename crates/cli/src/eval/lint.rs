@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_eval::EvalError;
 use mateval_eval::archive;
 use mateval_eval::lint::{LintFile, LintPlan, lint, plain, refused};
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -40,9 +41,7 @@ enum LintFormat {
 
 /// Looks a submission over; the answer is no where there is an error.
 pub fn run(args: &LintArgs) -> anyhow::Result<Outcome> {
-    if let Some(out) = args.out.as_ref().filter(|out| out.exists() && !args.force) {
-        bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
-    }
+    args.out.iter().try_for_each(|out| check_free(out, args.force, "--out"))?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let file = look_over(args, &dataset).context("cannot look the submission over")?;
     args.out.iter().try_for_each(|out| json::write(out, &file))?;

@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::Context as _;
 use mateval_eval::archive;
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_metrics::Net;
 use mateval_scene::json;
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 
 use crate::TOOL;
 use crate::bars::Bars;
@@ -47,9 +48,7 @@ enum Format {
 
 /// Makes every number anew, and tells whether they are the result's.
 pub fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
-    if let Some(out) = args.out.as_ref().filter(|out| out.exists() && !args.force) {
-        bail!("'{}' is already there; choose another --out, or add --force to replace it", out.display());
-    }
+    args.out.iter().try_for_each(|out| check_free(out, args.force, "--out"))?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let opened = archive::open(&args.submission, &std::env::temp_dir())?;
     let plan = VerifyPlan {

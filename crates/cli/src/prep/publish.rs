@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use mateval_prep::publish::publish;
+use mateval_scene::work_folder::check_free;
 
 use crate::bars::Bars;
 use crate::outcome::{Outcome, print};
@@ -41,9 +42,7 @@ pub fn run(args: &PublishArgs) -> anyhow::Result<Outcome> {
         bail!("--public and --private are one folder; the ground truth would not be withheld");
     }
     for place in [&args.public, &args.private] {
-        if place.exists() && !args.force {
-            bail!("'{}' is already there; choose another folder, or add --force to replace it", place.display());
-        }
+        check_free(place, args.force, "folder")?;
     }
     let bars = Bars::new();
     let found = publish(&args.dataset, &args.public, &args.private, &|step, done, all| bars.step(step, done, all))
