@@ -12,6 +12,7 @@ pub mod error;
 pub mod findings;
 pub mod glb;
 pub mod gltf_accessor;
+pub mod gltf_error;
 pub mod ids;
 pub mod json;
 pub mod layout;
