@@ -238,15 +238,15 @@ fn outputs_that_are_there() {
         run(build(&source.recipe, &out).args(words)).ends_with(2).says("is no dataset");
         run(baseline("grey", dataset(), &out).args(words)).ends_with(2).says("dataset'");
     }
-    run(mateval().arg("sample").arg(&out)).ends_with(2).says("is already there");
+    run(mateval().arg("sample").arg(&out)).ends_with(2).says("already exists");
     assert_eq!(files_below(&out), [Path::new("notes.txt")]);
 
     let result = out.join("RESULT.json");
     std::fs::write(&result, "mine").unwrap();
     let submission = out.join("grey");
     run(&mut baseline("grey", dataset(), &submission)).ends_with(0);
-    run(&mut baseline("grey", dataset(), &submission)).ends_with(2).says("is already there").says("--force");
-    run(&mut score(&submission, dataset(), &result)).ends_with(2).says("is already there").says("--force");
+    run(&mut baseline("grey", dataset(), &submission)).ends_with(2).says("already exists").says("--force");
+    run(&mut score(&submission, dataset(), &result)).ends_with(2).says("already exists").says("--force");
     assert_eq!(std::fs::read_to_string(&result).unwrap(), "mine");
     run(score(&submission, dataset(), &result).arg("--force")).ends_with(0);
     assert!(json(&result).is_object());

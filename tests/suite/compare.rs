@@ -210,7 +210,7 @@ fn an_honest_twin_agrees() {
     check_page(&out, &file);
     // It is not replaced unasked, and nothing else ever is.
     let mut again = compare(&LAMBERT, 1);
-    run(again.arg("--out").arg(&out)).ends_with(2).says("add --force to replace it");
+    run(again.arg("--out").arg(&out)).ends_with(2).says("add --force to overwrite it");
     let mut other = compare(&LAMBERT, 1);
     run(other.arg("--force").arg("--out").arg(page.path())).ends_with(2).says("is no comparison");
 }

@@ -66,7 +66,7 @@ fn an_archive_is_the_folder_that_it_holds() {
     let words = ["--format", "json", "--out", out.to_str().unwrap()];
     let expected = lint(&submission, &words).ends_with(1).stdout;
     assert_eq!(std::fs::read_to_string(&out).unwrap(), expected);
-    lint(&submission, &words).ends_with(2).says("add --force to replace it");
+    lint(&submission, &words).ends_with(2).says("add --force to overwrite it");
     let [zip, tar] = ["gt.zip", "gt.tar.gz"].map(|name| folder.path().join(name));
     std::fs::write(&zip, zipped(&submission, "mine/")).unwrap();
     std::fs::write(&tar, tarred(&submission, "./")).unwrap();

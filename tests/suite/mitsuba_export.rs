@@ -26,7 +26,7 @@ fn the_sample_means_the_same() {
     assert!(text.contains("<integer name=\"sample_count\" value=\"4\"/>"));
 
     // Again: refused, then forced, with the same bytes.
-    export(dataset(), "room", "up_left", &out, &[]).ends_with(2).says("is already there");
+    export(dataset(), "room", "up_left", &out, &[]).ends_with(2).says("already exists");
     export(dataset(), "room", "up_left", &out, &["--force"]).ends_with(0);
     assert_eq!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
     // Another view has another camera.

@@ -59,7 +59,7 @@ fn a_changed_schema_is_found() {
 fn nothing_is_overwritten_without_force() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("scene.schema.json"), "mine").unwrap();
-    run_words(["schema".as_ref(), folder.path().as_os_str()]).ends_with(2).says("add --force to replace it");
+    run_words(["schema".as_ref(), folder.path().as_os_str()]).ends_with(2).says("add --force to overwrite it");
     assert_eq!(files(folder.path()).len(), 1);
     run_words(["schema".as_ref(), folder.path().as_os_str(), "--force".as_ref()]).ends_with(0);
     assert_eq!(files(folder.path()).len(), 20);

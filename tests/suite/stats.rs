@@ -208,7 +208,7 @@ fn places_that_a_picture_must_not_have() {
     std::fs::write(&mine, "mine").unwrap();
     let before = files_below(copy.path());
     let cases = [
-        (mine.clone(), "is already there; choose another --picture, or add --force to replace it"),
+        (mine.clone(), "already exists; choose another --picture, or add --force to overwrite it"),
         (out.path().to_owned(), "is a folder; expected the name of a picture file"),
         (out.path().join("no/a.svg"), "does not exist; make it, or choose another --picture"),
         (

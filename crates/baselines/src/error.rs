@@ -15,10 +15,7 @@ pub enum BaselineError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The output is in the way.
-    #[error("'{}' is already there; choose another --out, or add --force to replace it", .0.display())]
-    Exists(PathBuf),
-    /// The same, of what is never replaced.
+    /// The output exists and is never replaced.
     #[error("'{}' is already there; choose another --out", .0.display())]
     InTheWay(PathBuf),
     /// The output would be a part of the dataset.

@@ -1,11 +1,11 @@
 //! Writing a submission: whole or not at all.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{SceneError, json};
 
 use crate::error::BaselineError;
@@ -100,10 +100,9 @@ fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
 }
 
 fn check_place(out: &Path, force: bool) -> Result<(), BaselineError> {
-    let there: PathBuf = out.to_owned();
-    match (out.exists(), force, out.join(SUBMISSION).exists()) {
-        (false, _, _) | (true, true, true) => Ok(()),
-        (true, false, _) => Err(BaselineError::Exists(there)),
-        (true, true, false) => Err(BaselineError::NotASubmission(there)),
+    check_free(out, force, "--out")?;
+    if out.exists() && !out.join(SUBMISSION).exists() {
+        return Err(BaselineError::NotASubmission(out.to_owned()));
     }
+    Ok(())
 }

@@ -5,25 +5,10 @@ use std::sync::Arc;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
-use mateval_scene::{RendererId, SceneError, SceneId, TriangleMesh, glb, reference_io};
+use mateval_scene::{RendererId, SceneError, TriangleMesh, glb, reference_io};
 use mateval_tracer::World;
 
 use crate::error::EvalError;
-
-/// The scenes of these ids, all where there are none; in the dataset's order.
-pub fn chosen_scenes<'a>(dataset: &'a Dataset, scenes: &[SceneId]) -> Result<Vec<&'a SceneFile>, EvalError> {
-    let all = &dataset.scenes;
-    let unknown: Vec<String> = scenes
-        .iter()
-        .filter(|id| !all.iter().any(|scene| scene.id == **id))
-        .map(|id| format!("the dataset has no scene '{id}'"))
-        .collect();
-    if !unknown.is_empty() {
-        let known: Vec<&str> = all.iter().map(|scene| scene.id.as_str()).collect();
-        return Err(EvalError::Invalid(format!("{}; it has: {}", unknown.join("; "), known.join(", "))));
-    }
-    Ok(all.iter().filter(|scene| scenes.is_empty() || scenes.contains(&scene.id)).collect())
-}
 
 /// The views of the scene that `targets.json` names, in the scene's order; at least one.
 pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&'a View>, EvalError> {

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::EvalError;
 use crate::light_rules::{LightRules, Track};
 use crate::pilot::enough_samples;
-use crate::relit::{RelitLighting, luminance};
+use crate::relit::RelitLighting;
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
 use mateval_light::light_fit::{LightFit, fit_lights};
@@ -291,7 +291,7 @@ impl Renderer<'_> {
         let error = |radiance: f64| -> f64 {
             let pairs = grey.pixels().iter().zip(light.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
             pairs
-                .map(|((g, t), _)| radiance * luminance(*g) - luminance(*t))
+                .map(|((g, t), _)| radiance * g.luminance() - t.luminance())
                 .map(|difference| difference * difference)
                 .sum()
         };

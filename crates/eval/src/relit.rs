@@ -44,17 +44,11 @@ pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask
 fn by_brightness(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<usize> {
     let luminance = |picture: &Picture<LinearRgb>| -> f64 {
         let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
-        lit.map(|(pixel, _)| luminance(*pixel)).sum()
+        lit.map(|(pixel, _)| pixel.luminance()).sum()
     };
     let mut order: Vec<(f64, usize)> = groups.iter().map(luminance).zip(0..).filter(|(sum, _)| *sum > 0.0).collect();
     order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     order.into_iter().map(|(_, group)| group).collect()
-}
-
-/// Relative luminance of linear Rec. 709.
-pub(crate) fn luminance(LinearRgb(rgb): LinearRgb) -> f64 {
-    let [r, g, b] = rgb.map(f64::from);
-    0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
 #[cfg(test)]

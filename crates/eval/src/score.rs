@@ -15,7 +15,7 @@ use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
-use crate::open_scene::{OpenScene, chosen_scenes, scored_views};
+use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::result::{MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise};
 use crate::scene_score::{SceneOrder, SceneScore, score_scene};
@@ -84,7 +84,7 @@ struct Outcome {
 /// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them, and so
 /// are paths of light for those that agree in roughness and metallic.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
-    let scenes = chosen_scenes(plan.dataset, &plan.scenes)?;
+    let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
     for (scene, outcomes) in scenes.iter().zip(score_scenes(plan, &scenes, progress)?) {
@@ -237,7 +237,7 @@ pub struct HashedSubmission {
 pub fn hashed_submission(path: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<HashedSubmission, EvalError> {
     let file = read_submission_file(path)?;
     let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    files.extend(chosen_scenes(dataset, scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
+    files.extend(dataset.chosen_scenes(scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
     Ok(HashedSubmission { method: file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
 }
 

@@ -57,11 +57,22 @@ pub struct ExrHeader {
     pub samples: usize,
 }
 
+/// Why an OpenEXR file has no header that can be read.
+#[derive(Debug, thiserror::Error)]
+pub enum ExrHeaderError {
+    /// The `exr` crate cannot read it.
+    #[error(transparent)]
+    Unsound(#[from] exr::error::Error),
+    /// Nothing follows the file's version.
+    #[error("it has no part")]
+    NoPart,
+}
+
 impl ExrHeader {
     /// Reads a file's headers. Fails, with what was expected, where they are not sound.
-    pub fn of(bytes: &[u8]) -> Result<Self, String> {
-        let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| error.to_string())?;
-        let first = meta.headers.first().ok_or("it has no part")?;
+    pub fn of(bytes: &[u8]) -> Result<Self, ExrHeaderError> {
+        let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
+        let first = meta.headers.first().ok_or(ExrHeaderError::NoPart)?;
         let display = first.shared_attributes.display_window.size;
         let samples = |header: &Header| {
             let pixels = header.layer_size.width().saturating_mul(header.layer_size.height());

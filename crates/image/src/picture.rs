@@ -6,6 +6,15 @@ use crate::ImageError;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinearRgb(pub [f32; 3]);
 
+impl LinearRgb {
+    /// The relative luminance (ITU-R BT.709).
+    #[inline]
+    pub fn luminance(self) -> f64 {
+        let [r, g, b] = self.0.map(f64::from);
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+}
+
 /// sRGB-encoded red, green, blue; 0 to 1 where it shows something displayable.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SrgbRgb(pub [f32; 3]);

@@ -33,6 +33,29 @@ impl PngColor {
     }
 }
 
+/// Why a PNG has no header that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PngHeaderError {
+    /// The first bytes are not [`PNG_SIGNATURE`].
+    #[error("it does not begin with the signature of a PNG")]
+    NoSignature,
+    /// The first chunk is another one, or cut.
+    #[error("its first chunk is not a whole header (IHDR)")]
+    NoHeader,
+    /// The header is too short or too long.
+    #[error("its header has {found} bytes; expected 13")]
+    HeaderLength {
+        /// How long it is.
+        found: usize,
+    },
+    /// A colour type that PNG does not have.
+    #[error("its colour type is {found}; expected 0, 2, 3, 4 or 6")]
+    ColorType {
+        /// The colour type.
+        found: u8,
+    },
+}
+
 /// The header, and which chunks there are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PngHeader {
@@ -56,13 +79,13 @@ pub struct PngHeader {
 
 impl PngHeader {
     /// Walks over a file's chunks. Fails, with what was expected, where the first of them is no sound header.
-    pub fn of(bytes: &[u8]) -> Result<Self, String> {
+    pub fn of(bytes: &[u8]) -> Result<Self, PngHeaderError> {
         let Some(rest) = bytes.strip_prefix(PNG_SIGNATURE) else {
-            return Err("it does not begin as a PNG does".to_owned());
+            return Err(PngHeaderError::NoSignature);
         };
         let mut chunks = Chunks { rest };
         let Some((b"IHDR", data)) = chunks.next() else {
-            return Err("its first chunk is no header (IHDR)".to_owned());
+            return Err(PngHeaderError::NoHeader);
         };
         let mut header = Self::of_data(data)?;
         for (name, _) in chunks.by_ref() {
@@ -76,11 +99,11 @@ impl PngHeader {
         Ok(header)
     }
 
-    fn of_data(data: &[u8]) -> Result<Self, String> {
+    fn of_data(data: &[u8]) -> Result<Self, PngHeaderError> {
         let (size, &[bit_depth, color, _, _, interlace]) = data
             .split_first_chunk::<8>()
             .and_then(|(size, rest)| Some((size, <&[u8; 5]>::try_from(rest).ok()?)))
-            .ok_or_else(|| format!("its header has {} bytes; expected 13", data.len()))?;
+            .ok_or(PngHeaderError::HeaderLength { found: data.len() })?;
         let side = |at: usize| u32::from_be_bytes([size[at], size[at + 1], size[at + 2], size[at + 3]]);
         let color = match color {
             0 => PngColor::Grey,
@@ -88,7 +111,7 @@ impl PngHeader {
             3 => PngColor::Palette,
             4 => PngColor::GreyAlpha,
             6 => PngColor::Rgba,
-            other => return Err(format!("its colour type is {other}; expected 0, 2, 3, 4 or 6")),
+            found => return Err(PngHeaderError::ColorType { found }),
         };
         Ok(Self {
             width: side(0),

@@ -6,11 +6,11 @@ use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 use mateval_scene::{Progress, SceneError, SceneId};
 
 use crate::error::ReportError;
 use mateval_eval::light_rules::Track;
-use mateval_eval::open_scene::chosen_scenes;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
@@ -80,16 +80,14 @@ impl Shown {
 /// than the input what it shows is darkened, and what is not valid is black. Error maps leave the truth's column out;
 /// their last row is the scale, black 0 to white [`WHITE_ERROR`] from left to right.
 pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, ReportError> {
-    let chosen = chosen_scenes(plan.dataset, plan.scenes)?;
+    let chosen = plan.dataset.chosen_scenes(plan.scenes)?;
     let paths = |scene: &SceneId, shown: Shown| {
         ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.name())))
     };
     let jobs: Vec<(&SceneFile, Shown)> =
         chosen.iter().flat_map(|scene| plan.shown.iter().map(|shown| (*scene, *shown))).collect();
-    let there = jobs.iter().flat_map(|(scene, shown)| paths(&scene.id, *shown)).find(|path| path.exists());
-    if let Some(path) = there.filter(|_| !plan.force) {
-        let what = format!("'{}' is already there; choose another --out, or add --force to replace it", path.display());
-        return Err(ReportError::Invalid(what));
+    for (scene, shown) in &jobs {
+        paths(&scene.id, *shown).iter().try_for_each(|path| check_free(path, plan.force, "--out"))?;
     }
     std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
     let mut written = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::Finding;
+use crate::{Finding, SceneId};
 
 /// Why a dataset or a part of it could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -33,6 +33,24 @@ pub enum SceneError {
         /// What was found and what would be read.
         what: String,
     },
+    /// Scenes were asked for that the dataset does not have.
+    #[error("'{}' has no scene {}; it has {}", dataset.display(), quoted(unknown), quoted(known))]
+    UnknownScenes {
+        /// The dataset's folder.
+        dataset: PathBuf,
+        /// The scenes that it does not have.
+        unknown: Vec<SceneId>,
+        /// All scenes that it has.
+        known: Vec<SceneId>,
+    },
+    /// An output exists and was not to be replaced.
+    #[error("'{}' already exists; choose another {place}, or add --force to overwrite it", path.display())]
+    Exists {
+        /// The output.
+        path: PathBuf,
+        /// What names the output in the command, as in `--out`.
+        place: &'static str,
+    },
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
@@ -44,4 +62,9 @@ impl SceneError {
         let path = path.into();
         move |source| Self::Io { action, path, source }
     }
+}
+
+/// `'a', 'b'`.
+fn quoted(scenes: &[SceneId]) -> String {
+    scenes.iter().map(|scene| format!("'{scene}'")).collect::<Vec<_>>().join(", ")
 }

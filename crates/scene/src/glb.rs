@@ -11,6 +11,7 @@ use json::validation::{Checked, USize64};
 use mateval_image::store::write_whole;
 
 use crate::gltf_accessor::{floats, indices, parse, triangles};
+use crate::gltf_error::GltfError;
 use crate::mesh::TriangleMesh;
 use crate::{Finding, SceneError, Severity};
 
@@ -175,7 +176,7 @@ pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
         return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
     }
     let bytes = std::fs::read(path).map_err(SceneError::io("read", path))?;
-    let file = parse(&bytes).map_err(|what| invalid(path, "", what))?;
+    let file = parse(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
     let blob = file.blob.as_deref().unwrap_or_default();
     file.document
         .nodes()
@@ -184,28 +185,28 @@ pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
             let name = node.name().unwrap_or_default().to_owned();
             read_mesh(&mesh, blob)
                 .map(|mesh| GlbNode { name: name.clone(), mesh })
-                .map_err(|what| invalid(path, &name, what))
+                .map_err(|error| invalid(path, &name, error.to_string()))
         })
         .collect()
 }
 
-fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, String> {
+fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, GltfError> {
     let mut primitives = mesh.primitives();
     let (Some(primitive), None) = (primitives.next(), primitives.next()) else {
-        return Err("expected one primitive".to_owned());
+        return Err(GltfError::NotOnePrimitive { found: mesh.primitives().count() });
     };
     let accessor = |semantic: gltf::Semantic| primitive.get(&semantic);
     let Some(positions) = accessor(gltf::Semantic::Positions) else {
-        return Err("expected POSITION".to_owned());
+        return Err(GltfError::Missing { attribute: "POSITION" });
     };
     let positions: Vec<Vec3> = floats::<3>(&positions, blob)?.into_iter().map(Vec3::from_array).collect();
     let normals = accessor(gltf::Semantic::Normals).map(|a| floats::<3>(&a, blob)).transpose()?;
     let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| floats::<2>(&a, blob)).transpose()?;
-    let accessor = primitive.indices().ok_or("expected indices")?;
+    let accessor = primitive.indices().ok_or(GltfError::Missing { attribute: "indices" })?;
     let triangles = triangles(indices(&accessor, blob)?, positions.len())?;
     let same_count = |count: Option<usize>| count.is_none_or(|count| count == positions.len());
     if !same_count(normals.as_ref().map(Vec::len)) || !same_count(uvs.as_ref().map(Vec::len)) {
-        return Err("expected as many NORMAL and TEXCOORD_0 as POSITION".to_owned());
+        return Err(GltfError::CountsDiffer);
     }
     Ok(TriangleMesh {
         positions,

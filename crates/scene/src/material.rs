@@ -206,6 +206,9 @@ pub struct BumpMap {
     pub scale: f32,
 }
 
+/// Where a surface is less opaque than this, it is cut out of the pictures that hold no light (depth, ids, materials).
+pub const CUT_OUT_BELOW_OPACITY: f32 = 0.5;
+
 /// A surface's material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -9,7 +9,7 @@ use crate::TriangleMesh;
 use crate::findings::shortened;
 
 /// What is read of a file at most.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjLimits {
     /// Triangles after polygons are split.
     pub triangles: usize,
@@ -17,15 +17,77 @@ pub struct ObjLimits {
     pub corners: usize,
 }
 
-/// Why an OBJ was refused: the line, from 1 (0 where none is to blame), and what is wrong.
-#[derive(Debug, PartialEq)]
-pub struct ObjFault {
-    /// From 1; 0 where none is to blame.
-    pub line: usize,
+/// Why an OBJ or MTL file was refused.
+#[derive(Debug, PartialEq, thiserror::Error)]
+#[error("{}{fault}", line.map_or(String::new(), |line| format!("line {line}: ")))]
+pub struct ObjError {
+    /// The line, from 1; none where no single line is to blame.
+    pub line: Option<usize>,
     /// What was expected and what was found.
-    pub what: String,
-    /// Whether it is sound but too large.
-    pub limit: bool,
+    pub fault: ObjFault,
+}
+
+/// What is wrong with an OBJ or MTL file.
+#[derive(Debug, PartialEq, thiserror::Error)]
+pub enum ObjFault {
+    /// It may be sound, but is too large.
+    #[error(
+        "more than {} triangles or {} corners, which is what is left of the scene's limit", .0.triangles, .0.corners
+    )]
+    TooLarge(ObjLimits),
+    /// A face of one or two corners.
+    #[error("expected a face of 3 or more corners, found {found}")]
+    TooFewCorners {
+        /// Its corners.
+        found: usize,
+    },
+    /// A word of a face that is no index.
+    #[error("expected an index of a {what}, found '{}'", shortened(found))]
+    NotAnIndex {
+        /// As in `position`.
+        what: &'static str,
+        /// The word.
+        found: String,
+    },
+    /// An index of something that does not exist (yet).
+    #[error("the index {index} of a {what} is out of range: {count} came before it")]
+    IndexOutOfRange {
+        /// The index.
+        index: i64,
+        /// As in `position`.
+        what: &'static str,
+        /// How many the file holds before this line.
+        count: i64,
+    },
+    /// A corner of more than three parts.
+    #[error("expected position/uv/normal, found '{}'", shortened(found))]
+    NotACorner {
+        /// The corner.
+        found: String,
+    },
+    /// A colour that has neither one number nor three.
+    #[error("Kd: expected one number or three, found {found}")]
+    NotAColor {
+        /// How many it has.
+        found: usize,
+    },
+    /// A property of a material that is no finite number.
+    #[error("{key} of '{}': expected finite numbers", shortened(material))]
+    NotFinite {
+        /// As in `Pr`.
+        key: &'static str,
+        /// The material's name.
+        material: String,
+    },
+    /// The `tobj` crate cannot read it.
+    #[error(transparent)]
+    Unsound(#[from] tobj::LoadError),
+}
+
+impl From<ObjFault> for ObjError {
+    fn from(fault: ObjFault) -> Self {
+        Self { line: None, fault }
+    }
 }
 
 /// A run of triangles of one object or group.
@@ -93,7 +155,7 @@ struct Census {
 }
 
 /// Reads an OBJ: positions, texture coordinates, normals and faces of all its groups as one mesh; polygons as fans.
-pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<ObjMesh, ObjFault> {
+pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<ObjMesh, ObjError> {
     let text = std::str::from_utf8(bytes).map_or_else(|_| String::from_utf8_lossy(bytes), std::borrow::Cow::Borrowed);
     let census = check(&text, limits)?;
     let mixed = |some: usize| some != 0 && some != census.corners;
@@ -106,22 +168,19 @@ pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<Obj
     Ok(ObjMesh { mesh, groups, mixed_uvs, mixed_normals })
 }
 
-fn check(text: &str, limits: ObjLimits) -> Result<Census, ObjFault> {
+fn check(text: &str, limits: ObjLimits) -> Result<Census, ObjError> {
     let mut census = Census::default();
     for (index, line) in text.lines().enumerate() {
-        check_line(line, &mut census).map_err(|what| ObjFault { line: index + 1, what, limit: false })?;
+        let refused = |fault| ObjError { line: Some(index + 1), fault };
+        check_line(line, &mut census).map_err(refused)?;
         if census.triangles > limits.triangles || census.corners > limits.corners {
-            let what = format!(
-                "more than {} triangles or {} corners, which is what is left of the scene's limit",
-                limits.triangles, limits.corners
-            );
-            return Err(ObjFault { line: index + 1, what, limit: true });
+            return Err(refused(ObjFault::TooLarge(limits)));
         }
     }
     Ok(census)
 }
 
-fn check_line(line: &str, census: &mut Census) -> Result<(), String> {
+fn check_line(line: &str, census: &mut Census) -> Result<(), ObjFault> {
     let mut words = line.split_whitespace();
     match words.next() {
         Some("v") => census.positions += 1,
@@ -134,7 +193,7 @@ fn check_line(line: &str, census: &mut Census) -> Result<(), String> {
                 corners += 1;
             }
             if corners < 3 {
-                return Err(format!("expected a face of 3 or more corners, found {corners}"));
+                return Err(ObjFault::TooFewCorners { found: corners });
             }
             census.corners += corners;
             census.triangles += corners - 2;
@@ -145,19 +204,18 @@ fn check_line(line: &str, census: &mut Census) -> Result<(), String> {
 }
 
 /// `position/uv/normal`, from 1, or negative from the end; uv and normal may be missing.
-fn check_corner(corner: &str, census: &mut Census) -> Result<(), String> {
+fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
     let mut parts = corner.split('/');
-    let mut index = |count: i64, what: &str, required: bool| match parts.next() {
+    let mut index = |count: i64, what: &'static str, required: bool| match parts.next() {
         None | Some("") if !required => Ok(false),
         part => {
             let part = part.unwrap_or("");
-            let number: i64 =
-                part.parse().map_err(|_| format!("expected an index of a {what}, found '{}'", shortened(part)))?;
+            let number: i64 = part.parse().map_err(|_| ObjFault::NotAnIndex { what, found: part.to_owned() })?;
             let place = if number < 0 { number.saturating_add(count).saturating_add(1) } else { number };
             if (1..=count).contains(&place) {
                 Ok(true)
             } else {
-                Err(format!("the index {number} of a {what} is out of range: there are {count} so far"))
+                Err(ObjFault::IndexOutOfRange { index: number, what, count })
             }
         }
     };
@@ -165,7 +223,7 @@ fn check_corner(corner: &str, census: &mut Census) -> Result<(), String> {
     census.corners_with_uv += usize::from(index(census.uvs, "texture coordinate", false)?);
     census.corners_with_normal += usize::from(index(census.normals, "normal", false)?);
     if parts.next().is_some() {
-        return Err(format!("expected position/uv/normal, found '{}'", shortened(corner)));
+        return Err(ObjFault::NotACorner { found: corner.to_owned() });
     }
     Ok(())
 }
@@ -199,20 +257,17 @@ pub fn material_files(bytes: &[u8]) -> Vec<String> {
 }
 
 /// Reads an MTL file. Numbers may be anything that is finite; one number behind `Kd` is all three.
-pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjFault> {
-    let whole_file = |what: String| ObjFault { line: 0, what, limit: false };
+pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
     let text = with_whole_colors(&String::from_utf8_lossy(bytes))?;
-    let (materials, _) =
-        tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|error| whole_file(format!("no sound MTL: {error}")))?;
-    let number = |material: &tobj::Material, key: &str| {
+    let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).map_err(ObjFault::Unsound)?;
+    let number = |material: &tobj::Material, key: &'static str| {
         let Some(word) = material.unknown_param.get(key) else { return Ok(None) };
         let value = word.trim().parse::<f32>().ok().filter(|value| value.is_finite());
-        let refused = || whole_file(format!("{key} of '{}': expected a number", shortened(&material.name)));
-        value.map(Some).ok_or_else(refused)
+        value.map(Some).ok_or_else(|| ObjFault::NotFinite { key, material: material.name.clone() })
     };
     let read = |material: tobj::Material| {
         if material.diffuse.is_some_and(|rgb| !rgb.iter().all(|v| v.is_finite())) {
-            return Err(whole_file(format!("Kd of '{}': expected finite numbers", shortened(&material.name))));
+            return Err(ObjFault::NotFinite { key: "Kd", material: material.name }.into());
         }
         let (roughness, metallic) = (number(&material, "Pr")?, number(&material, "Pm")?);
         let map = |key: &str| material.unknown_param.get(key).map(|name| name.trim().to_owned());
@@ -225,7 +280,7 @@ pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjFault> {
 
 /// The text of an MTL file with three numbers behind every `Kd`, and without the other colours: tobj wants three everywhere
 /// and panics without, the format wants one or three.
-fn with_whole_colors(text: &str) -> Result<String, ObjFault> {
+fn with_whole_colors(text: &str) -> Result<String, ObjError> {
     let mut out = String::with_capacity(text.len());
     for (at, line) in text.lines().enumerate() {
         let words: Vec<&str> = line.split_whitespace().take(4).collect();
@@ -233,8 +288,8 @@ fn with_whole_colors(text: &str) -> Result<String, ObjFault> {
             ["Ka" | "Ks" | "Ke", ..] => {}
             ["Kd", grey] => out.push_str(&format!("Kd {grey} {grey} {grey}")),
             ["Kd", ref rest @ ..] if rest.len() < 3 => {
-                let what = format!("Kd: expected one number or three, found {}", rest.len());
-                return Err(ObjFault { line: at + 1, what, limit: false });
+                let fault = ObjFault::NotAColor { found: rest.len() };
+                return Err(ObjError { line: Some(at + 1), fault });
             }
             _ => out.push_str(line),
         }
@@ -243,7 +298,7 @@ fn with_whole_colors(text: &str) -> Result<String, ObjFault> {
     Ok(out)
 }
 
-fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>), ObjFault> {
+fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>), ObjError> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     let names = match materials {
         Materials::Ignored => Vec::new(),
@@ -257,11 +312,7 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
     };
     let told = (!names.is_empty()).then(|| format!("mtllib any\n{}", without_material_files(text)));
     let text = told.as_deref().unwrap_or(text);
-    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(|error| ObjFault {
-        line: 0,
-        what: error.to_string(),
-        limit: false,
-    })?;
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(ObjFault::Unsound)?;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), normals: Some(Vec::new()), ..Default::default() };
     let mut groups = Vec::new();
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
@@ -315,7 +366,7 @@ mod tests {
     const LIMITS: ObjLimits = ObjLimits { triangles: 100, corners: 300 };
     const CORNERS: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n";
 
-    fn read_text(faces: &str) -> Result<ObjMesh, ObjFault> {
+    fn read_text(faces: &str) -> Result<ObjMesh, ObjError> {
         read(format!("{CORNERS}{faces}").as_bytes(), LIMITS, Materials::Ignored)
     }
 
@@ -355,7 +406,7 @@ mod tests {
             "f 1 2 99999999999999999999999",
         ] {
             let fault = read_text(bad).unwrap_err();
-            assert!(fault.line == 10 && !fault.limit, "{bad}: {fault:?}");
+            assert!(fault.line == Some(10) && !matches!(fault.fault, ObjFault::TooLarge(_)), "{bad}: {fault:?}");
         }
         // Twin.
         assert!(read_text("f 1 2 4").is_ok());
@@ -372,7 +423,7 @@ mod tests {
     #[test]
     fn too_many_triangles_are_refused_before_they_are_made() {
         let fault = read_text(&format!("f {}", "1 2 3 ".repeat(40))).unwrap_err();
-        assert!(fault.limit, "{fault:?}");
+        assert_eq!(fault.fault, ObjFault::TooLarge(LIMITS));
     }
 
     #[test]
@@ -411,7 +462,7 @@ mod tests {
         let read = read_materials(b"newmtl x\nKa 1\nKs\nKe 1 2\nKd 0.25\n").unwrap();
         assert_eq!(read[0].diffuse, Some([0.25; 3]));
         for (bad, line) in [("newmtl x\nKd 0.1 0.2", 2), ("newmtl x\n\nKd", 3)] {
-            assert_eq!(read_materials(bad.as_bytes()).unwrap_err().line, line, "{bad}");
+            assert_eq!(read_materials(bad.as_bytes()).unwrap_err().line, Some(line), "{bad}");
         }
     }
 }

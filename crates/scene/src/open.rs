@@ -59,10 +59,32 @@ impl Dataset {
         check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
+    /// The scenes with these ids, in the dataset's order; all scenes where `ids` is empty. Fails where an id is unknown.
+    pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, SceneError> {
+        let chosen = chosen_ids(&self.root, &self.file, ids)?;
+        Ok(self.scenes.iter().filter(|scene| chosen.contains(&&scene.id)).collect())
+    }
+
+    /// The scene with this id. Fails where the dataset has none.
+    pub fn scene(&self, id: &SceneId) -> Result<&SceneFile, SceneError> {
+        let chosen = self.chosen_scenes(std::slice::from_ref(id))?;
+        Ok(chosen[0])
+    }
+
     /// The scene's folder.
     pub fn folder(&self, scene: &SceneId) -> SceneFolder {
         SceneFolder::of(&self.root, scene)
     }
+}
+
+/// The ids among `ids` in the order of the dataset in `root`; all its ids where `ids` is empty. Fails where an id is
+/// unknown.
+pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, SceneError> {
+    let unknown: Vec<SceneId> = ids.iter().filter(|id| !file.scenes.contains(id)).cloned().collect();
+    if !unknown.is_empty() {
+        return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: file.scenes.clone() });
+    }
+    Ok(file.scenes.iter().filter(|id| ids.is_empty() || ids.contains(id)).collect())
 }
 
 /// One error for all faults of the JSON files.
@@ -121,4 +143,31 @@ fn check_format(path: &Path, format: &str) -> Result<(), SceneError> {
 fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
     let findings = manifest::check_those(root, concerns)?;
     if findings.is_empty() { Ok(()) } else { Err(SceneError::Invalid { path: root.to_owned(), findings }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_are_chosen_in_the_datasets_order() {
+        let [room, hall, attic] = ["room", "hall", "attic"].map(|id| SceneId::new(id).unwrap());
+        let file = DatasetFile {
+            format: FORMAT.to_owned(),
+            name: String::new(),
+            version: String::new(),
+            tool: String::new(),
+            scenes: vec![room.clone(), hall.clone()],
+            scored_renderer: None,
+            licences: Vec::new(),
+            manifest_sha256: String::new(),
+        };
+        let chosen =
+            |ids: &[SceneId]| chosen_ids(Path::new("d"), &file, ids).map(|ids| ids.into_iter().cloned().collect());
+        let all: Vec<SceneId> = chosen(&[]).unwrap();
+        assert_eq!(all, file.scenes);
+        assert_eq!(chosen(&[hall.clone(), room]).unwrap(), file.scenes);
+        let text = chosen(&[attic, hall]).unwrap_err().to_string();
+        assert_eq!(text, "'d' has no scene 'attic'; it has 'room', 'hall'");
+    }
 }

@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use mateval_image::Picture;
 
 use crate::mesh::TriangleMesh;
+use crate::triangle;
 
 /// A texel whose centre is this near to a triangle, in texels, takes part in bilinear lookups inside of it.
 const BILINEAR_REACH: f64 = std::f64::consts::SQRT_2;
@@ -186,15 +187,7 @@ fn nearest_in_triangle(corners: [DVec2; 3], place: DVec2) -> DVec2 {
     if (b - a).perp_dot(c - a) != 0.0 && barycentrics(corners, place).min_element() >= 0.0 {
         return place;
     }
-    let on_edge = |from: DVec2, to: DVec2| {
-        let along = to - from;
-        let length2 = along.length_squared();
-        let t = if length2 > 0.0 { ((place - from).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        from + along * t
-    };
-    let on_edges = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
-    let apart = |candidate: &DVec2| candidate.distance_squared(place);
-    on_edges.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("a triangle has three edges")
+    triangle::nearest_on_edges(corners.map(|corner| corner.extend(0.0)), place.extend(0.0)).point.truncate()
 }
 
 #[cfg(test)]

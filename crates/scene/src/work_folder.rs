@@ -4,6 +4,12 @@ use std::path::{Path, PathBuf};
 
 use crate::SceneError;
 
+/// Fails where the output `path` exists and `force` does not allow to replace it. `place` is what names the output in the
+/// command, as in `--out`.
+pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), SceneError> {
+    if force || !path.exists() { Ok(()) } else { Err(SceneError::Exists { path: path.to_owned(), place }) }
+}
+
 /// A folder under work beside its place; [`WorkFolder::finish`] renames it there, dropping it removes it.
 #[derive(Debug)]
 pub struct WorkFolder {
@@ -97,6 +103,17 @@ mod tests {
         let names: Vec<_> = std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names, ["new"]);
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_exists_is_overwritten_with_force_alone() {
+        let root = tempfile::tempdir().unwrap();
+        let out = root.path().join("out");
+        assert!(check_free(&out, false, "--out").is_ok());
+        std::fs::write(&out, "x").unwrap();
+        assert!(check_free(&out, true, "--out").is_ok());
+        let text = check_free(&out, false, "--out").unwrap_err().to_string();
+        assert!(text.ends_with("out' already exists; choose another --out, or add --force to overwrite it"), "{text}");
     }
 
     #[test]

@@ -170,9 +170,9 @@ fn kind_of(bytes: &[u8]) -> &'static str {
 
 fn header_of(path: &Path, bytes: &[u8]) -> Result<MapHeader, MapFault> {
     let header = if path.extension().is_some_and(|ending| ending == "exr") {
-        ExrHeader::of(bytes).map(MapHeader::Exr)
+        ExrHeader::of(bytes).map(MapHeader::Exr).map_err(|error| error.to_string())
     } else {
-        PngHeader::of(bytes).map(MapHeader::Png)
+        PngHeader::of(bytes).map(MapHeader::Png).map_err(|error| error.to_string())
     };
     header.map_err(|what| {
         let message = format!("its header is not sound: {}", shortened(&what));

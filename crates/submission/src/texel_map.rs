@@ -2,6 +2,7 @@
 
 use glam::{DVec2, DVec3, Vec2};
 use mateval_scene::camera::Projection;
+use mateval_scene::material::CUT_OUT_BELOW_OPACITY;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Ray, World};
@@ -17,8 +18,6 @@ const SAME_PLACE_ROUNDINGS: f64 = 16.0;
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 /// Surfaces at a sharper angle to the ray count as at this cosine.
 const LEAST_COSINE: f64 = 1e-3;
-/// From this opacity on a texel is there: the views' own rule.
-const OPACITY_THRESHOLD: f32 = 0.5;
 
 /// A texel of an atlas that lies on the surface, in whole or in part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +43,7 @@ struct Texel {
 }
 
 /// The texels of an atlas that lie on its surface. Together they have its area, but for what has none in the atlas and for
-/// texels that are cut out (of an opacity under one half), which nobody ever sees: those are left out.
+/// texels that are cut out ([`CUT_OUT_BELOW_OPACITY`]), which nobody ever sees: those are left out.
 ///
 /// The place that stands for a texel is its centre where that lies in a triangle, else the middle of what the triangle
 /// covers that has most of it.
@@ -164,7 +163,7 @@ impl Looker<'_> {
         // Rounding may leave a place of an edge a hair outside.
         let weights = self.coverage.barycentrics(cell.triangle, cell.place).max(DVec3::ZERO);
         let weights = weights / weights.element_sum();
-        if self.opacity(cell.triangle, weights) < OPACITY_THRESHOLD {
+        if self.opacity(cell.triangle, weights) < CUT_OUT_BELOW_OPACITY {
             return None;
         }
         let [a, b, c] = self.mesh.corners(cell.triangle).map(|corner| corner.as_dvec3());

@@ -4,6 +4,8 @@
 //! each set of each pixel with a seed of its own; after three scatterings plain hashed numbers. Two halves of one sequence are correlated: halves that are to be
 //! independent need two seeds.
 
+use mateval_scene::splitmix64;
+
 /// The numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
@@ -54,12 +56,8 @@ pub(crate) fn unit_hash(a: u32, b: u32) -> f32 {
     (mix((u64::from(a) << 32) | u64::from(b)) >> 40) as f32 / (1 << 24) as f32
 }
 
-/// The finaliser of SplitMix64 (Steele et al., OOPSLA 2014) after its increment.
 fn mix(value: u64) -> u64 {
-    let mut z = value.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    splitmix64::number(value, 0)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::Vec2;
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
-use mateval_scene::material::{Lookup, Material};
+use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
@@ -36,9 +36,6 @@ pub struct World {
 
 /// Bytes of texels below which huge pages would save little and cost more.
 const SMALL_TEXTURE: usize = 1 << 16;
-
-/// From this opacity on a surface counts as there, for pictures without light.
-const OPACITY_THRESHOLD: f32 = 0.5;
 
 impl World {
     /// Checks the scene and builds the hierarchy over all surfaces.
@@ -127,12 +124,12 @@ impl World {
         &self.tables
     }
 
-    /// The nearest hit on a surface whose opacity there is at least one half.
+    /// The nearest hit on a surface that is not cut out there.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
         if !self.masked {
             return self.accel.closest(ray);
         }
-        self.accel.closest_where(ray, |hit| self.opacity(hit) >= OPACITY_THRESHOLD)
+        self.accel.closest_where(ray, |hit| self.opacity(hit) >= CUT_OUT_BELOW_OPACITY)
     }
 
     /// The nearest hits of many rays: `hits[k]` of `rays[k]`. A surface of opacity o is met with probability o, drawn from

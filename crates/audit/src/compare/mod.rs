@@ -27,7 +27,7 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
 use mateval_tracer::World;
 
@@ -64,7 +64,7 @@ pub struct CompareOptions {
 /// Compares. Fails where no view of any scene was rendered; a scene or view that was not is told as `missing`.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
-    let scenes = picked(&dataset, options)?;
+    let scenes = dataset.chosen_scenes(&options.scenes)?;
     check_rendered(&dataset, &scenes)?;
     check_out(options)?;
     let work = options.out.as_deref().map(WorkFolder::start).transpose()?;
@@ -96,17 +96,6 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
         work.finish()?;
     }
     Ok(file)
-}
-
-fn picked<'a>(dataset: &'a Dataset, options: &CompareOptions) -> Result<Vec<&'a SceneFile>, AuditError> {
-    let is_there = |id: &&SceneId| !dataset.file.scenes.contains(id);
-    let unknown: Vec<&str> = options.scenes.iter().filter(is_there).map(SceneId::as_str).collect();
-    if !unknown.is_empty() {
-        let what = format!("has no scene '{}'", unknown.join("', '"));
-        return Err(AuditError::Output { path: options.dataset.clone(), what });
-    }
-    let is_picked = |scene: &&SceneFile| options.scenes.is_empty() || options.scenes.contains(&scene.id);
-    Ok(dataset.scenes.iter().filter(is_picked).collect())
 }
 
 fn renderer() -> RendererId {
@@ -147,9 +136,7 @@ fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
     if !out.exists() {
         return Ok(());
     }
-    if !options.force {
-        return refused("is already there; choose another --out, or add --force to replace it");
-    }
+    check_free(out, options.force, "--out")?;
     match json::read::<CompareFile>(&out.join(COMPARE)).is_ok_and(|file| file.format == COMPARE_FORMAT) {
         true => Ok(()),
         false => refused("is there and is no comparison: it is not replaced; choose another --out"),

@@ -1,6 +1,7 @@
 //! Made-up pictures: how often noise alone is called a difference, what is found, and how a picture is cut.
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
+use mateval_scene::splitmix64;
 
 use super::bounds::{GROUP_SUM, LAMBERT_TILE};
 use super::file::{Quantity, State};
@@ -10,17 +11,9 @@ use super::tiles::{Halves, difference, median, tiles};
 
 const SIZE: (usize, usize) = (96, 72);
 
-/// Whole numbers that look random (SplitMix64).
-fn hash(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 /// A deviate of mean 0 and variance 1, one-sided and long-tailed as light is: the exponential distribution less 1.
 fn deviate(seed: u64) -> f64 {
-    -libm::log((hash(seed) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-300) - 1.0
+    -libm::log((splitmix64::number(0, seed) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-300) - 1.0
 }
 
 /// Two halves of a gradient under relative noise of this deviation a pixel; `factor` multiplies what is expected.

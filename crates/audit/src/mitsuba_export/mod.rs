@@ -26,7 +26,7 @@ use mateval_scene::dataset::View;
 use mateval_scene::material::Material;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Camera, Finding, SceneId, ViewId, reference_io};
 use mateval_tracer::RenderSettings;
 
@@ -63,10 +63,7 @@ pub struct ExportOptions {
 ///
 /// Fails where the dataset, the scene or the view is not there, or the output is.
 pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> {
-    if options.out.exists() && !options.force {
-        let what = "is already there; choose another folder, or add --force to replace it".to_owned();
-        return Err(AuditError::Output { path: options.out.clone(), what });
-    }
+    check_free(&options.out, options.force, "folder")?;
     let dataset = Dataset::open(&options.dataset)?;
     let view = find_view(&dataset, options)?;
     let samples = match options.samples {
@@ -80,11 +77,11 @@ pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> 
 }
 
 fn find_view<'d>(dataset: &'d Dataset, options: &ExportOptions) -> Result<&'d View, AuditError> {
-    let absent = |what: String| AuditError::Output { path: options.dataset.clone(), what };
-    let scene = dataset.scenes.iter().find(|scene| scene.id == options.scene);
-    let scene = scene.ok_or_else(|| absent(format!("has no scene '{}'", options.scene)))?;
-    let view = scene.views.iter().find(|view| view.id == options.view);
-    view.ok_or_else(|| absent(format!("has no view '{}' of the scene '{}'", options.view, options.scene)))
+    let view = dataset.scene(&options.scene)?.views.iter().find(|view| view.id == options.view);
+    view.ok_or_else(|| {
+        let what = format!("has no view '{}' of the scene '{}'", options.view, options.scene);
+        AuditError::Output { path: options.dataset.clone(), what }
+    })
 }
 
 /// Writes the scene into the folder `out`, which is there whole or not at all; one that is there is replaced.

@@ -1,6 +1,7 @@
 //! The place of a donor's surface that is nearest to a given one.
 
 use glam::DVec3;
+use mateval_scene::triangle::nearest_weights;
 use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use super::donor::Donor;
@@ -90,28 +91,6 @@ impl Correspondence {
     }
 }
 
-/// The barycentric weights of a triangle's place that is nearest to a point: the regions of Ericson, "Real-Time
-/// Collision Detection", 2005, section 5.1.5. A triangle without area counts as its edges.
-fn nearest_weights([a, b, c]: [DVec3; 3], point: DVec3) -> DVec3 {
-    let (ab, ac) = (b - a, c - a);
-    let normal = ab.cross(ac);
-    let area = normal.length_squared();
-    let across = |from: DVec3, to: DVec3| (to - from).cross(point - from).dot(normal);
-    let weights = DVec3::new(across(b, c), across(c, a), across(a, b)) / area;
-    if area > 0.0 && weights.min_element() >= 0.0 {
-        return weights / weights.element_sum();
-    }
-    // Outside of it, the nearest place lies on an edge.
-    let edges = [(a, b, DVec3::X, DVec3::Y), (b, c, DVec3::Y, DVec3::Z), (c, a, DVec3::Z, DVec3::X)];
-    let on_edges = edges.map(|(from, to, first, second)| {
-        let along = to - from;
-        let share = ((point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        ((from + along * share).distance_squared(point), first.lerp(second, share))
-    });
-    let nearest = on_edges.into_iter().min_by(|x, y| x.0.total_cmp(&y.0));
-    nearest.expect("a triangle has three edges").1
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -127,42 +106,6 @@ mod tests {
             material: 0,
         };
         Donor { triangles: triangles.iter().map(triangle).collect(), ..Donor::default() }
-    }
-
-    /// Numbers without order, 0 to 1.
-    fn shares() -> impl Iterator<Item = f64> {
-        (1_u64..).map(|n| (n.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / f64::from(1 << 24))
-    }
-
-    fn points(shares: &mut impl Iterator<Item = f64>) -> DVec3 {
-        DVec3::from_array(std::array::from_fn(|_| shares.next().unwrap() * 2.0 - 0.5))
-    }
-
-    /// Against a fine net of the triangle's places.
-    #[test]
-    fn no_place_of_a_triangle_is_nearer() {
-        let mut shares = shares();
-        for _ in 0..50 {
-            let corners = std::array::from_fn(|_| points(&mut shares));
-            let point = points(&mut shares);
-            let at = |weights: DVec3| corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
-            let weights = nearest_weights(corners, point);
-            assert!(weights.min_element() >= 0.0 && (weights.element_sum() - 1.0).abs() < 1e-12);
-            let found = at(weights).distance(point);
-            let net = (0..=60).flat_map(|i| (0..=60 - i).map(move |j| (i, j)));
-            let best = net.map(|(i, j)| at(DVec3::new(f64::from(i), f64::from(j), f64::from(60 - i - j)) / 60.0));
-            let best = best.map(|place| place.distance(point)).fold(f64::INFINITY, f64::min);
-            assert!(found <= best + 1e-12 && found >= best - 0.05, "{found} {best}");
-        }
-    }
-
-    #[test]
-    fn triangles_without_area_have_a_nearest_place() {
-        let line = [DVec3::ZERO, DVec3::X, DVec3::X * 2.0];
-        let weights = nearest_weights(line, DVec3::new(1.5, 1.0, 0.0));
-        assert_eq!(line[1] * weights.y + line[2] * weights.z, DVec3::X * 1.5);
-        let dot = nearest_weights([DVec3::ONE; 3], DVec3::ZERO);
-        assert!((dot.element_sum() - 1.0).abs() < 1e-12 && dot.is_finite());
     }
 
     #[test]

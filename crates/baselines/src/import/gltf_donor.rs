@@ -10,6 +10,7 @@ use gltf::mesh::Mode;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
+use mateval_scene::gltf_error::GltfError;
 use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{
@@ -20,7 +21,7 @@ use super::donor::{
 /// Reads the file `name` of the folder; what is wrong in words.
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     let bytes = folder.read(name).map_err(|fault| fault.message)?;
-    let file = parse(&bytes)?;
+    let file = parse(&bytes).map_err(in_words)?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
     let mut bytes = 0;
@@ -42,6 +43,10 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     donor.materials.push(nothing);
     reader.walk(&file, &mut donor)?;
     Ok(donor)
+}
+
+fn in_words(error: GltfError) -> String {
+    error.to_string()
 }
 
 struct Reader<'a> {
@@ -100,7 +105,7 @@ impl Reader<'_> {
             gltf::image::Source::Uri { uri, .. } => (uri.to_owned(), self.file(uri)?),
             gltf::image::Source::View { view, .. } => {
                 let buffer = &self.buffers[view.buffer().index()];
-                (format!("image {}", image.index()), view_bytes(&view, buffer)?.to_vec())
+                (format!("image {}", image.index()), view_bytes(&view, buffer).map_err(in_words)?.to_vec())
             }
         };
         let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap).map_err(|error| error.to_string())?;
@@ -162,7 +167,8 @@ impl Reader<'_> {
         if donor.vertices > MAX_VERTICES {
             return Err(format!("more than {MAX_VERTICES} vertices, counted for each node that has them"));
         }
-        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)?
+        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)
+            .map_err(in_words)?
             .into_iter()
             .map(|place| world_from_node.transform_point3(DVec3::from(place.map(f64::from))).as_vec3())
             .collect();
@@ -173,16 +179,16 @@ impl Reader<'_> {
             Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
                 return Err(format!("more than {MAX_TRIANGLES} triangles"));
             }
-            Some(accessor) => indices(&accessor, bytes(&accessor)?)?,
+            Some(accessor) => indices(&accessor, bytes(&accessor)?).map_err(in_words)?,
             None => (0..positions.len() as u32).collect(),
         };
-        let triangles = triangles(numbers, positions.len())?;
+        let triangles = triangles(numbers, positions.len()).map_err(in_words)?;
         let same_count = |count: usize, what: &str| match count == positions.len() {
             true => Ok(()),
             false => Err(format!("{count} {what}, expected as many as POSITION: {}", positions.len())),
         };
         let colors = match primitive.get(&Semantic::Colors(0)) {
-            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?)?,
+            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?).map_err(in_words)?,
             None => vec![[1.0; 3]; positions.len()],
         };
         same_count(colors.len(), "COLOR_0")?;
@@ -194,7 +200,7 @@ impl Reader<'_> {
             let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
             let accessor =
                 primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| format!("expected TEXCOORD_{set}"))?;
-            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?)?;
+            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?).map_err(in_words)?;
             same_count(found.len(), "TEXCOORD")?;
             *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
         }

@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 use mateval_scene::findings::shortened;
-use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits, ObjMaterial};
+use mateval_scene::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, MAX_TRIANGLES, Scalar};
@@ -16,7 +16,7 @@ use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, 
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     let bytes = folder.read(name).map_err(|fault| fault.message)?;
     let limits = ObjLimits { triangles: MAX_TRIANGLES, corners: 3 * MAX_TRIANGLES };
-    let read = obj::read(&bytes, limits, Materials::Told).map_err(|fault| in_words("", &fault))?;
+    let read = obj::read(&bytes, limits, Materials::Told).map_err(|error| error.to_string())?;
     if read.mixed_uvs {
         return Err("some faces have texture coordinates and some have none".to_owned());
     }
@@ -27,7 +27,7 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     let mut known = BTreeMap::new();
     for file in obj::material_files(&bytes) {
         let bytes = reader.material_file(&file)?;
-        let materials = obj::read_materials(&bytes).map_err(|fault| in_words(&file, &fault))?;
+        let materials = obj::read_materials(&bytes).map_err(|error| format!("'{}': {error}", shortened(&file)))?;
         known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
     }
     let (mut donor, mut numbers, mut first) = (Donor::default(), BTreeMap::new(), 0);
@@ -63,12 +63,6 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
         first += group.triangles;
     }
     Ok(donor)
-}
-
-fn in_words(file: &str, fault: &ObjFault) -> String {
-    let file = if file.is_empty() { String::new() } else { format!("'{}': ", shortened(file)) };
-    let line = if fault.line > 0 { format!("line {}: ", fault.line) } else { String::new() };
-    format!("{file}{line}{}", fault.what)
 }
 
 struct Reader<'a> {

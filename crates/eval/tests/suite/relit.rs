@@ -57,7 +57,7 @@ fn by_luminance(scene: &SceneFile, groups: &[Picture<LinearRgb>]) -> Vec<usize> 
     let valid = ViewTruth::read(&dataset().folder(&scene.id), &scene.views[0]).unwrap().valid;
     let luminance = |picture: &Picture<LinearRgb>| -> f64 {
         let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
-        lit.map(|(LinearRgb([r, g, b]), _)| f64::from(0.2126 * r + 0.7152 * g + 0.0722 * b)).sum()
+        lit.map(|(pixel, _)| pixel.luminance()).sum()
     };
     let mut order: Vec<usize> = (0..groups.len()).collect();
     order.sort_by(|a, b| luminance(&groups[*b]).total_cmp(&luminance(&groups[*a])));

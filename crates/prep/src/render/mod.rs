@@ -11,6 +11,7 @@ use std::time::Duration;
 use mateval_scene::dataset::{DatasetFile, SceneFile, View};
 use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
 use mateval_scene::manifest::{self, sha256_of_bytes};
+use mateval_scene::open::chosen_ids;
 use mateval_scene::{Finding, Progress, RendererId, SceneError, SceneId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -128,15 +129,17 @@ pub struct RenderFile {
 /// kept, so that a killed run goes on; a scene that Blender cannot render is a failure in the report, and the others go on.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let mut dataset: DatasetFile = json::read(&root.join(DATASET))?;
-    check_scenes(root, &dataset, options)?;
+    if !root.join(MANIFEST).is_file() {
+        let what = "holds no MANIFEST.sha256: an unfinished `prep build`; run that again".to_owned();
+        return Err(PrepError::Output { path: root.to_owned(), what });
+    }
+    let wanted = chosen_ids(root, &dataset, &options.scenes)?;
     let renderer = options.renderer.id();
     check_hashes(root, &renderer)?;
     let samples = match options.samples {
         Some(samples) => samples,
         None => recipe::read(&root.join(RECIPE))?.0.samples,
     };
-    let wanted: Vec<&SceneId> =
-        dataset.scenes.iter().filter(|id| options.scenes.is_empty() || options.scenes.contains(id)).collect();
     let order = Order { root, samples, force: options.force };
     let mut report = match &options.renderer {
         Renderer::Builtin => builtin::render_scenes(&order, &wanted, progress)?,
@@ -172,19 +175,6 @@ impl Order<'_> {
         };
         !self.force && json::read::<RenderFile>(&mark).is_ok_and(is_same)
     }
-}
-
-fn check_scenes(root: &Path, dataset: &DatasetFile, options: &RenderOptions) -> Result<(), PrepError> {
-    let unknown: Vec<&str> =
-        options.scenes.iter().filter(|id| !dataset.scenes.contains(id)).map(SceneId::as_str).collect();
-    if !root.join(MANIFEST).is_file() || !unknown.is_empty() {
-        let what = match unknown.as_slice() {
-            [] => "holds no MANIFEST.sha256: an unfinished `prep build`; run that again".to_owned(),
-            names => format!("has no scene '{}'", names.join("', '")),
-        };
-        return Err(PrepError::Output { path: root.to_owned(), what });
-    }
-    Ok(())
 }
 
 /// Everything that is no render of this renderer must be what the manifest says: it is about to be renewed.

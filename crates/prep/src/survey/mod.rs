@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_image::png_io::write_rgb_bytes;
 use mateval_image::store::write_whole;
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Progress, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -168,10 +168,7 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
     let source = source_folder(options)?;
     let options = &below(options, &source)?;
     let houses = house_files(options, &source)?;
-    if options.out.exists() && !options.force {
-        let what = "is already there; choose another --out, or add --force to replace it".to_owned();
-        return Err(PrepError::Output { path: options.out.clone(), what });
-    }
+    check_free(&options.out, options.force, "--out")?;
     if options.out.exists() && !is_only_a_survey(&options.out) {
         let what =
             "is there and is no survey, or holds more than one: it is not replaced; choose another --out".to_owned();

@@ -28,6 +28,7 @@ use std::path::{Path, PathBuf};
 use mateval_metrics::Psnr;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::check_free;
 use mateval_scene::{Finding, Progress, SceneError, SceneId, ViewId};
 use rayon::prelude::*;
 
@@ -36,7 +37,7 @@ use self::kinds::{Explained, explained};
 use self::patch::{Patch, patches};
 use crate::error::ReportError;
 use mateval_eval::instance_errors::categories;
-use mateval_eval::open_scene::{chosen_scenes, scored_views};
+use mateval_eval::open_scene::scored_views;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
 
@@ -76,7 +77,7 @@ pub struct Explanation {
 /// Takes the scene's albedo apart. Fails where result, dataset and submission do not belong together.
 pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explanation, ReportError> {
     let scores = belongs::check(plan)?;
-    let scene = chosen_scenes(plan.dataset, std::slice::from_ref(plan.scene))?[0];
+    let scene = plan.dataset.scene(plan.scene)?;
     progress("pictures", 0, 2);
     let views = scene_albedo(plan.dataset, scene, &[plan.submission])?;
     progress("kinds of error", 1, 2);
@@ -170,7 +171,7 @@ impl Explanation {
             .collect();
         let page = out.join(PAGE);
         let paths: Vec<PathBuf> = names.iter().map(|name| out.join(name)).chain([page.clone()]).collect();
-        paths.iter().try_for_each(|path| check_free(path, force))?;
+        paths.iter().try_for_each(|path| check_free(path, force, "--out"))?;
         std::fs::create_dir_all(out).map_err(SceneError::io("make", out))?;
         for (index, path) in self.worst.iter().zip(&paths) {
             mateval_image::png_io::write_rgb_bytes(path, &crops::crop(&self.views, &self.patches[index]))?;
@@ -191,15 +192,7 @@ impl Explanation {
 /// Fails where the folder `out` holds an explanation already and may not be overwritten. Pictures, whose names are not known
 /// before, are looked at when they are written.
 pub fn check_out(out: &Path, force: bool) -> Result<(), ReportError> {
-    check_free(&out.join(PAGE), force)
-}
-
-fn check_free(path: &Path, force: bool) -> Result<(), ReportError> {
-    if force || !path.exists() {
-        return Ok(());
-    }
-    let what = format!("'{}' is already there; choose another --out, or add --force to replace it", path.display());
-    Err(ReportError::Invalid(what))
+    Ok(check_free(&out.join(PAGE), force, "--out")?)
 }
 
 /// The scores of a protocol, or what the result has instead.

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::open::Dataset;
-use mateval_scene::work_folder::WorkFolder;
+use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Progress, SceneId};
 use minijinja::context;
 use minijinja::value::Serde;
@@ -142,8 +142,7 @@ fn check_place(out: &Path, force: bool) -> Result<(), ReportError> {
         let what = format!("'{path}' is there and is no leaderboard; choose another --out");
         return Err(ReportError::Invalid(what));
     }
-    let what = format!("'{path}' is already there; choose another --out, or add --force to replace it");
-    if force { Ok(()) } else { Err(ReportError::Invalid(what)) }
+    Ok(check_free(out, force, "--out")?)
 }
 
 fn board<'a>(plan: &LeaderboardPlan<'a>, ranking: Ranking, pictures: PictureSet) -> Board<'a> {

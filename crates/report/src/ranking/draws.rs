@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use mateval_scene::splitmix64;
+
 /// Draws with replacement of as many clusters as there are.
 pub(super) struct Draws {
     clusters: usize,
@@ -22,7 +24,7 @@ impl Draws {
             for k in 0..clusters {
                 let index = (draw * clusters + k) as u64;
                 // The upper bits of a product are an even choice but for one part in 2^32.
-                let drawn = ((mixed(seed, index) >> 32) * clusters as u64) >> 32;
+                let drawn = ((splitmix64::number(seed, index) >> 32) * clusters as u64) >> 32;
                 counts[drawn as usize] += 1;
             }
         }
@@ -59,26 +61,9 @@ impl DrawTable {
     }
 }
 
-/// The number at `index` of SplitMix64's sequence from `seed` (Steele et al., OOPSLA 2014).
-pub(super) fn mixed(seed: u64, index: u64) -> u64 {
-    let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// The first numbers from seed 1234567 as the reference implementation gives them (Vigna's splitmix64.c; Rosetta Code,
-    /// "Pseudo-random numbers/Splitmix64").
-    #[test]
-    fn the_generator_is_splitmix64() {
-        let expected = [6457827717110365317, 3203168211198807973, 9817491932198370423];
-        assert_eq!([0, 1, 2].map(|index| mixed(1_234_567, index)), expected);
-        assert_ne!(mixed(1_234_568, 0), expected[0]);
-    }
 
     /// Every draw holds as many as there are; over all draws each cluster is held once a draw and its count has the
     /// variance of a binomial's, 1 - 1/n.

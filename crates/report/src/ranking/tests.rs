@@ -1,11 +1,10 @@
 //! Rankings of simulated leaderboards, whose truth is known.
 
 use mateval_scene::dataset_id::DatasetId;
-use mateval_scene::{Finding, InstanceId, Severity};
+use mateval_scene::{Finding, InstanceId, Severity, splitmix64};
 
 use super::bootstrap::{duels, intervals};
 use super::clusters::Clusters;
-use super::draws::mixed;
 use super::file::{IntervalKind, RankRange, Standing};
 use super::*;
 use mateval_eval::protocol::Protocol;
@@ -17,7 +16,7 @@ struct Chance(u64, u64);
 impl Chance {
     fn even(&mut self) -> f64 {
         self.1 += 1;
-        (mixed(self.0, self.1) >> 11) as f64 / (1_u64 << 53) as f64
+        (splitmix64::number(self.0, self.1) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Box and Muller 1958.

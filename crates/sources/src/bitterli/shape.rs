@@ -10,7 +10,7 @@ use super::primitives;
 use super::reader::Reader;
 use crate::surface_mesh::{Repairs, smooth_normals, to_world};
 use mateval_scene::findings::shortened;
-use mateval_scene::obj::{self, Materials, ObjLimits};
+use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 const LEFT_OUT: &str = "left the shape out";
@@ -190,10 +190,9 @@ impl<'a> Reader<'a> {
         self.totals.mesh_bytes = self.totals.mesh_bytes.saturating_add(bytes.len() as u64);
         let triangles = self.limits.triangles.saturating_sub(self.totals.triangles);
         let limits = ObjLimits { triangles, corners: triangles.saturating_mul(3) };
-        obj::read(&bytes, limits, Materials::Ignored).map_err(|fault| {
-            let line = if fault.line > 0 { format!("line {}: ", fault.line) } else { String::new() };
-            let message = format!("'{}': {line}{}", shortened(&relative), fault.what);
-            FileFault { code: if fault.limit { "limit" } else { "bad_mesh" }, message }
+        obj::read(&bytes, limits, Materials::Ignored).map_err(|error| {
+            let message = format!("'{}': {error}", shortened(&relative));
+            FileFault { code: if matches!(error.fault, ObjFault::TooLarge(_)) { "limit" } else { "bad_mesh" }, message }
         })
     }
 }

@@ -301,7 +301,7 @@ fn picture_fault(file: &str, error: &ImageError) -> FileFault {
     FileFault { code: "unreadable_texture", message: format!("'{}': {what}", shortened(file)) }
 }
 
-/// Rec. 709 luminance of a linear colour, with Mitsuba's weights.
+/// The luminance of a linear colour by Mitsuba's own weights, which have more digits than those of Rec. 709.
 pub(super) fn luminance(rgb: [f32; 3]) -> f32 {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] {
         return rgb[0];

@@ -8,8 +8,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
-use mateval_scene::TriangleMesh;
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
@@ -302,45 +302,14 @@ pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
 /// To the nearest point of a mesh, or `enough` where that is nearer.
 fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
     let mut nearest = enough;
-    for triangle in 0..mesh.triangles.len() {
-        let corners = mesh.corners(triangle);
+    for index in 0..mesh.triangles.len() {
+        let corners = mesh.corners(index);
         // Most triangles are far: their box tells.
         let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         if (from.clamp(low, high) - from).length() < nearest {
-            nearest = nearest.min((closest_point(corners, from) - from).length());
+            let corners = corners.map(|corner| corner.as_dvec3());
+            nearest = nearest.min(triangle::distance(corners, from.as_dvec3()) as f32);
         }
     }
     nearest
-}
-
-/// The point of a triangle nearest to `from` (Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
-pub(crate) fn closest_point([a, b, c]: [Vec3; 3], from: Vec3) -> Vec3 {
-    let (ab, ac, ap) = (b - a, c - a, from - a);
-    let (d1, d2) = (ab.dot(ap), ac.dot(ap));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return a;
-    }
-    let bp = from - b;
-    let (d3, d4) = (ab.dot(bp), ac.dot(bp));
-    if d3 >= 0.0 && d4 <= d3 {
-        return b;
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return a + ab * (d1 / (d1 - d3));
-    }
-    let cp = from - c;
-    let (d5, d6) = (ab.dot(cp), ac.dot(cp));
-    if d6 >= 0.0 && d5 <= d6 {
-        return c;
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return a + ac * (d2 / (d2 - d6));
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
-    }
-    a + ab * (vb / (va + vb + vc)) + ac * (vc / (va + vb + vc))
 }

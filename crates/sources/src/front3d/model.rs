@@ -8,7 +8,7 @@ use crate::log::Log;
 use crate::parts::labelled_parts;
 use crate::surface_mesh::{has_area, to_world};
 use mateval_scene::findings::shortened;
-use mateval_scene::obj::{self, Materials, ObjLimits, ObjMesh};
+use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
 use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
 /// A larger model is in centimetres: no furniture is ten metres long.
@@ -59,10 +59,10 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
     let limit = ObjLimits { triangles: limits.triangles, corners: 3 * limits.triangles };
     let read = match obj::read(&bytes, limit, Materials::Ignored) {
         Ok(read) => read,
-        Err(fault) => {
-            let place = if fault.line > 0 { format!("line {}", fault.line) } else { String::new() };
-            let code = if fault.limit { "limit" } else { "bad_model" };
-            warn(code, &place, fault.what, "left its pieces out");
+        Err(error) => {
+            let place = error.line.map_or(String::new(), |line| format!("line {line}"));
+            let code = if matches!(error.fault, ObjFault::TooLarge(_)) { "limit" } else { "bad_model" };
+            warn(code, &place, error.fault.to_string(), "left its pieces out");
             return None;
         }
     };

@@ -75,11 +75,6 @@ pub(super) fn mean(texture: &Texture, pixel: &SeenPixel, turn: Turn) -> [f32; 3]
     sum.map(|sum| sum / pixel.uvs.len() as f32)
 }
 
-/// Rec. 709's luminance.
-pub(super) fn luminance([r, g, b]: [f32; 3]) -> f64 {
-    0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
-}
-
 #[cfg(test)]
 mod tests {
     use mateval_image::{Texels, Wrap};

@@ -4,10 +4,11 @@
 //! brighter material. So the base colour goes along with the picture if it lies where it belongs, and does not where
 //! it was turned. Turning it back must then make it do so.
 
+use mateval_image::LinearRgb;
 use mateval_scene::Finding;
 
 use super::finding::warning;
-use super::looks::{Look, Turn, luminance};
+use super::looks::{Look, Turn};
 use super::statistics::Pairs;
 
 /// Fewest pixels that say anything.
@@ -49,7 +50,7 @@ pub(super) fn check(place: &str, looks: &[Look]) -> Option<Finding> {
 /// How the base colour's brightness goes along with the picture's, within instances and neighbourhoods.
 fn detail(looks: &[Look], turn: usize) -> Pairs {
     let pair = |look: &Look| {
-        let [base, photo] = [luminance(look.base_color[turn]), luminance(look.photo?)];
+        let [base, photo] = [LinearRgb(look.base_color[turn]).luminance(), LinearRgb(look.photo?).luminance()];
         (photo > DARKEST).then(|| ((look.instance, look.tile), base.max(DARKEST).ln(), photo.ln()))
     };
     Pairs::within(looks.iter().filter_map(pair))

@@ -1,9 +1,10 @@
 //! The input picture itself as base colour, with its light and shadow.
 
+use mateval_image::LinearRgb;
 use mateval_scene::Finding;
 
 use super::finding::warning;
-use super::looks::{Look, luminance};
+use super::looks::Look;
 use super::statistics::Pairs;
 
 /// Fewest pixels that say anything.
@@ -18,7 +19,7 @@ const DARKEST: f64 = 1e-3;
 /// A finding where, within instances, the base colour is as bright as the picture is.
 pub(super) fn check(place: &str, looks: &[Look]) -> Option<Finding> {
     let pair = |look: &Look| {
-        let [base, photo] = [luminance(look.own()), luminance(look.photo?)];
+        let [base, photo] = [LinearRgb(look.own()).luminance(), LinearRgb(look.photo?).luminance()];
         // White is where a picture was clipped.
         (photo > DARKEST && base > DARKEST && base < 0.98).then(|| (look.instance, base.ln(), photo.ln()))
     };

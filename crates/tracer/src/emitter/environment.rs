@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::{Mat3, Vec3};
-use mateval_image::Texture;
+use mateval_image::{LinearRgb, Texture};
 
 use super::distribution::Distribution;
 use crate::warp;
@@ -88,14 +88,8 @@ impl EnvironmentMap {
 }
 
 fn luminances(texture: &Texture) -> Vec<f64> {
-    let texel = |k: usize| texture.texel(k % texture.width(), k / texture.width());
-    (0..texture.width() * texture.height())
-        .map(|k| {
-            // Rec. 709.
-            let [r, g, b] = texel(k).map(f64::from);
-            (0.2126 * r + 0.7152 * g + 0.0722 * b).max(0.0)
-        })
-        .collect()
+    let texel = |k: usize| LinearRgb(texture.texel(k % texture.width(), k / texture.width()));
+    (0..texture.width() * texture.height()).map(|k| texel(k).luminance().max(0.0)).collect()
 }
 
 /// The mean over a texel and its neighbours: above zero wherever a bilinear lookup in the texel is.
