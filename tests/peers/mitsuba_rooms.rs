@@ -1,10 +1,11 @@
 //! Rooms: the built-in sample, the shared bench scenes and two of Bitterli's.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_scene::Camera;
 use mateval_scene::reference::ReferenceScene;
 use mateval_sources::bitterli::{self, Limits};
+use mateval_testkit::data::shared_data;
 
 use super::mitsuba::{Case, all_agree};
 use crate::bench_scene;
@@ -25,16 +26,6 @@ fn source(name: &str, xml: &Path, width: u32, samples: u32) -> Case {
     case(name, read.scene, camera, samples)
 }
 
-/// The shared data's `file`, or none after saying so.
-fn shared(file: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join(file);
-    if !path.exists() {
-        bench_scene::say_skipped(&format!("no '{file}' in MATEVAL_DATA or ../shared/data"));
-    }
-    path.exists().then_some(path)
-}
-
 #[test]
 fn sample_room() {
     let folder = tempfile::tempdir().unwrap();
@@ -45,20 +36,16 @@ fn sample_room() {
 #[test]
 fn bench_rooms() {
     for (name, samples) in [("room", 32), ("dense", 16)] {
-        match bench_scene::folder(name) {
-            Some(folder) => {
-                let (scene, camera) = bench_scene::read(&folder, 64);
-                all_agree(vec![case(&format!("bench/{name}"), scene, camera, samples)]);
-            }
-            None => bench_scene::say_skipped(&format!("no 'bench/{name}' in MATEVAL_DATA or ../shared/data")),
-        }
+        let Some(folder) = bench_scene::folder(name) else { continue };
+        let (scene, camera) = bench_scene::read(&folder, 64);
+        all_agree(vec![case(&format!("bench/{name}"), scene, camera, samples)]);
     }
 }
 
 #[test]
 fn bitterli_rooms() {
     for (name, samples) in [("staircase2", 32), ("living-room", 32)] {
-        if let Some(xml) = shared(&format!("bitterli/{name}/scene.xml")) {
+        if let Some(xml) = shared_data(&format!("bitterli/{name}/scene.xml")) {
             all_agree(vec![source(name, &xml, 80, samples)]);
         }
     }

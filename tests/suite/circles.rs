@@ -231,7 +231,8 @@ fn circles_are_found() {
     };
     let by_use = of(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "use super::a::{self, A};")]);
     assert_eq!(by_use, ["crate::a -> crate::b -> crate::a", "crate::b -> crate::a -> crate::b"]);
-    let by_code = of(&[("", "mod a; mod b;"), ("a", "fn f() { crate::b::g() }"), ("b", "fn g() { m!(super::a::f()) }")]);
+    let by_code =
+        of(&[("", "mod a; mod b;"), ("a", "fn f() { crate::b::g() }"), ("b", "fn g() { m!(super::a::f()) }")]);
     assert_eq!(by_code.len(), 2);
     let by_parent = of(&[("", "mod a;"), ("a", "mod c; pub struct S; fn f() { c::g() }"), ("a::c", "use super::S;")]);
     assert_eq!(by_parent.len(), 2);
@@ -240,6 +241,7 @@ fn circles_are_found() {
     let behind_a_signpost =
         of(&[("", "mod a; mod b; pub use b::B;"), ("a", "use crate::B;"), ("b", "use crate::a::A;")]);
     assert_eq!(behind_a_signpost.len(), 2);
-    let in_tests = of(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "#[cfg(test)] mod t { use crate::a::A; }")]);
+    let in_tests =
+        of(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "#[cfg(test)] mod t { use crate::a::A; }")]);
     assert_eq!(in_tests, [""; 0]);
 }

@@ -4,10 +4,11 @@
 use std::path::Path;
 
 use mateval_image::Picture;
+use mateval_testkit::data::{report_missing, shared_data};
 use serde_json::Value;
 
 use super::command::{mateval, run};
-use super::sample::{json, real_data, say_skipped};
+use super::sample::json;
 
 /// Keys of expected.json, and where `eval image` prints the same.
 const PLAIN: [(&str, &str); 3] = [("mse", "/mse"), ("psnr", "/psnr"), ("ssim", "/ssim")];
@@ -35,7 +36,7 @@ fn values(folder: &Path, prediction: &str, case: &Value, mask: Option<&str>, net
     }
     let printed: Value = serde_json::from_str(&run(&mut command).ends_with(0).stdout).unwrap();
     if printed["missing"] != Value::Array(Vec::new()) {
-        say_skipped(&format!("lpips_{net} of {prediction}: {}", printed["missing"][0]["mend"]));
+        report_missing(&format!("lpips_{net} of {prediction}: {}", printed["missing"][0]["mend"]));
         return None;
     }
     Some(printed["values"].clone())
@@ -66,7 +67,7 @@ fn compare(found: &Value, case: &Value, net: &str) -> (Vec<String>, usize) {
 }
 
 fn cases() -> Option<(std::path::PathBuf, Vec<Value>)> {
-    let file = real_data("metrics/expected.json")?;
+    let file = shared_data("metrics/expected.json")?;
     let cases = json(&file)["cases"].as_array().unwrap().clone();
     assert_eq!(cases.len(), 12);
     Some((file.parent().unwrap().to_owned(), cases))

@@ -323,7 +323,7 @@ fn what_cannot_be_imported_is_refused_with_the_reason() {
         ("red.obj", format!("mtllib ../../outside.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "leads out"),
         ("red.obj", format!("{triangle}f 1 2 3\n"), "which no mtllib of the file defines"),
         ("red.obj", format!("mtllib map.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "the faces have no vt"),
-        ("red.obj", format!("mtllib none.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "is not there"),
+        ("red.obj", format!("mtllib none.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "does not exist"),
         ("red.obj", format!("{triangle}f 1 2 9\n"), "line 5"),
         ("red.gltf", "{}".to_owned(), "not valid glTF"),
         ("red.glb", "glTF".to_owned(), "not valid glTF"),

@@ -4,9 +4,10 @@ use std::path::Path;
 
 use mateval_scene::Severity;
 use mateval_sources::bitterli;
+use mateval_testkit::data::shared_data;
 
 use super::command::{baseline, build, run, score, verify};
-use super::sample::{json, real_data};
+use super::sample::json;
 
 /// Builds staircase2 with this line in the recipe's head and gives its scene.json and the summary of `gt`'s scores.
 fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, serde_json::Value) {
@@ -25,7 +26,7 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, se
 /// 30,911 triangles in OBJ files: what SOURCE_FORMATS counts. Rectangles and disks come on top of it.
 #[test]
 fn staircase2_is_built_verified_and_scored() {
-    let Some(scene_file) = real_data("bitterli/staircase2/scene.xml") else { return };
+    let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };
     let source = scene_file.parent().unwrap().parent().unwrap();
     let folder = tempfile::tempdir().unwrap();
     let (scene, summary) = staircase(source, folder.path(), "atlas_size = 512");
@@ -41,7 +42,7 @@ fn staircase2_is_built_verified_and_scored() {
 /// The twin: with atlases that are too small, less than 38 dB are reached; with those that the tool chooses, far more.
 #[test]
 fn staircase2_needs_its_texels() {
-    let Some(scene_file) = real_data("bitterli/staircase2/scene.xml") else { return };
+    let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };
     let source = scene_file.parent().unwrap().parent().unwrap();
     let psnr = |line: &str| {
         let folder = tempfile::tempdir().unwrap();
@@ -53,7 +54,7 @@ fn staircase2_needs_its_texels() {
 
 #[test]
 fn bathroom_names_exactly_what_is_missing() {
-    let Some(file) = real_data("bitterli/bathroom/scene.xml") else { return };
+    let Some(file) = shared_data("bitterli/bathroom/scene.xml") else { return };
     let read = bitterli::read(&file, &bitterli::Limits::default()).unwrap();
     let warnings = read.findings.iter().filter(|finding| finding.severity != Severity::Note);
     let missing: Vec<(&str, &str)> = warnings.map(|f| (f.code.as_str(), f.file.as_str())).collect();
@@ -65,7 +66,7 @@ fn bathroom_names_exactly_what_is_missing() {
 #[test]
 fn the_other_scenes_are_whole() {
     for name in ["staircase2/scene.xml", "living-room/scene.xml", "living-room/scene_v0.6_dppm.xml"] {
-        let Some(file) = real_data(&format!("bitterli/{name}")) else { return };
+        let Some(file) = shared_data(&format!("bitterli/{name}")) else { return };
         let read = bitterli::read(&file, &bitterli::Limits::default()).unwrap();
         let above_note = read.findings.iter().filter(|finding| finding.severity != Severity::Note);
         assert_eq!(above_note.count(), 0, "{name}");

@@ -98,23 +98,3 @@ pub fn manifest(dataset: &Path) -> String {
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
-
-/// The folder of the real inputs: `MATEVAL_DATA`, or `shared/data` beside the repository. Where `file` is not in it that
-/// is said, past the test runner's capture, and none is given.
-pub fn real_data(file: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    say_skipped(&format!("no '{file}' in MATEVAL_DATA or ../shared/data"));
-    None
-}
-
-/// Says that a test, or a piece of it, was not run: straight to stderr, past the test runner's capture.
-pub fn say_skipped(why: &str) {
-    use std::io::Write as _;
-    let thread = std::thread::current();
-    let line = format!("SKIPPED: {}: {why}\n", thread.name().unwrap_or("a test"));
-    std::io::stderr().write_all(line.as_bytes()).unwrap();
-}

@@ -6,11 +6,12 @@ use std::sync::LazyLock;
 
 use mateval_image::transfer::linear_from_srgb_byte;
 use mateval_image::{exr_io, png_io};
+use mateval_testkit::data::report_missing;
 use serde_json::Value;
 
 use super::command::{baseline, build, mateval, run, score};
 use super::kept_folder::kept_folder;
-use super::sample::{dataset, json, say_skipped, write_source};
+use super::sample::{dataset, json, write_source};
 
 /// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen by the
 /// tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
@@ -176,7 +177,7 @@ fn lpips_with_weights_is_scored() {
     let result = json(&out);
     let missing = result["missing"].as_array().unwrap();
     if let Some(lpips) = missing.iter().find(|missing| missing["metric"] == "lpips_alex") {
-        say_skipped(lpips["reason"].as_str().unwrap());
+        report_missing(lpips["reason"].as_str().unwrap());
         return;
     }
     let ours = &result["protocols"]["mateval-1"];

@@ -1,4 +1,4 @@
-//! The one error of this crate.
+//! The error of this crate.
 
 use std::path::PathBuf;
 
@@ -8,14 +8,14 @@ pub enum ImageError {
     /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
-        /// What was tried, as in "read" or "write".
+        /// What was attempted, as in "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The file is not what it says, or breaks a limit.
+    /// The file is damaged, of another kind than expected, or beyond a limit.
     #[error("'{}': {what}", path.display())]
     Invalid {
         /// The file.
@@ -23,7 +23,7 @@ pub enum ImageError {
         /// What was expected and what was found.
         what: String,
     },
-    /// Sound, but of a kind that is not read here.
+    /// The file is valid, but of a kind that is not read here.
     #[error("'{}': unsupported: {what}", path.display())]
     Unsupported {
         /// The file.
@@ -31,7 +31,7 @@ pub enum ImageError {
         /// What was found and what would be read.
         what: String,
     },
-    /// Width times height is not the number of pixels given.
+    /// The number of pixels is not width times height.
     #[error("a picture of {width}x{height} needs {expected} pixels, {found} were given")]
     PixelCount {
         /// Pixels in a row.
@@ -40,7 +40,7 @@ pub enum ImageError {
         height: usize,
         /// Width times height.
         expected: usize,
-        /// What was given.
+        /// The number of pixels given.
         found: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What an OpenEXR file says of itself, without decoding its pixels: size, channels, how it is stored.
+//! The header of an OpenEXR file, read without decoding pixels: size, channels and storage.
 
 use std::io::Cursor;
 
@@ -6,10 +6,10 @@ use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
 use exr::meta::{BlockDescription, MetaData};
 
-/// How an OpenEXR file begins.
+/// The first bytes of an OpenEXR file.
 pub const EXR_SIGNATURE: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
-/// Rec. 709's red, green, blue and white, x and y each.
+/// The chromaticities x and y of the red, green, blue and white of Rec. 709.
 const REC_709: [f32; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 
 /// How a channel's numbers are stored.
@@ -19,7 +19,7 @@ pub enum ExrNumber {
     Half,
     /// 32-bit float.
     Float,
-    /// 32-bit whole number.
+    /// 32-bit unsigned integer.
     Whole,
 }
 
@@ -30,11 +30,11 @@ pub struct ExrChannel {
     pub name: String,
     /// How its numbers are stored.
     pub number: ExrNumber,
-    /// Whether it has a number for some pixels only.
+    /// Whether it has a number only for some of the pixels.
     pub subsampled: bool,
 }
 
-/// The header of the first part, and how many parts there are.
+/// The header of the first part, and the number of parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExrHeader {
     /// Parts (layers) of the file.
@@ -49,15 +49,15 @@ pub struct ExrHeader {
     pub channels: Vec<ExrChannel>,
     /// Whether pixels hold lists of samples.
     pub deep: bool,
-    /// Whether it is stored in tiles, not in rows.
+    /// Whether it is stored in tiles instead of rows.
     pub tiled: bool,
-    /// Whether its colours say to be of other primaries than Rec. 709's.
+    /// Whether it states other primaries than those of Rec. 709.
     pub other_primaries: bool,
-    /// Largest number of samples of all parts together, with all their channels.
+    /// The number of samples of all channels of all parts together.
     pub samples: usize,
 }
 
-/// Why an OpenEXR file has no header that can be read.
+/// Why the headers of an OpenEXR file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum ExrHeaderError {
     /// The `exr` crate cannot read it.
@@ -69,7 +69,7 @@ pub enum ExrHeaderError {
 }
 
 impl ExrHeader {
-    /// Reads a file's headers. Fails, with what was expected, where they are not sound.
+    /// Reads the headers of a file from its bytes. Fails where they are not valid.
     pub fn of(bytes: &[u8]) -> Result<Self, ExrHeaderError> {
         let meta = MetaData::read_from_buffered(Cursor::new(bytes), false)?;
         let first = meta.headers.first().ok_or(ExrHeaderError::NoPart)?;

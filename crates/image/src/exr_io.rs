@@ -1,4 +1,4 @@
-//! Float pictures as OpenEXR: one part, scan lines, ZIP, no dates and no names of software or machine.
+//! Reads and writes float pictures as OpenEXR: one part, scan lines, ZIP, no dates and no names of software or machine.
 //!
 //! Colours are channels `R`, `G`, `B` (linear Rec. 709), vectors `X`, `Y`, `Z`, scalars `V`.
 
@@ -14,7 +14,7 @@ use crate::limits::{check_size, read_file};
 use crate::store::write_whole;
 use crate::{ImageError, LinearRgb, Normal, Picture};
 
-/// Most samples of a layer, all channels together: one gibibyte as floats.
+/// Most samples of a layer in all channels together: one gibibyte as floats.
 const MAX_SAMPLES: usize = 1 << 28;
 /// Most blocks of a layer.
 const MAX_BLOCKS: usize = 1 << 20;
@@ -43,7 +43,7 @@ pub fn write_scalar(path: &Path, picture: &Picture<f32>, precision: Precision) -
     write_channels(path, picture.width(), picture.height(), vec![("V", picture.pixels().to_vec())], precision)
 }
 
-/// Writes channel `Y`, as other programs expect a grey picture.
+/// Writes channel `Y`, which other programs read as a grey picture.
 pub fn write_grey(path: &Path, picture: &Picture<f32>, precision: Precision) -> Result<(), ImageError> {
     write_channels(path, picture.width(), picture.height(), vec![("Y", picture.pixels().to_vec())], precision)
 }
@@ -58,21 +58,21 @@ pub fn read_normal(path: &Path) -> Result<Picture<Normal>, ImageError> {
     Ok(read_triples(path, ["X", "Y", "Z"])?.map(Normal))
 }
 
-/// Reads channel `V` (or `Y`, where others wrote a grey picture) of the first layer. Every value must be finite.
+/// Reads channel `V` of the first layer, or channel `Y` as other programs write it. Every value must be finite.
 pub fn read_scalar(path: &Path) -> Result<Picture<f32>, ImageError> {
     let picture = scalar_of_bytes(path, &read_file(path)?)?;
     check_finite(path, picture.width(), picture.pixels().iter().map(|v| v.is_finite()))?;
     Ok(picture)
 }
 
-/// Channel `V` (or `Y`) of a file's bytes, as it stands.
+/// Channel `V` (or `Y`) from a file's bytes, without a check of its values.
 pub(crate) fn scalar_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<f32>, ImageError> {
     let layer = first_layer(path, bytes)?;
     let values = channel(path, &layer, "V").or_else(|error| channel(path, &layer, "Y").map_err(|_| error))?;
     Picture::new(layer.size.width(), layer.size.height(), values)
 }
 
-/// Width, height and the channels of these names of a file's bytes, as they stand.
+/// Width, height and the channels with these names from a file's bytes, without a check of their values.
 pub(crate) fn channels_of_bytes(
     path: &Path,
     bytes: &[u8],
@@ -83,8 +83,8 @@ pub(crate) fn channels_of_bytes(
     Ok((layer.size.width(), layer.size.height(), [a?, b?, c?]))
 }
 
-/// Reads every channel of the first layer, by its full name, as in `ViewLayer.Combined.R`. Numbers are as they stand: they
-/// may be NaN or infinite.
+/// Reads every channel of the first layer, by its full name, as in `ViewLayer.Combined.R`. Values may
+/// be NaN or infinite.
 pub fn read_channels(path: &Path) -> Result<BTreeMap<String, Picture<f32>>, ImageError> {
     let layer = first_layer(path, &read_file(path)?)?;
     let (width, height) = (layer.size.width(), layer.size.height());
@@ -129,7 +129,7 @@ fn write_channels(
     let image =
         ex::Image::from_layer(ex::Layer::new((width, height), attributes, encoding, ex::AnyChannels::sort(channels)));
     let mut bytes = Cursor::new(Vec::new());
-    // One thread: the order of the blocks, and so the bytes, must not depend on how many there are.
+    // One thread: the order of the blocks, and so the bytes, must not depend on the number of threads.
     image
         .write()
         .non_parallel()
@@ -174,7 +174,7 @@ fn channel(path: &Path, layer: &FlatLayer, name: &str) -> Result<Vec<f32>, Image
     Ok(found.sample_data.values_as_f32().collect())
 }
 
-/// Fails where a layer that a header tells of is of a size that is not read.
+/// Fails where a header describes a layer that is too large.
 fn check_headers(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let meta =
         exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| invalid(path, &error))?;
@@ -185,7 +185,7 @@ fn check_headers(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     Ok(())
 }
 
-/// Memory follows samples and blocks, so both are bounded before any is taken.
+/// Decoding takes memory in proportion to samples and blocks, so both are bounded before.
 fn check_amount(path: &Path, header: &exr::meta::header::Header) -> Result<(), ImageError> {
     let samples = header.layer_size.area() * header.channels.list.len();
     if samples <= MAX_SAMPLES && header.chunk_count <= MAX_BLOCKS {
@@ -207,7 +207,7 @@ fn check_finite(path: &Path, width: usize, mut finite: impl Iterator<Item = bool
 }
 
 fn invalid(path: &Path, error: &ex::Error) -> ImageError {
-    ImageError::Invalid { path: path.to_owned(), what: format!("not a sound OpenEXR file: {error}") }
+    ImageError::Invalid { path: path.to_owned(), what: format!("not a valid OpenEXR file: {error}") }
 }
 
 #[cfg(test)]

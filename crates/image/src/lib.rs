@@ -1,10 +1,11 @@
-//! Pictures that know what they hold.
+//! Pictures and textures whose types state their contents, and the files that hold them.
 //!
-//! In: PNG, JPEG, HDR, BMP and EXR files from strangers, or pixels made by the other crates. Out: typed pictures
-//! ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures prepared for lookups
-//! ([`Texture`]), and files that hold the same bytes on every machine (no dates, no host names).
+//! In: PNG, JPEG, HDR, BMP and EXR files, which are untrusted input, or pixels from the other crates. Out: typed
+//! pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for lookups
+//! ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
-//! Between: size limits are checked on the header, before memory is taken; colours are decoded once, by [`transfer`].
+//! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours
+//! between sRGB and linear.
 
 pub mod error;
 pub mod exr_header;

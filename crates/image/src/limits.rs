@@ -1,5 +1,4 @@
-//! What the largest picture is that is read, checked on the header, before memory is taken; reading no more of any file
-//! than is wanted.
+//! The limits on pictures and files, which are checked before memory is taken.
 
 use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
@@ -13,7 +12,7 @@ pub const MAX_PIXELS: u64 = 1 << 26;
 /// Largest file, in bytes.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
 
-/// Fails where a picture of this size would not be read.
+/// Fails where a picture of this size is beyond the limits.
 pub fn check_size(path: &Path, width: u64, height: u64) -> Result<(), ImageError> {
     let sound = (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height) && width * height <= MAX_PIXELS;
     if sound {
@@ -22,7 +21,7 @@ pub fn check_size(path: &Path, width: u64, height: u64) -> Result<(), ImageError
     Err(ImageError::Invalid {
         path: path.to_owned(),
         what: format!(
-            "a picture of {width}x{height} pixels; expected 1 to {MAX_SIDE} a side and at most {MAX_PIXELS} in all"
+            "a picture of {width}x{height} pixels; expected 1 to {MAX_SIDE} a side and at most {MAX_PIXELS} together"
         ),
     })
 }
@@ -36,8 +35,8 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, ImageError> {
     })
 }
 
-/// The bytes of an ordinary file; fails where there are more than `most`. What is no ordinary file, as `/dev/zero` or a
-/// pipe, is not opened: its length is not known, and it may have no end.
+/// The bytes of an ordinary file; fails where there are more than `most`. Anything else, such as `/dev/zero` or a pipe,
+/// is not opened, since its length is unknown and may be endless.
 pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
     let data = std::fs::metadata(path)?;
     if data.is_dir() {
@@ -47,7 +46,7 @@ pub fn read_at_most(path: &Path, most: u64) -> std::io::Result<Vec<u8>> {
         return Err(Error::new(ErrorKind::InvalidInput, "it is not an ordinary file"));
     }
     let mut bytes = Vec::new();
-    // It may grow while it is read.
+    // The file may grow while it is read.
     if data.len() <= most {
         std::fs::File::open(path)?.take(most + 1).read_to_end(&mut bytes)?;
     }
@@ -72,7 +71,7 @@ mod tests {
         assert_eq!(read_at_most(&folder.path().join("none"), 3).unwrap_err().kind(), ErrorKind::NotFound);
     }
 
-    /// Their length is told as 0.
+    /// The system reports their length as 0.
     #[cfg(unix)]
     #[test]
     fn what_has_no_end_is_not_begun() {

@@ -1,5 +1,5 @@
-//! Textures from PNG and OpenEXR alone, from bytes: what a stranger's submission may hold. Nothing else of a file is looked
-//! at: text, profiles and gamma are passed over.
+//! Textures from the bytes of PNG and OpenEXR files, the formats of a submission's maps. Text, profiles and gamma are
+//! ignored.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::exr_io::{channels_of_bytes, scalar_of_bytes};
 use crate::png_io::{Raw, decode_bytes};
 use crate::{ImageError, Texels, Texture, Wrap};
 
-/// The colours of a PNG, sRGB; grey is all three channels, alpha is dropped. `path` is what errors call it.
+/// The sRGB colours of a PNG. Grey fills all three channels, alpha is dropped. `path` serves for errors only.
 pub fn png_color(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
     let raw = decode_bytes(path, bytes)?;
     let texels = if raw.depth == png::BitDepth::Sixteen {
@@ -18,7 +18,7 @@ pub fn png_color(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
     texture(&raw, texels)
 }
 
-/// The first channel of a PNG, linear: bytes where it has 8 bits, floats where it has 16.
+/// The first channel of a PNG, linear; kept as bytes if it has 8 bits, as floats if it has 16.
 pub fn png_scalar(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
     let raw = decode_bytes(path, bytes)?;
     let samples = raw.color.samples();
@@ -30,14 +30,14 @@ pub fn png_scalar(path: &Path, bytes: Vec<u8>) -> Result<Texture, ImageError> {
     texture(&raw, texels)
 }
 
-/// Channels `R`, `G`, `B` of an OpenEXR file, linear, as they stand: they may be NaN or infinite.
+/// Channels `R`, `G`, `B` of an OpenEXR file, linear. Values may be NaN or infinite.
 pub fn exr_color(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
     let (width, height, [r, g, b]) = channels_of_bytes(path, bytes, ["R", "G", "B"])?;
     let texels = r.into_iter().zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect();
     Texture::new(width, height, Texels::Linear(texels), Wrap::Clamp)
 }
 
-/// Channel `V` (or `Y`) of an OpenEXR file, as it stands: it may be NaN or infinite.
+/// Channel `V` (or `Y`) of an OpenEXR file. Values may be NaN or infinite.
 pub fn exr_scalar(path: &Path, bytes: &[u8]) -> Result<Texture, ImageError> {
     let picture = scalar_of_bytes(path, bytes)?;
     Texture::new(picture.width(), picture.height(), Texels::Grey(picture.into_pixels()), Wrap::Clamp)
@@ -61,7 +61,7 @@ mod tests {
     use crate::texture_io::{Encoding, read_texture};
     use crate::{Picture, png_io};
 
-    /// The same numbers as the reader of everybody's textures finds, for every kind of PNG that we write.
+    /// The values equal those of `read_texture`, for every kind of PNG that this crate writes.
     #[test]
     fn it_reads_what_the_general_reader_reads() {
         let folder = tempfile::tempdir().unwrap();

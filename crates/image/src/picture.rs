@@ -1,4 +1,4 @@
-//! A picture: rows of pixels from the top left, of a type that says what a pixel means.
+//! A picture: rows of pixels from the top left, with a type for each meaning of a pixel.
 
 use crate::ImageError;
 
@@ -35,7 +35,7 @@ pub struct Picture<T> {
 }
 
 impl<T: Copy> Picture<T> {
-    /// Takes the pixels, row by row from the top left. Fails if their number is not `width * height`.
+    /// A picture of these pixels, row by row from the top left. Fails if their number is not `width * height`.
     pub fn new(width: usize, height: usize, pixels: Vec<T>) -> Result<Self, ImageError> {
         let expected = width.saturating_mul(height);
         if pixels.len() != expected {
@@ -44,12 +44,12 @@ impl<T: Copy> Picture<T> {
         Ok(Self { width, height, pixels })
     }
 
-    /// Every pixel the same.
+    /// A picture whose pixels all have one value.
     pub fn filled(width: usize, height: usize, value: T) -> Self {
         Self { width, height, pixels: vec![value; width * height] }
     }
 
-    /// Pixel (x, y) is `value_at(x, y)`; called row by row.
+    /// A picture whose pixel (x, y) is `value_at(x, y)`, which is called row by row.
     pub fn from_fn(width: usize, height: usize, mut value_at: impl FnMut(usize, usize) -> T) -> Self {
         let mut pixels = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -80,7 +80,7 @@ impl<T: Copy> Picture<T> {
         &mut self.pixels
     }
 
-    /// The pixels alone.
+    /// The pixels, without width and height.
     pub fn into_pixels(self) -> Vec<T> {
         self.pixels
     }
@@ -97,7 +97,7 @@ impl<T: Copy> Picture<T> {
         self.pixels[y * self.width + x] = value;
     }
 
-    /// A picture of the same size, pixel by pixel.
+    /// A picture of the same size, with every pixel changed.
     pub fn map<U: Copy>(&self, change: impl FnMut(T) -> U) -> Picture<U> {
         Picture { width: self.width, height: self.height, pixels: self.pixels.iter().copied().map(change).collect() }
     }
@@ -109,14 +109,14 @@ impl<T: Copy> Picture<T> {
 }
 
 impl Picture<LinearRgb> {
-    /// Clipped to 0..1 and sRGB-encoded. NaN becomes 0.
+    /// The picture clipped to 0..1 and sRGB-encoded. NaN becomes 0.
     pub fn to_srgb(&self) -> Picture<SrgbRgb> {
         self.map(|LinearRgb(rgb)| SrgbRgb(rgb.map(|v| crate::transfer::srgb_from_linear(v.clamp(0.0, 1.0)))))
     }
 }
 
 impl Picture<SrgbRgb> {
-    /// sRGB-decoded.
+    /// The picture decoded to linear light.
     pub fn to_linear(&self) -> Picture<LinearRgb> {
         self.map(|SrgbRgb(rgb)| LinearRgb(rgb.map(crate::transfer::linear_from_srgb)))
     }

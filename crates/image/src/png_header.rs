@@ -1,27 +1,27 @@
-//! What a PNG says of itself, without decoding its pixels: size, kind, the chunks that are there.
+//! The header of a PNG and the names of its chunks, read without decoding pixels.
 
 use std::collections::BTreeSet;
 
-/// How a PNG begins.
+/// The first bytes of a PNG.
 pub const PNG_SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// What a pixel is made of, as the header has it.
+/// The header's colour type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PngColor {
-    /// One number.
+    /// Grey.
     Grey,
     /// Red, green, blue.
     Rgb,
-    /// A place in the palette.
+    /// Indices into a palette.
     Palette,
-    /// One number, and opacity.
+    /// Grey with opacity.
     GreyAlpha,
-    /// Red, green, blue, and opacity.
+    /// Red, green, blue with opacity.
     Rgba,
 }
 
 impl PngColor {
-    /// As messages call it.
+    /// The name in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Grey => "grey",
@@ -33,7 +33,7 @@ impl PngColor {
     }
 }
 
-/// Why a PNG has no header that can be read.
+/// Why the header of a PNG cannot be read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PngHeaderError {
     /// The first bytes are not [`PNG_SIGNATURE`].
@@ -56,7 +56,7 @@ pub enum PngHeaderError {
     },
 }
 
-/// The header, and which chunks there are.
+/// The header of a PNG, and the names of its chunks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PngHeader {
     /// Pixels in a row.
@@ -65,20 +65,20 @@ pub struct PngHeader {
     pub height: u32,
     /// Bits a sample: 1, 2, 4, 8 or 16.
     pub bit_depth: u8,
-    /// What a pixel is made of.
+    /// The colour type.
     pub color: PngColor,
-    /// Whether rows come in Adam7's order.
+    /// Whether rows are interlaced (Adam7).
     pub interlaced: bool,
     /// The names of all chunks.
     pub chunks: BTreeSet<[u8; 4]>,
-    /// Whether the closing chunk is there.
+    /// Whether the closing chunk (IEND) exists.
     pub ended: bool,
     /// Bytes behind the closing chunk.
     pub trailing_bytes: usize,
 }
 
 impl PngHeader {
-    /// Walks over a file's chunks. Fails, with what was expected, where the first of them is no sound header.
+    /// Reads the header and walks over the other chunks. Fails where the first chunk is not a valid header.
     pub fn of(bytes: &[u8]) -> Result<Self, PngHeaderError> {
         let Some(rest) = bytes.strip_prefix(PNG_SIGNATURE) else {
             return Err(PngHeaderError::NoSignature);
@@ -125,13 +125,13 @@ impl PngHeader {
         })
     }
 
-    /// Whether there is a chunk of this name, as `iCCP`.
+    /// Whether the file has a chunk with this name, as in `iCCP`.
     pub fn has(&self, chunk: &[u8; 4]) -> bool {
         self.chunks.contains(chunk)
     }
 }
 
-/// Name and data of chunk after chunk, for as long as the file holds them whole.
+/// Iterates over the names and data of chunks; ends at the first chunk that is cut off.
 struct Chunks<'a> {
     rest: &'a [u8],
 }

@@ -1,4 +1,4 @@
-//! Pictures as PNG: previews, ids, masks. Written without text, time or gamma chunks.
+//! Reads and writes pictures as PNG: previews, ids and masks, without text, time or gamma chunks.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -42,13 +42,13 @@ pub fn write_grey_bytes(path: &Path, picture: &Picture<u8>) -> Result<(), ImageE
     write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Eight, picture.pixels())
 }
 
-/// Writes 16-bit grey from whole numbers (ids; or words of 65535 times a value).
+/// Writes 16-bit grey from integers: ids, or values times 65535.
 pub fn write_ids(path: &Path, picture: &Picture<u16>) -> Result<(), ImageError> {
     let data: Vec<u8> = picture.pixels().iter().flat_map(|id| id.to_be_bytes()).collect();
     write(path, picture.width(), picture.height(), png::ColorType::Grayscale, png::BitDepth::Sixteen, &data)
 }
 
-/// Writes 8-bit grey: 255 where the mask counts, else 0.
+/// Writes 8-bit grey: 255 where the mask is true, else 0.
 pub fn write_mask(path: &Path, mask: &Mask) -> Result<(), ImageError> {
     write_grey_bytes(path, &mask.map(|counts| if counts { 255 } else { 0 }))
 }
@@ -72,7 +72,7 @@ pub fn read_rgb_bytes(path: &Path) -> Result<Picture<[u8; 3]>, ImageError> {
     Picture::new(raw.width, raw.height, raw.data.chunks_exact(raw.color.samples()).map(triple).collect())
 }
 
-/// Reads 16-bit grey as whole numbers; nothing else will do.
+/// Reads 16-bit grey as integers. Fails for any other kind.
 pub fn read_ids(path: &Path) -> Result<Picture<u16>, ImageError> {
     let raw = decode(path)?;
     if (raw.color, raw.depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
@@ -81,7 +81,7 @@ pub fn read_ids(path: &Path) -> Result<Picture<u16>, ImageError> {
     Picture::new(raw.width, raw.height, raw.words())
 }
 
-/// Reads an 8-bit grey picture of 0 (does not count) and 255 (counts); nothing else will do.
+/// Reads an 8-bit grey picture of 0 (false) and 255 (true). Fails for any other kind or value.
 pub fn read_mask(path: &Path) -> Result<Mask, ImageError> {
     let raw = decode(path)?;
     if (raw.color, raw.depth) != (png::ColorType::Grayscale, png::BitDepth::Eight) {
@@ -120,7 +120,7 @@ fn write(
     write_whole(path, &bytes)
 }
 
-/// A decoded PNG: samples as stored, palettes and less than eight bits expanded.
+/// A decoded PNG, with palettes and samples of fewer than eight bits expanded.
 pub(crate) struct Raw {
     pub(crate) width: usize,
     pub(crate) height: usize,
@@ -130,7 +130,7 @@ pub(crate) struct Raw {
 }
 
 impl Raw {
-    /// The samples of 16 bits.
+    /// The 16-bit samples.
     pub(crate) fn words(&self) -> Vec<u16> {
         self.data.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
     }
@@ -145,11 +145,11 @@ fn decode(path: &Path) -> Result<Raw, ImageError> {
     decode_bytes(path, read_file(path)?)
 }
 
-/// From a file's bytes. Text and profiles, which may be packed a thousandfold, are passed over.
+/// Decodes a file's bytes. Text and profiles are skipped, since they may unpack to a thousand times their size.
 pub(crate) fn decode_bytes(path: &Path, bytes: Vec<u8>) -> Result<Raw, ImageError> {
     let invalid = |error: png::DecodingError| ImageError::Invalid {
         path: path.to_owned(),
-        what: format!("not a sound PNG: {error}"),
+        what: format!("not a valid PNG: {error}"),
     };
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::EXPAND);
@@ -208,7 +208,7 @@ mod tests {
         assert!(read_ids(&path).unwrap_err().to_string().contains("expected 16-bit grey"));
     }
 
-    /// A header of 100000 x 100000 in a file of a few bytes must cost nothing.
+    /// A tiny file whose header claims 100000 x 100000 pixels takes no memory.
     #[test]
     fn a_huge_header_is_refused_before_memory_is_taken() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,19 +1,19 @@
-//! Files that are there whole or not at all: written beside their place, then renamed.
+//! Writes a file whole or not at all: beside its place first, then renamed.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use crate::ImageError;
 
-/// Writes `bytes` to `path`, replacing what is there. Nothing half-written is ever at `path`; what a killed process left
-/// beside it (`NAME.partial`) is overwritten the next time.
+/// Writes `bytes` to `path`, replacing an existing file. `path` never holds a half-written file; the `NAME.partial` of
+/// a killed process is overwritten by the next one.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
     let partial = partial_path(path);
     let written = std::fs::File::create(&partial)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_data()))
         .and_then(|()| std::fs::rename(&partial, path));
     written.map_err(|source| {
-        // The disk may be full: leave no remains. A failure to remove changes nothing about the error.
+        // The disk may be full, so the partial file is removed; if that fails too, the first error is reported.
         let _ = std::fs::remove_file(&partial);
         ImageError::Io { action: "write", path: path.to_owned(), source }
     })

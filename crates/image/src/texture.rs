@@ -1,21 +1,21 @@
-//! A texture: texels as they were stored, decoded at each lookup.
+//! A texture, whose texels are kept as they were stored and decoded at each lookup.
 //!
-//! uv (0, 0) is the lower left corner of the picture, v grows upwards (the OBJ convention; glTF's v is one minus this
-//! one). Lookups are bilinear between texel centres, which lie at half-integers.
+//! uv (0, 0) is the lower left corner of the picture and v grows upwards, as in OBJ; glTF's v is one minus this v.
+//! Lookups are bilinear between texel centres, which lie at half-integers.
 
 use std::sync::Arc;
 
 use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
 
-/// What a lookup outside 0..1 finds.
+/// How lookups continue outside 0..1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// The picture again.
+    /// The picture is repeated.
     #[default]
     Repeat,
-    /// The nearest border texel.
+    /// The nearest border texel is used.
     Clamp,
-    /// The picture, mirrored every other time.
+    /// The picture is repeated, mirrored every other time.
     Mirror,
 }
 
@@ -37,7 +37,7 @@ pub enum Texels {
 }
 
 impl Texels {
-    /// As they lie in memory.
+    /// The texels as bytes in memory.
     fn bytes(&self) -> &[u8] {
         match self {
             Self::Srgb8(v) | Self::Linear8(v) => v.as_flattened(),
@@ -59,18 +59,18 @@ impl Texels {
     }
 }
 
-/// A picture for lookups by uv; see the module for its conventions.
+/// A picture for lookups by uv, with the conventions of this module.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     width: usize,
     height: usize,
-    // Shared, so that a clone costs nothing.
+    // Shared, so that clones are cheap.
     texels: Arc<Texels>,
     wrap: Wrap,
 }
 
 impl Texture {
-    /// Takes the texels, row by row from the top left. Fails if there are none or not `width * height` of them.
+    /// A texture of these texels, row by row from the top left. Fails if there are none or not `width * height`.
     pub fn new(width: usize, height: usize, texels: Texels, wrap: Wrap) -> Result<Self, crate::ImageError> {
         let expected = width.saturating_mul(height);
         if expected == 0 || texels.len() != expected {
@@ -94,12 +94,12 @@ impl Texture {
         &self.texels
     }
 
-    /// How lookups go on outside 0..1.
+    /// How lookups continue outside 0..1.
     pub fn wrap(&self) -> Wrap {
         self.wrap
     }
 
-    /// The same texture; where all its texels are equal as one texel, which costs no memory.
+    /// The same texture, reduced to one texel where all texels are equal.
     pub fn collapsed(self) -> Self {
         fn first<T: PartialEq + Copy>(all: &[T]) -> Option<Vec<T>> {
             all.iter().all(|texel| *texel == all[0]).then(|| vec![all[0]])
@@ -134,7 +134,7 @@ impl Texture {
     /// The linear value at `uv`, bilinear. A coordinate that is not finite or beyond 1e9 reads as 0.
     #[inline]
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 3] {
-        // One decision a lookup, not one a texel.
+        // The kind of texels is matched once a lookup, not once a texel.
         match self.texels.as_ref() {
             Texels::Srgb8(v) => self.bilinear(uv, |at| v[at].map(linear_from_srgb_byte)),
             Texels::Srgb16(v) => self.bilinear(uv, |at| v[at].map(linear_from_srgb_word)),
@@ -145,11 +145,11 @@ impl Texture {
         }
     }
 
-    /// Where in memory the two rows of texels are that [`Self::sample`] reads at `uv`: for asking for them early.
+    /// The addresses of the two rows of texels that [`Self::sample`] reads at `uv`, for prefetching.
     #[inline]
     pub fn addresses(&self, uv: [f32; 2]) -> [*const u8; 2] {
         let [(x, ..), (upper, lower, _)] = self.footprint(uv);
-        // Not from the number of bytes: a division would take longer than the rest.
+        // Computing this from the number of bytes would take a division, longer than everything else here.
         let size = match self.texels.as_ref() {
             Texels::Grey8(_) => 1,
             Texels::Srgb8(_) | Texels::Linear8(_) => 3,
@@ -160,7 +160,7 @@ impl Texture {
         [upper, lower].map(|row| self.bytes().as_ptr().wrapping_add((row * self.width + x) * size))
     }
 
-    /// All texels as they lie in memory.
+    /// All texels as bytes in memory.
     pub fn bytes(&self) -> &[u8] {
         self.texels.bytes()
     }
@@ -181,7 +181,7 @@ impl Texture {
     /// The two columns and the two rows around `uv`, with the weight of the second of each.
     #[inline(always)]
     fn footprint(&self, uv: [f32; 2]) -> [(usize, usize, f32); 2] {
-        // Beyond 1e9 an f32 cannot tell one texel from the next.
+        // Beyond 1e9 neighbouring texels have the same f32 coordinate.
         let sane = |v: f32| if v.abs() < 1e9 { v } else { 0.0 };
         let x = sane(uv[0]) * self.width as f32 - 0.5;
         let y = (1.0 - sane(uv[1])) * self.height as f32 - 0.5;
@@ -190,8 +190,8 @@ impl Texture {
 
     #[inline(always)]
     fn neighbours(&self, position: f32, size: usize) -> (usize, usize, f32) {
-        // Rounded down, without a call of `floor` where processors before 2008 are served. i64 holds every f32 that a uv
-        // can give here; the cast saturates beyond.
+        // Rounds down without `floor`, which is a function call on the baseline x86-64 processor. i64 holds every f32
+        // that a uv can give here; the cast saturates beyond.
         let towards_zero = position as i64;
         let index = towards_zero.saturating_sub(i64::from((towards_zero as f32) > position));
         (self.wrapped(index, size), self.wrapped(index.saturating_add(1), size), position - index as f32)
@@ -208,7 +208,7 @@ impl Texture {
 
     fn wrapped_from_outside(&self, index: i64, size: i64) -> usize {
         let inside = match self.wrap {
-            // Most textures; a division takes ten times as long.
+            // Powers of two are the common case, and a division takes ten times as long.
             Wrap::Repeat if size & (size - 1) == 0 => index & (size - 1),
             Wrap::Repeat => index.rem_euclid(size),
             Wrap::Clamp => index.clamp(0, size - 1),

@@ -1,4 +1,4 @@
-//! Textures from files of strangers: PNG, JPEG, BMP, Radiance HDR, OpenEXR.
+//! Reads textures from untrusted PNG, JPEG, BMP, Radiance HDR and OpenEXR files.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -8,29 +8,29 @@ use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 use crate::limits::{check_size, read_file};
 use crate::{ImageError, Texels, Texture, Wrap, exr_io};
 
-/// How whole numbers stand for colours. Float files (EXR, HDR) are linear whatever is said.
+/// How the integers of a file encode colours. Float files (EXR, HDR) are always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// By the sRGB curve.
+    /// With the sRGB curve.
     Srgb,
-    /// Straight.
+    /// Linearly.
     Linear,
 }
 
-/// Reads a texture; alpha is dropped. Every value must be finite. The kind is told from the first bytes, not the name.
+/// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
     let (picture, _) = read_with_alpha(path, encoding, wrap)?;
     Ok(picture)
 }
 
-/// The same from a file's bytes; `path` is what errors call it. No OpenEXR.
+/// Reads a texture from a file's bytes, of any format but OpenEXR. `path` serves for errors only.
 pub fn texture_of_bytes(path: &Path, bytes: Vec<u8>, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
     let decoded = decode(path, bytes)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
     Texture::new(width, height, color_texels(path, decoded, encoding)?, wrap)
 }
 
-/// Reads a picture's alpha channel as a texture of scalars; none where it has no alpha.
+/// Reads a picture's alpha channel as a texture of scalars; none for a picture without alpha.
 pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError> {
     let (_, alpha) = read_with_alpha(path, Encoding::Linear, wrap)?;
     Ok(alpha)
@@ -54,7 +54,7 @@ fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Textu
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
     let invalid = |error: image::ImageError| ImageError::Invalid {
         path: path.to_owned(),
-        what: format!("not a sound picture: {error}"),
+        what: format!("not a valid picture: {error}"),
     };
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|source| ImageError::Io {
         action: "read",
@@ -62,7 +62,7 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
         source,
     })?;
     if reader.format().is_none() {
-        let what = "not a picture; expected PNG, JPEG, BMP, Radiance HDR or OpenEXR".to_owned();
+        let what = "not a known picture format; expected PNG, JPEG, BMP, Radiance HDR or OpenEXR".to_owned();
         return Err(ImageError::Unsupported { path: path.to_owned(), what });
     }
     let decoder = reader.into_decoder().map_err(invalid)?;

@@ -1,13 +1,13 @@
-//! The sRGB transfer function (IEC 61966-2-1), computed with the `libm` crate so that every machine gets the same bits.
+//! The sRGB transfer function (IEC 61966-2-1), computed with the `libm` crate for the same bits on every machine.
 
 use std::sync::LazyLock;
 
-/// sRGB-encoded value of a linear one; the curve is continued as it stands outside 0..1 (linear below 0).
+/// The sRGB-encoded value of a linear one. Outside 0..1 the same formula continues, linear below 0.
 pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * libm::powf(linear, 1.0 / 2.4) - 0.055 }
 }
 
-/// Linear value of an sRGB-encoded one; the inverse of [`srgb_from_linear`].
+/// The linear value of an sRGB-encoded one, the inverse of [`srgb_from_linear`].
 pub fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { libm::powf((encoded + 0.055) / 1.055, 2.4) }
 }
@@ -42,7 +42,7 @@ pub fn byte_from_unit(value: f32) -> u8 {
 mod tests {
     use super::*;
 
-    /// 188 for linear 0.5 and 0.2140 for byte 127.5: the usual published values of the curve.
+    /// Commonly published values: 188 for linear 0.5, and 0.2140 for encoded 0.5.
     #[test]
     fn known_values() {
         assert_eq!(byte_from_unit(srgb_from_linear(0.5)), 188);

@@ -1,9 +1,9 @@
-//! What a curve over noisy pixels does to an error that is otherwise free of noise.
+//! The bias that an encoding curve over noisy pixels adds to a noise-free mean squared error.
 //!
-//! Clipping to 0..1 and sRGB-encoding do not commute with means: the encoded half f(a) of a picture has not the
-//! expectation f(μ) but f(μ) + b, with b = f''(μ) var(a) / 2 to first order. With b the prediction's less the
-//! reference's, [`noise_free_mse`](crate::noise_free_mse()) of encoded halves expects (d + b)² instead of d²: it is off
-//! by the mean of 2 d b + b².
+//! Clipping to 0..1 and sRGB encoding do not commute with means: the expectation of an encoded half f(a) is not f(μ)
+//! but f(μ) + b, with b = f''(μ) var(a) / 2 to first order. With b of the prediction minus b of the reference, the
+//! expectation of [`noise_free_mse`](crate::noise_free_mse()) of encoded halves is (d + b)² instead of d². Its bias is
+//! the mean of 2 d b + b².
 
 use std::collections::BTreeMap;
 
@@ -12,33 +12,34 @@ use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use crate::MetricError;
 use crate::noise_free::{Halves, check_halves};
 
-/// How far a [`NoiseFreeMse`](crate::NoiseFreeMse) of encoded halves is from that of the encoded pictures.
+/// The difference between the [`NoiseFreeMse`](crate::NoiseFreeMse) of encoded halves and the mean squared error of the
+/// encoded noise-free pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EncodingBias {
-    /// The difference (found less true), to first order in 1 / samples.
+    /// The difference (measured minus true), to first order in 1 / samples.
     pub estimate: f64,
-    /// Its absolute value is at most this, as far as halves can tell: not if most of the light comes from samples so
-    /// rare that both halves lack them.
+    /// An upper bound of the difference's absolute value. It does not hold where most of the light comes from samples
+    /// so rare that neither half has one.
     pub bound: f64,
 }
 
-/// Standard errors of the estimate that the bound allows for.
+/// The number of standard errors of the estimate that the bound includes.
 const STANDARD_ERRORS: f64 = 3.0;
-/// How much of the mean of squared biases the bound allows for what is of second order in 1 / samples. In simulations
-/// of Gaussian and heavy-tailed noise at 4 to 256 samples, 0.7 was enough.
+/// The share of the mean squared bias that the bound includes for terms of second order in 1 / samples. In simulations
+/// of Gaussian and heavy-tailed noise at 4 to 256 samples, 0.7 sufficed.
 const SECOND_ORDER: f64 = 1.0;
 
-/// The bias of [`noise_free_mse`](crate::noise_free_mse()) of `encode`d halves over the pixels of the mask, from the
-/// same halves in linear light.
+/// Estimates the bias of [`noise_free_mse`](crate::noise_free_mse()) over the mask when it is given halves that went
+/// through `encode`. The halves given here are in linear light.
 ///
-/// The bias of a half is about twice that of the halves' mean, so b is estimated by the jackknife as f(a1) + f(a2) - 2
-/// f((a1 + a2) / 2), for the prediction less the same for the reference (Quenouille 1956). The difference M of the
-/// encoded means is about d + b / 2, whence 2 M b = 2 d b + b²: no noisy value is squared. The bound is the estimate's
-/// absolute value, its own noise by `blocks` (as [`noise_free_mse`](crate::noise_free_mse()) has them), and the mean of
-/// both squared biases for what is of higher order.
+/// The bias of a half is about twice that of the halves' mean, so the jackknife (Quenouille 1956) estimates b as f(a1)
+/// + f(a2) - 2 f((a1 + a2) / 2), for the prediction minus the same for the reference. The difference M of the encoded
+/// means is about d + b / 2, hence 2 M b = 2 d b + b² without squaring a noisy value. The bound adds up the estimate's
+/// absolute value, its own noise by `blocks` (as in [`noise_free_mse`](crate::noise_free_mse())), and the mean of both
+/// squared biases for terms of higher order.
 ///
-/// `encode` works on each pixel apart. `None` where no pixel counts. Fails if sizes differ or a linear value that
-/// counts is not finite.
+/// `encode` must treat each pixel alone. `None` where no pixel counts. Fails if sizes differ or a linear value inside
+/// the mask is not finite.
 pub fn encoding_bias(
     prediction: Halves<LinearRgb>,
     reference: Halves<LinearRgb>,
@@ -72,7 +73,7 @@ pub fn encoding_bias(
 struct Encoded {
     /// The encoded mean of both halves.
     mean: f64,
-    /// How far the expectation of an encoded half is from the encoded expectation.
+    /// The expectation of an encoded half minus the encoded expectation, estimated.
     bias: f64,
 }
 

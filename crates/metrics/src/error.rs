@@ -1,14 +1,14 @@
-//! What can go wrong while comparing pictures.
+//! The error of this crate.
 
 use std::path::PathBuf;
 
 /// Width and height, pixels.
 pub type Size = (usize, usize);
 
-/// Why a metric has no value. Io: the weights file; unsupported: pictures too small; invalid: everything else.
+/// Why a metric has no value. `WeightsIo` is an io error, `TooSmall` is unsupported, all others are invalid input.
 #[derive(Debug, thiserror::Error)]
 pub enum MetricError {
-    /// Two of prediction, reference and mask are not of the same size.
+    /// Prediction, reference and mask differ in size.
     #[error(
         "the {what} has {}x{} pixels; expected {}x{} like the prediction",
         found.0, found.1, prediction.0, prediction.1
@@ -22,7 +22,7 @@ pub enum MetricError {
         found: Size,
     },
 
-    /// The metric's window or network does not fit into the picture.
+    /// The picture is smaller than the metric's window or network needs.
     #[error("{metric} needs a picture of at least {least}x{least} pixels; found {}x{}", found.0, found.1)]
     TooSmall {
         /// The metric's key, as in results.
@@ -33,7 +33,7 @@ pub enum MetricError {
         found: Size,
     },
 
-    /// A value that would count is NaN or infinite.
+    /// A value inside the mask is NaN or infinite.
     #[error("the {picture} has the value {value} at pixel ({x}, {y}), channel {channel}; expected finite values")]
     NotFinite {
         /// `prediction`, `reference`, `picture` or a half of one.
@@ -48,14 +48,14 @@ pub enum MetricError {
         value: f32,
     },
 
-    /// A mean squared error that cannot be one.
+    /// A number that is no mean squared error: negative or not finite.
     #[error("a mean squared error of {mse} has no PSNR; expected a finite value of at least 0")]
     InvalidMse {
         /// The value.
         mse: f64,
     },
 
-    /// Two sets of features that come from different networks or pictures of different sizes.
+    /// Two sets of features come from different networks, or from pictures of different sizes.
     #[error("cannot compare the features of {prediction} with those of {reference}; use one network and one size")]
     FeaturesDiffer {
         /// Network and size of the prediction's features.
@@ -64,7 +64,7 @@ pub enum MetricError {
         reference: String,
     },
 
-    /// The weights file is not there or cannot be read.
+    /// The weights file does not exist or cannot be read.
     #[error(
         "cannot read the LPIPS weights '{}': {source}; make them with tools/fetch_lpips_weights.py",
         path.display()
@@ -72,26 +72,26 @@ pub enum MetricError {
     WeightsIo {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
 
-    /// The weights file is another one.
+    /// The weights file has another hash than the published one.
     #[error(
-        "'{}' has SHA-256 {found}; expected {expected}: make it anew with tools/fetch_lpips_weights.py",
+        "'{}' has SHA-256 {found}; expected {expected}; write it again with tools/fetch_lpips_weights.py",
         path.display()
     )]
     WeightsHash {
         /// The file.
         path: PathBuf,
-        /// What the network's file must have.
+        /// The hash of the right file.
         expected: &'static str,
-        /// What this one has; of its first 64 MiB where it is larger.
+        /// The hash of this file, or of its first 64 MiB where it is larger.
         found: String,
     },
 
     /// The weights do not fit the network.
-    #[error("the LPIPS weights are malformed: {reason}; make them anew with tools/fetch_lpips_weights.py")]
+    #[error("the LPIPS weights are malformed: {reason}; write them again with tools/fetch_lpips_weights.py")]
     WeightsMalformed {
         /// What was expected and what was found.
         reason: String,

@@ -1,19 +1,19 @@
-//! How far a picture is from the true one.
+//! Metrics of how far a picture is from the true one.
 //!
 //! In: a prediction and a reference of the same size, and the mask of the pixels that count, in that order. Out: one
-//! number, or `None` where no pixel (or no window) counts. The pictures' types say their colour space; clipping to 0..1
-//! and sRGB-encoding are the caller's, this crate changes no colours.
+//! number, or `None` where no pixel (or no window) counts. The type of a picture is its colour space; the caller clips
+//! to 0..1 and encodes to sRGB, this crate changes no colours.
 //!
-//! [`mse()`] and [`Psnr`] look at pixels, [`mod@ssim`] at 11x11 windows (Wang et al. 2004), [`lpips`] at what two
-//! trained networks see (Zhang et al. 2018). What happens outside the mask is a rule of its own for the last two, since
-//! their windows look across its edge; [`mask`] has the two fillings they are built on.
+//! [`mse()`] and [`Psnr`] compare pixels, [`mod@ssim`] compares 11x11 windows (Wang et al. 2004), [`lpips`] compares
+//! the responses of two trained networks (Zhang et al. 2018). The last two have two rules for pixels outside the mask,
+//! since their windows reach across its edge; [`mask`] holds the two ways to fill those pixels.
 //!
-//! Renders are noisy, and noise is taken for error. Where a prediction comes in two independent halves, there are
-//! metrics of what it would be without noise: [`mod@noise_free`] (and [`mod@encoding_bias`], what clipping and
-//! sRGB-encoding the halves does to it), [`mod@ssim_halves`], and the extrapolated distances of [`Lpips`].
+//! Renders are noisy, and a metric counts noise as error. For a prediction in two independent halves, these modules
+//! estimate the metric without noise: [`mod@noise_free`] (with [`mod@encoding_bias`] for the bias of clipping and sRGB
+//! encoding), [`mod@ssim_halves`], and the extrapolated distances of [`Lpips`].
 //!
-//! Means are summed in `f64` in a fixed order; the thread count changes no bit. A value that is NaN or infinite and
-//! would count is an error; one that would not is never looked at.
+//! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
+//! the mask is an error; values outside the mask are not read.
 
 pub mod encoding_bias;
 pub mod error;
@@ -25,8 +25,6 @@ pub mod pixel;
 pub mod psnr;
 pub mod ssim;
 pub mod ssim_halves;
-#[cfg(test)]
-mod synthetic_noise;
 
 pub use encoding_bias::{EncodingBias, encoding_bias};
 pub use error::MetricError;

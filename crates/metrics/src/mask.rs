@@ -1,4 +1,4 @@
-//! Two ways to take what lies outside a mask out of a comparison whose windows look across its edge.
+//! Two ways to fill the pixels outside a mask, for metrics whose windows reach across its edge.
 
 use mateval_image::{Mask, Picture};
 
@@ -10,7 +10,7 @@ pub fn pixel_count(mask: &Mask) -> usize {
     mask.pixels().iter().filter(|&&counts| counts).count()
 }
 
-/// The picture with black (zero) outside the mask, whatever was there, NaN too. Fails if the sizes differ.
+/// The picture with black (zero) outside the mask, where any value is allowed, NaN included. Fails if the sizes differ.
 pub fn black_filled<P: Pixel>(picture: &Picture<P>, mask: &Mask) -> Result<Picture<P>, MetricError> {
     let black = Picture::filled(picture.width(), picture.height(), P::default());
     reference_filled(picture, &black, mask)
@@ -34,7 +34,6 @@ pub fn reference_filled<P: Pixel>(
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use super::*;
 

@@ -5,11 +5,23 @@ use mateval_image::{Mask, Picture};
 use crate::MetricError;
 use crate::pixel::{Pixel, check_pair};
 
-/// The mean of (prediction - reference)² over the pixels of the mask (without one: all pixels) and their channels.
+/// The mean of (prediction - reference)² over all channels of the pixels of the mask, or of all pixels without a mask.
 ///
-/// Lower is better; 0 for equal pictures, at most 1 where both lie in 0..1. The unit is that of the values, squared, in
-/// the colour space of the pictures' type. `None` where no pixel counts. Fails if sizes differ or a value that counts
-/// is not finite.
+/// Lower is better: 0 for equal pictures, at most 1 where both lie in 0..1. The unit is that of the values, squared, in
+/// the colour space of the pictures' type. `None` where no pixel counts. Fails if sizes differ or a value inside the
+/// mask is not finite.
+///
+/// ```
+/// use mateval_image::Picture;
+///
+/// let prediction = Picture::new(2, 1, vec![0.5_f32, 0.9])?;
+/// let reference = Picture::new(2, 1, vec![0.0_f32, 0.9])?;
+/// assert_eq!(mateval_metrics::mse(&prediction, &reference, None)?, Some(0.125));
+///
+/// let right_half = Picture::new(2, 1, vec![false, true])?;
+/// assert_eq!(mateval_metrics::mse(&prediction, &reference, Some(&right_half))?, Some(0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn mse<P: Pixel>(
     prediction: &Picture<P>,
     reference: &Picture<P>,
@@ -32,7 +44,6 @@ fn squared_difference<P: Pixel>(p: P, r: P) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use mateval_image::{LinearRgb, SrgbRgb};
     use proptest::prelude::*;

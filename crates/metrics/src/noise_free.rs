@@ -1,31 +1,29 @@
-//! The mean squared error of renders as if they had no noise, and how uncertain it is.
+//! The mean squared error that renders would have without noise, and its standard error.
 //!
-//! A picture rendered with few samples is off by its noise, and its squared error by the noise's variance. Two
-//! independent halves of each picture avoid that: with X = A - Ia and Y = B - Ib, the mean of X*Y has the expectation
-//! of the squared true difference d², whatever the noise.
+//! Noise of few samples adds its variance to a squared error. Two independent halves of each picture avoid that: with
+//! X = A - Ia and Y = B - Ib, the expectation of the mean of X*Y is the squared true difference d², whatever the noise.
 //!
-//! Its own noise follows from the same halves. Where X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y, and
-//! D = (X² - Y²) / 2 = d (x - y) + (x² - y²) / 2 has mean 0 and, for Gaussian noise that is alike in both halves, the
-//! same covariances between any two pixels. Pixels whose noise is correlated form a block: D is summed within blocks,
-//! and the variance of the mean is the sum of the squared sums. D = m (A - B) - m (Ia - Ib) with m = (X + Y) / 2: its
-//! two parts are uncorrelated, the prediction's noise and the reference's.
+//! The noise of this estimate follows from the same halves. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y,
+//! and D = (X² - Y²) / 2 = d (x - y) + (x² - y²) / 2 has mean 0 and, for Gaussian noise that is alike in both halves,
+//! the same covariances between any two pixels. Pixels whose noise is correlated form a block: D is summed within
+//! blocks, and the variance of the mean is the sum of the squared sums. D = m (A - B) - m (Ia - Ib) with m = (X + Y) /
+//! 2; its two uncorrelated parts are the prediction's noise and the reference's.
 //!
 //! Noise that is not Gaussian adds to the variance of D half its fourth cumulant (never negative for heavy tails) and
-//! 2 d times its third; both fade against the rest with the number of samples. So at few samples of heavy-tailed
-//! noise the standard error is rather too large: where one sample in ten finds light, simulations had 1.3 times the
-//! true one at 4 samples and 1.1 at 16; where one in fifty does, 2.1 at 4, 1.5 at 16, 1.2 at 64. Two halves do not tell
-//! a fourth cumulant from a variance, so this is not corrected.
+//! 2 d times its third; both vanish against the rest as the number of samples grows. With few samples of heavy-tailed
+//! noise the standard error is therefore too large: where one sample in ten finds light, simulations gave 1.3 times the
+//! true one at 4 samples and 1.1 at 16; where one in fifty does, 2.1 at 4, 1.5 at 16, 1.2 at 64. Two halves cannot
+//! separate a fourth cumulant from a variance, so this is not corrected.
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_10;
 
 use mateval_image::{Mask, Picture};
 
-use crate::MetricError;
-use crate::Psnr;
 use crate::pixel::{Pixel, check_finite, check_size, size_of};
+use crate::{MetricError, Psnr};
 
-/// One picture rendered twice, with as many samples but different seeds.
+/// One picture rendered twice, with the same number of samples and different seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Halves<'a, P> {
     /// One half.
@@ -35,49 +33,48 @@ pub struct Halves<'a, P> {
 }
 
 impl<P: Pixel> Halves<'_, P> {
-    /// The pixel of both halves, by its place in [`Picture::pixels`].
+    /// The pixel of both halves at an index of [`Picture::pixels`].
     pub(crate) fn at(&self, index: usize) -> [P; 2] {
         [self.a.pixels()[index], self.b.pixels()[index]]
     }
 }
 
-/// A mean squared error without the pictures' noise in it. Unit: that of the values, squared.
+/// An estimate of the mean squared error without noise. Its unit is that of the values, squared.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NoiseFreeMse {
-    /// The estimate. Its expectation is the true one, so it may be negative where that is near 0.
+    /// The estimate. It has no bias, so it may be negative where the true value is near 0.
     pub mse: f64,
-    /// How many pixels counted, at least 1.
+    /// The number of pixels that count, at least 1.
     pub pixels: usize,
-    /// The estimate's noise by block; ascending ids of the blocks that count.
+    /// The estimate's noise by block id, ascending, for the blocks with pixels that count.
     pub blocks: Vec<(u32, BlockNoise)>,
 }
 
-/// How far one block's noise may move a [`NoiseFreeMse`]: a random value of mean 0, whose square is what the block adds
-/// to the variance. Unit: that of the MSE.
+/// The noise that one block adds to a [`NoiseFreeMse`]: a random value of mean 0, whose square estimates the block's
+/// part of the variance. Its unit is that of the MSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockNoise {
-    /// By the prediction's noise: the block's sum of m (A - B), over the number of all values that count.
+    /// From the prediction's noise: the block's sum of m (A - B), divided by the number of all values that count.
     pub prediction: f64,
-    /// By the reference's noise: the same of m (Ia - Ib).
+    /// From the reference's noise: the same with m (Ia - Ib).
     pub reference: f64,
 }
 
 impl BlockNoise {
-    /// By both: the block's sum of D.
+    /// From both: the block's sum of D, divided likewise.
     pub fn total(&self) -> f64 {
         self.prediction - self.reference
     }
 }
 
-/// The mean squared error of the pictures that the halves are noisy renders of, over the pixels of the mask and their
-/// channels.
+/// Estimates the mean squared error, over the pixels of the mask and their channels, of the noise-free pictures that
+/// the halves are renders of.
 ///
-/// All pictures are of one size. Values are compared as given, in the colour space of their type; where a curve was
-/// applied to noisy pixels, [`encoding_bias`](crate::encoding_bias()) tells what that does. `blocks` tells for each
-/// pixel the id of its block: noise may be correlated within a block, not between two. One id may occur in several
-/// views ([`psnr_mean_error`]).
+/// Values are compared as given, in the colour space of their type; where a curve was applied to noisy pixels,
+/// [`encoding_bias`](crate::encoding_bias()) estimates its effect. `blocks` holds the block id of each pixel: noise may
+/// be correlated within a block, not between two blocks. One id may occur in several views ([`psnr_mean_error`]).
 ///
-/// `None` where no pixel counts. Fails if sizes differ or a value that counts is not finite.
+/// `None` where no pixel counts. Fails if sizes differ or a value inside the mask is not finite.
 pub fn noise_free_mse<P: Pixel>(
     prediction: Halves<P>,
     reference: Halves<P>,
@@ -108,7 +105,7 @@ pub fn noise_free_mse<P: Pixel>(
     Ok((pixels > 0).then(|| NoiseFreeMse { mse: share(sum), pixels, blocks }))
 }
 
-/// Sizes first, then values that count.
+/// Checks all sizes first, then the values inside the mask.
 pub(crate) fn check_halves<P: Pixel>(
     prediction: Halves<P>,
     reference: Halves<P>,
@@ -128,17 +125,17 @@ pub(crate) fn check_halves<P: Pixel>(
 }
 
 impl NoiseFreeMse {
-    /// The standard deviation of `mse`, from the noise of both.
+    /// The standard deviation of `mse`, from the noise of prediction and reference.
     pub fn standard_error(&self) -> f64 {
         self.root_of_squares(|noise| noise.total())
     }
 
-    /// The part of [`standard_error`](Self::standard_error) that is the prediction's; more samples of it lower it.
+    /// The part of [`standard_error`](Self::standard_error) that more samples of the prediction lower.
     pub fn prediction_error(&self) -> f64 {
         self.root_of_squares(|noise| noise.prediction)
     }
 
-    /// The part that is the reference's, which no sample of the prediction lowers.
+    /// The part of [`standard_error`](Self::standard_error) that comes from the reference.
     pub fn reference_error(&self) -> f64 {
         self.root_of_squares(|noise| noise.reference)
     }
@@ -147,7 +144,8 @@ impl NoiseFreeMse {
         self.blocks.iter().map(|(_, noise)| part(noise).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// The PSNR, or its lower bound where `mse` is not surely above 0. Fails if `mse` or the noise is not finite.
+    /// The PSNR, or its lower bound where `mse` is not significantly above 0. Fails if `mse` or the noise is not
+    /// finite.
     pub fn psnr(&self) -> Result<NoiseFreePsnr, MetricError> {
         let reach = ONE_SIDED_95 * self.standard_error();
         if !(self.mse.is_finite() && reach.is_finite()) {
@@ -157,13 +155,13 @@ impl NoiseFreeMse {
             let Psnr { db, exact } = Psnr::from_mse(self.mse)?;
             return Ok(NoiseFreePsnr { db, exact, lower_bound: false });
         }
-        // A negative estimate shows that the noise is at least as large as it; the bound never falls below the reach.
+        // A negative estimate shows that the noise is at least as large; the bound never falls below the reach.
         let bound = if self.mse > 0.0 { self.mse + reach } else { reach.max(-self.mse) };
         Ok(NoiseFreePsnr { db: Psnr::from_mse(bound)?.db, exact: false, lower_bound: true })
     }
 }
 
-/// Standard deviations that a Gaussian value exceeds on one side in 5 % of all cases.
+/// A Gaussian value exceeds its mean by more than this many standard deviations in 5 % of all cases.
 const ONE_SIDED_95: f64 = 1.645;
 
 /// The PSNR of a [`NoiseFreeMse`], capped at [`Psnr::CAP_DB`] as [`Psnr`] is.
@@ -171,29 +169,29 @@ const ONE_SIDED_95: f64 = 1.645;
 pub struct NoiseFreePsnr {
     /// Decibels.
     pub db: f64,
-    /// The MSE was 0, and without noise.
+    /// The MSE was 0 and had no noise.
     pub exact: bool,
-    /// The MSE was at most 1.645 standard errors, so that it may as well be 0: `db` is the PSNR of the MSE's one-sided
-    /// 95 % upper bound, mse + 1.645 standard errors (of a negative estimate: the larger of 1.645 standard errors and
-    /// its absolute value), and the true PSNR is probably higher.
+    /// The MSE was at most 1.645 standard errors and so may be 0. `db` is then the PSNR of the MSE's one-sided 95 %
+    /// upper bound, which is mse + 1.645 standard errors, or for a negative estimate the larger of 1.645 standard
+    /// errors and its absolute value. The true PSNR is probably higher.
     pub lower_bound: bool,
 }
 
 /// The standard error of a mean of PSNRs, decibels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoisePsnr {
-    /// By all noise.
+    /// From all noise.
     pub total: f64,
-    /// By the predictions' noise.
+    /// From the predictions' noise.
     pub prediction: f64,
-    /// By the references' noise.
+    /// From the references' noise.
     pub reference: f64,
 }
 
 /// The standard error of the mean PSNR of several views, decibels.
 ///
-/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE. What one block does to all views that it occurs in is summed
-/// before it is squared, so correlation between views counts. `None` without views or where an MSE is not above 0.
+/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE. A block's effects on all views are summed before they are squared,
+/// so that correlation between views counts. `None` without views or where an MSE is not above 0.
 pub fn psnr_mean_error(views: &[&NoiseFreeMse]) -> Option<NoisePsnr> {
     if views.is_empty() || !views.iter().all(|view| view.mse > 0.0) {
         return None;

@@ -1,4 +1,4 @@
-//! What the pixels of different pictures have in common, and the checks every metric begins with.
+//! The trait of pixels that can be compared, and the checks that every metric begins with.
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 
@@ -12,8 +12,8 @@ mod sealed {
     impl Sealed for super::SrgbRgb {}
 }
 
-/// A pixel of one or more values that can be compared one by one: linear or sRGB-encoded RGB, or a scalar (roughness,
-/// metallic). Closed: no other crate can add one.
+/// A pixel whose values are compared one by one: linear or sRGB-encoded RGB, or a scalar (roughness, metallic). Sealed:
+/// no other crate can implement it.
 pub trait Pixel: Copy + Default + Sync + sealed::Sealed {
     /// The values, channel by channel.
     fn channels(&self) -> &[f32];
@@ -42,7 +42,7 @@ pub(crate) fn size_of<T: Copy>(picture: &Picture<T>) -> Size {
     (picture.width(), picture.height())
 }
 
-/// All three must be of one size.
+/// Fails unless all three have one size.
 pub(crate) fn check_sizes<P: Pixel>(
     prediction: &Picture<P>,
     reference: &Picture<P>,
@@ -52,12 +52,12 @@ pub(crate) fn check_sizes<P: Pixel>(
     mask.map_or(Ok(()), |mask| check_size(size_of(prediction), "mask", size_of(mask)))
 }
 
-/// `what` must be of the prediction's size.
+/// Fails unless `what` has the prediction's size.
 pub(crate) fn check_size(prediction: Size, what: &'static str, found: Size) -> Result<(), MetricError> {
     if prediction == found { Ok(()) } else { Err(MetricError::SizesDiffer { prediction, what, found }) }
 }
 
-/// Every value that counts must be finite; `name` is the picture's in the error.
+/// Fails unless every value inside the mask is finite; the error calls the picture `name`.
 pub(crate) fn check_finite<P: Pixel>(
     name: &'static str,
     picture: &Picture<P>,
@@ -75,7 +75,7 @@ pub(crate) fn check_finite<P: Pixel>(
     Ok(())
 }
 
-/// Sizes first, then values: what a comparison of two pictures begins with.
+/// Checks sizes, then values of both pictures.
 pub(crate) fn check_pair<P: Pixel>(
     prediction: &Picture<P>,
     reference: &Picture<P>,

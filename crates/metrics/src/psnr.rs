@@ -7,28 +7,27 @@ use crate::MetricError;
 pub struct Psnr {
     /// Decibels; at most [`Psnr::CAP_DB`], below 0 where the MSE is above 1.
     pub db: f64,
-    /// The MSE was exactly 0, for which there is no ratio; `db` is the cap.
+    /// The MSE was exactly 0, which has no finite ratio; `db` is the cap.
     pub exact: bool,
 }
 
 impl Psnr {
-    /// Where the ratio ends: an MSE of 1e-10 and everything below it.
+    /// The largest ratio, which an MSE of 1e-10 or less gets.
     pub const CAP_DB: f64 = 100.0;
 
-    /// The ratio of a mean squared error. Fails if it is negative or not finite.
+    /// The ratio of a mean squared error. Fails if the error is negative or not finite.
     pub fn from_mse(mse: f64) -> Result<Self, MetricError> {
         if !(mse.is_finite() && mse >= 0.0) {
             return Err(MetricError::InvalidMse { mse });
         }
-        // The `libm` crate's logarithm gives every machine the same bits; at 0 it is minus infinity, which the cap
-        // takes.
+        // The `libm` crate's logarithm gives the same bits on every machine; at 0 it is minus infinity, and the cap
+        // applies.
         let db = (-10.0 * libm::log10(mse)).min(Self::CAP_DB);
         Ok(Self { db, exact: mse == 0.0 })
     }
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use super::*;
 

@@ -2,8 +2,8 @@
 //!
 //! Wang, Bovik, Sheikh, Simoncelli: "Image quality assessment: from error visibility to structural similarity", 2004,
 //! with their constants: an 11x11 Gaussian window of sigma 1.5, K1 = 0.01, K2 = 0.03, dynamic range 1. Variances are
-//! those of a population; colours are the mean over channels. scikit-image computes the same with `gaussian_weights`,
-//! `sigma=1.5`, `use_sample_covariance=False`, `data_range=1`.
+//! population variances; the index of a colour picture is the mean over its channels. scikit-image computes the same
+//! with `gaussian_weights`, `sigma=1.5`, `use_sample_covariance=False`, `data_range=1`.
 //!
 //! Higher is better: 1 for equal pictures, at least -1. Meant for sRGB-encoded pictures in 0..1.
 
@@ -26,13 +26,13 @@ pub(crate) const C2: f64 = 0.03 * 0.03;
 /// SSIM over the windows that lie wholly inside a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MaskedSsim {
-    /// Their mean.
+    /// Their mean index.
     pub ssim: f64,
     /// Their number, at least 1.
     pub windows: usize,
 }
 
-/// The mean over all windows inside the picture: the border of 5 pixels is the centre of none.
+/// The mean over all windows inside the picture. No window is centred on the border of 5 pixels.
 ///
 /// Fails if sizes differ, a side is below 11 pixels or a value is not finite.
 pub fn ssim<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<f64, MetricError> {
@@ -44,9 +44,9 @@ pub(crate) fn mean(map: &Picture<f64>) -> f64 {
     map.pixels().iter().sum::<f64>() / map.pixels().len() as f64
 }
 
-/// [`ssim`] of both pictures with black outside the mask, averaged over the whole picture (protocol `paper`): the
-/// larger the black part, the nearer to 1. `None` where no pixel counts. Values outside the mask are not looked at.
-/// Fails as [`ssim`] does.
+/// [`ssim`] of both pictures with black outside the mask, averaged over the whole picture (protocol `paper`). The
+/// larger the black part, the nearer the result is to 1. `None` where no pixel counts. Values outside the mask are not
+/// read. Fails as [`ssim`] does.
 pub fn ssim_black_fill<P: Pixel>(
     prediction: &Picture<P>,
     reference: &Picture<P>,
@@ -57,20 +57,20 @@ pub fn ssim_black_fill<P: Pixel>(
     Ok((pixel_count(mask) > 0).then_some(value))
 }
 
-/// The mean over the windows that lie wholly inside picture and mask (protocol `mateval-1`); `None` where there is
-/// none. Values outside the mask are not looked at. Fails as [`ssim`] does.
+/// The mean over the windows that lie wholly inside picture and mask (protocol `mateval-1`), `None` without such a
+/// window. Values outside the mask are not read. Fails as [`ssim`] does.
 pub fn ssim_valid_windows<P: Pixel>(
     prediction: &Picture<P>,
     reference: &Picture<P>,
     mask: &Mask,
 ) -> Result<Option<MaskedSsim>, MetricError> {
     check_pair(prediction, reference, Some(mask))?;
-    // Valid windows do not see the filling; it keeps what must not be looked at out of the map.
+    // No valid window reaches the filling; it replaces values that may be NaN.
     let map = ssim_map(&black_filled(prediction, mask)?, &black_filled(reference, mask)?)?;
     Ok(mean_of_valid(&map, mask))
 }
 
-/// The mean over the map's windows that lie wholly inside the mask.
+/// The mean over those windows of the map that lie wholly inside the mask.
 pub(crate) fn mean_of_valid(map: &Picture<f64>, mask: &Mask) -> Option<MaskedSsim> {
     let (mut sum, mut windows) = (0.0, 0);
     for (value, _) in map.pixels().iter().zip(valid_windows(mask)).filter(|&(_, valid)| valid) {
@@ -80,8 +80,8 @@ pub(crate) fn mean_of_valid(map: &Picture<f64>, mask: &Mask) -> Option<MaskedSsi
     (windows > 0).then(|| MaskedSsim { ssim: sum / windows as f64, windows })
 }
 
-/// The index of every window, mean over channels. The map is 10 pixels narrower and lower than the pictures; its pixel
-/// (x, y) belongs to the window around (x + 5, y + 5). Fails as [`ssim`] does.
+/// The index of every window, averaged over channels. The map is 10 pixels narrower and lower than the pictures; its
+/// pixel (x, y) is the index of the window around (x + 5, y + 5). Fails as [`ssim`] does.
 pub fn ssim_map<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>) -> Result<Picture<f64>, MetricError> {
     check_sizes(prediction, reference, None)?;
     check_window_fits(size_of(prediction))?;
@@ -105,7 +105,7 @@ pub(crate) fn gaussian(sigma: f64) -> [f64; WINDOW] {
     weights.map(|weight| weight / sum)
 }
 
-/// The map of two pictures by this window.
+/// The map of two pictures under the given window.
 fn map_with<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &[f64; WINDOW]) -> Picture<f64> {
     let channels = P::default().channels().len();
     let terms = |pixel: usize, channel: usize| {
@@ -115,8 +115,8 @@ fn map_with<P: Pixel>(prediction: &Picture<P>, reference: &Picture<P>, window: &
     windows_map(size_of(prediction), channels, window, terms, index)
 }
 
-/// For each window inside a picture of this size, the mean over channels of the index of its moments: the weighted
-/// means of `terms(pixel, channel)`, a pixel being given by its place in [`Picture::pixels`].
+/// For each window inside a picture of this size, `index` of its moments, averaged over channels. The moments are the
+/// weighted means of `terms(pixel, channel)`, where `pixel` is an index of [`Picture::pixels`].
 pub(crate) fn windows_map<const TERMS: usize>(
     (width, height): Size,
     channels: usize,
@@ -140,7 +140,7 @@ pub(crate) fn windows_map<const TERMS: usize>(
     map.expect("one row of the map for each row of windows")
 }
 
-/// The moments of each column of 11 pixels below row `y`.
+/// The moments of each column of 11 pixels that starts at row `y`.
 fn column_moments<const TERMS: usize>(
     width: usize,
     y: usize,
@@ -166,14 +166,14 @@ fn window_moments<const TERMS: usize>(columns: &[[f64; TERMS]], window: &[f64; W
     sums
 }
 
-/// The index of one window, from its means of p, r, p², r², pr: equation 13 of Wang et al. 2004.
+/// The index of one window from its means of p, r, p², r² and pr (Wang et al. 2004, equation 13).
 fn index(&[p, r, pp, rr, pr]: &[f64; 5]) -> f64 {
     let (variance_p, variance_r, covariance) = (pp - p * p, rr - r * r, pr - p * r);
     let numerator = (2.0 * p * r + C1) * (2.0 * covariance + C2);
     numerator / ((p * p + r * r + C1) * (variance_p + variance_r + C2))
 }
 
-/// For each window inside the picture, row by row: whether all its pixels are in the mask.
+/// For each window inside the picture, row by row, whether all its pixels are in the mask.
 fn valid_windows(mask: &Mask) -> Vec<bool> {
     let (width, height) = size_of(mask);
     let counts: Vec<usize> = (0..height).flat_map(|y| runs(&mask.pixels()[y * width..(y + 1) * width])).collect();
@@ -182,13 +182,12 @@ fn valid_windows(mask: &Mask) -> Vec<bool> {
     (0..(height - 2 * RADIUS) * row).map(full).collect()
 }
 
-/// For each stretch of 11 pixels of a row: 11 where all of them count, else fewer.
+/// For each run of 11 neighbouring pixels of a row, how many of them count.
 fn runs(row: &[bool]) -> impl Iterator<Item = usize> {
     row.windows(WINDOW).map(|stretch| stretch.iter().filter(|&&counts| counts).count())
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use mateval_image::SrgbRgb;
     use proptest::prelude::*;
@@ -207,7 +206,7 @@ mod tests {
         })
     }
 
-    /// Flat pictures have no variance, so the index is (2ab + C1) / (a² + b² + C1), from the formula by hand.
+    /// Flat pictures have no variance, so the index is (2ab + C1) / (a² + b² + C1).
     #[test]
     fn flat_pictures_in_closed_form() {
         let (a, b) = (0.25_f64, 0.5_f64);
@@ -225,7 +224,7 @@ mod tests {
         assert_eq!(window[0], window[WINDOW - 1]);
     }
 
-    /// Two passes along the axes must be what one sum over 121 pixels is; another sigma must not.
+    /// Two passes along the axes equal one sum over 121 pixels; with another sigma they do not.
     #[test]
     fn a_window_summed_directly() {
         let (p, r) = (noise(13, 12, 1), noise(13, 12, 2));
@@ -274,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_outside_the_mask_is_not_looked_at() {
+    fn values_outside_the_mask_are_not_read() {
         let mask = Picture::from_fn(24, 16, |x, _| x < 14);
         let (p, r) = (noise(24, 16, 5), noise(24, 16, 6));
         let mut spoilt = p.clone();

@@ -1,14 +1,15 @@
-//! SSIM of a noisy render as if it had no noise, from its two halves.
+//! The SSIM that a noisy render would have without noise, from its two halves.
 //!
-//! Noise lowers SSIM, since its variance counts as the prediction's. The prediction's moments within a window are taken
-//! from two independent halves instead: of the mean, the mean of both halves' means; of its square, their product; of
-//! the variance, the covariance of the halves, not below 0; of the covariance with the reference, the mean of both. The
-//! reference is one picture without noise. Window, constants and rules for masks are those of [`mod@crate::ssim`].
+//! Noise lowers SSIM, since its variance counts as the prediction's. So the prediction's moments within a window are
+//! taken from two independent halves. Its mean is the mean of both halves' means, its squared mean is their product,
+//! its variance is the covariance of the halves (at least 0), and its covariance with the reference is the mean of both
+//! halves' covariances. The reference is one picture without noise. Window, constants and mask rules are those of
+//! [`mod@crate::ssim`].
 //!
-//! Each moment has the expectation of that without noise (but for the variance held at 0); the ratio of moments keeps a
-//! bias of second order, and a single window may exceed 1. For equal halves all of it is plain SSIM. Encoding the
-//! halves has its own bias ([`mod@crate::encoding_bias`]), which stays. Measured on synthetic renders of 64 samples:
-//! 0.003 is left of 0.025 where a pixel of the mean is off by 6 % of its value, 0.02 of 0.08 where it is off by 12 %.
+//! Each moment is free of bias, except the variance where it is held at 0. Their ratio keeps a bias of second order,
+//! and a single window may exceed 1. With equal halves the result is plain SSIM. The bias of encoding the halves
+//! ([`mod@crate::encoding_bias`]) remains. On synthetic renders of 64 samples, 0.003 remained of an error of 0.025
+//! where a pixel of the mean is off by 6 % of its value, and 0.02 of 0.08 where it is off by 12 %.
 
 use mateval_image::{Mask, Picture};
 
@@ -18,7 +19,7 @@ use crate::noise_free::Halves;
 use crate::pixel::{Pixel, check_finite, check_size, size_of};
 use crate::ssim::{C1, C2, MaskedSsim, SIGMA, check_window_fits, gaussian, mean, mean_of_valid, windows_map};
 
-/// [`ssim`](crate::ssim()) of the picture that both halves are noisy renders of: the mean over all windows.
+/// Estimates [`ssim`](crate::ssim()) of the noise-free picture that both halves are renders of, over all windows.
 ///
 /// Meant for sRGB-encoded pictures in 0..1, all of one size. Fails if sizes differ, a side is below 11 pixels or a
 /// value is not finite.
@@ -39,7 +40,7 @@ pub fn ssim_halves_black_fill<P: Pixel>(
 }
 
 /// [`ssim_halves`] over the windows that lie wholly inside the mask, as
-/// [`ssim_valid_windows`](crate::ssim_valid_windows) does; `None` where there is none. Fails as [`ssim_halves`] does.
+/// [`ssim_valid_windows`](crate::ssim_valid_windows) does; `None` without such a window. Fails as [`ssim_halves`] does.
 pub fn ssim_halves_valid_windows<P: Pixel>(
     prediction: Halves<P>,
     reference: &Picture<P>,
@@ -59,7 +60,7 @@ fn check<P: Pixel>(prediction: Halves<P>, reference: &Picture<P>, mask: Option<&
     check_finite("reference", reference, mask)
 }
 
-/// The map of all three with black outside the mask.
+/// The map of both halves and the reference with black outside the mask.
 fn filled_map<P: Pixel>(
     prediction: Halves<P>,
     reference: &Picture<P>,
@@ -79,7 +80,8 @@ fn map<P: Pixel>(prediction: Halves<P>, reference: &Picture<P>) -> Picture<f64> 
     windows_map(size_of(reference), P::default().channels().len(), &gaussian(SIGMA), terms, index)
 }
 
-/// Equation 13 of Wang et al. 2004, from a window's means of a, b, r, ab, r², pr with p = (a + b) / 2.
+/// The index of one window from its means of a, b, r, ab, r² and pr, where p = (a + b) / 2 (Wang et al. 2004, equation
+/// 13).
 fn index(&[a, b, r, ab, rr, pr]: &[f64; 6]) -> f64 {
     let (p, p_squared) = (0.5 * (a + b), a * b);
     let (variance_p, variance_r, covariance) = ((ab - a * b).max(0.0), rr - r * r, pr - p * r);
@@ -88,15 +90,12 @@ fn index(&[a, b, r, ab, rr, pr]: &[f64; 6]) -> f64 {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use mateval_image::{LinearRgb, SrgbRgb};
 
     use super::*;
-    use crate::ssim;
-    use crate::ssim_black_fill;
-    use crate::ssim_valid_windows;
-    use crate::synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves};
+    use crate::{ssim, ssim_black_fill, ssim_valid_windows};
+    use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves};
 
     const SIDE: usize = 48;
 
@@ -110,7 +109,7 @@ mod tests {
         picture
     }
 
-    /// A half of `samples / 2` samples, linear; one sample is off by half its value (standard deviation).
+    /// A half of `samples / 2` samples, linear. The standard deviation of one sample is half its value.
     fn half(scatter: Scatter, samples: u32, seed: u64) -> Picture<LinearRgb> {
         let strength = match scatter {
             Scatter::GaussianLike => 0.5,
@@ -138,7 +137,7 @@ mod tests {
         assert!((ssim_halves(Halves { a: &p, b: &other }, &r).unwrap() - ssim(&p, &r).unwrap()).abs() > 1e-3);
     }
 
-    /// 64 samples in two halves against 4096; the noisy mean of the same 64 is off by more.
+    /// Two halves of 32 samples agree with 4096 samples; the noisy mean of the same 64 does not.
     #[test]
     fn sixty_four_samples_are_as_good_as_4096() {
         let (r, mask) = (waves(SIDE).to_srgb(), some_mask());
@@ -162,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_count_is_not_looked_at() {
+    fn values_outside_the_mask_are_not_read() {
         let (r, mask) = (waves(SIDE).to_srgb(), some_mask());
         let [a, b] = [1, 2].map(|seed| half(Scatter::GaussianLike, 8, seed).to_srgb());
         let mut spoilt = b.clone();

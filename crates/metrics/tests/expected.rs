@@ -1,23 +1,29 @@
-//! Every value of `metrics/expected.json`, computed by scikit-image and by the LPIPS authors' code, must be met.
+//! The metrics agree with scikit-image and with the LPIPS authors' code, on small pictures that are made here and,
+//! where the shared data exist, on real ones.
 //!
-//! The data lie in `$MATEVAL_DATA`, else in `../shared/data` beside the repository; the LPIPS weights in MatEval's
-//! cache folder. Where either is missing, a line on stderr says what was skipped and how to mend it.
-#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; skipped tests must say so
+//! LPIPS needs its weights in MatEval's cache folder. What is missing is skipped, or fails (`mateval_testkit::data`).
+#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; deviations are printed
 
+mod vectors;
 mod weights;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Net, Psnr, mse, ssim, ssim_black_fill, ssim_valid_windows};
+use mateval_testkit::data::shared_data;
 use serde::Deserialize;
 use weights::load_lpips;
 
-const CASES: usize = 12;
-const MASKED_CASES: usize = 10;
+/// Cases made here; all have a mask.
+const MADE_CASES: usize = 10;
+/// Cases of the shared data.
+const SHARED_CASES: usize = 12;
+/// Those of them that have a mask.
+const SHARED_MASKED_CASES: usize = 10;
 /// Relative.
 const MSE_TOLERANCE: f64 = 1e-9;
-/// Relative, where the input was rounded to `f32`.
+/// Relative, for pictures that were rounded to `f32`.
 const ROUNDED_MSE_TOLERANCE: f64 = 1e-7;
 const SSIM_TOLERANCE: f64 = 1e-6;
 const LPIPS_TOLERANCE: f64 = 2e-5;
@@ -27,7 +33,7 @@ struct Expected {
     cases: Vec<Case>,
 }
 
-/// A pair of pictures and its values; the pairs of the LPIPS authors have no mask and nothing but LPIPS.
+/// A pair of pictures and its values. The pairs of the LPIPS authors have no mask and no values but those of LPIPS.
 #[derive(Deserialize)]
 struct Case {
     reference: String,
@@ -57,19 +63,25 @@ struct Loaded {
     mask: Option<Mask>,
 }
 
-/// All cases; `None`, said on stderr, where the data are absent.
-fn load_cases() -> Option<Vec<Loaded>> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join("metrics");
-    let path = folder.join("expected.json");
-    if !path.is_file() {
-        eprintln!("SKIPPED: no '{}'; set MATEVAL_DATA to the folder with the reference values", path.display());
-        return None;
-    }
-    let expected: Expected = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
-    assert_eq!(expected.cases.len(), CASES);
-    assert_eq!(expected.cases.iter().filter(|case| case.mask.is_some()).count(), MASKED_CASES);
-    Some(expected.cases.into_iter().map(|case| load_case(&folder, case)).collect())
+/// The cases that are made here and those of the shared data, the latter empty where they are skipped.
+fn load_cases() -> Vec<Loaded> {
+    let mut cases = vectors::load();
+    assert_eq!(cases.len(), MADE_CASES);
+    cases.extend(load_shared_cases());
+    cases
+}
+
+fn load_shared_cases() -> Vec<Loaded> {
+    let Some(path) = shared_data("metrics/expected.json") else { return Vec::new() };
+    let expected: Expected = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    assert_eq!(expected.cases.len(), SHARED_CASES);
+    assert_eq!(expected.cases.iter().filter(|case| case.mask.is_some()).count(), SHARED_MASKED_CASES);
+    let folder = path.parent().unwrap();
+    expected.cases.into_iter().map(|case| load_case(folder, case)).collect()
+}
+
+fn count_masked(cases: &[Loaded]) -> usize {
+    cases.iter().filter(|loaded| loaded.mask.is_some()).count()
 }
 
 fn load_case(folder: &Path, case: Case) -> Loaded {
@@ -97,7 +109,7 @@ fn read_png<T: Copy>(path: &Path, pixel: impl Fn(&[f32]) -> T) -> Picture<T> {
     Picture::new(info.width as usize, info.height as usize, pixels).unwrap()
 }
 
-/// Compares, and keeps the largest deviation and the number of values seen.
+/// Compares values, and keeps the largest deviation and the number of values.
 struct Check {
     what: &'static str,
     tolerance: f64,
@@ -131,20 +143,20 @@ impl Check {
 }
 
 /// The expected values come from value/255 in `f64`, which a picture of `f32` rounds by up to 3e-8. So the metric
-/// itself is held to its tolerance on whole numbers, which `f32` holds exactly, and 255² is taken out of the result.
+/// itself is tested on integers, which `f32` holds exactly, and its result is divided by 255².
 #[test]
 fn mse_and_psnr_of_whole_numbers() {
     check_mse_and_psnr(MSE_TOLERANCE, |value| (value * 255.0).round(), |mse| mse / (255.0 * 255.0));
 }
 
-/// As pictures are scored: value/255 in `f32`, whose rounding is all that the wider tolerance is for.
+/// Pictures are scored as value/255 in `f32`; the wider tolerance is for that rounding alone.
 #[test]
 fn mse_and_psnr_of_values_in_f32() {
     check_mse_and_psnr(ROUNDED_MSE_TOLERANCE, |value| value, |mse| mse);
 }
 
 fn check_mse_and_psnr(tolerance: f64, value: impl Fn(f32) -> f32, unit: impl Fn(f64) -> f64) {
-    let Some(cases) = load_cases() else { return };
+    let cases = load_cases();
     let (mut mses, mut psnrs) = (Check::new("mse", tolerance), Check::new("psnr", tolerance));
     for Loaded { case, prediction, reference, mask } in cases.iter().filter(|loaded| loaded.mask.is_some()) {
         let change = |picture: &Picture<SrgbRgb>| picture.map(|SrgbRgb(rgb)| SrgbRgb(rgb.map(&value)));
@@ -155,16 +167,16 @@ fn check_mse_and_psnr(tolerance: f64, value: impl Fn(f32) -> f32, unit: impl Fn(
         mses.relative(&case.prediction, masked, case.masked_mse.unwrap());
         psnrs.relative(&case.prediction, Psnr::from_mse(whole).unwrap().db, case.psnr.unwrap());
         psnrs.relative(&case.prediction, Psnr::from_mse(masked).unwrap().db, case.masked_psnr.unwrap());
-        // The twin: the wrong mask is noticed.
+        // The twin: a missing mask is noticed.
         assert!((whole / case.masked_mse.unwrap() - 1.0).abs() > tolerance);
     }
-    mses.finish(2 * MASKED_CASES);
-    psnrs.finish(2 * MASKED_CASES);
+    mses.finish(2 * count_masked(&cases));
+    psnrs.finish(2 * count_masked(&cases));
 }
 
 #[test]
 fn ssim_by_all_three_rules() {
-    let Some(cases) = load_cases() else { return };
+    let cases = load_cases();
     let mut check = Check::new("ssim", SSIM_TOLERANCE);
     for Loaded { case, prediction, reference, mask } in &cases {
         let Some(mask) = mask else { continue };
@@ -175,11 +187,11 @@ fn ssim_by_all_three_rules() {
         check.value(&case.prediction, black_fill, case.blackfill_ssim.unwrap());
         check.value(&case.prediction, valid.ssim, case.masked_ssim_valid_windows.unwrap());
         assert_eq!(valid.windows, case.valid_windows.unwrap());
-        // The twin: rules are not taken for each other.
+        // The twin: one rule in place of another is noticed.
         assert!((whole - case.blackfill_ssim.unwrap()).abs() > SSIM_TOLERANCE);
         assert!((black_fill - case.masked_ssim_valid_windows.unwrap()).abs() > SSIM_TOLERANCE);
     }
-    check.finish(3 * MASKED_CASES);
+    check.finish(3 * count_masked(&cases));
 }
 
 #[test]
@@ -193,7 +205,8 @@ fn lpips_vgg() {
 }
 
 fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f64>)) {
-    let (Some(cases), Some(lpips)) = (load_cases(), load_lpips(net)) else { return };
+    let Some(lpips) = load_lpips(net) else { return };
+    let cases = load_cases();
     let mut check = Check::new(net.key(), LPIPS_TOLERANCE);
     for Loaded { case, prediction, reference, mask } in &cases {
         let (whole, black_fill, masked) = expected(case);
@@ -204,7 +217,7 @@ fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f
         let found = lpips.masked(prediction, reference, mask).unwrap().unwrap();
         check.value(&case.prediction, found, masked.unwrap());
     }
-    check.finish(CASES + 2 * MASKED_CASES);
+    check.finish(cases.len() + 2 * count_masked(&cases));
     // The twin: pictures whose channels are in the wrong order are noticed.
     let swap = |picture: &Picture<SrgbRgb>| picture.map(|SrgbRgb([r, g, b])| SrgbRgb([b, g, r]));
     let Loaded { case, prediction, reference, .. } = &cases[0];
@@ -212,11 +225,11 @@ fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f
     assert!((swapped - expected(case).0).abs() > LPIPS_TOLERANCE);
 }
 
-/// One thread, two threads: the same bits, with the real weights.
+/// One thread and two threads give the same bits with the real weights.
 #[test]
 fn the_thread_count_changes_no_bit_of_lpips() {
-    let (Some(cases), Some(lpips)) = (load_cases(), load_lpips(Net::Alex)) else { return };
-    let Loaded { prediction, reference, .. } = &cases[0];
+    let Some(lpips) = load_lpips(Net::Alex) else { return };
+    let Loaded { prediction, reference, .. } = &vectors::load()[0];
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| lpips.whole(prediction, reference).unwrap().to_bits())

@@ -1,16 +1,14 @@
 //! LPIPS extrapolated to no noise, with the real network: 64 samples against 4096.
 //!
-//! The weights lie in MatEval's cache folder. Where they are missing, a line on stderr says so.
-#![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; skipped tests must say so
+//! The weights lie in MatEval's cache folder. Where they are missing, tests are skipped, or fail
+//! (`mateval_testkit::data`).
+#![allow(clippy::unwrap_used)] // tests may
 
-#[path = "../src/synthetic_noise.rs"]
-#[allow(dead_code)] // the unit tests use the rest
-mod synthetic_noise;
 mod weights;
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::{ExtrapolatedLpips, Lpips, MeanAndHalves, Net};
-use synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves};
+use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves};
 
 const SIDE: usize = 96;
 

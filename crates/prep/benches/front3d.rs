@@ -3,7 +3,7 @@
 //! the shared data where they are. CPU seconds of the whole process; medians.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use cpu_time::ProcessTime;
@@ -13,6 +13,7 @@ use mateval_prep::bake::bake;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_sources::front3d::room_scene::room_scene;
 use mateval_sources::front3d::{HouseFiles, Limits, furnish, read_house};
+use mateval_testkit::data::shared_data;
 use mateval_tracer::World;
 
 const STAGES: [&str; 6] =
@@ -24,10 +25,7 @@ fn main() {
     let sample = tempfile::tempdir().unwrap();
     mateval_sample::write(sample.path()).unwrap();
     measure(&files(&sample.path().join("house"), "cc000000-5a3b-4e00-8000-000000000001", true), rounds);
-    let Some(shared) = shared_data() else {
-        println!("SKIPPED: the shared data is not here; set MATEVAL_DATA");
-        return;
-    };
+    let Some(shared) = shared_data("3d-front") else { return };
     for uid in ["07700701-1835-4532-8af0-bd8c7f624b1b", "dc74ad5c-34cf-4237-a3f3-a94297a907c8"] {
         measure(&files(&shared, uid, false), rounds);
     }
@@ -42,12 +40,6 @@ fn files(root: &Path, uid: &str, textures: bool) -> HouseFiles {
         cameras: None,
         blenderproc_compat: false,
     }
-}
-
-fn shared_data() -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join("3d-front");
-    folder.is_dir().then_some(folder)
 }
 
 fn measure(files: &HouseFiles, rounds: usize) {

@@ -1,4 +1,4 @@
-//! The one camera model: a pinhole without distortion, one matrix for every picture of a view.
+//! The camera model: a pinhole without distortion, with one matrix for every picture of a view.
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use schemars::JsonSchema;
@@ -23,13 +23,13 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// Square pixels, principal point in the middle; `fov_y` in radians.
+    /// Intrinsics with square pixels and the principal point in the middle; `fov_y` in radians.
     pub fn from_fov_y(width: u32, height: u32, fov_y: f64) -> Self {
         let focal = f64::from(height) / 2.0 / libm::tan(fov_y / 2.0);
         Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
     }
 
-    /// Square pixels, principal point in the middle; `fov_x` in radians.
+    /// Intrinsics with square pixels and the principal point in the middle; `fov_x` in radians.
     pub fn from_fov_x(width: u32, height: u32, fov_x: f64) -> Self {
         let focal = f64::from(width) / 2.0 / libm::tan(fov_x / 2.0);
         Self { width, height, fx: focal, fy: focal, cx: f64::from(width) / 2.0, cy: f64::from(height) / 2.0 }
@@ -42,11 +42,11 @@ impl Intrinsics {
 pub struct Camera {
     /// Row-major 4x4; a rotation and a translation in metres.
     pub world_from_camera: [[f64; 4]; 4],
-    /// Pixels.
+    /// Focal lengths and principal point, in pixels.
     pub intrinsics: Intrinsics,
 }
 
-/// A camera made ready to say where many points lie in its picture.
+/// A camera with its inverse matrix, for projecting many points.
 #[derive(Clone, Copy, Debug)]
 pub struct Projection {
     camera_from_world: DMat4,
@@ -64,7 +64,7 @@ impl Projection {
 }
 
 impl Camera {
-    /// A camera at `position` that looks at `target`, its right side level as `up` says.
+    /// A camera at `position` that looks at `target`, with its X axis perpendicular to `up`.
     pub fn look_at(position: DVec3, target: DVec3, up: DVec3, intrinsics: Intrinsics) -> Option<Self> {
         let back = (position - target).try_normalize()?;
         let right = up.cross(back).try_normalize()?;
@@ -72,7 +72,7 @@ impl Camera {
         Some(Self::from_rotation(rotation, position, intrinsics))
     }
 
-    /// A camera of the rotation world-from-camera at `position`.
+    /// A camera at `position` with this rotation from camera to world.
     pub fn from_rotation(rotation: DMat3, position: DVec3, intrinsics: Intrinsics) -> Self {
         let matrix = DMat4::from_cols(
             rotation.x_axis.extend(0.0),
@@ -88,12 +88,12 @@ impl Camera {
         DMat4::from_cols_array_2d(&self.world_from_camera).transpose()
     }
 
-    /// Rotation world-from-camera.
+    /// The rotation from camera to world.
     pub fn rotation(&self) -> DMat3 {
         DMat3::from_mat4(self.matrix())
     }
 
-    /// The camera's place in the world.
+    /// The camera's position in the world.
     pub fn position(&self) -> DVec3 {
         self.matrix().w_axis.truncate()
     }
@@ -105,12 +105,12 @@ impl Camera {
         Self::from_rotation(self.rotation() * turn, self.position(), self.intrinsics)
     }
 
-    /// World direction (unit length) through the point `pixel` of the picture.
+    /// The unit direction in world space through the point `pixel` of the picture.
     pub fn direction(&self, pixel: DVec2) -> DVec3 {
         (self.rotation() * self.camera_direction(pixel)).normalize()
     }
 
-    /// Direction in camera space through `pixel`, with z = -1: times a depth it is a point in camera space.
+    /// The direction in camera space through `pixel`, with z = -1; multiplied by a depth it is a point in camera space.
     pub fn camera_direction(&self, pixel: DVec2) -> DVec3 {
         let k = &self.intrinsics;
         DVec3::new((pixel.x - k.cx) / k.fx, -(pixel.y - k.cy) / k.fy, -1.0)
@@ -121,17 +121,18 @@ impl Camera {
         self.matrix().transform_point3(self.camera_direction(pixel) * depth)
     }
 
-    /// Where a world point lies in the picture, and its depth along the camera's axis in metres; none behind the camera.
+    /// The place of a world point in the picture, and its depth along the camera's axis in metres; none behind the
+    /// camera.
     pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
         self.projection().project(world)
     }
 
-    /// The same for many points.
+    /// A [`Projection`], for many points.
     pub fn projection(&self) -> Projection {
         Projection { camera_from_world: self.matrix().inverse(), intrinsics: self.intrinsics }
     }
 
-    /// The camera of the same picture at `width` times `height` pixels.
+    /// The same camera with a picture of `width` times `height` pixels.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let k = &self.intrinsics;
         let (x, y) = (f64::from(width) / f64::from(k.width), f64::from(height) / f64::from(k.height));
@@ -178,7 +179,7 @@ mod tests {
         assert!(camera.project(camera.position() + camera.rotation().z_axis).is_none());
     }
 
-    /// What the offsets' names say: +x looks up, +y looks left.
+    /// +x looks up and +y looks left, as the names of the views say.
     #[test]
     fn plus_five_plus_five_looks_up_and_left() {
         let level = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, Intrinsics::from_fov_x(64, 64, 1.0)).unwrap();

@@ -1,4 +1,4 @@
-//! The types of a dataset's JSON files; `dataset_spec/FORMAT.md` tells them to a reader who has only the files.
+//! The types of a dataset's JSON files, which `dataset_spec/FORMAT.md` documents for readers of the files.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
 
-/// The word for this version of the format.
+/// The name of this version of the format.
 pub const FORMAT: &str = "mateval/1";
 
 /// `dataset.json`: what this dataset is.
@@ -154,10 +154,10 @@ pub struct Atlas {
     pub charts: u32,
     /// Share of the square that charts cover, 0 to 1.
     pub coverage: f64,
-    /// Length of a texel's side on the surface, in metres (on the average over area).
+    /// Length of a texel's side on the surface in metres, averaged over the area.
     pub texel_m: f64,
-    /// Length of half a pixel of the input view where the instance is nearest, in metres; null where it is seen in no
-    /// view. A finer texel shows nothing more.
+    /// Length of half a pixel of the input view where the instance is nearest, in metres; null where no view shows it.
+    /// A finer texel adds no visible detail.
     pub half_pixel_m: Option<f64>,
 }
 
@@ -169,7 +169,7 @@ pub struct Part {
     pub id: PartId,
     /// Its value in its set's `part.png`.
     pub index: PartIndex,
-    /// The instance that it is of.
+    /// The instance that it belongs to.
     pub instance: InstanceId,
     /// Triangles in its set's `parts.glb`.
     pub triangles: usize,
@@ -192,7 +192,7 @@ impl SceneFile {
         std::iter::once((None, self.parts.as_slice())).chain(others)
     }
 
-    /// The view of this id.
+    /// The view with this id.
     pub fn view(&self, id: &str) -> Option<&View> {
         self.views.iter().find(|view| view.id.as_str() == id)
     }

@@ -1,4 +1,4 @@
-//! The one error of this crate.
+//! The error of this crate.
 
 use std::path::PathBuf;
 
@@ -10,22 +10,22 @@ pub enum SceneError {
     /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
-        /// What was tried, as in "read" or "write".
+        /// What was attempted, as in "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A file breaks the format; every fault is listed.
-    #[error("'{}' is not sound:{}", path.display(), Finding::list(findings))]
+    #[error("'{}' is not valid:{}", path.display(), Finding::list(findings))]
     Invalid {
         /// The file or folder.
         path: PathBuf,
-        /// All that is wrong with it.
+        /// All its faults.
         findings: Vec<Finding>,
     },
-    /// Sound, but of a version or kind that is not read here.
+    /// A file that is valid, but of a version or kind that is not read here.
     #[error("'{}': unsupported: {what}", path.display())]
     Unsupported {
         /// The file.
@@ -57,7 +57,7 @@ pub enum SceneError {
 }
 
 impl SceneError {
-    /// An [`SceneError::Io`]; to be used with `map_err`.
+    /// A constructor of [`SceneError::Io`] for `map_err`.
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }

@@ -1,4 +1,4 @@
-//! Findings: what was wrong with an input, where, and what was done instead.
+//! Findings: a fault of an input, its place, and what was done about it.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How much a finding weighs.
+/// The severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -18,11 +18,11 @@ pub enum Severity {
     Note,
 }
 
-/// One thing that was wrong with an input. Findings sort by severity, then code, file and place.
+/// One fault of an input. Findings sort by severity, then code, file and place.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// How much it weighs.
+    /// How severe it is.
     pub severity: Severity,
     /// A stable word for the kind of fault, as in `missing_file`; snake_case.
     pub code: String,
@@ -62,7 +62,7 @@ impl FindingCount {
 }
 
 impl Finding {
-    /// All findings, one a line, each on a line of its own beneath the text before.
+    /// All findings, each after a line break and two blanks.
     pub fn list(findings: &[Self]) -> String {
         findings.iter().fold(String::new(), |mut text, finding| {
             // Writing to a String cannot fail.
@@ -87,7 +87,7 @@ impl std::fmt::Display for Finding {
     }
 }
 
-/// At most 80 characters of a stranger's text, without control characters.
+/// The first 80 characters of untrusted text, with control characters escaped.
 pub fn shortened(text: &str) -> String {
     let short: String = text.chars().take(80).collect::<String>().escape_debug().to_string();
     if text.chars().nth(80).is_some() { format!("{short}...") } else { short }

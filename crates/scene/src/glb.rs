@@ -1,6 +1,6 @@
-//! Geometry as binary glTF: one node and one mesh a name, world space, identity transforms, no materials.
+//! Reads and writes geometry as binary glTF: one node with one mesh a name, in world space, without materials.
 //!
-//! glTF counts v from the top of a picture, our meshes count it from the bottom; it is turned here.
+//! glTF counts v from the top of a picture and [`TriangleMesh`] from the bottom; this module converts.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -32,7 +32,7 @@ pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
     let bytes: u64 =
         nodes.iter().map(|node| 32 * node.mesh.positions.len() as u64 + 12 * node.mesh.triangles.len() as u64).sum();
     if bytes > MAX_GLB_BYTES - (64 << 20) {
-        let what = format!("{bytes} bytes of geometry; a .glb holds 4 GiB: split the scene");
+        let what = format!("{bytes} bytes of geometry; a .glb holds at most 4 GiB; split the scene");
         return Err(SceneError::Unsupported { path: path.to_owned(), what });
     }
     let mut file = Writer::default();
@@ -169,7 +169,8 @@ impl Writer {
     }
 }
 
-/// Reads every node that has a mesh, in the file's order. Positions and uv must be finite, indices inside.
+/// Reads every node that has a mesh, in the file's order. Fails where positions or uv are not finite or an index is out
+/// of range.
 pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
     let length = std::fs::metadata(path).map_err(SceneError::io("read", path))?.len();
     if length > MAX_GLB_BYTES {
@@ -223,7 +224,7 @@ fn invalid(path: &Path, node: &str, message: String) -> SceneError {
         file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         place: if node.is_empty() { String::new() } else { format!("node '{node}'") },
         message,
-        action: "get the dataset anew, or build it again".to_owned(),
+        action: "fetch or build the dataset again".to_owned(),
     };
     SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
 }

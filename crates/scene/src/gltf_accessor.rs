@@ -1,14 +1,14 @@
-//! glTF files and the contents of their accessors, for untrusted input: nothing is read outside a buffer, and every float
-//! must be finite.
+//! glTF files and the contents of their accessors, for untrusted input: nothing is read outside a buffer, and every
+//! float must be finite.
 
 use gltf::accessor::DataType;
 
 use crate::gltf_error::GltfError;
 
-/// The bytes of a binary file's header.
+/// Length of a binary file's header, in bytes.
 const GLB_HEADER: u32 = 12;
 
-/// A glTF or GLB file, checked.
+/// Parses and validates a glTF or GLB file.
 pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, GltfError> {
     // The gltf crate subtracts the header from the length that a binary file states, without checking that length.
     let stated = bytes.strip_prefix(b"glTF").and_then(|rest| rest.get(4..8)).map(word);
@@ -25,7 +25,7 @@ pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, GltfError> {
     Ok(gltf::Gltf::from_slice(bytes)?)
 }
 
-/// An accessor of floats, `N` an entry.
+/// The entries of an accessor of floats, `N` an entry.
 pub fn floats<const N: usize>(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<[f32; N]>, GltfError> {
     if accessor.data_type() != DataType::F32 || accessor.dimensions().multiplicity() != N {
         return Err(GltfError::NotFloats { accessor: accessor.index(), expected: N });
@@ -35,7 +35,7 @@ pub fn floats<const N: usize>(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> R
     finite(accessor, values)
 }
 
-/// An accessor of floats, or of whole numbers that stand for 0 to 1: the first `N` of each entry.
+/// The first `N` numbers of each entry of an accessor of floats, or of normalized integers, which stand for 0 to 1.
 pub fn floats_or_shares<const N: usize>(
     accessor: &gltf::Accessor<'_>,
     buffer: &[u8],
@@ -66,7 +66,7 @@ fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, values: Vec<[f32; N]>) 
     }
 }
 
-/// An accessor of whole numbers.
+/// The entries of an accessor of integers.
 pub fn indices(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<u32>, GltfError> {
     let size = match accessor.data_type() {
         DataType::U32 => 4,
@@ -80,7 +80,7 @@ pub fn indices(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<u32>,
     Ok(entries(accessor, buffer, size)?.map(word).collect())
 }
 
-/// Indices of a mesh with that many vertices, three a triangle.
+/// Splits indices into triangles. Fails where one is not below `vertices`, or their number is not a multiple of three.
 pub fn triangles(indices: Vec<u32>, vertices: usize) -> Result<Vec<[u32; 3]>, GltfError> {
     if let Some(at) = indices.iter().position(|index| *index as usize >= vertices) {
         return Err(GltfError::IndexOutOfRange { at, index: indices[at], vertices });
@@ -89,19 +89,19 @@ pub fn triangles(indices: Vec<u32>, vertices: usize) -> Result<Vec<[u32; 3]>, Gl
     if rest.is_empty() { Ok(triangles.to_vec()) } else { Err(GltfError::NotTriangles { indices: indices.len() }) }
 }
 
-/// The bytes of a view, once they are known to lie in its buffer.
+/// The bytes of a buffer view. Fails where it reaches outside its buffer.
 pub fn view_bytes<'a>(view: &gltf::buffer::View<'_>, buffer: &'a [u8]) -> Result<&'a [u8], GltfError> {
     let outside = || GltfError::ViewOutside { view: view.index() };
     let start = view.offset();
     start.checked_add(view.length()).and_then(|end| buffer.get(start..end)).ok_or_else(outside)
 }
 
-/// Little-endian, of four bytes or fewer.
+/// The little-endian integer in four bytes or fewer.
 fn word(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
 }
 
-/// The accessor's entries of `size` bytes, once they are known to lie in the file.
+/// The accessor's entries, of `size` bytes each. Fails where they reach outside the buffer.
 fn entries<'a>(
     accessor: &gltf::Accessor<'_>,
     buffer: &'a [u8],

@@ -5,7 +5,7 @@ use gltf::accessor::DataType;
 /// Why a glTF file, or a part of it, cannot be read. Accessors and buffer views are named by their index in the file.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
-    /// The `gltf` crate cannot read it.
+    /// The `gltf` crate refuses it.
     #[error("not valid glTF: {0}")]
     Unsound(#[from] gltf::Error),
     /// A binary file states a length that cannot hold its own header.

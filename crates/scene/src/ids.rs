@@ -1,11 +1,11 @@
-//! Names of scenes, instances, parts and views; numbers of instances and parts in pictures.
+//! Ids of scenes, instances, parts, views and renderers, and the indices of instances and parts in pictures.
 
 use std::borrow::Cow;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
-/// What every id matches: `[a-z0-9][a-z0-9_-]{0,63}`. Such a name is safe as a folder on every system.
+/// The pattern of every id, which is safe as the name of a folder on every system.
 pub const ID_PATTERN: &str = "^[a-z0-9][a-z0-9_-]{0,63}$";
 
 /// A text that is not an id.
@@ -19,8 +19,8 @@ fn is_id(text: &str) -> bool {
     (1..=64).contains(&bytes.len()) && word(&bytes[0]) && bytes.iter().all(|b| word(b) || matches!(b, b'_' | b'-'))
 }
 
-/// A text turned into an id: lower case, anything else than letters, digits, `_` and `-` becomes `-`, at most 48
-/// characters (so that a number can be appended). `fallback` where nothing is left.
+/// Turns any text into an id: in lower case, with `-` for everything but letters, digits, `_` and `-`, and cut to 48
+/// characters so that a number can be appended. `fallback` where nothing remains.
 pub fn id_text_from(name: &str, fallback: &str) -> String {
     let mapped: String = name
         .chars()
@@ -101,7 +101,7 @@ id_type!(
     PartId
 );
 id_type!(
-    /// The id of a set of parts that comes from outside, as in `partfield`.
+    /// The id of a set of parts that was made elsewhere, as in `partfield`.
     PartSetId
 );
 id_type!(
@@ -114,12 +114,12 @@ id_type!(
     RendererId
 );
 
-/// An instance's value in `instance.png`: 1 to 65535; 0 in the picture is "nothing".
+/// An instance's value in `instance.png`: 1 to 65535, where 0 stands for no instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct InstanceIndex(pub std::num::NonZeroU16);
 
-/// A part's value in `part.png`: 1 to 65535; 0 in the picture is "nothing".
+/// A part's value in `part.png`: 1 to 65535, where 0 stands for no part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct PartIndex(pub std::num::NonZeroU16);

@@ -1,4 +1,4 @@
-//! JSON files: written the same on every machine, read with the path and pointer of what is wrong.
+//! Reads and writes JSON files, with the same bytes on every machine and with path, line and column of every fault.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ pub const MAX_JSON_BYTES: u64 = 256 << 20;
 
 /// Pretty JSON with a closing newline.
 pub fn to_text<T: Serialize>(value: &T) -> String {
-    // Our own types hold neither maps with keys that are no texts nor numbers that JSON lacks in key position.
+    // It fails for maps whose keys are not strings, which our types do not hold.
     let mut text = serde_json::to_string_pretty(value).expect("our types can be written as JSON");
     text.push('\n');
     text
@@ -25,12 +25,12 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
     Ok(write_whole(path, to_text(value).as_bytes())?)
 }
 
-/// Reads a file; what does not fit is an error with the line and column.
+/// Reads a file. An error names the line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
     read_within(path, MAX_JSON_BYTES)
 }
 
-/// The same of a file of at most so many bytes.
+/// Reads a file of at most `most` bytes.
 pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
     let text = read_at_most(path, most).map_err(SceneError::io("read", path))?;
     serde_json::from_slice(&text)
@@ -44,7 +44,7 @@ fn invalid(path: &Path, place: String, message: String) -> SceneError {
         file: path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         place,
         message,
-        action: "mend the file; `mateval prep verify` lists every fault of a dataset".to_owned(),
+        action: "fix the file; `mateval prep verify` lists every fault of a dataset".to_owned(),
     };
     SceneError::Invalid { path: path.to_owned(), findings: vec![finding] }
 }

@@ -1,4 +1,4 @@
-//! Where everything lies in a dataset and in a submission.
+//! The paths of files in a dataset.
 
 use std::path::{Path, PathBuf};
 
@@ -13,13 +13,14 @@ pub const MANIFEST: &str = "MANIFEST.sha256";
 /// The input view's id.
 pub const INPUT: &str = "input";
 
-/// The meshes of a set of parts, in its scene's folder: `geometry/parts.glb` for the source's own, `geometry/parts_<set>.glb`
-/// for another.
+/// The meshes of a set of parts, relative to the scene's folder: `geometry/parts.glb` for the source's own parts,
+/// `geometry/parts_<set>.glb` for another set.
 pub fn parts_file(set: Option<&PartSetId>) -> String {
     set.map_or("geometry/parts.glb".to_owned(), |set| format!("geometry/parts_{set}.glb"))
 }
 
-/// The picture of a set of parts, in its view's folder: `part.png` for the source's own, `part_<set>.png` for another.
+/// The picture of a set of parts, relative to the view's folder: `part.png` for the source's own parts,
+/// `part_<set>.png` for another set.
 pub fn part_picture(set: Option<&PartSetId>) -> String {
     set.map_or("part.png".to_owned(), |set| format!("part_{set}.png"))
 }
@@ -34,7 +35,7 @@ impl SceneFolder {
         Self(dataset.join("scenes").join(scene.as_str()))
     }
 
-    /// The scene in `folder`, wherever that is.
+    /// The scene in `folder`, which may lie outside a dataset.
     pub fn at(folder: PathBuf) -> Self {
         Self(folder)
     }

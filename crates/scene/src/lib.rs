@@ -1,10 +1,11 @@
 //! The dataset format: types, reading, writing, validation.
 //!
-//! In: what `prep` converted, or a dataset folder on disk. Out: the same on disk, or as checked Rust values.
+//! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
-//! Between: [`ids`] and [`findings`] are the words that everything shares; [`camera`] is the one camera model;
-//! [`obj`], [`gltf_accessor`] and [`source_folder`] read strangers' files without trust;
-//! [`mesh`], [`material`] and [`mod@reference`] describe a scene as its makers meant it.
+//! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
+//! [`mod@reference`] describe a scene with its source materials and lights; [`dataset`], [`layout`], [`manifest`] and
+//! [`open`] are the files of a dataset, [`submission`] those of a submission. [`obj`], [`gltf_accessor`] and
+//! [`source_folder`] read untrusted files.
 
 pub mod camera;
 pub mod dataset;

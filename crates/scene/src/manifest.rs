@@ -1,4 +1,4 @@
-//! `MANIFEST.sha256`: one line a file, `<sha256>  <path>`, sorted by path, as `sha256sum -c` reads it.
+//! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`.
 
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -32,7 +32,8 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Every file below `root` but the manifest, `dataset.json` and hidden ones at the top, relative, sorted. Folders behind links are not entered.
+/// The files below `root`, relative and sorted, without the manifest, `dataset.json` and hidden files in `root` itself.
+/// Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = Vec::new();
     let mut folders = vec![PathBuf::new()];
@@ -54,12 +55,13 @@ pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
     Ok(files)
 }
 
-/// What a killed process leaves of a file that it was writing.
+/// Whether the file was left half-written by a killed process.
 fn is_partial(file: &str) -> bool {
     file.ends_with(".partial") || file.contains(".partial/")
 }
 
-/// Hashes every file of the dataset and writes the manifest; what killed runs left half-written is removed. Gives the manifest's own hash, which `dataset.json` holds.
+/// Hashes every file of the dataset and writes the manifest; half-written files of killed runs are removed. Returns the
+/// manifest's own hash, which `dataset.json` holds.
 pub fn write(root: &Path) -> Result<String, SceneError> {
     let mut text = String::new();
     for file in list_files(root)? {
@@ -79,7 +81,7 @@ pub fn write(root: &Path) -> Result<String, SceneError> {
 pub struct Entry {
     /// SHA-256 of the file, hex.
     pub sha256: String,
-    /// Relative to the dataset, with forward slashes; never outside it.
+    /// The path relative to the dataset, with forward slashes; never outside it.
     pub file: String,
 }
 
@@ -90,19 +92,19 @@ impl Entry {
     }
 }
 
-/// The lines of the manifest, in its order; those that [`check`] faults are left out.
+/// The valid lines of the manifest in their order; [`check`] reports the others.
 pub fn entries(root: &Path) -> Result<Vec<Entry>, SceneError> {
     let path = root.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
     Ok(text.lines().filter_map(Entry::parse).collect())
 }
 
-/// Holds every file against the manifest: each one that is missing, changed or not listed is a finding.
+/// Compares every file with the manifest: each one that is missing, changed or not listed is a finding.
 pub fn check(root: &Path) -> Result<Vec<Finding>, SceneError> {
     check_those(root, |_| true)
 }
 
-/// Holds the files that `concerns` picks, by their paths in the dataset, against the manifest.
+/// Compares those files with the manifest that `concerns` accepts by their paths in the dataset.
 pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<Finding>, SceneError> {
     let path = root.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(SceneError::io("read", &path))?;
@@ -127,9 +129,7 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
             Err(error) if root.join(&file).exists() => {
                 findings.push(fault("unreadable", &file, String::new(), &error.to_string()));
             }
-            Err(_) => {
-                findings.push(fault("missing_file", &file, String::new(), "listed in the manifest but not there"))
-            }
+            Err(_) => findings.push(fault("missing_file", &file, String::new(), "listed in the manifest, but missing")),
             Ok(found) if found != hash => {
                 findings.push(fault(
                     "changed_file",
@@ -160,7 +160,7 @@ fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
         file: file.to_owned(),
         place,
         message: message.to_owned(),
-        action: "get the dataset anew, or build it again".to_owned(),
+        action: "fetch or build the dataset again".to_owned(),
     }
 }
 

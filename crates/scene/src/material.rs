@@ -1,16 +1,16 @@
-//! Materials as their makers meant them: the parameters, not what light does with them (that is the tracer's `Bsdf`).
+//! Materials as parameters, as their sources state them. How they scatter light is the tracer's `Bsdf`.
 
 use glam::Vec2;
 use mateval_image::Texture;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A place in [`crate::reference::ReferenceScene::textures`].
+/// An index of [`crate::reference::ReferenceScene::textures`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct TextureIndex(pub usize);
 
-/// A colour, linear Rec. 709: the same everywhere or from a texture.
+/// A colour in linear Rec. 709, constant or from a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ColorInput {
@@ -25,7 +25,7 @@ pub enum ColorInput {
     },
 }
 
-/// A number: the same everywhere or from a texture.
+/// A number, constant or from a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScalarInput {
@@ -93,13 +93,13 @@ pub enum Distribution {
     Beckmann,
 }
 
-/// A rough interface. `alpha` is the distribution's own parameter; perceptual roughness is its square root.
+/// The microfacets of a rough interface. Perceptual roughness is the square root of `alpha`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Microfacets {
-    /// Their distribution.
+    /// The distribution of their normals.
     pub distribution: Distribution,
-    /// Its width.
+    /// The width of the distribution.
     pub alpha: ScalarInput,
 }
 
@@ -107,7 +107,7 @@ pub struct Microfacets {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ConductorIor {
-    /// Reflects everything (Mitsuba's `material=none`).
+    /// Reflects all light (Mitsuba's `material=none`).
     PerfectMirror,
     /// Complex index relative to the outside: eta + i k.
     EtaK {
@@ -118,20 +118,20 @@ pub enum ConductorIor {
     },
 }
 
-/// How light is scattered; the names are Mitsuba's, `Principled` is Disney's with our two flavours.
+/// A model of scattering. The names are those of Mitsuba; `Principled` is Disney's model in one of two flavours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum MaterialModel {
     /// Lambert; with `alpha` Oren-Nayar.
     Diffuse {
-        /// Share of light sent back.
+        /// The share of light that is reflected.
         reflectance: ColorInput,
         /// Oren-Nayar's roughness, in Mitsuba's terms; none for Lambert.
         alpha: Option<ScalarInput>,
     },
     /// A metal.
     Conductor {
-        /// What it is made of.
+        /// Its index of refraction.
         ior: ConductorIor,
         /// Multiplies what is reflected.
         specular_reflectance: ColorInput,
@@ -142,9 +142,9 @@ pub enum MaterialModel {
     Plastic {
         /// Inside over outside.
         eta: f32,
-        /// Whether colour shifts by multiple inner reflection count (Mitsuba's `nonlinear`).
+        /// Whether colour shifts from multiple internal reflections are included (Mitsuba's `nonlinear`).
         nonlinear: bool,
-        /// The base.
+        /// The reflectance of the base.
         diffuse_reflectance: ColorInput,
         /// Multiplies what the coat reflects.
         specular_reflectance: ColorInput,
@@ -171,7 +171,7 @@ pub enum MaterialModel {
         /// Multiplies what is let through.
         specular_transmittance: ColorInput,
     },
-    /// base_color, roughness, metallic.
+    /// base_color, roughness and metallic.
     Principled {
         /// Linear.
         base_color: ColorInput,
@@ -179,14 +179,14 @@ pub enum MaterialModel {
         roughness: ScalarInput,
         /// 0 to 1.
         metallic: ScalarInput,
-        /// Disney's; 0.5 is an index of 1.5.
+        /// Disney's parameter; 0.5 is an index of refraction of 1.5.
         specular: f32,
-        /// Whose.
+        /// Which renderer's version of the model.
         flavour: PrincipledFlavour,
     },
 }
 
-/// Whose `principled`: on one room they differ by 12 %.
+/// Which renderer's version of the principled model; on one room they differ by 12 %.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PrincipledFlavour {
@@ -217,15 +217,15 @@ pub struct Material {
     pub name: String,
     /// How light is scattered.
     pub model: MaterialModel,
-    /// Whether the back looks like the front; else the back is black (of no meaning for dielectrics).
+    /// Whether the back looks like the front. Otherwise the back is black. Ignored for dielectrics.
     pub two_sided: bool,
-    /// Coverage, 0 lets light straight through; none: covered everywhere.
+    /// Opacity from 0, which lets all light pass straight through, to 1; none means opaque everywhere.
     pub opacity: Option<ScalarInput>,
     /// Bends the shading normal.
     pub bump: Option<BumpMap>,
 }
 
-/// What a method is to recover at a point: DESIGN's "Bitterli materials as base_color, roughness, metallic".
+/// What a method is to recover at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
     /// Linear.
@@ -236,7 +236,7 @@ pub struct Appearance {
     pub metallic: f32,
 }
 
-/// One of a material's textures and how it is looked up.
+/// A texture of a material and how it is looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lookup {
     /// Which.
@@ -256,15 +256,15 @@ impl Material {
         colors.chain(scalars.into_iter().chain(around).filter_map(ScalarInput::lookup)).collect()
     }
 
-    /// Whether it is opaque, so that it has base_color, roughness and metallic (glass has not).
+    /// Whether it has base_color, roughness and metallic. Glass has not.
     pub fn has_appearance(&self) -> bool {
         !matches!(self.model, MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. })
     }
 
     /// base_color, roughness and metallic at the surface's `uv`; none for dielectrics.
     ///
-    /// Diffuse and plastic: reflectance, metallic 0. Conductors: F0 times specular reflectance, metallic 1. Roughness is
-    /// the square root of alpha, smooth is 0, diffuse is 1.
+    /// Diffuse and plastic materials have their reflectance as base_color, and metallic 0. Conductors have F0 times
+    /// specular reflectance, and metallic 1. Roughness is the square root of alpha: 0 if smooth, 1 if diffuse.
     pub fn appearance(&self, textures: &[Texture], uv: Vec2) -> Option<Appearance> {
         let rough = |microfacets: &Option<Microfacets>| {
             microfacets.map_or(0.0, |m| m.alpha.at(textures, uv).clamp(0.0, 1.0).sqrt())
@@ -317,7 +317,7 @@ impl ScalarInput {
 }
 
 impl MaterialModel {
-    /// All of its colours and all of its numbers.
+    /// All its colours and all its numbers.
     fn inputs(&self) -> (Vec<&ColorInput>, Vec<&ScalarInput>) {
         match self {
             Self::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter().collect()),
@@ -343,7 +343,7 @@ fn rough_inputs(microfacets: &Option<Microfacets>) -> Vec<&ScalarInput> {
 }
 
 impl ConductorIor {
-    /// F0: ((eta-1)^2 + k^2) / ((eta+1)^2 + k^2) a channel.
+    /// F0 of each channel: ((eta-1)^2 + k^2) / ((eta+1)^2 + k^2).
     pub fn reflectance_at_normal(&self) -> [f32; 3] {
         match self {
             Self::PerfectMirror => [1.0; 3],

@@ -2,12 +2,12 @@
 
 use glam::{DVec3, Vec2, Vec3};
 
-/// Triangles in world space (metres, +Y up). Vertex arrays, where present, have one entry a position.
+/// Triangles in world space (metres, +Y up). Optional arrays have one entry for each position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
     /// Vertex positions.
     pub positions: Vec<Vec3>,
-    /// Shading normals of unit length, or none: then the geometric normal serves.
+    /// Shading normals of unit length; without them the geometric normal is used.
     pub normals: Option<Vec<Vec3>>,
     /// Texture coordinates, origin at the lower left, v upwards (OBJ's convention, not glTF's).
     pub uvs: Option<Vec<Vec2>>,
@@ -21,13 +21,14 @@ impl TriangleMesh {
         self.triangles[index].map(|vertex| self.positions[vertex as usize])
     }
 
-    /// The unit vector across triangle `index`, towards who sees it counter-clockwise; zero where it has no area.
+    /// The unit normal of triangle `index`, on the side where it is counter-clockwise; zero for a triangle without
+    /// area.
     pub fn geometric_normal(&self, index: usize) -> DVec3 {
         let [a, b, c] = self.corners(index).map(|corner| corner.as_dvec3());
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Puts another mesh behind this one. Uvs that one of them lacks are zero; normals are kept where both have them.
+    /// Appends another mesh. Where only one of them has uvs, the other's are zero; normals are kept if both have them.
     pub fn append(&mut self, other: &Self) {
         let first = self.positions.len();
         if self.uvs.is_some() || other.uvs.is_some() {
@@ -49,7 +50,7 @@ impl TriangleMesh {
         self.triangles.extend(other.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first as u32)));
     }
 
-    /// The triangles that belong, in their order, with the vertices that they use; `belongs` is asked by index.
+    /// The triangles whose index `belongs` accepts, in their order, with the vertices that they use.
     pub fn picked(&self, belongs: impl Fn(usize) -> bool) -> Self {
         let mut new_place = vec![u32::MAX; self.positions.len()];
         let mut used = Vec::new();

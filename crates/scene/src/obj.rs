@@ -1,5 +1,5 @@
-//! OBJ files through tobj, behind a check of every index and count: tobj trusts the file's indices, and one that
-//! overflows would end the program.
+//! Reads untrusted OBJ and MTL files with tobj, after a check of every index and count, since tobj panics where an
+//! index overflows.
 
 use std::collections::BTreeSet;
 
@@ -8,12 +8,12 @@ use glam::{Vec2, Vec3};
 use crate::TriangleMesh;
 use crate::findings::shortened;
 
-/// What is read of a file at most.
+/// Limits on a file's geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObjLimits {
-    /// Triangles after polygons are split.
+    /// Most triangles, after polygons are split.
     pub triangles: usize,
-    /// Corners of faces, so at least as many as vertices can come of it.
+    /// Most corners of faces, which bound the number of vertices.
     pub corners: usize,
 }
 
@@ -30,7 +30,7 @@ pub struct ObjError {
 /// What is wrong with an OBJ or MTL file.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum ObjFault {
-    /// It may be sound, but is too large.
+    /// It is too large; the rest of it is not read.
     #[error(
         "more than {} triangles or {} corners, which is what is left of the scene's limit", .0.triangles, .0.corners
     )]
@@ -41,7 +41,7 @@ pub enum ObjFault {
         /// Its corners.
         found: usize,
     },
-    /// A word of a face that is no index.
+    /// A word of a face that is not an index.
     #[error("expected an index of a {what}, found '{}'", shortened(found))]
     NotAnIndex {
         /// As in `position`.
@@ -49,7 +49,7 @@ pub enum ObjFault {
         /// The word.
         found: String,
     },
-    /// An index of something that does not exist (yet).
+    /// An index of something that the file has not defined before.
     #[error("the index {index} of a {what} is out of range: {count} came before it")]
     IndexOutOfRange {
         /// The index.
@@ -71,7 +71,7 @@ pub enum ObjFault {
         /// How many it has.
         found: usize,
     },
-    /// A property of a material that is no finite number.
+    /// A property of a material that is not a finite number.
     #[error("{key} of '{}': expected finite numbers", shortened(material))]
     NotFinite {
         /// As in `Pr`.
@@ -95,29 +95,29 @@ impl From<ObjFault> for ObjError {
 pub struct ObjGroup {
     /// Its name.
     pub name: String,
-    /// What `usemtl` says; none where nothing is said, or where materials are not asked for.
+    /// The name after `usemtl`; none without one, and under [`Materials::Ignored`].
     pub material: Option<String>,
     /// How many triangles it has.
     pub triangles: usize,
 }
 
-/// A mesh in the file's own space, and what had to be left out of it.
+/// A mesh in the file's own space, and what was left out of it.
 #[derive(Debug)]
 pub struct ObjMesh {
-    /// All groups, one behind the other.
+    /// The triangles of all groups, group by group.
     pub mesh: TriangleMesh,
     /// Its objects and groups in their order.
     pub groups: Vec<ObjGroup>,
-    /// Some faces have texture coordinates (normals) and some have none: then nobody keeps them.
+    /// Whether only some faces have texture coordinates, which are then dropped for all.
     pub mixed_uvs: bool,
-    /// The same of normals.
+    /// Whether only some faces have normals, which are then dropped for all.
     pub mixed_normals: bool,
 }
 
-/// A material of an MTL file, as far as anybody here reads it.
+/// The properties of an MTL file's material that are read here.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjMaterial {
-    /// As `usemtl` calls it.
+    /// Its name, which `usemtl` refers to.
     pub name: String,
     /// `Kd`, linear.
     pub diffuse: Option<[f32; 3]>,
@@ -136,13 +136,13 @@ pub struct ObjMaterial {
 /// Whether groups are split where their material changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Materials {
-    /// They are one, and name no material.
+    /// They are not split, and no group names a material.
     Ignored,
-    /// A group has one material.
-    Told,
+    /// They are split, so that each group has one material.
+    Split,
 }
 
-/// What a file's faces refer to.
+/// Counts of what a file defines and of what its faces refer to.
 #[derive(Debug, Default)]
 struct Census {
     positions: i64,
@@ -154,7 +154,8 @@ struct Census {
     corners_with_normal: usize,
 }
 
-/// Reads an OBJ: positions, texture coordinates, normals and faces of all its groups as one mesh; polygons as fans.
+/// Reads an OBJ file: the faces of all groups as one mesh, with texture coordinates and normals. Polygons become fans
+/// of triangles.
 pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<ObjMesh, ObjError> {
     let text = std::str::from_utf8(bytes).map_or_else(|_| String::from_utf8_lossy(bytes), std::borrow::Cow::Borrowed);
     let census = check(&text, limits)?;
@@ -203,7 +204,7 @@ fn check_line(line: &str, census: &mut Census) -> Result<(), ObjFault> {
     Ok(())
 }
 
-/// `position/uv/normal`, from 1, or negative from the end; uv and normal may be missing.
+/// Checks `position/uv/normal`, whose indices count from 1 or, if negative, from the end. uv and normal may be missing.
 fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
     let mut parts = corner.split('/');
     let mut index = |count: i64, what: &'static str, required: bool| match parts.next() {
@@ -228,7 +229,7 @@ fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
     Ok(())
 }
 
-/// The text with the indices of what is mixed taken from every face.
+/// The text without the indices of texture coordinates or normals in its faces.
 fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
     let mut out = String::with_capacity(text.len());
     for line in text.lines() {
@@ -249,14 +250,14 @@ fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
     out
 }
 
-/// The names of the material files that it wants.
+/// The names of the material files that an OBJ file refers to.
 pub fn material_files(bytes: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(bytes);
     let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("mtllib", line)).collect();
     names.into_iter().map(str::to_owned).collect()
 }
 
-/// Reads an MTL file. Numbers may be anything that is finite; one number behind `Kd` is all three.
+/// Reads an MTL file. Every number must be finite; a single number after `Kd` stands for all three.
 pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
     let text = with_whole_colors(&String::from_utf8_lossy(bytes))?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).map_err(ObjFault::Unsound)?;
@@ -278,8 +279,8 @@ pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
     materials.into_iter().map(read).collect()
 }
 
-/// The text of an MTL file with three numbers behind every `Kd`, and without the other colours: tobj wants three everywhere
-/// and panics without, the format wants one or three.
+/// The text of an MTL file with three numbers after every `Kd` and without the other colours. The format allows one
+/// number or three, tobj panics for one.
 fn with_whole_colors(text: &str) -> Result<String, ObjError> {
     let mut out = String::with_capacity(text.len());
     for (at, line) in text.lines().enumerate() {
@@ -302,16 +303,16 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     let names = match materials {
         Materials::Ignored => Vec::new(),
-        Materials::Told => material_names(text),
+        Materials::Split => material_names(text),
     };
-    // Material files are never opened here, their names come from a stranger. tobj keeps only names that a file
-    // defines: it is told of one file that defines them all.
+    // Material files are not opened here, since their names are untrusted. tobj keeps only names that a material file
+    // defines, so it is given one file that defines all of them.
     let defined = |_: &std::path::Path| {
         let materials = names.iter().map(|name| tobj::Material { name: name.clone(), ..Default::default() }).collect();
         Ok((materials, names.iter().enumerate().map(|(at, name)| (name.clone(), at)).collect()))
     };
-    let told = (!names.is_empty()).then(|| format!("mtllib any\n{}", without_material_files(text)));
-    let text = told.as_deref().unwrap_or(text);
+    let with_materials = (!names.is_empty()).then(|| format!("mtllib any\n{}", without_material_files(text)));
+    let text = with_materials.as_deref().unwrap_or(text);
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(ObjFault::Unsound)?;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), normals: Some(Vec::new()), ..Default::default() };
     let mut groups = Vec::new();
@@ -335,13 +336,13 @@ fn without_material_files(text: &str) -> String {
     kept
 }
 
-/// What stands behind a line's first word, if that is `word`.
+/// The rest of a line whose first word is `word`.
 fn named_after<'a>(word: &str, line: &'a str) -> Option<&'a str> {
     let rest = line.trim().strip_prefix(word)?;
     rest.starts_with(char::is_whitespace).then(|| rest.trim())
 }
 
-/// What `usemtl` names, each once, sorted.
+/// The names after `usemtl`, without duplicates, sorted.
 fn material_names(text: &str) -> Vec<String> {
     let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("usemtl", line)).collect();
     names.into_iter().map(str::to_owned).collect()
@@ -381,7 +382,7 @@ mod tests {
         assert_eq!(mesh.corners(2), mesh.corners(0));
     }
 
-    /// v is not flipped: OBJ's origin is the lower left, as ours.
+    /// OBJ's origin of uv is the lower left corner, as ours.
     #[test]
     fn texture_coordinates_stay_as_they_are() {
         let mesh = read_text("f 1/1 2/2 3/3").unwrap().mesh;
@@ -435,11 +436,11 @@ mod tests {
     }
 
     #[test]
-    fn groups_tell_their_materials_where_asked() {
+    fn groups_name_their_materials_where_asked() {
         let text = format!("{CORNERS}g a\nusemtl x\nf 1 2 3\nusemtl y z\nf 1 3 4\nmtllib some where.mtl\nf 1 2 4\n");
-        let read = read(text.as_bytes(), LIMITS, Materials::Told).unwrap();
-        let told: Vec<_> = read.groups.iter().map(|group| (group.material.as_deref(), group.triangles)).collect();
-        assert_eq!(told, [(Some("x"), 1), (Some("y z"), 2)]);
+        let read = read(text.as_bytes(), LIMITS, Materials::Split).unwrap();
+        let named: Vec<_> = read.groups.iter().map(|group| (group.material.as_deref(), group.triangles)).collect();
+        assert_eq!(named, [(Some("x"), 1), (Some("y z"), 2)]);
         assert_eq!(material_files(text.as_bytes()), ["some where.mtl"]);
     }
 
@@ -456,7 +457,7 @@ mod tests {
         }
     }
 
-    /// Found by fuzzing: fewer than three made tobj panic.
+    /// Found by fuzzing: tobj panics for fewer than three numbers.
     #[test]
     fn a_color_has_one_number_or_three() {
         let read = read_materials(b"newmtl x\nKa 1\nKs\nKe 1 2\nKd 0.25\n").unwrap();

@@ -1,4 +1,4 @@
-//! An open dataset: its JSON files, read and checked once.
+//! Opens a dataset: reads and checks its JSON files.
 
 use std::path::{Path, PathBuf};
 
@@ -14,15 +14,16 @@ pub struct Dataset {
     pub root: PathBuf,
     /// `dataset.json`.
     pub file: DatasetFile,
-    /// `targets.json`.
+    /// `targets.json`, what is scored.
     pub targets: TargetsFile,
     /// `scene.json` of every scene, in the dataset's order.
     pub scenes: Vec<SceneFile>,
 }
 
 impl Dataset {
-    /// Opens the dataset in `root`. Its JSON must be sound and be what the manifest says, the manifest what `dataset.json`
-    /// names; faults of several files are told together. The other files are not hashed: see [`Dataset::check_files`].
+    /// Opens the dataset in `root`. Fails where a JSON file is not valid or not the one that the manifest lists, or
+    /// where the manifest is not the one that `dataset.json` names. Faults of several files are reported together.
+    /// Other files are not hashed: see [`Dataset::check_files`].
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let path = root.join(DATASET);
         let file: DatasetFile = json::read(&path)?;
@@ -52,14 +53,15 @@ impl Dataset {
         }
     }
 
-    /// Fails where a file of the scene that `concerns` picks, by its path in the scene's folder, is not what the manifest
-    /// says: then nothing made of it would deserve the dataset's fingerprint.
+    /// Fails where a file of the scene differs from the manifest, since results made from it would not deserve the
+    /// dataset's fingerprint. Only files are checked that `concerns` accepts by their paths in the scene's folder.
     pub fn check_files(&self, scene: &SceneId, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
         let folder = format!("scenes/{scene}/");
         check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
-    /// The scenes with these ids, in the dataset's order; all scenes where `ids` is empty. Fails where an id is unknown.
+    /// The scenes with these ids, in the dataset's order; all scenes where `ids` is empty. Fails where an id is
+    /// unknown.
     pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, SceneError> {
         let chosen = chosen_ids(&self.root, &self.file, ids)?;
         Ok(self.scenes.iter().filter(|scene| chosen.contains(&&scene.id)).collect())
@@ -87,7 +89,7 @@ pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Re
     Ok(file.scenes.iter().filter(|id| ids.is_empty() || ids.contains(id)).collect())
 }
 
-/// One error for all faults of the JSON files.
+/// Joins the errors of several JSON files into one.
 fn together(root: &Path, mut faults: Vec<(String, SceneError)>) -> SceneError {
     if faults.len() == 1 {
         return faults.remove(0).1;

@@ -1,4 +1,4 @@
-//! A scene's geometry as everybody may see it: `instances.glb` as surfaces of grey paper, without light.
+//! A scene's public geometry: `instances.glb` as surfaces of one grey material, without lights.
 
 use crate::dataset::SceneFile;
 use crate::error::SceneError;
@@ -7,8 +7,8 @@ use crate::layout::SceneFolder;
 use crate::material::{ColorInput, Material, MaterialModel};
 use crate::reference::{MaterialIndex, ReferenceScene, Surface};
 
-/// All instances, opaque: surface k is instance k of `scene.json`, with the uv of its atlas. Fails where `instances.glb` is
-/// no such file, or holds other instances than `scene.json` says.
+/// Reads all instances as opaque surfaces with the uv of their atlases, in the order of `scene.json`. Fails where
+/// `instances.glb` cannot be read or holds other instances than `scene.json`.
 pub fn read(folder: &SceneFolder, scene: &SceneFile) -> Result<ReferenceScene, SceneError> {
     let path = folder.instances();
     let nodes = glb::read(&path)?;

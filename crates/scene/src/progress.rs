@@ -1,4 +1,4 @@
-//! How long work tells how far it is.
+//! The callback by which long work reports its progress.
 
-/// Called with the step's name, how much of it is done, and how much there is. May be called from several threads.
+/// Called with the step's name, the number of its parts that are done, and their total. Several threads may call it.
 pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);

@@ -1,6 +1,5 @@
-//! A scene as its makers meant it: surfaces with their source materials and textures, and what emits.
-//!
-//! This is what truth is made from: the tracer renders it, `prep` bakes it.
+//! The reference scene: surfaces with their source materials and textures, and the lights. The ground truth is rendered
+//! and baked from it.
 
 use glam::Vec2;
 use mateval_image::Texture;
@@ -10,36 +9,36 @@ use serde::{Deserialize, Serialize};
 use crate::material::{Material, TextureIndex, UvTransform};
 use crate::mesh::TriangleMesh;
 
-/// A place in [`ReferenceScene::materials`].
+/// An index of [`ReferenceScene::materials`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct MaterialIndex(pub usize);
 
-/// A place in [`ReferenceScene::surfaces`].
+/// An index of [`ReferenceScene::surfaces`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct SurfaceIndex(pub usize);
 
-/// A place in [`ReferenceScene::lights`].
+/// An index of [`ReferenceScene::lights`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct LightIndex(pub usize);
 
-/// One source object: a mesh in world space and what it is made of.
+/// One source object: a mesh in world space and its material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Its name in the source, not necessarily unique.
     pub name: String,
-    /// World space.
+    /// Its triangles in world space.
     pub mesh: TriangleMesh,
-    /// What it is made of.
+    /// Its material.
     pub material: MaterialIndex,
 }
 
 /// A texture and the file that it came from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SourceTexture {
-    /// The file, relative to the source's root; or a word for a texture that was computed, as in `sunsky`.
+    /// The file, relative to the source's root, or the name of a computed texture, as in `sunsky`.
     pub name: String,
     /// SHA-256 of the file's bytes, hex; none for a computed one.
     pub sha256: Option<String>,
@@ -47,7 +46,7 @@ pub struct SourceTexture {
     pub texture: Texture,
 }
 
-/// A texture that says how a glowing surface's radiance differs from place to place, as a lamp's shade does.
+/// A texture that varies the radiance of a glowing surface from place to place, as a lamp's shade does.
 ///
 /// It is looked up at the surface's own uv, zero where that has none, and multiplies the radiance channel by channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -99,7 +98,7 @@ pub enum Emission {
     },
 }
 
-/// One group of emitters, told apart from the others in the light basis.
+/// One group of emitters, with a picture of its own in the light basis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightGroup {
@@ -107,11 +106,11 @@ pub struct LightGroup {
     pub name: String,
     /// What it is.
     pub emission: Emission,
-    /// False: camera rays see the surface as if it did not emit (or black, for an environment).
+    /// Whether camera rays see it emit. If not, they see the plain surface, or black for an environment.
     pub camera_visible: bool,
 }
 
-/// A scene as its makers meant it.
+/// A scene with its source materials and lights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReferenceScene {
     /// Every object, glass and lamps included.
@@ -125,7 +124,7 @@ pub struct ReferenceScene {
 }
 
 impl ReferenceScene {
-    /// The textures alone, as [`Material::appearance`] wants them; texels are shared, not copied.
+    /// The textures alone, for [`Material::appearance`]. Texels are shared, not copied.
     pub fn texture_list(&self) -> Vec<Texture> {
         self.textures.iter().map(|source| source.texture.clone()).collect()
     }

@@ -1,7 +1,7 @@
 //! A reference scene on disk: `ground_truth/reference/` and `ground_truth/lights.json`.
 //!
-//! `geometry.glb` holds a node a surface with its source uv, `textures/` the texels as decoded (so that no picture
-//! decoder stands between two machines), `reference.json` what ties them together.
+//! `geometry.glb` holds a node for each surface with its source uv, `textures/` holds decoded texels, so that no
+//! machine's picture decoder can change them, and `reference.json` connects the two.
 
 use std::path::Path;
 
@@ -25,9 +25,9 @@ pub struct ReferenceFile {
     pub format: String,
     /// In the order of the nodes of `geometry.glb`.
     pub surfaces: Vec<SurfaceEntry>,
-    /// What surfaces are made of.
+    /// The materials of the surfaces.
     pub materials: Vec<Material>,
-    /// What materials and lights look up.
+    /// The textures of materials and lights.
     pub textures: Vec<TextureEntry>,
 }
 
@@ -37,7 +37,7 @@ pub struct ReferenceFile {
 pub struct SurfaceEntry {
     /// Its name in the source.
     pub name: String,
-    /// Place in `materials`.
+    /// Index of `materials`.
     pub material: MaterialIndex,
 }
 
@@ -47,13 +47,13 @@ pub struct SurfaceEntry {
 pub struct TextureEntry {
     /// The file in `textures/`.
     pub file: String,
-    /// The file that it came from, relative to the source; or a word for a computed one.
+    /// The file that it came from, relative to the source, or the name of a computed texture.
     pub source: String,
     /// SHA-256 of that file, hex; null for a computed one.
     pub source_sha256: Option<String>,
     /// How its numbers are stored.
     pub texels: TexelKind,
-    /// How it goes on outside 0..1: `repeat`, `clamp` or `mirror`.
+    /// How it continues outside 0..1: `repeat`, `clamp` or `mirror`.
     pub wrap: WrapWord,
 }
 
@@ -75,7 +75,7 @@ pub enum TexelKind {
     Grey,
 }
 
-/// How a texture goes on outside 0..1.
+/// How a texture continues outside 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WrapWord {
@@ -113,7 +113,7 @@ impl From<WrapWord> for Wrap {
 pub struct LightsFile {
     /// Always `mateval/1`.
     pub format: String,
-    /// One entry a group of emitters; surfaces and textures are places in `reference.json`.
+    /// The groups of emitters; their surfaces and textures are indices of the lists in `reference.json`.
     pub groups: Vec<LightGroup>,
 }
 
@@ -141,7 +141,7 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
     json::write(&folder.lights(), &LightsFile { format, groups: scene.lights.clone() })
 }
 
-/// Reads what [`write()`] wrote; every place that leads nowhere is a finding of the error.
+/// Reads the files of [`write()`]. Every index out of range is a finding of the error.
 pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
     let reference = folder.reference();
     let path = reference.join("reference.json");
@@ -214,7 +214,7 @@ fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTe
     Ok(SourceTexture { name: entry.source.clone(), sha256: entry.source_sha256.clone(), texture })
 }
 
-/// Every index that leads nowhere, and every file name that leads out of `textures/`.
+/// Every index out of range, and every file name that leads out of `textures/`.
 fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Finding> {
     let mut faults = Vec::new();
     let mut fault = |file: &str, place: String, message: String| {
@@ -224,7 +224,7 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
             file: file.to_owned(),
             place,
             message,
-            action: "get the dataset anew, or build it again".to_owned(),
+            action: "fetch or build the dataset again".to_owned(),
         });
     };
     if file.surfaces.len() != nodes {
@@ -259,7 +259,7 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
             Emission::Constant { .. } => true,
         };
         if !sound {
-            fault("lights.json", format!("/groups/{at}"), "a surface or texture that is not there".to_owned());
+            fault("lights.json", format!("/groups/{at}"), "a surface or texture that does not exist".to_owned());
         }
     }
     faults
@@ -328,7 +328,7 @@ mod tests {
         assert_eq!(read(&folder).unwrap(), scene());
     }
 
-    /// A light without a map is written as it was before there were maps; one with a map comes back.
+    /// A light without a map has no key for it in the file; one with a map is read as it was written.
     #[test]
     fn maps_of_lights() {
         let folder = tempfile::tempdir().unwrap();
@@ -355,7 +355,7 @@ mod tests {
         }
     }
 
-    /// What a stranger may write where a map should be is an error that names the file.
+    /// Invalid maps are errors that name the file.
     #[test]
     fn hostile_maps() {
         let folder = tempfile::tempdir().unwrap();

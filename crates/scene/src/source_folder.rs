@@ -1,5 +1,5 @@
-//! The folder of a stranger's scene: file names that its files give made safe, files read within limits, each one's hash
-//! kept.
+//! The folder of an untrusted scene: makes the file names in its files safe, reads files within limits and keeps their
+//! hashes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use crate::findings::shortened;
 use crate::manifest::sha256_of_bytes;
 
-/// Why a file that another names was not read.
+/// Why a file that another file names was not read.
 #[derive(Debug)]
 pub struct FileFault {
     /// The finding's code.
@@ -17,33 +17,33 @@ pub struct FileFault {
     pub message: String,
 }
 
-/// A folder. Nothing outside of it is read.
+/// A folder outside of which nothing is read.
 #[derive(Debug)]
 pub struct SourceFolder {
     root: PathBuf,
     file_bytes: u64,
     hashes: BTreeMap<String, String>,
-    /// What was looked for and was not there.
+    /// Files that were looked for and do not exist.
     absent: BTreeSet<String>,
 }
 
 /// Files that were looked for; both lists are sorted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LookedFor {
-    /// What was read, and its SHA-256.
+    /// The files that were read, with their SHA-256.
     pub hashes: Vec<(String, String)>,
-    /// What was not there.
+    /// The files that do not exist.
     pub absent: Vec<String>,
 }
 
 impl LookedFor {
-    /// The same, with other names.
+    /// The same files with other names.
     pub fn renamed(self, name: impl Fn(String) -> String) -> Self {
         let hashes = self.hashes.into_iter().map(|(file, hash)| (name(file), hash)).collect();
         Self { hashes, absent: self.absent.into_iter().map(name).collect() }
     }
 
-    /// Takes in another's.
+    /// Adds the files of another.
     pub fn extend(&mut self, other: Self) {
         self.hashes.extend(other.hashes);
         self.hashes.sort();
@@ -53,13 +53,14 @@ impl LookedFor {
 }
 
 impl SourceFolder {
-    /// `root` is the folder; no file of more than `file_bytes` is read.
+    /// The folder `root`, of which no file of more than `file_bytes` is read.
     pub fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
         Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new(), absent: BTreeSet::new() })
     }
 
-    /// A file name as a file gives it, with forward slashes and without `.` and `..`; refused where it leads out.
+    /// Converts a file name from a file to forward slashes without `.` and `..`. Fails where it leads out of the
+    /// folder.
     pub fn relative(name: &str) -> Result<String, FileFault> {
         let forward = name.trim().replace('\\', "/");
         let escapes = || FileFault {
@@ -102,14 +103,14 @@ impl SourceFolder {
         Ok(bytes)
     }
 
-    /// Where the file `relative` is: an ordinary file inside the folder and within the limit.
+    /// The path of the file `relative`. Fails unless it is an ordinary file inside the folder and within the limit.
     pub fn path(&mut self, relative: &str) -> Result<PathBuf, FileFault> {
         let short = shortened(relative);
         let path = match self.root.join(relative).canonicalize() {
             Ok(path) => path,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 self.absent.insert(relative.to_owned());
-                return Err(FileFault { code: "missing_file", message: format!("the file '{short}' is not there") });
+                return Err(FileFault { code: "missing_file", message: format!("the file '{short}' does not exist") });
             }
             Err(error) => {
                 let message = format!("'{short}' cannot be read: {error}");
@@ -137,12 +138,12 @@ impl SourceFolder {
         self.hashes.get(relative).cloned()
     }
 
-    /// Where it is.
+    /// Its path.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// What was looked for in it.
+    /// The files that were looked for.
     pub fn into_files(self) -> LookedFor {
         LookedFor { hashes: self.hashes.into_iter().collect(), absent: self.absent.into_iter().collect() }
     }

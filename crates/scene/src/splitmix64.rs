@@ -1,10 +1,13 @@
 //! SplitMix64 (Steele et al., "Fast splittable pseudorandom number generators", OOPSLA 2014) as a function of seed and
 //! index, so that every random number can be had without those before it.
 
+/// What separates two neighbouring states of the generator.
+pub const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// The number at `index`, counted from 0, of the sequence that starts from `seed`.
 #[inline]
 pub fn number(seed: u64, index: u64) -> u64 {
-    let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(INCREMENT));
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
@@ -14,8 +17,8 @@ pub fn number(seed: u64, index: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// The first numbers from seed 1234567 as the reference implementation gives them (Vigna's splitmix64.c; Rosetta Code,
-    /// "Pseudo-random numbers/Splitmix64").
+    /// The first numbers from seed 1234567 as the reference implementation gives them (Vigna's splitmix64.c; Rosetta
+    /// Code, "Pseudo-random numbers/Splitmix64").
     #[test]
     fn equals_the_reference_implementation() {
         let expected = [6457827717110365317, 3203168211198807973, 9817491932198370423];

@@ -12,13 +12,13 @@ use crate::{SceneError, json};
 /// `submission.json`.
 pub const SUBMISSION: &str = "submission.json";
 
-/// The word for this version of a submission.
+/// The name of this version of a submission.
 pub const SUBMISSION_FORMAT: &str = "mateval-submission/1";
 
 /// Largest `submission.json` that is read, in bytes.
 pub const MAX_SUBMISSION_BYTES: u64 = 1 << 20;
 
-/// `submission.json`: who made this, and how.
+/// `submission.json`: the method and how it was made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionFile {
@@ -26,7 +26,7 @@ pub struct SubmissionFile {
     pub format: String,
     /// The method's name, as tables show it.
     pub method: String,
-    /// Anything that a reader should know: settings, training data, links.
+    /// Settings, training data, links and whatever else readers should know.
     #[serde(default)]
     pub description: String,
     /// Where to read about the method; leaderboards link to it if it begins with `https://` or `http://`.
@@ -35,7 +35,7 @@ pub struct SubmissionFile {
     /// The licence of the method's code and weights, as in `MIT` or `CC-BY-NC-4.0`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
-    /// What it took, as its makers say; nobody checks it.
+    /// The cost as its makers state it, unchecked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
     /// `manifest_sha256` of the dataset that it was made for.
@@ -43,7 +43,7 @@ pub struct SubmissionFile {
 }
 
 impl SubmissionFile {
-    /// Reads a submission's own; fails where it is of another format.
+    /// Reads the file of a submission. Fails where its format is another one.
     pub fn read(submission: &Path) -> Result<Self, SceneError> {
         let path = submission.join(SUBMISSION);
         let file: Self = json::read_within(&path, MAX_SUBMISSION_BYTES)?;
@@ -55,22 +55,22 @@ impl SubmissionFile {
     }
 }
 
-/// What a method takes for a scene.
+/// The cost of a method for one scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cost {
-    /// Seconds for a scene, on the average.
+    /// Seconds a scene, on average.
     #[schemars(range(min = 0.0))]
     pub seconds_a_scene: f64,
-    /// On what, as in `one RTX 4090`.
+    /// The hardware, as in `one RTX 4090`.
     #[serde(default)]
     pub hardware: String,
 }
 
-/// Texels a side that a submission may use.
+/// The sides of a submission's maps that are allowed, in texels.
 pub const MAP_SIZES: std::ops::RangeInclusive<usize> = 64..=4096;
 
-/// What a missing base colour scores as, and what the grey baseline holds; linear.
+/// The linear grey that a missing base colour scores as, and that the grey baseline writes.
 pub const GREY: f32 = 0.5;
 
 /// One of a material's maps.

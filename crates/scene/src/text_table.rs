@@ -1,14 +1,14 @@
-//! Tables for people: rows of cells, set in columns.
+//! Plain-text tables with aligned columns.
 
 use std::fmt::Write as _;
 
-/// Rows of cells; the first row is the head.
+/// A table whose first row is its head.
 pub struct Table {
-    /// Said above.
+    /// The line above the table.
     pub title: String,
-    /// Columns from the left that hold words; all others hold numbers.
+    /// The number of columns, from the left, that hold words; all others hold numbers.
     pub words: usize,
-    /// Of any length each.
+    /// The rows, which may differ in length.
     pub rows: Vec<Vec<String>>,
 }
 
@@ -18,7 +18,7 @@ pub fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
 }
 
 impl Table {
-    /// Title and rows, in columns: words to the left, numbers to the right; a head alone says `none`.
+    /// Title and rows with words aligned left and numbers right, or `none` for a table of nothing but a head.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
         if self.rows.len() <= 1 {

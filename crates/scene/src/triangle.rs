@@ -32,8 +32,8 @@ pub struct EdgePoint {
     pub weights: DVec3,
 }
 
-/// The point of the triangle's edges nearest to `point`: the nearest of the triangle for every point beside it (Ericson,
-/// "Real-Time Collision Detection", 2005, section 5.1.5). Of equally near ones that of the earlier edge.
+/// The point of the triangle's edges nearest to `point`: the nearest of the triangle for every point beside it
+/// (Ericson, "Real-Time Collision Detection", 2005, section 5.1.5). Of equally near ones that of the earlier edge.
 pub fn nearest_on_edges([a, b, c]: [DVec3; 3], point: DVec3) -> EdgePoint {
     let edges = [(a, b, DVec3::X, DVec3::Y), (b, c, DVec3::Y, DVec3::Z), (c, a, DVec3::Z, DVec3::X)];
     let on_edges = edges.map(|(from, to, first, second)| {

@@ -1,6 +1,6 @@
-//! Which triangle each texel of an instance's atlas belongs to.
+//! The triangle that each texel of an instance's atlas belongs to.
 //!
-//! Texel (x, y) counts from the top left; its centre lies at uv ((x + 0.5) / size, 1 - (y + 0.5) / size).
+//! Texels are counted from the top left; the centre of (x, y) lies at uv ((x + 0.5) / size, 1 - (y + 0.5) / size).
 
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
@@ -8,11 +8,11 @@ use mateval_image::Picture;
 use crate::mesh::TriangleMesh;
 use crate::triangle;
 
-/// A texel whose centre is this near to a triangle, in texels, takes part in bilinear lookups inside of it.
+/// Texels whose centres are at most this far from a triangle, in texels, take part in bilinear lookups inside it.
 const BILINEAR_REACH: f64 = std::f64::consts::SQRT_2;
 
-/// The owner of every texel: the triangle that its centre lies in, or else the nearest one that a bilinear lookup could
-/// reach it from.
+/// The owner of every texel: the triangle that holds its centre, or else the nearest triangle from which a bilinear
+/// lookup reaches it.
 #[derive(Clone, Debug)]
 pub struct UvAtlas {
     size: usize,
@@ -25,13 +25,13 @@ enum Owner {
     Nobody,
     /// The centre lies in the triangle.
     Inside(u32),
-    /// The centre lies within reach of the triangle.
+    /// The centre lies outside, but within bilinear reach of the triangle.
     Near(u32),
 }
 
 impl UvAtlas {
-    /// Rasters the mesh's uv into `size` times `size` texels. Of two triangles that claim a texel the first has it
-    /// (their common edge). A mesh without uv owns nothing.
+    /// Rasterises the mesh's uv into `size` times `size` texels. A centre on the common edge of two triangles belongs
+    /// to the first. A mesh without uv owns no texel.
     pub fn new(mesh: &TriangleMesh, size: usize) -> Self {
         let corners = texel_corners(mesh, size);
         let mut atlas = Self { size, corners, owners: Picture::filled(size, size, Owner::Nobody) };
@@ -54,16 +54,16 @@ impl UvAtlas {
         }
     }
 
-    /// Barycentric weights of a place (in texels from the top left) with respect to a triangle; they add to one and go
-    /// on linearly outside. The middle of a triangle without area.
+    /// Barycentric weights of a place, in texels from the top left, in a triangle. They add to one and are negative
+    /// outside. For a triangle without area they are those of its middle.
     pub fn barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
         barycentrics(self.corners[triangle], place)
     }
 
-    /// The weights of a triangle's place that is nearest to a place in texels: its own where it lies inside.
+    /// The weights of the triangle's place nearest to a place in texels.
     pub fn nearest_barycentrics(&self, triangle: usize, place: DVec2) -> DVec3 {
         let corners = self.corners[triangle];
-        // Rounding may leave a place of an edge a hair outside.
+        // Rounding may move a place on an edge slightly outside.
         let weights = barycentrics(corners, nearest_in_triangle(corners, place)).max(DVec3::ZERO);
         weights / weights.element_sum()
     }
@@ -74,8 +74,8 @@ impl UvAtlas {
         ((b - a).perp_dot(c - a) / 2.0).abs()
     }
 
-    /// Gives every texel without an owner the value of an owned one nearby (breadth first, so that the nearest layer
-    /// wins). Nothing changes where nothing is owned.
+    /// Gives every texel without an owner the value of an owned one nearby, breadth first. Changes nothing where no
+    /// texel has an owner.
     pub fn fill_gutters<T: Copy>(&self, picture: &mut Picture<T>) {
         let size = self.size;
         let mut done: Vec<bool> = self.owners.pixels().iter().map(|owner| *owner != Owner::Nobody).collect();
@@ -119,7 +119,7 @@ impl UvAtlas {
     fn claim_near(&mut self) {
         let mut distances = Picture::filled(self.size, self.size, f32::INFINITY);
         for triangle in 0..self.corners.len() {
-            // No place of it can be told from another: it must not colour its neighbours' texels.
+            // A triangle without area shows nothing, so it must not take its neighbours' texels.
             if self.texel_area(triangle) == 0.0 {
                 continue;
             }
@@ -136,7 +136,7 @@ impl UvAtlas {
         }
     }
 
-    /// The texels whose centres lie in the triangle's box, grown by `reach` texels.
+    /// The texels whose centres lie in the triangle's bounding box, grown by `reach` texels.
     fn texels_around(&self, triangle: usize, reach: f64) -> impl Iterator<Item = (usize, usize)> + use<> {
         let [a, b, c] = self.corners[triangle];
         let (low, high) = (a.min(b).min(c) - reach - 0.5, a.max(b).max(c) + reach - 0.5);
@@ -176,12 +176,12 @@ fn barycentrics([a, b, c]: [DVec2; 3], place: DVec2) -> DVec3 {
     DVec3::new(1.0 - second - third, second, third)
 }
 
-/// Zero inside.
+/// The distance to the nearest place of the triangle; 0 inside.
 fn distance_to_triangle(corners: [DVec2; 3], place: DVec2) -> f64 {
     nearest_in_triangle(corners, place).distance(place)
 }
 
-/// The place itself where it lies inside.
+/// The nearest place of the triangle: the place itself where it lies inside.
 fn nearest_in_triangle(corners: [DVec2; 3], place: DVec2) -> DVec2 {
     let [a, b, c] = corners;
     if (b - a).perp_dot(c - a) != 0.0 && barycentrics(corners, place).min_element() >= 0.0 {
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn owners_of_a_square() {
         let atlas = UvAtlas::new(&square(), 8);
-        // Texels 2 to 5 of each side lie inside; the one beyond is in bilinear reach; the corner (0, 0) is not.
+        // Texels 2 to 5 of each side lie inside; the next one is in bilinear reach, the corner (0, 0) is not.
         assert_eq!(atlas.owner(3, 5), Some((0, true)));
         assert_eq!(atlas.owner(2, 2), Some((1, true)));
         assert_eq!(atlas.owner(1, 3), Some((1, false)));
@@ -219,13 +219,13 @@ mod tests {
     }
 
     #[test]
-    fn barycentrics_go_on_outside() {
+    fn barycentrics_continue_outside() {
         let atlas = UvAtlas::new(&square(), 8);
         assert_eq!(atlas.barycentrics(0, DVec2::new(2.0, 6.0)), DVec3::X);
         assert!((atlas.barycentrics(0, DVec2::new(0.0, 6.0)) - DVec3::new(1.5, -0.5, 0.0)).length() < 1e-12);
     }
 
-    /// Weights that are only clipped would put this a third of the sliver's length away.
+    /// Clipping the weights alone would move this place by a third of the sliver's length.
     #[test]
     fn beside_a_sliver_its_nearest_place() {
         let uvs = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.995]].map(Vec2::from);

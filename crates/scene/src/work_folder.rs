@@ -1,16 +1,16 @@
-//! Folders that are there whole or not at all.
+//! Outputs: whether they may be written, and folders that appear whole or not at all.
 
 use std::path::{Path, PathBuf};
 
 use crate::SceneError;
 
-/// Fails where the output `path` exists and `force` does not allow to replace it. `place` is what names the output in the
-/// command, as in `--out`.
+/// Fails where the output `path` exists and `force` does not allow to replace it. `place` is what names the output in
+/// the command, as in `--out`.
 pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), SceneError> {
     if force || !path.exists() { Ok(()) } else { Err(SceneError::Exists { path: path.to_owned(), place }) }
 }
 
-/// A folder under work beside its place; [`WorkFolder::finish`] renames it there, dropping it removes it.
+/// A folder that is filled beside its place. [`WorkFolder::finish`] moves it there, dropping it removes it.
 #[derive(Debug)]
 pub struct WorkFolder {
     place: PathBuf,
@@ -18,8 +18,8 @@ pub struct WorkFolder {
 }
 
 impl WorkFolder {
-    /// Starts anew: what an earlier, killed run left beside `place` is removed. Fails for a place without a name of its
-    /// own, as in `.` or `/`.
+    /// Starts an empty folder, after removing what a killed run left. Fails for a place without a name, as in `.` or
+    /// `/`.
     pub fn start(place: &Path) -> Result<Self, SceneError> {
         let work = beside(place, "partial")?;
         remove(&work)?;
@@ -27,12 +27,12 @@ impl WorkFolder {
         Ok(Self { place: place.to_owned(), work })
     }
 
-    /// Where to write until it is finished.
+    /// The folder to fill.
     pub fn path(&self) -> &Path {
         &self.work
     }
 
-    /// Moves the folder to its place. What is there is put aside first and removed last.
+    /// Moves the folder to its place. A folder that exists there is put aside first and removed last.
     pub fn finish(self) -> Result<(), SceneError> {
         put_aside(&self.place)?;
         std::fs::rename(&self.work, &self.place).map_err(SceneError::io("rename to", &self.place))?;
@@ -42,12 +42,12 @@ impl WorkFolder {
 
 impl Drop for WorkFolder {
     fn drop(&mut self) {
-        // After `finish` there is nothing there; after an error the next start would remove it too.
+        // After `finish` it no longer exists; if it cannot be removed after an error, the next start tries again.
         let _ = remove(&self.work);
     }
 }
 
-/// Renames a folder, if it is there, to `.NAME.old` beside it, so that its place is free at once; [`remove_aside`] deletes
+/// Renames a folder, if it exists, to `.NAME.old` beside it, which frees its place at once. [`remove_aside`] deletes
 /// it.
 pub fn put_aside(place: &Path) -> Result<(), SceneError> {
     let old = beside(place, "old")?;
@@ -58,7 +58,7 @@ pub fn put_aside(place: &Path) -> Result<(), SceneError> {
     }
 }
 
-/// Deletes what [`put_aside`] put aside.
+/// Deletes the folder that [`put_aside`] renamed.
 pub fn remove_aside(place: &Path) -> Result<(), SceneError> {
     remove(&beside(place, "old")?)
 }
@@ -66,7 +66,7 @@ pub fn remove_aside(place: &Path) -> Result<(), SceneError> {
 /// `.NAME.ending` beside `NAME`.
 fn beside(place: &Path, ending: &str) -> Result<PathBuf, SceneError> {
     let Some(name) = place.file_name() else {
-        let what = "a folder without a name of its own; name the folder to be made".to_owned();
+        let what = "a folder without a name; name the folder to be made".to_owned();
         return Err(SceneError::Unsupported { path: place.to_owned(), what });
     };
     let mut hidden = std::ffi::OsString::from(".");
@@ -91,7 +91,7 @@ mod tests {
     fn nothing_is_at_the_place_until_it_is_finished() {
         let root = tempfile::tempdir().unwrap();
         let place = root.path().join("out");
-        // As a killed run leaves it.
+        // What a killed run leaves.
         std::fs::create_dir(root.path().join(".out.partial")).unwrap();
         std::fs::write(root.path().join(".out.partial/old"), "x").unwrap();
         std::fs::create_dir(&place).unwrap();

@@ -1,6 +1,7 @@
-//! Renders whose expectation is known, for tests of what is free of noise.
+//! Noisy pictures whose expectation is known, for tests of metrics that remove noise.
 
 use mateval_image::{LinearRgb, Picture};
+use mateval_scene::splitmix64::{INCREMENT, number};
 
 /// How single samples scatter about their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,14 +12,17 @@ pub enum Scatter {
     HeavyTailed,
 }
 
+/// Both of them.
 pub const SCATTERS: [Scatter; 2] = [Scatter::GaussianLike, Scatter::HeavyTailed];
 
 /// How a picture is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct Render<'a> {
+    /// How its samples scatter.
     pub scatter: Scatter,
     /// The share of each sample that scatters.
     pub strength: f64,
+    /// Samples a pixel.
     pub samples: u32,
     /// Where given, three of four samples are shared by all pixels of a block, in whatever view.
     pub blocks: Option<&'a Picture<u32>>,
@@ -54,12 +58,10 @@ impl Render<'_> {
     }
 }
 
-/// The finaliser of SplitMix64 over both.
+/// Mixes two numbers into one.
 fn hash(state: u64, word: u64) -> u64 {
-    let mut h = state ^ word.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    h = (h ^ (h >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    h = (h ^ (h >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    h ^ (h >> 31)
+    let mixed = state ^ word.wrapping_add(1).wrapping_mul(INCREMENT);
+    number(mixed.wrapping_sub(INCREMENT), 0)
 }
 
 /// The mean of two halves.

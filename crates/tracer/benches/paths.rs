@@ -39,10 +39,7 @@ fn main() {
     let rounds: usize = words.first().map_or(5, |word| word.parse().unwrap());
     let scenes = ["bench/room", "bench/dense", "20000", "1000000", "3000000"];
     for scene in words.get(1).map_or(scenes.to_vec(), |scene| vec![scene.as_str()]) {
-        let Some((reference, camera)) = load(scene) else {
-            println!("SKIPPED: {scene} is not here; set MATEVAL_DATA");
-            continue;
-        };
+        let Some((reference, camera)) = load(scene) else { continue };
         measure(scene, reference, &camera, rounds);
     }
 }

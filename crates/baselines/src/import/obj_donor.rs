@@ -16,7 +16,7 @@ use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, 
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     let bytes = folder.read(name).map_err(|fault| fault.message)?;
     let limits = ObjLimits { triangles: MAX_TRIANGLES, corners: 3 * MAX_TRIANGLES };
-    let read = obj::read(&bytes, limits, Materials::Told).map_err(|error| error.to_string())?;
+    let read = obj::read(&bytes, limits, Materials::Split).map_err(|error| error.to_string())?;
     if read.mixed_uvs {
         return Err("some faces have texture coordinates and some have none".to_owned());
     }

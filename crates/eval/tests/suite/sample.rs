@@ -21,6 +21,7 @@ use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
 use mateval_scene::{SceneId, glb, reference_io};
 use mateval_submission::texel_map::TexelMap;
+use mateval_testkit::data::lpips_weights;
 use mateval_tracer::World;
 
 use super::kept_folder::kept_folder;
@@ -118,23 +119,9 @@ pub fn write_changed(out: &Path, change: impl Fn(&Picture<LinearRgb>) -> Picture
     .unwrap();
 }
 
-/// The network of LPIPS; where its weights are absent that is said, past the test runner's capture.
+/// The network of LPIPS; none where its weights are missing.
 pub fn lpips() -> Option<Lpips> {
-    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let folder = set("MATEVAL_CACHE")
-        .or_else(|| set("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
-        .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))?;
-    let path = folder.join(Net::Alex.file_name());
-    if path.is_file() {
-        return Some(Lpips::load(Net::Alex, &path).unwrap());
-    }
-    use std::io::Write as _;
-    let thread = std::thread::current();
-    let name = thread.name().unwrap_or("a test");
-    let line =
-        format!("SKIPPED: LPIPS in {name}: no '{}'; run: python3 tools/fetch_lpips_weights.py\n", path.display());
-    std::io::stderr().write_all(line.as_bytes()).unwrap();
-    None
+    Some(Lpips::load(Net::Alex, &lpips_weights(Net::Alex.file_name())?).unwrap())
 }
 
 /// What is scored, all of it under `protocol`.

@@ -1,9 +1,6 @@
-#![allow(clippy::unwrap_used)] // tests may
-
 use super::*;
-use crate::mse;
-use crate::noise_free_mse;
-use crate::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, single_pixels, squares, waves};
+use crate::{mse, noise_free_mse};
+use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, single_pixels, squares, waves};
 
 const SIDE: usize = 16;
 const SEEDS: u64 = 64;

@@ -1,18 +1,19 @@
-//! A convolution and the rectifier after it, as products of matrices.
+//! A convolution and the rectifier after it, as matrix products.
 //!
 //! Each output pixel's patch of the input becomes a row of a matrix ("im2col"), which is multiplied with the weights.
-//! Only [`BLOCK_PIXELS`] rows exist at a time and thread. Blocks are the same for any number of threads, and so is
-//! every sum.
+//! A thread holds only [`BLOCK_PIXELS`] rows at a time. Blocks, and so the order of every sum, do not depend on the
+//! number of threads.
 
 use rayon::prelude::*;
 
 use super::multiply::add_product;
 use super::tensor::Tensor;
 
-/// Output pixels in one product of matrices: enough to keep it busy, few enough that small pictures feed many threads.
+/// Output pixels of one matrix product: enough for an efficient product, few enough that small pictures occupy several
+/// threads.
 const BLOCK_PIXELS: usize = 192;
 
-/// The form of a convolution: a square kernel, zeros around the input.
+/// The shape of a convolution with a square kernel and zeros around the input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shape {
     pub(crate) kernel: usize,
@@ -72,7 +73,7 @@ impl Convolution {
         output
     }
 
-    /// Output pixels from number `first` on; `width` is the output's. `patches` is memory to be used again.
+    /// Computes the output pixels from index `first` on; `width` is the output's. `patches` is memory for reuse.
     fn fill_block(&self, input: &Tensor, width: usize, first: usize, patches: &mut Vec<f32>, values: &mut [f32]) {
         let (patch, outputs) = (self.shape.patch(), self.shape.outputs);
         let pixels = values.len() / outputs;
@@ -86,10 +87,10 @@ impl Convolution {
         values.iter_mut().for_each(|value| *value = value.max(0.0));
     }
 
-    /// What output pixel (x, y) sees of the input: kernel rows from the top, pixels from the left, channels.
+    /// Copies the input under the kernel of output pixel (x, y): rows from the top, pixels from the left, channels.
     fn fill_patch(&self, input: &Tensor, x: usize, y: usize, patch: &mut [f32]) {
         let Shape { kernel, stride, padding, inputs, .. } = self.shape;
-        // Columns of the kernel that lie left of the input, and the first that lies right of it.
+        // The kernel's columns `left..right` lie inside the input.
         let left = padding.saturating_sub(x * stride).min(kernel);
         let right = (input.width + padding).saturating_sub(x * stride).min(kernel).max(left);
         for (dy, row) in patch.chunks_mut(kernel * inputs).enumerate() {
@@ -121,7 +122,7 @@ mod tests {
         (0..count).map(|_| next()).collect()
     }
 
-    /// The definition, one product after another; `shift` moves the input, for the twin that must fail.
+    /// The definition as plain sums. `shift` moves the input, for the twin that must fail.
     fn direct(shape: &Shape, weights: &[f32], bias: &[f32], input: &Tensor, shift: usize) -> Vec<f64> {
         let side = |n| shape.output_side(n).expect("fits");
         let mut output = Vec::new();

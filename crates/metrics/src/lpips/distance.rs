@@ -1,4 +1,4 @@
-//! How far apart the features of two pictures are.
+//! The distance between the features of two pictures.
 
 use rayon::prelude::*;
 
@@ -15,7 +15,7 @@ pub(crate) fn mean(network: &Network, prediction: &Features, reference: &Feature
 /// The sum over stages and pixels of the stages' maps, each enlarged to the picture's size.
 pub(crate) fn enlarged_sum(network: &Network, prediction: &Features, reference: &Features) -> f64 {
     let sums = maps(network, prediction, reference).map(|(stage, map)| {
-        // The enlarged map is never made: it is known how much each of its sources counts in its sum.
+        // The enlarged map is not computed: its sum is a weighted sum of the stage's values.
         let columns = enlarged_counts(stage.width, prediction.width());
         let rows = enlarged_counts(stage.height, prediction.height());
         let row_sum = |row: &[f64]| row.iter().zip(&columns).map(|(value, count)| value * count).sum::<f64>();
@@ -45,8 +45,8 @@ fn pixel_distance(linear: &[f32], p: &[f32], r: &[f32]) -> f64 {
     terms.map(|(&weight, (&p, &r))| f64::from(weight) * (f64::from(p) - f64::from(r)).powi(2)).sum()
 }
 
-/// How much each of `from` samples counts in the sum over `to` samples interpolated linearly between them, pixel
-/// centres at one half and the ends continued (torch's `bilinear` with `align_corners=False`). Their sum is `to`.
+/// The weight of each of `from` samples in the sum over `to` samples interpolated linearly between them, with pixel
+/// centres at one half and the ends continued (torch's `bilinear` with `align_corners=False`). The weights add to `to`.
 fn enlarged_counts(from: usize, to: usize) -> Vec<f64> {
     let mut counts = vec![0.0; from];
     for target in 0..to {
@@ -63,7 +63,7 @@ fn enlarged_counts(from: usize, to: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// By hand: two samples enlarged to four sit at 0, 0.25, 0.75 and 1; three to three at themselves.
+    /// By hand: two samples enlarged to four lie at 0, 0.25, 0.75 and 1; three stay where they are.
     #[test]
     fn counts_by_hand() {
         assert_eq!(enlarged_counts(2, 4), [2.0, 2.0]);

@@ -1,11 +1,11 @@
 //! LPIPS of a noisy render, extrapolated to no noise.
 //!
-//! To first order noise raises the distance by as much as its own variance, which halves when the samples double. So
-//! with L(m) of the mean of two halves and L(a), L(b) of each, L0 = 2 L(m) - (L(a) + L(b)) / 2 (Richardson's
+//! To first order, noise raises the distance in proportion to its variance, which halves when the samples double. So
+//! from L(m) of the mean of two halves and L(a), L(b) of each, L0 = 2 L(m) - (L(a) + L(b)) / 2 (Richardson
 //! extrapolation in 1 / samples).
 //!
-//! What is left is of second order. Measured with Alex on synthetic renders of 64 samples: less than 0.01 is left of
-//! 0.05 where a pixel of the mean is off by 6 % of its value, 0.03 of 0.1 where it is off by 9 %.
+//! The remaining error is of second order. With Alex on synthetic renders of 64 samples, less than 0.01 remained of an
+//! error of 0.05 where a pixel of the mean is off by 6 % of its value, and 0.03 of 0.1 where it is off by 9 %.
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 
@@ -14,19 +14,19 @@ use crate::MetricError;
 use crate::mask::{black_filled, pixel_count, reference_filled};
 use crate::pixel::{check_finite, check_size, size_of};
 
-/// A noisy render three times, sRGB-encoded, of one size.
+/// The halves of a noisy render and their mean, sRGB-encoded and of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct MeanAndHalves<'a> {
     /// The mean of both halves, taken in linear light and then encoded.
     pub mean: &'a Picture<SrgbRgb>,
     /// One half.
     pub a: &'a Picture<SrgbRgb>,
-    /// The other, of as many samples and another seed.
+    /// The other half, with the same number of samples and another seed.
     pub b: &'a Picture<SrgbRgb>,
 }
 
 impl MeanAndHalves<'_> {
-    /// All three must be of the reference's and the mask's size and finite where the mask counts.
+    /// Fails unless all three have the size of reference and mask and are finite inside the mask.
     fn check(&self, reference: (usize, usize), mask: &Mask) -> Result<(), MetricError> {
         let size = size_of(self.mean);
         check_size(size, "prediction's first half", size_of(self.a))?;
@@ -39,23 +39,23 @@ impl MeanAndHalves<'_> {
     }
 }
 
-/// The distance without noise, and those with it that it comes from. Lower is better.
+/// The distance without noise, and the noisy distances that it comes from. Lower is better.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExtrapolatedLpips {
     /// Extrapolated; it may be slightly below 0 where the true distance is near 0.
     pub lpips: f64,
-    /// Of the halves' mean, noise and all.
+    /// The noisy distance of the halves' mean.
     pub of_mean: f64,
-    /// The mean of that of either half.
+    /// The mean of both halves' noisy distances.
     pub of_halves: f64,
 }
 
 impl Lpips {
     /// [`Lpips::masked`] (protocol `mateval-1`) extrapolated to no noise.
     ///
-    /// `reference_features` are [`Lpips::features`] of the whole `reference`; they depend neither on the prediction nor
-    /// on the mask and serve all of them. `None` where no pixel counts. Fails if sizes differ, a side is below
-    /// [`Net::least_side`](super::Net::least_side), a value is not finite where the mask counts, or the features are of
+    /// `reference_features` are [`Lpips::features`] of the whole `reference`, the same for every prediction and mask.
+    /// `None` where no pixel counts. Fails if sizes differ, a side is below
+    /// [`Net::least_side`](super::Net::least_side), a value inside the mask is not finite, or the features belong to
     /// another network or size.
     pub fn extrapolated_masked(
         &self,
@@ -90,15 +90,15 @@ impl Lpips {
         extrapolated(prediction, mask, distance)
     }
 
-    /// What the network sees in a picture with black outside the mask; computed once for a reference and a mask, it
-    /// serves every prediction. Values outside the mask are not looked at. Fails as [`Lpips::features`] does, and if
-    /// the mask is of another size.
+    /// The network's features of a picture with black outside the mask. Those of a reference serve every prediction
+    /// under the same mask. Values outside the mask are not read. Fails as [`Lpips::features`] does, and if the mask
+    /// has another size.
     pub fn black_filled_features(&self, picture: &Picture<SrgbRgb>, mask: &Mask) -> Result<Features, MetricError> {
         self.features(&black_filled(picture, mask)?)
     }
 }
 
-/// By the distance of one picture, which is `None` where no pixel counts; networks do not run then.
+/// Extrapolates from `distance` of mean and halves. `None`, without running networks, where no pixel counts.
 fn extrapolated(
     prediction: MeanAndHalves,
     mask: &Mask,

@@ -1,4 +1,4 @@
-//! What a network sees in a picture.
+//! The features of a picture: the normalised responses of a network's five stages.
 
 use mateval_image::{Picture, SrgbRgb};
 use rayon::prelude::*;
@@ -9,14 +9,14 @@ use crate::MetricError;
 use crate::error::Size;
 use crate::pixel::{check_finite, size_of};
 
-/// LPIPS' scaling layer: what is taken from each channel of a picture in -1..1, and what it is divided by. They are
-/// ImageNet's mean and deviation, moved from 0..1 to -1..1.
+/// LPIPS' scaling layer, for a picture in -1..1: `SHIFT` is subtracted from each channel, the result is divided by
+/// `SCALE`. They are ImageNet's mean and standard deviation, converted from 0..1 to -1..1.
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
 const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
-/// Keeps pixels that no channel responds to at zero.
+/// Keeps a pixel at zero where all channels are zero.
 const EPSILON: f64 = 1e-10;
 
-/// The five stages' responses to one picture, the channels of every pixel brought to unit length.
+/// The responses of the five stages to one picture, the channels of every pixel normalised to unit length.
 #[derive(Clone, Debug)]
 pub struct Features {
     net: Net,
@@ -45,7 +45,7 @@ impl Features {
     }
 }
 
-/// Runs the network; `name` is the picture's in errors.
+/// Runs the network. Errors call the picture `name`.
 pub(crate) fn compute(
     net: Net,
     network: &Network,
@@ -71,7 +71,7 @@ pub(crate) fn compute(
     Ok(Features { net, size, stages })
 }
 
-/// Both must come from `net` and pictures of one size.
+/// Fails unless both come from `net` and from pictures of one size.
 pub(crate) fn check_pair(net: Net, prediction: &Features, reference: &Features) -> Result<(), MetricError> {
     if prediction.net == net && reference.net == net && prediction.size == reference.size {
         return Ok(());
@@ -79,7 +79,7 @@ pub(crate) fn check_pair(net: Net, prediction: &Features, reference: &Features) 
     Err(MetricError::FeaturesDiffer { prediction: prediction.describe(), reference: reference.describe() })
 }
 
-/// From 0..1 through -1..1 to what the networks were trained on.
+/// From 0..1 to the range that the networks were trained on.
 fn scaled(picture: &Picture<SrgbRgb>) -> Tensor {
     let scale =
         |&SrgbRgb(rgb): &SrgbRgb| -> [f32; 3] { std::array::from_fn(|c| (2.0 * rgb[c] - 1.0 - SHIFT[c]) / SCALE[c]) };

@@ -1,13 +1,13 @@
-//! LPIPS v0.1: how far apart two pictures look to a trained network.
+//! LPIPS v0.1: the distance between two pictures in the features of a trained network.
 //!
 //! Zhang, Isola, Efros, Shechtman, Wang: "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
-//! 2018, as their code has it in version 0.1: the picture in -1..1 is shifted and scaled per channel, runs through the
-//! convolutions of AlexNet or VGG-16, and after each of five stages the channels of every pixel are brought to unit
+//! 2018, as in version 0.1 of their code. The picture in -1..1 is shifted and scaled per channel and runs through the
+//! convolutions of AlexNet or VGG-16; after each of five stages the channels of every pixel are normalised to unit
 //! length. The distance is the mean over a stage's pixels of the weighted squared differences, summed over the stages.
-//! Lower is better; 0 for equal pictures, rarely above 1. In: sRGB-encoded pictures in 0..1.
+//! Lower is better: 0 for equal pictures, rarely above 1. Pictures are sRGB-encoded, in 0..1.
 //!
-//! Convolutions are products of matrices in `f32`, cut into blocks that do not depend on the number of threads: one
-//! machine gives the same bits for any of them. Processors with other vector units may differ in the last digits.
+//! Convolutions are matrix products in `f32`, in blocks that do not depend on the number of threads: one machine gives
+//! the same bits with any number. Processors with other vector units may differ in the last digits.
 
 mod convolution;
 mod distance;
@@ -34,8 +34,8 @@ use net::Network;
 
 /// A network with its weights, ready to compare pictures.
 ///
-/// Memory while [`Lpips::features`] runs, beside the picture: about 0.1 kB a pixel for Alex, 0.6 kB for VGG, plus a few
-/// MB a thread. What [`Features`] keep of that: 0.04 kB a pixel for Alex, 0.5 kB for VGG.
+/// While [`Lpips::features`] runs it takes, beside the picture, about 0.1 kB a pixel for Alex, 0.6 kB for VGG, plus a
+/// few MB a thread. The resulting [`Features`] take 0.04 kB a pixel for Alex, 0.5 kB for VGG.
 #[derive(Debug)]
 pub struct Lpips {
     net: Net,
@@ -46,7 +46,7 @@ pub struct Lpips {
 impl Lpips {
     /// Reads the weights that `tools/fetch_lpips_weights.py` wrote.
     ///
-    /// Fails if the file cannot be read, is not byte for byte the one this version knows, or does not fit the network.
+    /// Fails if the file cannot be read, its hash is not the expected one, or it does not fit the network.
     pub fn load(net: Net, path: &Path) -> Result<Self, MetricError> {
         let (network, sha256) = weights::load(net, path)?;
         Ok(Self { net, sha256, network })
@@ -70,8 +70,9 @@ impl Lpips {
         self.distance(&self.features(prediction)?, &self.features(reference)?)
     }
 
-    /// [`Lpips::whole`] of both pictures with black outside the mask (protocol `paper`): the larger the black part, the
-    /// nearer to 0. `None` where no pixel counts; values outside the mask are not looked at. Fails as [`Lpips::whole`].
+    /// [`Lpips::whole`] of both pictures with black outside the mask (protocol `paper`). The larger the black part, the
+    /// nearer the result is to 0. `None` where no pixel counts. Values outside the mask are not read. Fails as
+    /// [`Lpips::whole`] does.
     pub fn black_fill(
         &self,
         prediction: &Picture<SrgbRgb>,
@@ -85,9 +86,9 @@ impl Lpips {
         self.whole(&black_filled(prediction, mask)?, &black_filled(reference, mask)?).map(Some)
     }
 
-    /// The distance a pixel of the mask (protocol `mateval-1`): the prediction gets the reference's pixels outside the
-    /// mask, and [`Lpips::masked_distance`] compares. `None` where no pixel counts; the prediction is not looked at
-    /// outside the mask, the reference is. Fails as [`Lpips::whole`].
+    /// The distance per pixel of the mask (protocol `mateval-1`): [`Lpips::masked_distance`] after the prediction's
+    /// pixels outside the mask were replaced by the reference's. `None` where no pixel counts. The prediction is not
+    /// read outside the mask, the reference is. Fails as [`Lpips::whole`] does.
     pub fn masked(
         &self,
         prediction: &Picture<SrgbRgb>,
@@ -103,7 +104,7 @@ impl Lpips {
         self.masked_distance(&self.features_named("prediction", &filled)?, &reference, pixel_count(mask))
     }
 
-    /// What the network sees in a picture; computed once for a reference, it serves every prediction.
+    /// The network's features of a picture. Those of a reference serve every prediction.
     ///
     /// Fails if a side is below [`Net::least_side`] or a value is not finite.
     pub fn features(&self, picture: &Picture<SrgbRgb>) -> Result<Features, MetricError> {
@@ -114,15 +115,15 @@ impl Lpips {
         features::compute(self.net, &self.network, name, picture)
     }
 
-    /// [`Lpips::whole`] of two pictures whose features are known. Fails if they are of another network or of two sizes.
+    /// [`Lpips::whole`] of two pictures from their features. Fails if networks or sizes differ.
     pub fn distance(&self, prediction: &Features, reference: &Features) -> Result<f64, MetricError> {
         features::check_pair(self.net, prediction, reference)?;
         Ok(distance::mean(&self.network, prediction, reference))
     }
 
-    /// [`Lpips::masked`] of a filled prediction ([`reference_filled`]) and a reference whose features are known: each
-    /// stage's map of distances is enlarged bilinearly to the picture, the maps are summed over stages and pixels, and
-    /// the sum is divided by `mask_pixels`. `None` where that is 0. Fails as [`Lpips::distance`].
+    /// [`Lpips::masked`] from the features of a filled prediction ([`reference_filled`]) and of the reference: each
+    /// stage's map of distances is enlarged bilinearly to the picture's size, the maps are summed over stages and
+    /// pixels, and the sum is divided by `mask_pixels`. `None` where that is 0. Fails as [`Lpips::distance`] does.
     pub fn masked_distance(
         &self,
         prediction: &Features,

@@ -1,7 +1,8 @@
 //! The product of two matrices.
 
-/// Adds `left * right` to `sum`, all row by row: `sum` is rows x `columns`, `left` rows x `inner`, `right` `inner` x
-/// `columns`. Runs on the calling thread, so the order of the sums depends on the sizes and the processor only.
+/// Adds the matrix product `left * right` to `sum`. All are stored row by row: `sum` is rows x `columns`, `left` is
+/// rows x `inner`, `right` is `inner` x `columns`. Runs on the calling thread, so that the order of sums depends on the
+/// sizes and the processor alone.
 ///
 /// Panics if the lengths do not fit.
 pub(crate) fn add_product(sum: &mut [f32], left: &[f32], right: &[f32], inner: usize, columns: usize) {
@@ -12,8 +13,8 @@ pub(crate) fn add_product(sum: &mut [f32], left: &[f32], right: &[f32], inner: u
     assert_eq!(right.len(), inner * columns, "the right factor is not inner x columns");
     // `gemm` takes (pointer, column stride, row stride); a Vec's length always fits an isize.
     let (row_of_sum, row_of_left) = (columns as isize, inner as isize);
-    // SAFETY: the three asserts say that every index row * row stride + column lies inside its slice; `sum` is borrowed
-    // mutably, so it overlaps neither factor.
+    // SAFETY: by the three asserts every index row * row stride + column lies inside its slice; `sum` is borrowed
+    // mutably and so overlaps neither factor.
     #[allow(unsafe_code)] // `gemm` has no safe entry
     unsafe {
         gemm::gemm(

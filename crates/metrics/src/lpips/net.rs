@@ -1,4 +1,4 @@
-//! The two networks: which file, which layers.
+//! The two networks: their weights files and their layers.
 
 use super::convolution::{Convolution, Shape};
 use super::pool::Pool;
@@ -12,12 +12,12 @@ pub const ALEX_SHA256: &str = "b24653d691930ef38ebb65d7139a65227e482b1abcf5709f4
 /// SHA-256 of the file with VGG's weights.
 pub const VGG_SHA256: &str = "5bd07b60a36a4a0588774f8b9e810e3ea3225925c30a6a73f171bb3932227524";
 
-/// A network LPIPS can look through.
+/// A network whose features LPIPS compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Net {
-    /// AlexNet's five convolutions: fast, the LPIPS authors' choice for scoring.
+    /// AlexNet's five convolutions; fast, and recommended by the LPIPS authors for scoring.
     Alex,
-    /// VGG-16's thirteen: about twenty times the work.
+    /// VGG-16's thirteen convolutions; about twenty times the work.
     Vgg,
 }
 
@@ -46,7 +46,7 @@ impl Net {
         }
     }
 
-    /// Least width and height of a picture, pixels: below it a stage would have none.
+    /// Least width and height of a picture in pixels. A smaller one would leave a stage without a pixel.
     pub const fn least_side(self) -> usize {
         match self {
             Self::Alex => 31,
@@ -63,14 +63,14 @@ impl Net {
     }
 }
 
-/// What a stage does: perhaps a pool, then convolutions.
+/// The layers of a stage: an optional pool, then convolutions.
 #[derive(Debug)]
 pub(crate) struct StageShape {
     pub(crate) pool: Option<Pool>,
     pub(crate) convolutions: Vec<Shape>,
 }
 
-/// Krizhevsky's network as torchvision has it, up to the last rectifier before its third pool.
+/// AlexNet (Krizhevsky) as in torchvision, up to the last rectifier before its third pool.
 fn alex_stages() -> Vec<StageShape> {
     let pool = Some(Pool { window: 3, stride: 2 });
     let stage = |pool, kernel, stride, padding, inputs, outputs| StageShape {
@@ -86,7 +86,7 @@ fn alex_stages() -> Vec<StageShape> {
     ]
 }
 
-/// Simonyan and Zisserman's configuration D, up to the last rectifier before its fifth pool.
+/// VGG configuration D (Simonyan and Zisserman), up to the last rectifier before its fifth pool.
 fn vgg_stages() -> Vec<StageShape> {
     let stages: [(usize, usize, usize); 5] = [(2, 3, 64), (2, 64, 128), (3, 128, 256), (3, 256, 512), (3, 512, 512)];
     let shape = |inputs, outputs| Shape { kernel: 3, stride: 1, padding: 1, inputs, outputs };
@@ -102,7 +102,7 @@ fn vgg_stages() -> Vec<StageShape> {
 pub(crate) struct Stage {
     pub(crate) pool: Option<Pool>,
     pub(crate) convolutions: Vec<Convolution>,
-    /// How much the squared difference of each channel counts.
+    /// The weight of each channel's squared difference.
     pub(crate) linear: Vec<f32>,
 }
 
@@ -113,7 +113,7 @@ pub(crate) struct Network {
 }
 
 impl Network {
-    /// Whether a picture with this width (or height) leaves every stage at least one pixel.
+    /// Whether every stage has at least one pixel for a picture of this width or height.
     pub(crate) fn fits(&self, side: usize) -> bool {
         let mut side = Some(side);
         for stage in &self.stages {

@@ -1,10 +1,10 @@
-//! The largest value of each channel in a moving window.
+//! Max pooling: the largest value of each channel in a moving window.
 
 use rayon::prelude::*;
 
 use super::tensor::Tensor;
 
-/// A square window and how far it moves; windows stay inside the input.
+/// A square window and its stride. Windows stay inside the input.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Pool {
     pub(crate) window: usize,
@@ -17,7 +17,7 @@ impl Pool {
         Some(side.checked_sub(self.window)? / self.stride + 1)
     }
 
-    /// Panics if the window does not fit.
+    /// The pooled input. Panics if the window does not fit.
     pub(crate) fn apply(&self, input: &Tensor) -> Tensor {
         let side = |input| self.output_side(input).expect("the picture's size was checked against the network");
         let mut output = Tensor::zeros(side(input.width), side(input.height), input.channels);

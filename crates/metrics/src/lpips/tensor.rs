@@ -1,4 +1,4 @@
-//! What flows through the network.
+//! The values between two layers of the network.
 
 /// Values at the pixels of a grid: row by row, the channels of a pixel side by side.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,5 +1,4 @@
-//! LPIPS on tiny random networks, so that its code is tested where the real weights are absent.
-#![allow(clippy::unwrap_used)] // tests may
+//! Tests of LPIPS on tiny random networks, which need no weights file.
 
 use proptest::prelude::*;
 
@@ -8,7 +7,7 @@ use super::net::{Stage, StageShape};
 use super::pool::Pool;
 use super::*;
 
-/// Values in -0.5..0.5 from a counter.
+/// Pseudorandom values in -0.5..0.5.
 fn random(count: usize, seed: u64) -> Vec<f32> {
     let mut state = seed.wrapping_mul(2) | 1;
     let mut next = || {
@@ -18,7 +17,7 @@ fn random(count: usize, seed: u64) -> Vec<f32> {
     (0..count).map(|_| next()).collect()
 }
 
-/// Random weights for these stages; linear weights are not negative, as in the real networks.
+/// A network with random weights. Linear weights are not negative, as in the real networks.
 fn random_network(shapes: &[StageShape], seed: u64) -> Network {
     let mut seed = seed;
     let mut values = |count| {
@@ -39,7 +38,7 @@ fn random_network(shapes: &[StageShape], seed: u64) -> Network {
     Network { stages }
 }
 
-/// Two stages, of strides 2 and 1 with a pool between.
+/// Two stages, with strides 2 and 1 and a pool between them.
 fn tiny() -> Lpips {
     let shape = |kernel, stride, inputs, outputs| Shape { kernel, stride, padding: 1, inputs, outputs };
     let shapes = [
@@ -57,7 +56,7 @@ fn noise(width: usize, height: usize, seed: u64) -> Picture<SrgbRgb> {
     Picture::from_fn(width, height, |x, y| SrgbRgb(std::array::from_fn(|c| values[3 * (y * width + x) + c] + 0.5)))
 }
 
-/// The whole metric from its definition in `f64`, on the tiny network's own features.
+/// The metric equals its definition, computed in `f64` from the same features.
 #[test]
 fn the_distance_by_its_definition() {
     let (lpips, p, r) = (tiny(), noise(17, 14, 1), noise(17, 14, 2));
@@ -104,13 +103,13 @@ fn features_of_other_networks_and_sizes_are_refused() {
 }
 
 #[test]
-fn what_is_outside_the_mask() {
+fn values_outside_the_mask() {
     let (lpips, p, r) = (tiny(), noise(24, 18, 10), noise(24, 18, 11));
     let mask = Picture::from_fn(24, 18, |x, y| x > 6 && y < 12);
     let mut spoilt = p.clone();
     spoilt.set(3, 3, SrgbRgb([f32::NAN; 3]));
     spoilt.set(20, 15, SrgbRgb([1e9; 3]));
-    // The prediction is not looked at.
+    // The prediction is not read.
     assert_eq!(lpips.masked(&spoilt, &r, &mask).unwrap(), lpips.masked(&p, &r, &mask).unwrap());
     assert_eq!(lpips.black_fill(&spoilt, &spoilt, &mask).unwrap(), Some(0.0));
     let error = lpips.whole(&spoilt, &r).unwrap_err();
@@ -138,7 +137,7 @@ fn the_thread_count_changes_no_bit() {
     assert_eq!(with(1), with(4));
 }
 
-/// From its definition, by both rules; the reference's features are computed once.
+/// The extrapolation equals its definition under both mask rules.
 #[test]
 fn the_extrapolation_by_its_definition() {
     let (lpips, r) = (tiny(), noise(24, 18, 20));
@@ -154,7 +153,7 @@ fn the_extrapolation_by_its_definition() {
     assert_eq!(found.lpips, 2.0 * found.of_mean - found.of_halves);
     let found = lpips.extrapolated_black_fill(noisy, &black, &mask).unwrap().unwrap();
     assert_eq!(found.lpips, expected(&|p| lpips.black_fill(p, &r, &mask).unwrap().unwrap()));
-    // The twin: the features of the other rule are not those.
+    // The twin: features of the other mask rule give another value.
     assert_ne!(lpips.extrapolated_black_fill(noisy, &whole, &mask).unwrap(), Some(found));
     let none = Picture::filled(24, 18, false);
     assert_eq!(lpips.extrapolated_masked(noisy, &r, &whole, &none).unwrap(), None);
@@ -168,7 +167,7 @@ fn the_extrapolation_by_its_definition() {
     assert!(matches!(error, MetricError::SizesDiffer { what: "prediction's second half", .. }));
 }
 
-/// Pictures without noise are extrapolated to themselves.
+/// Without noise the extrapolation changes nothing.
 #[test]
 fn equal_halves_are_plain_lpips() {
     let (lpips, p, r, mask) = (tiny(), noise(20, 20, 25), noise(20, 20, 26), Picture::from_fn(20, 20, |x, _| x > 4));
@@ -177,7 +176,7 @@ fn equal_halves_are_plain_lpips() {
     assert_eq!(Some(found.lpips), lpips.masked(&p, &r, &mask).unwrap());
 }
 
-/// The least sides are those of the real layers: one pixel less and a stage has none.
+/// The least sides follow from the real layers: with one pixel less, a stage has no pixel.
 #[test]
 fn least_sides_of_the_real_networks() {
     for net in [Net::Alex, Net::Vgg] {

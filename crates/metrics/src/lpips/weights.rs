@@ -1,4 +1,4 @@
-//! The weights, from the file that `tools/fetch_lpips_weights.py` writes.
+//! Reads the weights file that `tools/fetch_lpips_weights.py` writes.
 //!
 //! A safetensors file of little-endian `f32`: `convN.weight` [out, in, height, width], `convN.bias` [out],
 //! `linN.weight` [channels], N from 1.
@@ -14,10 +14,10 @@ use super::convolution::{Convolution, Shape};
 use super::net::{Net, Network, Stage, StageShape};
 use crate::MetricError;
 
-/// More than either file has.
+/// Larger than either file.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// The network and the file's SHA-256, which must be the expected one.
+/// The network and the file's SHA-256. Fails unless the hash is the expected one.
 pub(crate) fn load(net: Net, path: &Path) -> Result<(Network, String), MetricError> {
     let bytes = read_capped(path).map_err(|source| MetricError::WeightsIo { path: path.to_owned(), source })?;
     let found: String = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
@@ -27,14 +27,14 @@ pub(crate) fn load(net: Net, path: &Path) -> Result<(Network, String), MetricErr
     Ok((parse(&net.stages(), &bytes)?, found))
 }
 
-/// The file's bytes; at most one more than [`MAX_BYTES`], which no hash will fit.
+/// The file's bytes, at most one more than [`MAX_BYTES`], so that a larger file fails the check of its hash.
 fn read_capped(path: &Path) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// The network of these stages from the bytes of a safetensors file.
+/// The network with these stages, from the bytes of a safetensors file.
 fn parse(shapes: &[StageShape], bytes: &[u8]) -> Result<Network, MetricError> {
     let file = SafeTensors::deserialize(bytes).map_err(|error| malformed(error.to_string()))?;
     let mut number = 0;
@@ -59,7 +59,7 @@ fn convolution(file: &SafeTensors<'_>, number: usize, shape: Shape) -> Result<Co
     Ok(Convolution::new(shape, &weights, bias))
 }
 
-/// The tensor of this name, which must be `f32` and of this shape.
+/// The tensor with this name. Fails unless it is `f32` and has this shape.
 fn floats(file: &SafeTensors<'_>, name: &str, shape: &[usize]) -> Result<Vec<f32>, MetricError> {
     let tensor = file.tensor(name).map_err(|error| malformed(format!("'{name}': {error}")))?;
     if tensor.dtype() != Dtype::F32 || tensor.shape() != shape {
@@ -75,7 +75,6 @@ fn malformed(reason: String) -> MetricError {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used)] // tests may
 mod tests {
     use safetensors::tensor::TensorView;
 
@@ -135,7 +134,7 @@ mod tests {
         assert!(matches!(load(Net::Alex, &path), Err(MetricError::WeightsHash { .. })));
     }
 
-    /// The tool that writes the files and the code that reads them must mean the same ones.
+    /// The tool that writes the files and the code that reads them agree on names and hashes.
     #[test]
     fn the_tool_has_the_same_names_and_hashes() {
         let tool = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tools/fetch_lpips_weights.py");

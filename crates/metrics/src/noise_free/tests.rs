@@ -1,10 +1,10 @@
-#![allow(clippy::unwrap_used)] // tests may
-
 use mateval_image::LinearRgb;
 
 use super::*;
 use crate::mse;
-use crate::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, mean_of, single_pixels, squares, waves};
+use mateval_testkit::synthetic_noise::{
+    Render, SCATTERS, Scatter, mean_and_deviation, mean_of, single_pixels, squares, waves,
+};
 
 const SIDE: usize = 24;
 const SAMPLES: [u32; 3] = [4, 16, 64];

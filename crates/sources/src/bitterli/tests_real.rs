@@ -1,22 +1,13 @@
-//! The real scenes, where they are: `MATEVAL_DATA`, or `shared/data` beside the repository.
-
-use std::path::PathBuf;
+//! Real scenes, from the shared data.
 
 use mateval_scene::Severity;
+use mateval_testkit::data::shared_data;
 
 use super::*;
 
-/// The scene, or none after saying so.
+/// The scene; none where the shared data are missing.
 fn real(file: &str) -> Option<BitterliScene> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let path = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join("bitterli").join(file);
-    if !path.exists() {
-        #[expect(clippy::print_stderr, reason = "a test that is not run says so")]
-        {
-            eprintln!("SKIPPED: no '{}'", path.display());
-        }
-        return None;
-    }
+    let path = shared_data(&format!("bitterli/{file}"))?;
     Some(read(&path, &Limits::default()).unwrap())
 }
 

@@ -1,30 +1,20 @@
-//! Two real houses, where they are: `MATEVAL_DATA`, or `shared/data` beside the repository.
-
-use std::path::PathBuf;
+//! Two real houses, from the shared data.
 
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::material::{ColorInput, MaterialModel};
+use mateval_testkit::data::shared_data;
 
 use super::*;
 
 const TWO_BEDROOMS: &str = "07700701-1835-4532-8af0-bd8c7f624b1b";
 const STORAGE: &str = "dc74ad5c-34cf-4237-a3f3-a94297a907c8";
 
-/// The house, or none after saying so.
+/// The house; none where the shared data are missing.
 fn real(uid: &str) -> Option<FurnishedHouse> {
-    let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let root = std::env::var_os("MATEVAL_DATA").map_or_else(beside, PathBuf::from).join("3d-front");
-    let house = PathBuf::from(format!("3D-FRONT/{uid}.json"));
-    if !root.join(&house).exists() {
-        #[expect(clippy::print_stderr, reason = "a test that is not run says so")]
-        {
-            eprintln!("SKIPPED: no '{}'", root.join(&house).display());
-        }
-        return None;
-    }
+    shared_data(&format!("3d-front/3D-FRONT/{uid}.json"))?;
     let files = HouseFiles {
-        root,
-        house,
+        root: shared_data("3d-front")?,
+        house: format!("3D-FRONT/{uid}.json").into(),
         models: "3D-FUTURE-model".into(),
         textures: None,
         cameras: Some("camera_data.json".into()),

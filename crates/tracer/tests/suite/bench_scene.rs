@@ -12,22 +12,13 @@ use mateval_scene::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+use mateval_testkit::data::shared_data;
 use serde_json::Value;
 
-/// The folder of `bench/<name>`, if the data is there: `MATEVAL_DATA`, or `../shared/data` from the project's root.
+/// The folder of `bench/<name>`; none where the shared data are missing.
 pub fn folder(name: &str) -> Option<PathBuf> {
-    let data = std::env::var_os("MATEVAL_DATA").map_or_else(beside_the_project, PathBuf::from);
-    let folder = data.join("bench").join(name);
-    folder.join("scene.json").is_file().then_some(folder)
-}
-
-/// Tells of a test that is left out, even where the test runner keeps what tests print to itself.
-#[allow(dead_code, reason = "benchmarks print")]
-pub fn say_skipped(why: &str) {
-    use std::io::Write as _;
-    let thread = std::thread::current();
-    let line = format!("SKIPPED: {}: {why}\n", thread.name().unwrap_or("a test"));
-    std::io::stderr().write_all(line.as_bytes()).unwrap();
+    let scene = shared_data(&format!("bench/{name}/scene.json"))?;
+    scene.parent().map(Path::to_owned)
 }
 
 /// Mitsuba's picture of a scene of 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`, max_depth 8,
@@ -40,13 +31,6 @@ pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     let floats: Vec<f32> = bytes[start..].as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
     let pixels = floats.as_chunks::<3>().0.iter().map(|rgb| LinearRgb(*rgb)).collect();
     Picture::new(SIZE, SIZE, pixels).unwrap()
-}
-
-/// The nearest folder above this crate or package that holds `Cargo.lock` is the project's root.
-fn beside_the_project() -> PathBuf {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let root = package.ancestors().find(|folder| folder.join("Cargo.lock").is_file()).unwrap_or(package);
-    root.join("../shared/data")
 }
 
 /// The scene, with Mitsuba's flavour of `principled`, two-sided surfaces and one-sided lamps, as its references were made;
