@@ -4,7 +4,6 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 use std::path::Path;
-use std::sync::Arc;
 
 use cpu_time::ProcessTime;
 use glam::DVec3;
@@ -65,11 +64,11 @@ fn stages(files: &HouseFiles) -> [f64; 6] {
     note(0);
     let house = furnish(files, &Limits::default()).unwrap();
     note(1);
-    World::new(Arc::new(house.scene.clone())).unwrap();
+    let world = World::new(house.scene.clone()).unwrap();
     note(2);
     let room = (0..house.wanted_pieces.len()).max_by_key(|&room| house.wanted_pieces[room]).unwrap();
     let views = views(&house, room);
-    let scene = room_scene(&house, room, &views).unwrap().scene;
+    let scene = room_scene(&house, &world, room, &views).scene;
     note(3);
     let unwrapped: Vec<_> = scene
         .surfaces

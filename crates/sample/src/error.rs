@@ -1,18 +1,18 @@
-//! The one error of this crate.
+//! The error type of this crate.
 
 use std::path::PathBuf;
 
 /// Why the built-in scenes could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum SampleError {
-    /// The file system refused.
+    /// An operation of the file system failed.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
-        /// What was tried, as in "read" or "write".
+        /// The operation, as in "read" or "write".
         action: &'static str,
-        /// The file.
+        /// The file or folder.
         path: PathBuf,
-        /// The system's reason.
+        /// The operating system's reason.
         source: std::io::Error,
     },
     /// A picture could not be written.
@@ -21,7 +21,7 @@ pub enum SampleError {
 }
 
 impl SampleError {
-    /// A [`SampleError::Io`]; to be used with `map_err`.
+    /// Makes a [`SampleError::Io`] of an [`std::io::Error`], for use with `map_err`.
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }

@@ -1,11 +1,13 @@
-//! A small room and a house that the program makes itself, under CC0: what one can try everything on without a download.
+//! The built-in sample: a small room and a house under CC0, on which every command can be tried without a download.
 //!
-//! In: a folder. Out: in it `recipe.toml`; `room/`, a Mitsuba scene as Bitterli's are: `scene.xml`, OBJ files, textures,
-//! `LICENSE.txt`; and `house/`, three rooms in the layout of 3D-FRONT and 3D-FUTURE, with their faults. The bytes are the
-//! same on every machine.
+//! The input is a folder. Written into it are `recipe.toml`, which lists both scenes, and two sources:
+//! - `room/`, a Mitsuba scene laid out as Bitterli's are: `scene.xml`, OBJ files, textures, `LICENSE.txt`;
+//! - `house/`, three rooms in the layout of 3D-FRONT and 3D-FUTURE, with planted faults.
 //!
-//! Between: `solid` builds meshes, `furniture` makes things of them, `pattern` paints the textures, `room` says what
-//! stands where and writes it as XML. `house` uses the first three.
+//! The bytes are the same on every machine.
+//!
+//! `solid` builds meshes, `furniture` combines them into objects, `pattern` paints the textures, and `room` places the
+//! objects and writes the XML. `house` uses the first three.
 
 mod error;
 mod furniture;
@@ -20,7 +22,7 @@ use mateval_image::png_io::write_rgb_bytes;
 
 pub use error::SampleError;
 
-/// CC0 1.0, and what it covers.
+/// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
 This scene was released under a CC0 license and is in the public domain.\n\
 It may be copied, modified and used commercially, without permission or\n\
@@ -28,7 +30,7 @@ attribution.\n\n\
 For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
-/// One scene of each source.
+/// A recipe with one scene from each source.
 const RECIPE: &str = r#"name = "sample"
 resolution = [320, 240]
 
@@ -47,11 +49,11 @@ id = "room"
 bitterli = "room/scene.xml"
 "#;
 
-/// Writes the sample into the folder `out`, which is made if it is not there; files of the same name are replaced.
+/// Writes the sample into the folder `out`, which is created if it is missing. Files of the same name are replaced.
 pub fn write(out: &Path) -> Result<(), SampleError> {
     write_room(out)?;
     house::write(out)?;
-    // The recipe comes last: where it is, the sample is whole.
+    // The recipe is written last, so that a folder with a recipe holds a complete sample.
     write_text(&out.join("recipe.toml"), RECIPE)
 }
 
@@ -102,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn it_holds_what_it_is_for_and_stays_small() {
+    fn it_covers_the_materials_and_lights_and_stays_small() {
         let BitterliScene { scene, .. } = sample();
         let triangles: usize = scene.surfaces.iter().map(|s| s.mesh.triangles.len()).sum();
         assert!((500..5000).contains(&triangles), "{triangles}");
@@ -116,9 +118,9 @@ mod tests {
         assert_eq!(kinds(|e| matches!(e, Emission::Environment { .. })), 1);
     }
 
-    /// The middle of the mirror and of the window are in the picture.
+    /// The centre of each main object projects into the picture.
     #[test]
-    fn mirror_and_window_are_in_view() {
+    fn the_main_objects_are_in_view() {
         let room = sample();
         for name in ["mirror", "window_glass", "table", "sofa", "shelf", "rug", "lamp_stand"] {
             let surface = room.scene.surfaces.iter().find(|s| s.name == name).unwrap();
@@ -129,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Faces look into the room or out of their thing: the floor up, the ceiling down.
+    /// The floor faces up, the ceiling and its light face down.
     #[test]
     fn floor_and_ceiling_face_the_room() {
         let room = sample();
@@ -164,9 +166,9 @@ mod tests {
         assert_eq!(first, files());
     }
 
-    /// One hash over what was drawn and built, so that a change of any platform's arithmetic shows.
+    /// One hash over all textures, meshes and the XML, so that a difference in any platform's arithmetic shows.
     #[test]
-    fn the_bytes_are_these() {
+    fn the_bytes_have_the_pinned_hash() {
         use sha2::{Digest as _, Sha256};
         let mut hash = Sha256::new();
         for (_, picture) in pattern::all() {

@@ -1,9 +1,9 @@
-//! The textures, painted from integer hashes and plain arithmetic only: no function whose last digit differs between
-//! machines. Colours are sRGB bytes; coordinates are in shares of the picture, v downwards.
+//! Painted textures. Only integer hashes and basic arithmetic are used, whose results are the same on every machine.
+//! Pictures hold sRGB bytes. Coordinates run from 0 to 1 over the picture, v downwards.
 
 use mateval_image::Picture;
 
-/// Every texture and its name.
+/// The room's textures and their names.
 pub(super) fn all() -> Vec<(&'static str, Picture<[u8; 3]>)> {
     vec![
         ("planks", paint(512, 512, planks)),
@@ -15,10 +15,10 @@ pub(super) fn all() -> Vec<(&'static str, Picture<[u8; 3]>)> {
     ]
 }
 
-/// sRGB values of 0 to 1.
+/// An sRGB-encoded colour, 0 to 1.
 pub(super) type Color = [f64; 3];
 
-/// `color_at` gives sRGB values of 0 to 1 at texel centres.
+/// A picture whose texels are the colours that `color_at` gives at their centres.
 pub(super) fn paint(width: usize, height: usize, color_at: impl Fn(f64, f64) -> Color) -> Picture<[u8; 3]> {
     Picture::from_fn(width, height, |x, y| {
         let color = color_at((x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64);
@@ -26,7 +26,7 @@ pub(super) fn paint(width: usize, height: usize, color_at: impl Fn(f64, f64) -> 
     })
 }
 
-/// A well-mixed number from three (the finaliser of MurmurHash3).
+/// A hash of three numbers (the finaliser of MurmurHash3).
 fn hash(x: i64, y: i64, seed: u32) -> u32 {
     let mut h =
         (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77) ^ seed.wrapping_mul(0xc2b2_ae3d);
@@ -36,12 +36,12 @@ fn hash(x: i64, y: i64, seed: u32) -> u32 {
     h ^ (h >> 16)
 }
 
-/// 0 to 1.
+/// A pseudo-random number of 0 to 1 that follows from the arguments.
 pub(super) fn random(x: i64, y: i64, seed: u32) -> f64 {
     f64::from(hash(x, y, seed)) / f64::from(u32::MAX)
 }
 
-/// Smooth noise of 0 to 1 that repeats after `nx` and `ny` cells, which span the picture.
+/// Smooth noise of 0 to 1 with `nx` by `ny` cells over the picture. It repeats without a seam.
 pub(super) fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
     let (x, y) = (u * nx as f64, v * ny as f64);
     let (i, j) = (x.floor() as i64, y.floor() as i64);
@@ -51,32 +51,36 @@ pub(super) fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
     mix1(mix1(at(0, 0), at(1, 0), s), mix1(at(0, 1), at(1, 1), s), t)
 }
 
+/// Linear interpolation from `a` to `b`.
 fn mix1(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
+/// Linear interpolation from `a` to `b`; `t` is clamped to 0 to 1.
 pub(super) fn mix(a: Color, b: Color, t: f64) -> Color {
     std::array::from_fn(|c| mix1(a[c], b[c], t.clamp(0.0, 1.0)))
 }
 
-/// 0 to 1 and back as `t` goes from 0 to 1.
+/// A triangle wave of period 1: 0 at whole numbers, 1 between them.
 pub(super) fn triangle(t: f64) -> f64 {
     1.0 - (2.0 * (t - t.floor()) - 1.0).abs()
 }
 
-/// 0 below `from`, 1 above `to`.
+/// 0 below `from`, 1 above `to`, linear in between.
 pub(super) fn ramp(from: f64, to: f64, value: f64) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 
-/// Eight rows of oak planks along u, each of two lengths, with dark joints.
+/// Eight rows of oak planks along u, two planks a row, with dark joints.
 pub(super) fn planks(u: f64, v: f64) -> Color {
     const ROWS: i64 = 8;
+    // The plank under the point, and the place within it.
     let row = (v * ROWS as f64).floor() as i64;
     let shifted = u + random(row, 0, 1);
     let half = (shifted * 2.0).floor() as i64;
     let plank = half.rem_euclid(2) + 2 * row;
     let (across, along) = (v * ROWS as f64 - row as f64, shifted * 2.0 - half as f64);
+    // Growth rings and fibres give the tone.
     let seed = 100 + plank as u32;
     let waves = noise(u, v, 6, 24, seed);
     let rings = triangle(across * 3.0 + waves * 2.2 + random(plank, 1, 2));
@@ -87,7 +91,7 @@ pub(super) fn planks(u: f64, v: f64) -> Color {
     mix([0.16, 0.10, 0.07], color, 0.25 + 0.75 * joint)
 }
 
-/// Dark walnut with long grain along u.
+/// Dark walnut with its grain along u.
 pub(super) fn wood(u: f64, v: f64) -> Color {
     let bend = noise(u, v, 3, 4, 7) + 0.4 * noise(u, v, 6, 12, 8);
     let rings = triangle(v * 7.0 + bend * 1.6);
@@ -97,11 +101,12 @@ pub(super) fn wood(u: f64, v: f64) -> Color {
     mix(color, [0.14, 0.08, 0.05], 0.6 * pores)
 }
 
-/// Pale leaves and dots in a half-drop repeat on sage green.
+/// Wallpaper with pale leaves and dots on sage green; every second column is shifted by half a repeat.
 fn wallpaper(u: f64, v: f64) -> Color {
     let column = (u * 2.0).floor();
     let x = u * 2.0 - column - 0.5;
     let y = (v + 0.5 * column).rem_euclid(1.0) - 0.5;
+    // Each shape is a function that is positive inside it.
     let leaf = |cx: f64, cy: f64, tilt: f64, long: f64, wide: f64| {
         let (dx, dy) = (x - cx, 2.0 * (y - cy));
         let (a, b) = (dx + tilt * dy, dy - tilt * dx);
@@ -113,12 +118,13 @@ fn wallpaper(u: f64, v: f64) -> Color {
     let stem = 1.0 - x * x / 0.0004 - (y - 0.1) * (y - 0.1) / 0.08;
     let dot = 1.0 - (x * x + (2.0 * (y - 0.4)) * (2.0 * (y - 0.4))) / 0.004;
     let shape = sides.into_iter().chain(low).chain([bud, stem, dot]).fold(f64::MIN, f64::max);
+    // Shapes are drawn over the ground, the bud with a darker vein.
     let ground = mix([0.44, 0.53, 0.47], [0.48, 0.57, 0.50], noise(u, v, 64, 64, 11));
     let vein = if shape == bud && x.abs() < 0.012 { 0.5 } else { 1.0 };
     mix(ground, [0.88, 0.86, 0.74], ramp(0.0, 0.12, shape) * vein)
 }
 
-/// A plain weave of two blues.
+/// A plain weave in two blues.
 pub(super) fn fabric(u: f64, v: f64) -> Color {
     const THREADS: f64 = 32.0;
     let (i, j) = ((u * THREADS).floor() as i64, (v * THREADS).floor() as i64);
@@ -130,9 +136,10 @@ pub(super) fn fabric(u: f64, v: f64) -> Color {
     color.map(|c| c * light)
 }
 
-/// Borders around a field of lozenges.
+/// A rug: borders around a field of lozenges.
 fn rug(u: f64, v: f64) -> Color {
     const ASPECT: f64 = 1.9 / 1.3;
+    // The field of lozenges.
     let edge = (u.min(1.0 - u) * ASPECT).min(v.min(1.0 - v));
     let (a, b) = ((u * ASPECT + v) * 6.0, (u * ASPECT - v) * 6.0);
     let lozenge = triangle(a).min(triangle(b));
@@ -144,6 +151,7 @@ fn rug(u: f64, v: f64) -> Color {
     } else {
         [0.16, 0.20, 0.30]
     };
+    // The borders, by the distance to the nearest edge.
     let color = if edge < 0.03 {
         [0.86, 0.78, 0.62]
     } else if edge < 0.11 {
@@ -158,7 +166,7 @@ fn rug(u: f64, v: f64) -> Color {
     color.map(|c| c * pile)
 }
 
-/// A latitude-longitude view: cloudy sky, hills, a meadow.
+/// A latitude-longitude picture of a cloudy sky, hills and a meadow.
 fn outside(u: f64, v: f64) -> Color {
     let hills = 0.48 - 0.035 * noise(u, 0.5, 12, 1, 17) - 0.015 * noise(u, 0.5, 40, 1, 18);
     if v < hills {
@@ -186,7 +194,7 @@ mod tests {
         }
     }
 
-    /// A texture that repeats has no seam: its first and last columns differ no more than neighbours do.
+    /// A texture that repeats has no seam: its first and last columns differ no more than neighbouring columns do.
     #[test]
     fn tiles_have_no_seam() {
         for (name, picture) in all().into_iter().filter(|(name, _)| ["wood", "wallpaper", "fabric"].contains(name)) {

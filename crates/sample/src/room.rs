@@ -1,7 +1,7 @@
-//! What stands where, what it is made of, and the XML that says so.
+//! The room as a Mitsuba scene: its objects, where they stand, their materials, and the XML.
 //!
-//! The room spans x 0..4, y 0..2.6, z 0..3.2 metres. The wallpaper and the mirror are at x = 0, the window at z = 0, the
-//! camera in the opposite corner.
+//! The room spans x 0..4, y 0..2.6, z 0..3.2 metres. The wallpaper and the mirror are at x = 0, the window at z = 0, and
+//! the camera is in the opposite corner.
 
 use std::fmt::Write as _;
 
@@ -14,23 +14,24 @@ const WIDTH: f64 = 4.0;
 const HEIGHT: f64 = 2.6;
 const DEPTH: f64 = 3.2;
 
-/// The window's lower left corner and size in the wall z = 0, and how deep it sits.
+/// The window's lower left corner and size in the wall z = 0.
 const WINDOW: (DVec2, DVec2) = (DVec2::new(1.25, 1.05), DVec2::new(1.3, 1.05));
+/// The depth of the window's opening in the wall.
 const REVEAL: f64 = 0.12;
 
 /// One shape of the scene.
 pub(super) struct Item {
-    /// Its id, and its file's name.
+    /// The shape's id and its file's name without ending.
     pub(super) name: &'static str,
-    /// In its own space.
+    /// Its mesh, in object space.
     pub(super) solid: Solid,
     /// The id of its BSDF.
     material: &'static str,
-    /// Degrees about +y, before it is moved.
+    /// Rotation about +y in degrees, applied before the translation.
     turn_deg: f64,
-    /// Where it stands.
+    /// Translation in metres.
     at: DVec3,
-    /// Whether it glows, and how: linear Rec. 709 radiance.
+    /// Emitted radiance, linear Rec. 709.
     radiance: Option<[f64; 3]>,
 }
 
@@ -46,13 +47,14 @@ fn placed(name: &'static str, material: &'static str, solid: Solid, turn_deg: f6
     Item { turn_deg, at, ..item(name, material, solid) }
 }
 
-/// Everything with a mesh.
+/// Every shape that has a mesh file.
 pub(super) fn items() -> Vec<Item> {
     let mut items = shell();
-    items.extend(things());
+    items.extend(objects());
     items
 }
 
+/// Floor, ceiling, walls and window.
 fn shell() -> Vec<Item> {
     let square = |size: f64| DVec2::splat(size);
     let (x, y, z) = (v(WIDTH, 0.0, 0.0), v(0.0, HEIGHT, 0.0), v(0.0, 0.0, DEPTH));
@@ -75,7 +77,7 @@ fn shell() -> Vec<Item> {
     ]
 }
 
-/// The wall z = 0 with a hole, and the hole's inner sides.
+/// The wall z = 0 with the window's opening and the opening's inner sides.
 fn window_wall() -> Solid {
     let (low, size) = WINDOW;
     let high = low + size;
@@ -94,7 +96,7 @@ fn window_wall() -> Solid {
         .rectangle(v(high.x, low.y, -REVEAL), -back, up, tile)
 }
 
-/// A frame with a cross in it, just inside of the hole.
+/// A frame around the opening and a cross within it.
 fn window_frame(size: DVec2) -> Solid {
     let bar = 0.05;
     let (back, front) = (-REVEAL / 2.0 - 0.02, -REVEAL / 2.0 + 0.02);
@@ -103,10 +105,11 @@ fn window_frame(size: DVec2) -> Solid {
         .boxed(v(0.0, size.y * 0.62, back), v(size.x, size.y * 0.62 + bar, front), tile::PLAIN)
 }
 
-fn things() -> Vec<Item> {
+/// Furniture, mirror and lamp.
+fn objects() -> Vec<Item> {
     let mirror = DVec2::new(0.7, 0.85);
     let mirror_at = |off: f64| v(off, 1.15, 1.65);
-    // The shelf stands at x = 0 and looks along +x; its own x runs along the room's -z.
+    // The shelf stands at x = 0 and faces +x, so its own x axis runs along the room's -z.
     let on_shelf = |along: f64, y: f64| v(0.2, y, 1.3 - along);
     let glow = |item: Item, radiance| Item { radiance: Some(radiance), ..item };
     vec![
@@ -128,7 +131,7 @@ fn things() -> Vec<Item> {
     ]
 }
 
-/// The materials, in Mitsuba's words; everything opaque is seen from both sides.
+/// The materials as Mitsuba XML; every opaque one is two-sided.
 const MATERIALS: &str = r#"
     <bsdf type="twosided" id="planks">
         <bsdf type="roughplastic">
@@ -210,7 +213,7 @@ const MATERIALS: &str = r#"
     </bsdf>
 "#;
 
-/// Glossy paints: id and linear colour.
+/// Glossy paints: id and linear Rec. 709 colour.
 const GLOSSY: [(&str, &str); 4] = [
     ("red", "0.55, 0.05, 0.04"),
     ("teal", "0.03, 0.28, 0.3"),
@@ -218,7 +221,7 @@ const GLOSSY: [(&str, &str); 4] = [
     ("ceramic", "0.78, 0.78, 0.74"),
 ];
 
-/// The scene in Mitsuba 3's spelling.
+/// The scene as XML of Mitsuba 3.
 pub(super) fn xml() -> String {
     let mut xml = String::from(HEAD);
     xml.push_str(MATERIALS);

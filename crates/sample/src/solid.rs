@@ -1,25 +1,25 @@
-//! Meshes from boxes, cushions and turned shapes, in metres, written as OBJ. Texture coordinates are metres divided by
-//! the size of the texture's tile.
+//! Meshes made of boxes, cushions and surfaces of revolution, in metres, and their OBJ text. Texture coordinates are
+//! metres divided by the size of the texture's tile.
 
 use std::fmt::Write as _;
 
 use glam::{DVec2, DVec3};
 
-/// A mesh under construction; every face brings its own vertices.
+/// A mesh under construction. Faces share no vertices.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solid {
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Vec<DVec3>,
     pub(super) uvs: Vec<DVec2>,
-    /// Counter-clockwise from outside, three or four corners.
+    /// Vertex indices of each face, three or four, counter-clockwise seen from outside.
     pub(super) faces: Vec<Vec<usize>>,
 }
 
-/// A corner of a face.
+/// Position, normal and texture coordinates of a corner of a face.
 type Corner = (DVec3, DVec3, DVec2);
 
 impl Solid {
-    /// Triangles after quads are split.
+    /// The number of triangles once quads are split.
     #[cfg(test)]
     pub(super) fn triangle_count(&self) -> usize {
         self.faces.iter().map(|face| face.len() - 2).sum()
@@ -35,7 +35,8 @@ impl Solid {
         self.faces.push((first..first + corners.len()).collect());
     }
 
-    /// A rectangle from `corner` along `right` and `up`, front towards their cross product; uv in tiles of `tile` metres.
+    /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. One unit of uv is `tile`
+    /// metres.
     pub(super) fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, tile: DVec2) -> Self {
         let normal = right.cross(up).normalize();
         let size = DVec2::new(right.length(), up.length()) / tile;
@@ -44,7 +45,7 @@ impl Solid {
         self
     }
 
-    /// A box between two corners. The texture's u runs along the longest edge of each side.
+    /// Adds a box between two corners. The texture's u runs along the longest edge of each side.
     pub(super) fn boxed(mut self, low: DVec3, high: DVec3, tile: f64) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
@@ -55,15 +56,17 @@ impl Solid {
         self
     }
 
-    /// A box with edges rounded by `radius`.
+    /// Adds a box whose edges are rounded by `radius`.
     pub(super) fn cushion(mut self, low: DVec3, high: DVec3, radius: f64, tile: f64) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
+            // Grid lines across the side, denser where the edges are round.
             let lines = |axis: DVec3| {
                 let (h, bend) = ((axis * half).length(), 0.4 * radius);
                 [-h, -h + bend, -h + radius, h - radius, h - bend, h]
             };
             let (across, along) = (lines(right), lines(up));
+            // A grid point is pushed out from the box that remains when `radius` is taken off every side.
             let at = |i: usize, j: usize| {
                 let flat = normal * half + right * across[i] + up * along[j];
                 let core = flat.clamp(-half + radius, half - radius);
@@ -79,7 +82,8 @@ impl Solid {
         self
     }
 
-    /// A profile of (radius, height) from bottom to top turned about the vertical through `foot`; front outside.
+    /// Adds the surface of revolution of a profile of (radius, height), given from bottom to top, about the vertical axis
+    /// through `foot`. It faces outwards.
     pub(super) fn turned(mut self, foot: DVec3, profile: &[(f64, f64)], segments: usize, tile: f64) -> Self {
         let turn = |step: usize| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (step % segments) as f64 / segments as f64);
@@ -88,6 +92,7 @@ impl Solid {
         let widest = profile.iter().fold(0.0_f64, |widest, (radius, _)| widest.max(*radius));
         let mut length = 0.0;
         for pair in profile.windows(2) {
+            // The normal in the plane of the profile, and the length of the profile up to here, which becomes v.
             let [(r0, y0), (r1, y1)] = [pair[0], pair[1]];
             let slope = DVec2::new(y1 - y0, r0 - r1).normalize();
             let next = length + DVec2::new(r1 - r0, y1 - y0).length();
@@ -97,6 +102,7 @@ impl Solid {
                 let normal = (out * slope.x).with_y(slope.y);
                 (foot + (out * radius).with_y(height), normal, DVec2::new(around, v) / tile)
             };
+            // One face a segment: a quad, or a triangle where the profile meets the axis.
             for step in 0..segments {
                 let (a, b) = (at(step, r0, y0, length), at(step + 1, r0, y0, length));
                 let (c, d) = (at(step + 1, r1, y1, next), at(step, r1, y1, next));
@@ -111,10 +117,10 @@ impl Solid {
         self
     }
 
-    /// Wavefront OBJ: positions and normals to a tenth of a millimetre, every face with uv and normal.
+    /// The solid as Wavefront OBJ text with four decimals. Every corner of a face has uv and normal.
     pub(super) fn to_obj(&self) -> String {
         let mut text = String::from("# made by MatEval, CC0 1.0\n");
-        // Writing to a String cannot fail. Adding 0 to a rounded value turns -0 into 0.
+        // Writing to a String cannot fail. Adding 0 turns a rounded -0 into 0.
         let round = |v: f64| (v * 1e4).round() / 1e4 + 0.0;
         for p in &self.positions {
             let _ = writeln!(text, "v {:.4} {:.4} {:.4}", round(p.x), round(p.y), round(p.z));
@@ -136,13 +142,13 @@ impl Solid {
     }
 }
 
-/// Normal, right and up of a box's six sides, right times up being the normal.
+/// Normal, right and up of the six sides of a box; the cross product of right and up is the normal.
 pub(super) fn sides() -> [(DVec3, DVec3, DVec3); 6] {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     [(x, -z, y), (-x, z, y), (y, x, -z), (-y, x, z), (z, x, y), (-z, -x, y)]
 }
 
-/// Right and up, turned a quarter where up is the longer edge.
+/// Right and up of a side, turned by 90 degrees where up is the longer edge.
 fn longest_first(normal: DVec3, right: DVec3, up: DVec3, half: DVec3) -> (DVec3, DVec3) {
     if (up * half).length() > (right * half).length() { (up, normal.cross(up)) } else { (right, up) }
 }
@@ -151,7 +157,7 @@ fn longest_first(normal: DVec3, right: DVec3, up: DVec3, half: DVec3) -> (DVec3,
 mod tests {
     use super::*;
 
-    /// Each face, seen from the side of its normals, is counter-clockwise.
+    /// Whether every face is counter-clockwise seen from the side of its normals.
     fn faces_agree_with_normals(solid: &Solid) -> bool {
         solid.faces.iter().all(|face| {
             let p: Vec<_> = face.iter().map(|&i| solid.positions[i]).collect();

@@ -1,27 +1,47 @@
-//! Paths that a recipe or a command names, told by where they lie below the source's folder: a dataset must not hold
-//! where things are on the machine that made it.
+//! Makes paths relative to the source's folder, since a dataset must not record the folders of the machine that made it.
 
 use std::path::{Component, Path, PathBuf};
 
-/// The path relative to `source`; in words what is wrong where it leads elsewhere. A relative path comes back as it is: it
-/// may go through links, which are the machine's business.
-pub fn relative_below(path: &Path, source: &Path) -> Result<PathBuf, String> {
+/// Why a path is not below the source's folder.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BelowError {
+    /// A relative path leads out of the folder.
+    #[error("'{}' leads out of the source's folder", path.display())]
+    LeadsOut {
+        /// The path.
+        path: PathBuf,
+    },
+    /// An absolute path lies elsewhere.
+    #[error("'{}' does not lie below '{}'", path.display(), source_folder.display())]
+    Elsewhere {
+        /// The path.
+        path: PathBuf,
+        /// The source's folder.
+        source_folder: PathBuf,
+    },
+}
+
+/// The path relative to `source`. Fails where it leads elsewhere. A relative path within the folder is returned unchanged
+/// and may pass through links.
+pub fn relative_below(path: &Path, source: &Path) -> Result<PathBuf, BelowError> {
     if !path.is_absolute() {
-        let elsewhere = || format!("'{}' leads out of the source's folder", path.display());
-        return if stays_inside(path) { Ok(path.to_owned()) } else { Err(elsewhere()) };
+        let leads_out = || BelowError::LeadsOut { path: path.to_owned() };
+        return if stays_inside(path) { Ok(path.to_owned()) } else { Err(leads_out()) };
     }
-    let as_named = || {
+    // The path as it is written, or else with all links resolved.
+    let as_written = || {
         let source = std::path::absolute(source).ok()?;
         let inside = path.strip_prefix(source).ok()?;
         stays_inside(inside).then(|| inside.to_owned())
     };
-    let as_found =
+    let resolved =
         || Some(path.canonicalize().ok()?.strip_prefix(folder_or_here(source).canonicalize().ok()?).ok()?.to_owned());
-    let elsewhere = || format!("'{}' does not lie below '{}'", path.display(), folder_or_here(source).display());
-    as_named().or_else(as_found).ok_or_else(elsewhere)
+    let source_folder = || folder_or_here(source).to_owned();
+    let elsewhere = || BelowError::Elsewhere { path: path.to_owned(), source_folder: source_folder() };
+    as_written().or_else(resolved).ok_or_else(elsewhere)
 }
 
-/// The empty path is the current folder.
+/// The folder; the empty path stands for the current one.
 fn folder_or_here(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }
@@ -36,7 +56,7 @@ fn stays_inside(path: &Path) -> bool {
     depth.is_some()
 }
 
-/// The deepest folder that all of these lie below, links followed; none where that is the root, or one is not there.
+/// The deepest folder that contains all of these, with links resolved; none where that is the root or a path is missing.
 pub fn common_folder<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<PathBuf> {
     let mut common: Option<PathBuf> = None;
     for path in paths {
@@ -56,7 +76,7 @@ pub fn common_folder<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<Pa
 mod tests {
     use super::*;
 
-    /// A folder with two more.
+    /// A folder with two folders.
     fn folders() -> (tempfile::TempDir, [PathBuf; 2]) {
         let root = tempfile::tempdir().unwrap();
         let both = ["houses", "models/one"].map(|name| root.path().join(name));
@@ -72,17 +92,19 @@ mod tests {
             assert_eq!(relative_below(Path::new(path), root.path()).unwrap(), Path::new(path));
         }
         for path in ["..", "a/../../b", "../a"] {
-            assert!(relative_below(Path::new(path), root.path()).unwrap_err().contains("leads out"), "{path}");
+            let refused = relative_below(Path::new(path), root.path());
+            assert_eq!(refused, Err(BelowError::LeadsOut { path: path.into() }));
         }
         assert_eq!(relative_below(&houses.join("a.json"), root.path()).unwrap(), Path::new("houses/a.json"));
         assert_eq!(relative_below(root.path(), root.path()).unwrap(), Path::new(""));
-        assert!(relative_below(&models, &houses).unwrap_err().contains("does not lie below"));
+        let error = relative_below(&models, &houses).unwrap_err();
+        assert_eq!(error, BelowError::Elsewhere { path: models, source_folder: houses.clone() });
         assert!(relative_below(&houses.join("../models"), &houses).is_err());
     }
 
     #[cfg(unix)]
     #[test]
-    fn links_lead_where_they_lead() {
+    fn links_are_resolved() {
         let (root, [houses, _]) = folders();
         let link = root.path().join("link");
         std::os::unix::fs::symlink(&houses, &link).unwrap();

@@ -1,24 +1,64 @@
-//! The one error of all readers: why a source could not be read at all. All lesser faults are findings.
+//! The error type of all readers: why a source could not be read at all. Lesser faults are findings.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// Why nothing could be made of a source.
+use mateval_scene::source_folder::FileFault;
+
+use crate::bitterli::BitterliError;
+use crate::front3d::HouseError;
+
+/// Why a source could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// The file system refused.
+    /// An operation of the file system failed.
     #[error("cannot read '{}': {source}", path.display())]
     Io {
-        /// The file.
+        /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's reason.
         source: std::io::Error,
     },
-    /// It is not what it should be (no XML, no scene, no house, without a usable camera), or beyond a limit.
-    #[error("'{}': {what}", path.display())]
+    /// The content of a file is not that of a source, or exceeds a limit.
+    #[error("'{}': {reason}", path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
         /// What was expected and what was found.
-        what: String,
+        reason: InvalidSource,
     },
+}
+
+impl SourceError {
+    /// A [`SourceError::Invalid`].
+    pub(crate) fn invalid(path: &Path, reason: InvalidSource) -> Self {
+        Self::Invalid { path: path.to_owned(), reason }
+    }
+}
+
+/// Why the content of a file is not that of a source.
+#[derive(Debug, thiserror::Error)]
+pub enum InvalidSource {
+    /// The file is too large.
+    #[error("expected at most {most} bytes, found {found}")]
+    TooLarge {
+        /// The most bytes allowed.
+        most: u64,
+        /// Bytes of the file.
+        found: u64,
+    },
+    /// The path has no file name.
+    #[error("expected the path of a file")]
+    NotAFile,
+    /// The source's folder refused the file.
+    #[error("{}", .0.message)]
+    Unreadable(FileFault),
+    /// The file is not text.
+    #[error("expected UTF-8, found other bytes")]
+    NotUtf8,
+    /// The file is not a Mitsuba scene.
+    #[error(transparent)]
+    Bitterli(BitterliError),
+    /// The file is not a 3D-FRONT house.
+    #[error(transparent)]
+    House(HouseError),
 }

@@ -1,12 +1,13 @@
-//! Files from elsewhere become source scenes.
+//! Reads scenes from other projects' files.
 //!
-//! In: a 3D-FRONT house with its furniture, or a Mitsuba scene of Bitterli's resources. Out: a
-//! [`source_scene::SourceScene`] a room or scene: geometry in world space, materials, lights, a camera, and findings about
-//! everything that was wrong with the input. All input is untrusted: sizes are limited before memory is taken, and no file
-//! outside the source's folder is opened.
+//! The input is a 3D-FRONT house with its furniture, or a Mitsuba scene of Bitterli's resources. The output is a
+//! [`source_scene::SourceScene`] for each room or scene: geometry in world space, materials, lights, a camera, and findings
+//! about all faults of the input. Input is untrusted: sizes are limited before memory is taken, and no file outside the
+//! source's folder is opened.
 //!
-//! Between: [`bitterli`] reads XML, [`front3d`] reads a house's JSON, furnishes its rooms and draws cameras; [`log`]
-//! collects findings, [`surface_mesh`] repairs meshes and takes them to world space, [`parts`] splits them.
+//! [`bitterli`] reads XML. [`front3d`] reads a house's JSON, furnishes its rooms and draws cameras. Both use [`log`], which
+//! collects findings, [`surface_mesh`], which repairs meshes and transforms them to world space, and [`parts`], which
+//! splits them. [`npy`] and [`below`] read arrays and paths that a recipe names.
 
 pub mod below;
 pub mod bitterli;
@@ -18,4 +19,4 @@ pub mod parts;
 pub mod source_scene;
 pub mod surface_mesh;
 
-pub use error::SourceError;
+pub use error::{InvalidSource, SourceError};

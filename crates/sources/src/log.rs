@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mateval_scene::{Finding, Severity};
 
-/// What was found so far, each finding once.
+/// The findings so far, each once.
 #[derive(Debug)]
 pub struct Log {
     file: String,
@@ -14,29 +14,29 @@ pub struct Log {
 }
 
 impl Log {
-    /// Findings are about `file` unless said otherwise; beyond `limit` they are only counted.
+    /// An empty log. Findings refer to `file` by default. Findings beyond `limit` are only counted.
     pub fn new(file: String, limit: usize) -> Self {
         Self { file, limit, findings: BTreeSet::new(), dropped: 0 }
     }
 
-    /// The file that findings are about unless said otherwise.
+    /// The file that findings refer to by default.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Something was left out or replaced.
+    /// Reports that something was left out or replaced.
     pub fn warn(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
         let file = self.file.clone();
         self.push(Severity::Warning, code, &file, place, message, action);
     }
 
-    /// Something was read differently from how it is written, without loss.
+    /// Reports that something was read differently from how it is written, without loss.
     pub fn note(&mut self, code: &str, place: &str, message: impl Into<String>, action: impl Into<String>) {
         let file = self.file.clone();
         self.push(Severity::Note, code, &file, place, message, action);
     }
 
-    /// A finding about another file.
+    /// Reports a finding about another file.
     pub fn push(
         &mut self,
         severity: Severity,
@@ -60,10 +60,10 @@ impl Log {
         });
     }
 
-    /// All of them, sorted.
+    /// All findings, sorted.
     pub fn into_findings(mut self) -> Vec<Finding> {
         if self.dropped > 0 {
-            let (file, message) = (self.file.clone(), format!("{} more findings than are listed", self.dropped));
+            let (file, message) = (self.file.clone(), format!("{} findings are not listed", self.dropped));
             self.limit = usize::MAX;
             self.push(Severity::Warning, "too_many_findings", &file, "", message, "only counted them");
         }
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn findings_are_sorted_single_and_bounded() {
+    fn findings_are_sorted_unique_and_limited() {
         let mut log = Log::new("scene.xml".into(), 2);
         for code in ["b", "a", "b", "c", "d"] {
             log.warn(code, "", "message", "action");

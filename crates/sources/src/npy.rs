@@ -1,28 +1,83 @@
-//! A NumPy array of whole numbers along one axis (`.npy`, versions 1 to 3).
+//! Reads one-dimensional NumPy arrays of integers (`.npy`, versions 1 to 3).
 //!
-//! The reader takes memory for the header's length, follows its brackets as deep as they go and multiplies the shape's
-//! numbers unchecked. So a header is held against what NumPy writes for a plain array before it is interpreted; and a file
-//! holds its numbers and no more.
+//! The library takes memory for the header's stated length, recurses as deep as its brackets and multiplies the shape's
+//! numbers unchecked. The header is therefore compared with what NumPy writes for a plain array before the library sees it,
+//! and the data must have exactly the length that follows from the header.
 
-/// Largest header: NumPy's own are below 200 bytes.
+/// The largest header. NumPy's own are below 200 bytes.
 pub const MAX_HEADER_BYTES: usize = 4096;
-/// Bytes before the header at most: magic word, version, its length.
+/// The most bytes before the header: magic string, version and the header's length.
 pub const MAX_PREFIX_BYTES: usize = 12;
-/// The widest whole number, in bytes.
+/// The widest integer, in bytes.
 pub const MAX_NUMBER_BYTES: usize = 8;
-/// Most digits in a header: so few that the product of any numbers written with them, times a width, is below 10^17.
+/// The most digits in a header. The product of any numbers written with so few digits, times a width, is below 10^17.
 const MAX_HEADER_DIGITS: usize = 16;
 
-/// The numbers of an array with at most one axis that is not 1: (N,), (N, 1) or (1, N). Those above 2^63 come back as
-/// their negative complements. In words what is wrong with any other.
-pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, String> {
+/// Why bytes are not an array of integers along one axis.
+#[derive(Debug, thiserror::Error)]
+pub enum NpyError {
+    /// The bytes end within the prefix or the header.
+    #[error("expected a NumPy array, found {found} bytes, which end in its header")]
+    CutOff {
+        /// The number of bytes.
+        found: usize,
+    },
+    /// The header is too long.
+    #[error("its header is {found} bytes long; expected at most {most}")]
+    LongHeader {
+        /// The header's stated length.
+        found: usize,
+        /// The greatest length allowed.
+        most: usize,
+    },
+    /// NumPy does not write such a header for an array of integers.
+    #[error("its header is not one that NumPy writes for an array of integers")]
+    OtherHeader,
+    /// The library refused the array.
+    #[error("expected a sound NumPy array: {reason}")]
+    Unsound {
+        /// The library's reason.
+        reason: std::io::Error,
+    },
+    /// The array has more than one axis whose length is not 1, or none.
+    #[error("an array of shape ({}); expected (N,), (N, 1) or (1, N)", joined(shape))]
+    Shape {
+        /// The lengths of the axes.
+        shape: Vec<u64>,
+    },
+    /// The array does not hold integers.
+    #[error("an array of {found}; expected integers, as in '<i8'")]
+    NotIntegers {
+        /// The description of its type.
+        found: String,
+    },
+    /// The data has another length than the header states.
+    #[error("expected {expected} bytes of numbers, found {found}")]
+    Length {
+        /// Bytes that the numbers take.
+        expected: u64,
+        /// Bytes behind the header.
+        found: u64,
+    },
+}
+
+fn joined(shape: &[u64]) -> String {
+    shape.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
+}
+
+/// The numbers of an array with at most one axis whose length is not 1: (N,), (N, 1) or (1, N). Numbers of 2^63 or more
+/// wrap around to negative ones.
+pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, NpyError> {
+    // The header, before and by the library.
     let (header, data) = split(bytes)?;
     if !is_plain(header) {
-        return Err("its header is none that NumPy writes for an array of whole numbers".to_owned());
+        return Err(NpyError::OtherHeader);
     }
-    let file = npyz::NpyFile::new(bytes).map_err(|error| format!("no sound NumPy array: {error}"))?;
+    let unsound = |reason| NpyError::Unsound { reason };
+    let file = npyz::NpyFile::new(bytes).map_err(unsound)?;
     let count = length(file.shape())?;
-    let descr = file.dtype().descr();
+    // The numbers, of whichever type.
+    let found = file.dtype().descr();
     macro_rules! try_types {
         ($file:expr; $($number:ty),*) => {{
             let file = $file;
@@ -30,7 +85,7 @@ pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, String> {
                 Ok(numbers) => {
                     check_length(data.len(), count, size_of::<$number>())?;
                     let numbers = numbers.map(|number| number.map(|number| number as i64));
-                    return numbers.collect::<Result<_, _>>().map_err(|error| format!("it ends early: {error}"));
+                    return numbers.collect::<Result<_, _>>().map_err(unsound);
                 }
                 Err(file) => file,
             };)*
@@ -38,22 +93,22 @@ pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, String> {
         }};
     }
     try_types!(file; i64, i32, i16, i8, u64, u32, u16, u8);
-    Err(format!("an array of {descr}; expected whole numbers, as in '<i8'"))
+    Err(NpyError::NotIntegers { found })
 }
 
-/// The header's text and what follows it.
-fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let cut_off = || "no NumPy array: it is too short".to_owned();
+/// The header's text and the data behind it.
+fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
+    let cut_off = || NpyError::CutOff { found: bytes.len() };
     let from = if bytes.get(6) == Some(&1) { 10 } else { MAX_PREFIX_BYTES };
     let length = bytes.get(8..from).ok_or_else(cut_off)?;
     let length = length.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte));
     if length > MAX_HEADER_BYTES {
-        return Err(format!("its header is {length} bytes long; expected at most {MAX_HEADER_BYTES}"));
+        return Err(NpyError::LongHeader { found: length, most: MAX_HEADER_BYTES });
     }
-    bytes[from..].split_at_checked(length).ok_or_else(|| "no NumPy array: its header is cut off".to_owned())
+    bytes[from..].split_at_checked(length).ok_or_else(cut_off)
 }
 
-/// Whether it is one dictionary with one tuple of decimal numbers, without escapes, lists and large numbers.
+/// Whether the header is one dictionary with one tuple of decimal numbers, without escapes, lists and large numbers.
 fn is_plain(header: &[u8]) -> bool {
     let count = |bytes: &[u8]| header.iter().filter(|byte| bytes.contains(byte)).count();
     let digits = header.iter().filter(|byte| byte.is_ascii_digit()).count();
@@ -66,25 +121,18 @@ fn is_plain(header: &[u8]) -> bool {
         && shape.is_some_and(is_decimal)
 }
 
-/// The length of its one axis that is not 1. With two of them the order of the numbers would be anybody's guess.
-fn length(shape: &[u64]) -> Result<u64, String> {
+/// The number of elements. With two long axes, their order would be ambiguous.
+fn length(shape: &[u64]) -> Result<u64, NpyError> {
     match shape {
         [count] | [count, 1] | [1, count] => Ok(*count),
-        _ => {
-            let axes: Vec<String> = shape.iter().map(u64::to_string).collect();
-            Err(format!("an array of shape ({}); expected (N,), (N, 1) or (1, N)", axes.join(", ")))
-        }
+        _ => Err(NpyError::Shape { shape: shape.to_vec() }),
     }
 }
 
-/// There are as many bytes as the numbers take.
-fn check_length(found: usize, count: u64, width: usize) -> Result<(), String> {
+/// Checks that the data has the length of `count` numbers of `width` bytes.
+fn check_length(found: usize, count: u64, width: usize) -> Result<(), NpyError> {
     let (found, expected) = (found as u64, count * width as u64);
-    match found.checked_sub(expected) {
-        None => Err(format!("it ends early: {found} bytes of numbers, expected {expected}")),
-        Some(0) => Ok(()),
-        Some(behind) => Err(format!("{behind} bytes behind its numbers, expected none")),
-    }
+    if found == expected { Ok(()) } else { Err(NpyError::Length { expected, found }) }
 }
 
 #[cfg(test)]
@@ -94,7 +142,7 @@ mod tests {
 
     use super::*;
 
-    /// As another program writes it.
+    /// An array as the library writes it.
     fn npy<T: npyz::AutoSerialize + Copy>(numbers: &[T], shape: &[u64], order: npyz::Order) -> Vec<u8> {
         let mut bytes = Vec::new();
         let options = npyz::WriteOptions::new().default_dtype().shape(shape).order(order);
@@ -127,12 +175,12 @@ mod tests {
         assert_eq!(whole_numbers(&big).unwrap(), [1, -2]);
     }
 
-    /// In Fortran's order the numbers of two axes lie otherwise; of one axis there is no other order.
+    /// In Fortran's order the numbers of two axes are stored differently; those of one axis are not.
     #[test]
     fn two_axes_are_refused_in_either_order() {
         for order in [npyz::Order::C, npyz::Order::Fortran] {
             let fault = whole_numbers(&npy(&[1_i64; 6], &[2, 3], order)).unwrap_err();
-            assert_eq!(fault, "an array of shape (2, 3); expected (N,), (N, 1) or (1, N)");
+            assert_eq!(fault.to_string(), "an array of shape (2, 3); expected (N,), (N, 1) or (1, N)");
             assert_eq!(whole_numbers(&npy(&[5_i64, 6], &[2, 1], order)).unwrap(), [5, 6]);
         }
         for shape in [&[1, 1, 4][..], &[]] {
@@ -142,11 +190,13 @@ mod tests {
     }
 
     #[test]
-    fn a_file_holds_its_numbers_and_no_more() {
+    fn data_of_another_length_is_refused() {
         let mut bytes = npy(&[1_i64, 2], &[2], npyz::Order::C);
-        assert!(whole_numbers(&bytes[..bytes.len() - 1]).unwrap_err().contains("it ends early"));
+        let short = whole_numbers(&bytes[..bytes.len() - 1]);
+        assert!(matches!(short, Err(NpyError::Length { expected: 16, found: 15 })), "{short:?}");
         bytes.push(0);
-        assert_eq!(whole_numbers(&bytes).unwrap_err(), "1 bytes behind its numbers, expected none");
+        let long = whole_numbers(&bytes);
+        assert!(matches!(long, Err(NpyError::Length { expected: 16, found: 17 })), "{long:?}");
     }
 
     #[test]
@@ -154,7 +204,7 @@ mod tests {
         let plain = "{'descr': '<i8', 'fortran_order': False, 'shape': (1,), }";
         assert_eq!(whole_numbers(&with_header(plain, &[5, 0, 0, 0, 0, 0, 0, 0])).unwrap(), [5]);
         for (from, to) in [
-            // Once multiplied beyond 64 bits: a panic, or a small number.
+            // The product exceeds 64 bits, which once caused a panic or a small number.
             ("(1,)", "(0xffffffffffffffff, 0xffff)"),
             ("(1,)", "(0b1,)"),
             ("(1,)", "(1_0,)"),
@@ -182,12 +232,12 @@ mod tests {
         whole_numbers(&with_header(&"[".repeat(4000), &[])).unwrap_err();
         let mut long = b"\x93NUMPY\x02\x00".to_vec();
         long.extend(&u32::MAX.to_le_bytes());
-        assert!(whole_numbers(&long).unwrap_err().contains("4294967295 bytes long"));
+        assert!(matches!(whole_numbers(&long), Err(NpyError::LongHeader { found: 4_294_967_295, .. })));
     }
 
     proptest! {
         #[test]
-        fn any_bytes_are_an_answer(mut bytes in prop::collection::vec(any::<u8>(), 0..300), whole in any::<bool>()) {
+        fn no_bytes_cause_a_panic(mut bytes in prop::collection::vec(any::<u8>(), 0..300), whole in any::<bool>()) {
             if whole {
                 let sound = npy(&[1_i64; 4], &[4], npyz::Order::C);
                 let noise = bytes.iter().chain(std::iter::repeat(&0));

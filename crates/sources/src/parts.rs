@@ -1,39 +1,39 @@
-//! Parts: the connected components of an instance's mesh, or of each of its groups.
+//! Splits a mesh into parts: its connected components, or those of each of its groups.
 
 use std::collections::HashMap;
 
 use mateval_scene::TriangleMesh;
 
-/// Most parts of one instance: the largest by area keep their own, all smaller ones share the last.
+/// The most parts of one instance. The largest by area are parts of their own, and all others share the last part.
 pub const MAX_PARTS: usize = 64;
 
-/// The part (0, 1, ...) of each triangle, by the area of the parts, largest first.
+/// The part of each triangle. Parts are numbered from 0 by area, largest first.
 ///
-/// Triangles belong together when they share a vertex position to the last bit.
+/// Triangles are connected if they share a vertex position to the last bit.
 pub fn connected_parts(mesh: &TriangleMesh) -> Vec<usize> {
     labelled_parts(mesh, &vec![0; mesh.triangles.len()])
 }
 
-/// As [`connected_parts`], but only triangles of one label belong together; `labels` holds one a triangle.
+/// As [`connected_parts`], but only triangles of the same label are connected. `labels` holds one for each triangle.
 pub fn labelled_parts(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
     by_area(mesh, &component_of_triangles(mesh, labels))
 }
 
-/// Each label a part, whether it hangs together or not; parts are numbered by area, largest first.
+/// As [`connected_parts`], but the triangles of a label form one part, whether they are connected or not.
 pub fn parts_of_labels(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
     let mut first_triangle: HashMap<usize, usize> = HashMap::new();
     let first = labels.iter().enumerate().map(|(triangle, label)| *first_triangle.entry(*label).or_insert(triangle));
     by_area(mesh, &first.collect::<Vec<_>>())
 }
 
-/// Numbers groups of triangles, which are named by their first triangle.
+/// The part of each triangle, where `roots` holds the first triangle of its group.
 fn by_area(mesh: &TriangleMesh, roots: &[usize]) -> Vec<usize> {
     let mut areas: HashMap<usize, f64> = HashMap::new();
     for (triangle, root) in roots.iter().enumerate() {
         *areas.entry(*root).or_default() += area(mesh, triangle);
     }
     let mut by_area: Vec<(usize, f64)> = areas.into_iter().collect();
-    // Equal areas keep the order of their first triangle, so that the hash map's order never shows.
+    // Equal areas are ordered by their first triangle, so that the order of the hash map has no effect.
     by_area.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     let rank: HashMap<usize, usize> =
         by_area.iter().enumerate().map(|(rank, (root, _))| (*root, rank.min(MAX_PARTS - 1))).collect();
@@ -42,6 +42,7 @@ fn by_area(mesh: &TriangleMesh, roots: &[usize]) -> Vec<usize> {
 
 /// For each triangle the first triangle of its component.
 fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
+    // Vertices with the same label and position get the same number.
     let mut places: HashMap<(usize, [u32; 3]), u32> = HashMap::new();
     let corners: Vec<[u32; 3]> = mesh
         .triangles
@@ -49,13 +50,14 @@ fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
         .zip(labels)
         .map(|(triangle, label)| {
             triangle.map(|vertex| {
-                // Adding zero turns -0 into +0: they are one place.
+                // Adding zero turns -0 into +0, which is the same position.
                 let bits = mesh.positions[vertex as usize].to_array().map(|v| (v + 0.0).to_bits());
                 let next = places.len() as u32;
                 *places.entry((*label, bits)).or_insert(next)
             })
         })
         .collect();
+    // Triangles join their vertices into components (union-find).
     let mut parent: Vec<u32> = (0..places.len() as u32).collect();
     for triangle in &corners {
         let [a, b, c] = triangle.map(|place| find(&mut parent, place));
@@ -64,6 +66,7 @@ fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
             parent[root as usize] = least;
         }
     }
+    // A component is identified by its first triangle.
     let mut first_triangle: HashMap<u32, usize> = HashMap::new();
     corners
         .iter()
@@ -73,6 +76,7 @@ fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
 }
 
 /// The component's least vertex; halves the path on the way.
+/// The root of a vertex's component. Shortens the path to it.
 fn find(parent: &mut [u32], mut vertex: u32) -> u32 {
     while parent[vertex as usize] != vertex {
         parent[vertex as usize] = parent[parent[vertex as usize] as usize];
@@ -92,7 +96,7 @@ mod tests {
 
     use super::*;
 
-    /// `count` triangles of growing size, apart from each other.
+    /// `count` separate triangles of growing size.
     fn islands(count: usize) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
         for index in 0..count {
@@ -119,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn labels_part_what_hangs_together() {
+    fn labels_split_connected_triangles() {
         let mut mesh = islands(2);
         mesh.triangles.push([0, 1, 2]);
         assert_eq!(connected_parts(&mesh), [0, 1, 0]);

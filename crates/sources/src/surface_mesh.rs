@@ -1,27 +1,28 @@
-//! From a shape's own space to the world: positions, normals, front sides, and what is wrong with the result.
+//! Transforms meshes to world space and repairs them: positions, normals, texture coordinates and front sides.
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use mateval_scene::TriangleMesh;
 
-/// Beyond this many metres a position is a fault, not a place.
+/// Coordinates beyond this many metres are faults.
 const FARTHEST: f32 = 1e9;
 
-/// What was mended in a mesh, as counts.
+/// Counts of the repairs to a mesh.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Repairs {
-    /// Triangles left out: a corner was not finite or absurdly far away.
+    /// Triangles left out because a corner is not finite or too far away.
     pub not_finite: usize,
-    /// Triangles of no area; they stay.
+    /// Triangles without area, which are kept.
     pub degenerate: usize,
-    /// Normals made anew: they were zero or not finite.
+    /// Normals computed anew because they were zero or not finite.
     pub normals: usize,
-    /// Texture coordinates set to 0: they were not finite.
+    /// Texture coordinates set to 0 because they were not finite.
     pub uvs: usize,
 }
 
-/// The mesh in world space. The front stays the front under a mirror: the winding turns with the determinant's sign,
-/// and normals go by the inverse transpose.
+/// The mesh in world space. A mirroring transform keeps the front: the winding is reversed where the determinant is
+/// negative, and normals are transformed by the inverse transpose. `flip` swaps front and back.
 pub fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) -> (TriangleMesh, Repairs) {
+    // Positions and normals.
     let mut repairs = Repairs::default();
     let linear = DMat3::from_mat4(world_from_object);
     let mirrored = linear.determinant() < 0.0;
@@ -29,12 +30,13 @@ pub fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) ->
         for position in &mut mesh.positions {
             *position = world_from_object.transform_point3(position.as_dvec3()).as_vec3();
         }
-        // The adjugate is the inverse transpose times the determinant, and exists for flat transforms too.
+        // The cofactor matrix is the inverse transpose times the determinant, and exists for singular transforms too.
         let normal_matrix = cofactors(linear) * if mirrored { -1.0 } else { 1.0 };
         for normal in mesh.normals.iter_mut().flatten() {
             *normal = (normal_matrix * normal.as_dvec3()).as_vec3();
         }
     }
+    // The front side.
     repairs.not_finite = drop_far_triangles(&mut mesh);
     if mirrored != flip {
         mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
@@ -42,8 +44,9 @@ pub fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) ->
     if flip {
         mesh.normals.iter_mut().flatten().for_each(|normal| *normal = -*normal);
     }
-    repairs.normals = mend_normals(&mut mesh);
-    repairs.uvs = mend_uvs(&mut mesh);
+    // The other repairs.
+    repairs.normals = repair_normals(&mut mesh);
+    repairs.uvs = repair_uvs(&mut mesh);
     repairs.degenerate = (0..mesh.triangles.len()).filter(|&index| is_degenerate(mesh.corners(index))).count();
     (mesh, repairs)
 }
@@ -58,24 +61,26 @@ fn is_degenerate(corners: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).length() <= 1e-12 * longest
 }
 
-/// Whether a triangle covers anything worth keeping; false for what is not finite.
+/// Whether a triangle has an area worth keeping; false where a corner is not finite.
 pub fn has_area(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.as_dvec3());
     let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
     longest < 1e12 && (b - a).cross(c - a).length() > 1e-9 * longest
 }
 
-/// Leaves out triangles with impossible corners, and those corners; how many.
+/// Drops vertices that are not finite or too far away and the triangles that use them. Returns the number of triangles.
 fn drop_far_triangles(mesh: &mut TriangleMesh) -> usize {
     let sound: Vec<bool> = mesh.positions.iter().map(|p| p.is_finite() && p.abs().max_element() <= FARTHEST).collect();
     if sound.iter().all(|s| *s) {
         return 0;
     }
+    // Triangles, with the vertices renumbered.
     let before = mesh.triangles.len();
     mesh.triangles.retain(|triangle| triangle.iter().all(|&v| sound[v as usize]));
     let mut next = 0;
     let new_index: Vec<u32> = sound.iter().map(|&s| (next, next += u32::from(s)).0).collect();
     mesh.triangles.iter_mut().flatten().for_each(|vertex| *vertex = new_index[*vertex as usize]);
+    // Vertices.
     let keep = |index: &mut usize| (sound[*index], *index += 1).0;
     let mut index = 0;
     mesh.positions.retain(|_| keep(&mut index));
@@ -90,8 +95,8 @@ fn drop_far_triangles(mesh: &mut TriangleMesh) -> usize {
     before - mesh.triangles.len()
 }
 
-/// Makes normals of unit length; one that cannot be is taken from the faces around it. How many were.
-fn mend_normals(mesh: &mut TriangleMesh) -> usize {
+/// Normalises normals. One that cannot be normalised is computed from the adjacent faces. Returns the number of those.
+fn repair_normals(mesh: &mut TriangleMesh) -> usize {
     let Some(normals) = &mesh.normals else { return 0 };
     let unit: Vec<Option<Vec3>> = normals.iter().map(|n| n.as_dvec3().try_normalize().map(|n| n.as_vec3())).collect();
     let faulty = unit.iter().filter(|n| n.is_none()).count();
@@ -100,13 +105,14 @@ fn mend_normals(mesh: &mut TriangleMesh) -> usize {
     faulty
 }
 
-fn mend_uvs(mesh: &mut TriangleMesh) -> usize {
+fn repair_uvs(mesh: &mut TriangleMesh) -> usize {
     let faulty = mesh.uvs.iter_mut().flatten().filter(|uv| !uv.is_finite());
     faulty.map(|uv| *uv = glam::Vec2::ZERO).count()
 }
 
-/// Normals of a smooth surface: those of the faces around a vertex, weighted by their angle there (Thürmer and Wüthrich,
-/// "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba makes them for an OBJ without normals.
+/// Vertex normals of a smooth surface: the mean of the adjacent faces' normals, weighted by their angles at the vertex
+/// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba computes them for an OBJ
+/// without normals.
 pub fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     for (index, triangle) in mesh.triangles.iter().enumerate() {
@@ -133,7 +139,7 @@ mod tests {
         (b - a).cross(c - a).normalize()
     }
 
-    /// Mitsuba 3.9.1: a rectangle scaled by (-1, 1, 1) keeps its shading normal, and so its glowing side, at +z.
+    /// In Mitsuba 3.9.1 a rectangle scaled by (-1, 1, 1) keeps its shading normal, and so its emitting side, at +z.
     #[test]
     fn mirrors_keep_the_front() {
         for scale in [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(2.0, -0.5, 1.0), DVec3::ONE] {
@@ -142,7 +148,7 @@ mod tests {
             assert!((front(&mesh) - Vec3::Z).length() < 1e-6);
             assert!(mesh.normals.unwrap().iter().all(|n| (*n - Vec3::Z).length() < 1e-6));
         }
-        // Twin: upside down, it looks down.
+        // Twin: turned upside down, it faces down.
         let (mesh, _) = to_world(rectangle(), DMat4::from_rotation_x(std::f64::consts::PI), false);
         assert!((front(&mesh) + Vec3::Z).length() < 1e-6);
         let (mesh, _) = to_world(rectangle(), DMat4::IDENTITY, true);
@@ -150,14 +156,14 @@ mod tests {
     }
 
     #[test]
-    fn normals_go_by_the_inverse_transpose() {
+    fn normals_are_transformed_by_the_inverse_transpose() {
         let tilted = DMat4::from_rotation_x(std::f64::consts::FRAC_PI_4);
         let (mesh, _) = to_world(rectangle(), DMat4::from_scale(DVec3::new(1.0, 1.0, 5.0)) * tilted, false);
         assert!(mesh.normals.as_ref().unwrap()[0].dot(front(&mesh)) > 0.999_99);
     }
 
     #[test]
-    fn faults_are_mended_and_counted() {
+    fn faults_are_repaired_and_counted() {
         let mut mesh = cube();
         mesh.positions[0].x = f32::NAN;
         mesh.positions[5] = mesh.positions[4];

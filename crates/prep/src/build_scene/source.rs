@@ -9,9 +9,10 @@ use super::views_of;
 use crate::error::PrepError;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
 use mateval_sources::bitterli;
-use mateval_sources::front3d::camera_sampler::{self, SamplerRules};
+use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules};
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
+use mateval_tracer::World;
 
 /// Pictures of a room where the recipe names no size.
 const DEFAULT_RESOLUTION: [u32; 2] = [480, 270];
@@ -87,9 +88,11 @@ fn front3d_scene(
         let what = format!("the house has no room '{}'; it has '{}'", room.room, rooms.join("', '"));
         return Err(fault(what));
     };
-    let camera = room_camera(recipe, entry, &house, number).map_err(fault)?;
+    // The camera sampler and the choice of what the views see share one world.
+    let world = World::new(house.scene.clone())?;
+    let camera = room_camera(recipe, entry, &house, &world, number).map_err(fault)?;
     let views: Vec<Camera> = views_of(recipe, camera).iter().map(|view| view.camera).collect();
-    Ok(front3d::room_scene::room_scene(&house, number, &views)?)
+    Ok(front3d::room_scene::room_scene(&house, &world, number, &views))
 }
 
 /// Where the files of a recipe's room are.
@@ -104,7 +107,13 @@ fn files(root: &Path, room: &Front3dRoom) -> HouseFiles {
     }
 }
 
-fn room_camera(recipe: &Recipe, entry: &RecipeScene, house: &FurnishedHouse, room: usize) -> Result<Camera, String> {
+fn room_camera(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    house: &FurnishedHouse,
+    world: &World,
+    room: usize,
+) -> Result<Camera, String> {
     let resolution = entry.resolution.or(recipe.resolution).unwrap_or(DEFAULT_RESOLUTION);
     match &entry.camera {
         None => Err("a room needs a camera, as in `camera = { seed = 1 }`".to_owned()),
@@ -122,8 +131,9 @@ fn room_camera(recipe: &Recipe, entry: &RecipeScene, house: &FurnishedHouse, roo
             let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
             let turns: Vec<[f64; 2]> = recipe.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
             let rules = SamplerRules::default();
-            let found = camera_sampler::sample(house, room, intrinsics, &turns, &rules, *seed)?;
-            Ok(found.camera)
+            let sampler = RoomSampler::new(house, world, room);
+            let found = sampler.and_then(|sampler| sampler.sample(intrinsics, &turns, &rules, *seed));
+            found.map(|found| found.camera).map_err(|error| error.to_string())
         }
     }
 }

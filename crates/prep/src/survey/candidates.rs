@@ -1,7 +1,6 @@
 //! The rooms of one house: what they are like, and cameras in them with what these see.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
 use glam::{DVec2, Vec2};
 use mateval_image::Picture;
@@ -40,7 +39,7 @@ pub(super) fn look_through(
     house: &FurnishedHouse,
     taken: &mut BTreeSet<String>,
 ) -> Result<HouseSurvey, PrepError> {
-    let world = World::new(Arc::new(house.scene.clone()))?;
+    let world = World::new(house.scene.clone())?;
     let look = Look { options, house, world: &world, views: crate::recipe::default_views() };
     let mut survey = HouseSurvey { rooms: Vec::new(), pictures: Vec::new() };
     for room in 0..house.house.rooms.len() {
@@ -187,7 +186,7 @@ impl Look<'_> {
         let [width, height] = self.options.resolution;
         let sampler = match RoomSampler::new(self.house, self.world, room) {
             Ok(sampler) => sampler,
-            Err(why) => return (Vec::new(), vec![why]),
+            Err(why) => return (Vec::new(), vec![why.to_string()]),
         };
         let (mut posed, mut refused) = (Vec::new(), Vec::new());
         let turns: Vec<[f64; 2]> = self.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();

@@ -1,35 +1,34 @@
-//! What is wrong with the house, one of each kind that the data shows: where it is, and how it gets there.
-//!
-//! Faults of the JSON are planted here, in a house that has none; those of the models' files are `Quirk`s of `models`.
+//! The faults of the house, at least one of each kind found in the data: a table of where they are, and the code that
+//! plants those of the JSON in a sound house. Faults of the models' files are the `Quirk`s of `models`.
 
 use serde_json::{Value, json};
 
 use super::materials;
 use super::uids;
 
-/// Where a fault is.
+/// The location of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// In the house's JSON.
     Json {
-        /// Where in it, as RFC 6901 says.
+        /// JSON pointer (RFC 6901).
         pointer: &'static str,
     },
     /// In a file.
     File {
-        /// Below the house's folder.
+        /// Path relative to the house's folder.
         path: &'static str,
     },
 }
 
-/// Something that is wrong on purpose.
+/// A fault planted on purpose.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
     /// A short name.
     pub name: &'static str,
-    /// Where it is.
+    /// Its location.
     pub place: Place,
-    /// What is wrong, in words.
+    /// A description.
     pub what: &'static str,
 }
 
@@ -48,7 +47,7 @@ macro_rules! in_model {
     };
 }
 
-/// Every fault. They are in the third room, but for the normals of two walls and for `local`, which outer walls say.
+/// Every fault. All are in the third room, except the normals of two walls and the `local` of the outer walls.
 pub const FAULTS: [Fault; 44] = [
     json_fault("furniture_uid_repeated", "/furniture/30", "the uid of /furniture/21 again, with another model"),
     json_fault("category_chinese", "/furniture/17/category", "a category in Chinese, of a valid piece"),
@@ -96,7 +95,7 @@ pub const FAULTS: [Fault; 44] = [
     file_fault("texture_missing", in_model!("21", "texture.png"), "no such file"),
 ];
 
-/// Plants the faults of the JSON that are not in the lists of pieces and rooms already.
+/// Plants the faults of the JSON, except those that the lists of pieces and rooms already contain.
 pub(super) fn plant(house: &mut Value) {
     for fault in FAULTS {
         if let Place::Json { pointer } = fault.place {
@@ -106,20 +105,21 @@ pub(super) fn plant(house: &mut Value) {
 }
 
 fn plant_one(house: &mut Value, name: &str, pointer: &str) {
-    let list = |house: &mut Value, key: &str, entry: Value| {
+    let push = |house: &mut Value, key: &str, entry: Value| {
         house[key].as_array_mut().expect("the house has these lists").push(entry);
     };
     match name {
+        // Faults that add or remove an entry.
         "furniture_uid_repeated" => {
             let mut again = house["furniture"][21].clone();
             again["jid"] = house["furniture"][20]["jid"].clone();
-            list(house, "furniture", again);
+            push(house, "furniture", again);
         }
         "material_uid_repeated" => {
             let mut again = house["material"][0].clone();
             again["color"] = json!([255, 0, 255, 255]);
             again["jid"] = "local".into();
-            list(house, "material", again);
+            push(house, "material", again);
         }
         "child_without_record" => {
             let children = house["scene"]["room"][2]["children"].as_array_mut().expect("rooms have children");
@@ -130,26 +130,27 @@ fn plant_one(house: &mut Value, name: &str, pointer: &str) {
         }
         "category_missing" => {
             let record = house.pointer_mut(pointer).and_then(Value::as_object_mut);
-            record.expect("pointers of the table are places of the house").remove("category");
+            record.expect("the table's pointers resolve in the house").remove("category");
         }
+        // Faults that change a value in its place.
         _ => {
             let normals = pointer.strip_suffix("/normal").and_then(|mesh| house.pointer(mesh)).map(shifted_positions);
-            let place = house.pointer_mut(pointer).expect("pointers of the table are places of the house");
+            let place = house.pointer_mut(pointer).expect("the table's pointers resolve in the house");
             spoil(place, name, normals);
         }
     }
 }
 
-/// A mesh's positions moved by one along z, which is what the data has as normals of some walls.
+/// A mesh's positions moved by one along z, which some walls of the data have as normals.
 fn shifted_positions(mesh: &Value) -> Value {
     let moved = |(place, value): (usize, &Value)| {
         let value = value.as_f64().expect("positions are numbers");
-        super::house_json::number(if place % 3 == 2 { value - 1.0 } else { value })
+        super::json_number::number(if place % 3 == 2 { value - 1.0 } else { value })
     };
     mesh["xyz"].as_array().into_iter().flatten().enumerate().map(moved).collect()
 }
 
-/// Replaces a value by one with the fault of that name.
+/// Replaces a value by a faulty one. `name` is the fault's.
 fn spoil(value: &mut Value, name: &str, normals: Option<Value>) {
     let spoilt = match name {
         "category_chinese" => json!("抽屉柜"),
@@ -173,20 +174,20 @@ fn spoil(value: &mut Value, name: &str, normals: Option<Value>) {
     *value = spoilt;
 }
 
-/// Spoils some numbers of a list; what has no fault to be planted here stays.
+/// Changes some numbers of a list. Does nothing for faults that the sound house already contains.
 fn spoil_list(value: &mut Value, name: &str) {
     let Some(list) = value.as_array_mut() else { return };
     match name {
         "mesh_uv_null" => list[..2].fill(Value::Null),
         "mesh_index_out_of_range" => list[5] = json!(999),
-        // A corner twice; and two corners that lie in one place.
+        // One triangle names a vertex twice, the other has two vertices at one position.
         "mesh_zero_area" => list.extend([0, 0, 1, 2, 3, 4].map(Value::from)),
         "mesh_normals_short" => list.truncate(list.len() - 3),
         _ => {}
     }
 }
 
-/// The table as text, for who looks into the folder.
+/// The text of `FAULTS.txt`.
 pub(super) fn text() -> String {
     let mut text = String::from(
         "What is wrong with this house, on purpose: one of each kind that 3D-FRONT and 3D-FUTURE show.\n\

@@ -1,11 +1,11 @@
-//! Letters and arrows of five by seven dots, so that a picture says which way is up and whether it is mirrored.
+//! Letters and arrows of five by seven dots. They show which way up a texture is and whether it is mirrored.
 
-/// Dots from one letter's left edge to the next one's.
+/// Dots from the left edge of a letter to that of the next.
 pub(super) const ADVANCE: usize = 6;
-/// Dots from one line's top to the next one's.
+/// Dots from the top of a line to that of the next.
 pub(super) const LINE: usize = 9;
 
-/// A character's rows from the top; the highest of five bits is the leftmost dot.
+/// Characters and their rows from the top. Bit 4 of a row is the leftmost dot.
 const GLYPHS: [(char, [u8; 7]); 32] = [
     ('A', [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11]),
     ('B', [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e]),
@@ -41,28 +41,28 @@ const GLYPHS: [(char, [u8; 7]); 32] = [
     ('_', [0x04, 0x04, 0x04, 0x04, 0x15, 0x0e, 0x04]),
 ];
 
-/// Whether the dot at `column`, `row` of a line of text is inked. `^`, `>` and `_` are arrows up, right and down; what
-/// has no glyph is blank.
+/// Whether the dot at `column`, `row` of a line of text is inked. `^`, `>` and `_` are arrows up, right and down. A
+/// character without a glyph is blank.
 fn is_inked(line: &str, column: usize, row: usize) -> bool {
     let glyph = line.chars().nth(column / ADVANCE).and_then(|letter| GLYPHS.iter().find(|(known, _)| *known == letter));
     let (dot, rows) = (column % ADVANCE, 7);
     glyph.is_some_and(|(_, bits)| dot < 5 && row < rows && bits[row] & (0x10 >> dot) != 0)
 }
 
-/// Text in a picture, in shares of it from its upper left corner.
+/// Text in a picture. Lengths are fractions of the picture, measured from its upper left corner.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lettering {
-    /// From the top down.
+    /// Lines from the top down.
     pub(super) lines: &'static [&'static str],
-    /// The left edge and the top of the first letter.
+    /// Upper left corner of the first letter.
     pub(super) at: [f64; 2],
-    /// A dot's width and height.
+    /// Width and height of a dot.
     pub(super) dot: [f64; 2],
 }
 
 impl Lettering {
-    /// As large as fits into the rectangle from `low` to `high` with square dots, in its middle. `aspect` is the width
-    /// of the thing that shows the picture, divided by its height.
+    /// Text in the middle of the rectangle from `low` to `high`, as large as fits with square dots. `aspect` is the width
+    /// of the surface that shows the picture divided by its height.
     pub(super) fn fitted(lines: &'static [&'static str], low: [f64; 2], high: [f64; 2], aspect: f64) -> Self {
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(1);
         let columns = (longest * ADVANCE - 1) as f64;
@@ -74,7 +74,7 @@ impl Lettering {
         Self { lines, at: [left, top], dot }
     }
 
-    /// Whether there is ink at a place of the picture.
+    /// Whether a point of the picture is inked.
     pub(super) fn covers(&self, u: f64, v: f64) -> bool {
         let (x, y) = ((u - self.at[0]) / self.dot[0], (v - self.at[1]) / self.dot[1]);
         if x < 0.0 || y < 0.0 {
@@ -90,14 +90,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn letters_are_where_they_are_said_to_be() {
+    fn letters_fill_their_rectangle() {
         let text = Lettering::fitted(&["L"], [0.0, 0.0], [1.0, 1.0], 5.0 / 7.0);
-        // The stroke down the left, the foot to the right, nothing above the foot.
+        // An L has a stroke down the left, a foot to the right, and nothing above the foot.
         assert!(text.covers(0.1, 0.1) && text.covers(0.9, 0.95) && !text.covers(0.9, 0.1));
         assert!(!text.covers(-0.1, 0.1) && !text.covers(0.1, 1.1));
     }
 
-    /// A mirrored or turned text is another one. Its twin is a letter that is its own mirror image.
+    /// A mirrored text differs from the text. The twin is a letter that is its own mirror image.
     #[test]
     fn asymmetric_words_change_under_a_mirror() {
         let differs = |lines: &'static [&'static str]| {

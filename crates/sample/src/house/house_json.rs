@@ -1,31 +1,24 @@
-//! The house's JSON, in the words of the data's third release: what it would be without a fault.
+//! The JSON of the house before faults are planted, with the keys of 3D-FRONT's third release.
 
 use glam::{DVec2, DVec3};
 use serde_json::{Map, Value, json};
 
+use super::json_number::{number, numbers};
 use super::layout::{self, ROOMS};
 use super::models::Model;
-use super::pieces::{PIECES, RECORDS, Record, Shown, record_of};
+use super::pieces::{PIECES, RECORDS, Record, Validity, record_of};
 use super::surfaces::LayoutMesh;
 use super::textures::LayoutTexture;
 use super::{materials, uids};
 
-/// A number with at most five decimals; whole ones are written without a point, as in the data.
-pub(super) fn number(value: f64) -> Value {
-    let rounded = (value * 1e5).round() / 1e5;
-    if rounded.fract() == 0.0 { json!(rounded as i64) } else { json!(rounded) }
-}
-
-fn numbers(values: impl IntoIterator<Item = f64>) -> Value {
-    values.into_iter().map(number).collect()
-}
-
+/// The coordinates of all points in one list.
 fn flat(points: &[DVec3]) -> Value {
     numbers(points.iter().flat_map(|p| p.to_array()))
 }
 
 /// The whole house.
 pub(super) fn house(models: &[Model], textures: &[LayoutTexture]) -> Value {
+    // The meshes of all rooms are in one list, to which the rooms' children refer.
     let mut meshes: Vec<Value> = Vec::new();
     let mut rooms: Vec<Value> = Vec::new();
     for (place, room) in ROOMS.iter().enumerate() {
@@ -37,6 +30,7 @@ pub(super) fn house(models: &[Model], textures: &[LayoutTexture]) -> Value {
             "rot": [0, 0, 0, 1], "scale": [1, 1, 1], "children": children(place, &meshes[first..], first), "empty": 0,
         }));
     }
+    // The lists around them.
     let jids: Vec<String> = textures.iter().map(|texture| uids::texture(texture.number)).collect();
     json!({
         "uid": uids::HOUSE, "jobid": "cc000000-5a3b-4e00-8000-000000000002", "version": "2.0", "design_version": "0.1",
@@ -63,7 +57,7 @@ fn mesh_entry(mesh: &LayoutMesh, place: usize) -> Value {
     })
 }
 
-/// What a room holds: its meshes, then its furniture.
+/// The children of a room: its meshes, then its furniture.
 fn children(room: usize, meshes: &[Value], first: usize) -> Value {
     let pieces = PIECES.iter().enumerate().filter(|(_, piece)| piece.room == room);
     let meshes = meshes.iter().zip(first..).map(|(mesh, place)| {
@@ -81,18 +75,19 @@ fn children(room: usize, meshes: &[Value], first: usize) -> Value {
     meshes.chain(pieces).collect()
 }
 
-/// A record of the `furniture` list. `size` and `bbox` are in the order x, z, y of the later releases. A model that is not
-/// in the library gets an id after the `place` in the list.
+/// A record of the `furniture` list. `size` and `bbox` are in the order x, z, y of the later releases. A model that is
+/// missing from the library gets an id made of `place`, the record's number in the list.
 fn furniture_entry(record: &Record, place: u32, models: &[Model]) -> Value {
     let mut entry = json!({
         "uid": record.uid, "aid": [], "title": record.title, "type": "standard", "jid": uids::model(900 + place),
         "category": "Others", "sourceCategoryId": "cc000000-5a3b-4e00-8000-000000000003",
     });
-    match record.shown {
-        Shown::Valid => entry["valid"] = true.into(),
-        Shown::Invalid => entry["valid"] = false.into(),
-        Shown::Unsaid => {}
+    match record.validity {
+        Validity::Valid => entry["valid"] = true.into(),
+        Validity::Invalid => entry["valid"] = false.into(),
+        Validity::Absent => {}
     }
+    // What follows from the model.
     let Some(model) = models.iter().find(|model| model.name == record.model) else { return entry };
     let points = || model.parts.iter().flat_map(|(_, solid)| &solid.positions);
     let size = points().fold(DVec3::MIN, |high, p| high.max(*p)) - points().fold(DVec3::MAX, |low, p| low.min(*p));
@@ -125,7 +120,7 @@ fn lights() -> Value {
     ])
 }
 
-/// A designer's camera: the room it stands in, where, what it looks at, and the height of its picture in degrees.
+/// Designers' cameras: room, position, target and vertical field of view in degrees.
 const SNAPSHOTS: [(usize, [f64; 3], [f64; 3], f64); 6] = [
     (0, [5.5, 1.5, 3.9], [1.8, 0.85, 1.7], 60.0),
     (0, [0.6, 1.5, 2.2], [6.1, 1.0, 2.0], 55.0),
@@ -157,7 +152,7 @@ fn extension() -> Value {
     })
 }
 
-/// The text of the file: one line, keys in order.
+/// The text of the file: one line with sorted keys.
 pub(super) fn text(mut house: Value) -> String {
     house.sort_all_objects();
     let mut text = house.to_string();

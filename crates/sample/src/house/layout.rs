@@ -1,33 +1,33 @@
-//! The rooms: which there are, and their floors, walls, ceilings, holes and what is built in.
+//! The three rooms of the house: floors, walls, ceilings, openings and fittings.
 //!
-//! Metres, y up, the floor at y = 0. Seen from above with -z up, the living room lies in the north-west, the bedroom east
-//! of it behind a wall with an opening that has no door, the library south of it behind a door.
+//! Metres, +y up, the floor at y = 0. On a plan with -z at the top, the living room is in the north-west, the bedroom is
+//! east of it behind an opening without a door, and the library is south of it behind a door.
 
 use glam::{DVec2, DVec3};
 
 use super::surfaces::{LayoutMesh, WallHole};
 
-/// Floor to ceiling.
+/// Height of the ceiling.
 pub(super) const HEIGHT: f64 = 2.8;
-/// How thick walls are.
+/// Thickness of the walls.
 pub(super) const THICKNESS: f64 = 0.2;
 
-/// A room between two corners (x, z).
+/// A rectangular room between two corners (x, z).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
-    /// What the data calls its kind.
+    /// The data's type of room.
     pub(super) kind: &'static str,
-    /// Its id.
+    /// The data's instanceid.
     pub(super) name: &'static str,
     pub(super) low: DVec2,
     pub(super) high: DVec2,
-    /// Materials of the floor, of the walls and of the strip at their foot.
+    /// Materials of the floor, the walls and the baseboards.
     floor: &'static str,
     walls: &'static str,
     trim: &'static str,
 }
 
-/// The three rooms. The last is the one where things are wrong.
+/// The three rooms. Most faults are planted in the last.
 pub(super) const ROOMS: [Room; 3] = [
     Room {
         kind: "LivingDiningRoom",
@@ -62,7 +62,7 @@ const fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// Corners of the holes, each as deep as its wall.
+/// Lowest and highest corners of the openings, each as deep as its wall.
 const PASSAGE: [DVec3; 2] = [v(6.0, 0.0, 1.5), v(6.2, 2.2, 2.9)];
 const DOOR: [DVec3; 2] = [v(4.6, 0.0, 4.4), v(5.5, 2.1, 4.6)];
 const LIVING_WINDOW: [DVec3; 2] = [v(1.4, 0.9, -0.2), v(4.2, 2.3, 0.0)];
@@ -70,7 +70,7 @@ const BEDROOM_WINDOW: [DVec3; 2] = [v(10.0, 0.9, 1.4), v(10.2, 2.3, 3.2)];
 const LIBRARY_WINDOW: [DVec3; 2] = [v(-0.2, 1.2, 5.8), v(0.0, 2.2, 6.8)];
 const HOLES: [[DVec3; 2]; 5] = [PASSAGE, DOOR, LIVING_WINDOW, BEDROOM_WINDOW, LIBRARY_WINDOW];
 
-/// The meshes of a room, by its place in [`ROOMS`]. The library has no ceiling.
+/// The meshes of the room with this index in [`ROOMS`]. The library has no ceiling.
 pub(super) fn meshes(room: usize) -> Vec<LayoutMesh> {
     let mut meshes = shell(&ROOMS[room]);
     meshes.retain(|mesh| room < 2 || mesh.kind != "Ceiling");
@@ -83,7 +83,7 @@ pub(super) fn meshes(room: usize) -> Vec<LayoutMesh> {
     meshes
 }
 
-/// The holes in a wall from `foot` along `along`.
+/// The openings in the wall that starts at `foot` and runs along `along`.
 fn holes_of(foot: DVec3, along: DVec3) -> Vec<WallHole> {
     let (length, right) = (along.length(), along.normalize());
     let normal = right.cross(DVec3::Y);
@@ -97,7 +97,7 @@ fn holes_of(foot: DVec3, along: DVec3) -> Vec<WallHole> {
     HOLES.iter().filter_map(within).collect()
 }
 
-/// The four walls of a room: foot and way, to the right of who looks at them from inside.
+/// The four walls of a room, each as its start on the floor and its extent, which runs to the right seen from inside.
 fn wall_lines(room: &Room) -> [(DVec3, DVec3); 4] {
     let (low, high) = (room.low, room.high);
     let size = high - low;
@@ -109,7 +109,7 @@ fn wall_lines(room: &Room) -> [(DVec3, DVec3); 4] {
     ]
 }
 
-/// Floor, ceiling, the four walls and the strips at their feet.
+/// Floor, ceiling, four walls and their baseboards.
 fn shell(room: &Room) -> Vec<LayoutMesh> {
     let mut meshes = vec![
         LayoutMesh::new("Floor", room.floor).facing_up(room.low, room.high, 0.0),
@@ -123,7 +123,7 @@ fn shell(room: &Room) -> Vec<LayoutMesh> {
     meshes
 }
 
-/// A strip of 10 cm by 1.2 cm along a wall, but where a hole reaches down to the floor.
+/// A strip of 10 cm by 1.2 cm along a wall, interrupted by the openings that reach down to the floor.
 fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHole]) -> LayoutMesh {
     let (length, right) = (along.length(), along.normalize());
     let inwards = right.cross(DVec3::Y);
@@ -138,9 +138,9 @@ fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHol
     board
 }
 
-/// Outer walls, and the tops and bottoms of the walls that belong to a room.
+/// The outer walls of a room, and the tops and bottoms of its walls.
 fn outside(room: usize) -> Vec<LayoutMesh> {
-    // Foot and way of the outer sides, to the right of who looks at them from outside.
+    // Start and extent of the outer sides, which run to the right seen from outside.
     let lines: &[(DVec3, DVec3)] = &match room {
         0 => vec![(v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)), (v(-0.2, 0.0, -0.2), v(0.0, 0.0, 4.7))],
         1 => vec![
@@ -154,12 +154,13 @@ fn outside(room: usize) -> Vec<LayoutMesh> {
             (v(5.8, 0.0, 8.4), v(0.0, 0.0, -3.8)),
         ],
     };
-    // Corners (x, z) of the walls' plans.
+    // Corners (x, z) of the walls on the plan.
     let plans: &[[f64; 4]] = match room {
         0 => &[[-0.2, -0.2, 6.1, 0.0], [-0.2, 0.0, 0.0, 4.4], [6.0, 0.0, 6.2, 4.4], [-0.2, 4.4, 6.1, 4.6]],
         1 => &[[6.1, -0.2, 10.2, 0.0], [10.0, 0.0, 10.2, 4.4], [6.1, 4.4, 10.2, 4.6]],
         _ => &[[-0.2, 4.6, 0.0, 8.2], [5.6, 4.6, 5.8, 8.2], [-0.2, 8.2, 5.8, 8.4]],
     };
+    // The outer sides with their openings; a top and a bottom for every wall.
     let outer = lines.iter().map(|&(foot, along)| {
         LayoutMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along))
     });
@@ -174,7 +175,8 @@ fn outside(room: usize) -> Vec<LayoutMesh> {
     outer.chain(levels).collect()
 }
 
-/// The parts of a wall's plan that stand on the floor: all but where one goes through. A wall has at most one such hole.
+/// The parts of a wall's plan that touch the floor: all of it except an opening that reaches down to the floor, of which a
+/// wall has at most one.
 fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
     for [from, to] in HOLES.iter().filter(|[from, _]| from.y == 0.0) {
         let (from, to) = (DVec2::new(from.x, from.z), DVec2::new(to.x, to.z));
@@ -188,7 +190,7 @@ fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
     vec![(low, high)]
 }
 
-/// The opening to the bedroom, the door to the library, the window, and a frame that hangs below the ceiling.
+/// The opening to the bedroom, the door to the library, the window and the suspended ceiling.
 fn living_room() -> Vec<LayoutMesh> {
     let mut meshes = vec![
         LayoutMesh::new("Hole", "trim").reveal(PASSAGE[0], PASSAGE[1], true),
@@ -202,7 +204,7 @@ fn living_room() -> Vec<LayoutMesh> {
     meshes
 }
 
-/// Bars on three sides of the door, between two depths.
+/// Trim on three sides of the door from z = `back` to z = `front`.
 fn door_trim(back: f64, front: f64) -> LayoutMesh {
     let ([low, high], w) = (DOOR, 0.06);
     LayoutMesh::new("Pocket", "door")
@@ -211,7 +213,7 @@ fn door_trim(back: f64, front: f64) -> LayoutMesh {
         .boxed(v(low.x - w, high.y, back), v(high.x + w, high.y + w, front))
 }
 
-/// A frame in the living room's window, with two uprights.
+/// The frame of the living room's window, with two mullions.
 fn window_bars() -> LayoutMesh {
     let ([low, high], w) = (LIVING_WINDOW, 0.05);
     let bar = |mesh: LayoutMesh, x0: f64, y0: f64, x1: f64, y1: f64| mesh.boxed(v(x0, y0, -0.13), v(x1, y1, -0.08));
@@ -225,8 +227,8 @@ fn window_bars() -> LayoutMesh {
     bars
 }
 
-/// Four boxes whose tops lie in the ceiling, a sheet close below the ceiling, and
-/// the strips of light along the inner edges.
+/// A suspended ceiling: four boxes whose tops lie in the ceiling, a sheet just below the ceiling, and light strips along
+/// the inner edges.
 fn hung_ceiling() -> Vec<LayoutMesh> {
     let (low, high, wide, bottom) = (ROOMS[0].low, ROOMS[0].high, 0.5, 2.55);
     let mut frame = LayoutMesh::new("CustomizedCeiling", "ceiling");
@@ -250,7 +252,7 @@ fn hung_ceiling() -> Vec<LayoutMesh> {
     vec![frame, sheet, band]
 }
 
-/// A panel on the wall behind the bed, and the window's inner sides.
+/// A panel on the wall behind the bed, the window's inner sides and its sill.
 fn bedroom() -> Vec<LayoutMesh> {
     let (low, high) = (v(6.95, 0.12, 0.0), v(9.25, 2.4, 0.03));
     vec![
@@ -260,7 +262,7 @@ fn bedroom() -> Vec<LayoutMesh> {
     ]
 }
 
-/// A hung cabinet of three meshes, a moulding, a pipe, the other side of the door's trim. The window is a bare hole.
+/// A wall cabinet of three meshes, a cornice, a pipe and the door's trim on this side. The window is an open hole.
 fn library() -> Vec<LayoutMesh> {
     vec![
         LayoutMesh::new("Cabinet", "cabinet").boxed(v(2.0, 1.5, 7.86), v(4.6, 2.2, 8.19)),
@@ -278,7 +280,7 @@ fn library() -> Vec<LayoutMesh> {
 mod tests {
     use super::*;
 
-    /// Each hole is cut into the walls on both of its sides, and no other wall has one.
+    /// Every opening is cut into the walls on both of its sides and into no other wall.
     #[test]
     fn holes_go_through() {
         let lines = ROOMS.iter().flat_map(wall_lines);

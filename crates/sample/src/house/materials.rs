@@ -1,26 +1,26 @@
-//! What the layout is made of, as the data's `material` list says it.
+//! The materials of floors, walls and fittings, and their entries in the data's `material` list.
 
 use serde_json::{Value, json};
 
-use super::house_json::number;
+use super::json_number::number;
 use super::textures::LayoutTexture;
 use super::uids;
 
 /// A material of the layout.
 pub(super) struct LayoutMaterial {
-    /// What meshes call it.
+    /// The name by which meshes refer to it.
     pub(super) name: &'static str,
-    /// The name of its picture; without one it is its colour.
+    /// The name of its texture; without one it shows its colour.
     texture: Option<&'static str>,
     /// sRGB bytes.
     color: [u8; 3],
-    /// What the data says it is, with its finish.
+    /// The data's `contentType`: a constant word and the finish.
     content: [&'static str; 2],
 }
 
 const WHITE: [u8; 3] = [255; 3];
 
-/// All of them. Those of the third room are further down, where [`super::faults`] breaks them.
+/// Every material. Those of the third room come last, and [`super::faults`] changes them by their position.
 pub(super) const ALL: [LayoutMaterial; 13] = [
     pictured("floor", "planks", ["material", "flooring - hardwood"]),
     pictured("wallpaper", "wallpaper", ["material", "wallpaper"]),
@@ -45,13 +45,13 @@ const fn plain(name: &'static str, color: [u8; 3], content: [&'static str; 2]) -
     LayoutMaterial { name, texture: None, color, content }
 }
 
-/// The id by which meshes name a material: its place in the list, in the data's style.
+/// The id of a material, made of its position in the list and shaped as the data's.
 pub(super) fn uid(name: &str) -> String {
     let place = ALL.iter().position(|material| material.name == name);
     format!("101000000003/{:05}", place.expect("meshes name materials of the list"))
 }
 
-/// The entry of the data's list.
+/// The material's entry in the data's list.
 pub(super) fn json(material: &LayoutMaterial, textures: &[LayoutTexture]) -> Value {
     let [r, g, b] = material.color;
     let mut entry = json!({

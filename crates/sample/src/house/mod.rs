@@ -1,19 +1,21 @@
-//! A house that the program makes itself, under CC0, in the layout of 3D-FRONT and 3D-FUTURE and with one of each fault
-//! that those show: what their reader can be tried on without a download.
+//! The built-in house, under CC0, in the layout of 3D-FRONT and 3D-FUTURE and with one of each fault that their files
+//! show. The reader of 3D-FRONT is tested on it without a download.
 //!
-//! In: a folder. Out: in it `house/` with `3D-FRONT/UID.json`, `3D-FRONT-texture/JID/texture.png`,
-//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json`, `LICENSE.txt`, `FAULTS.txt`.
-//! The bytes are the same on every machine.
+//! The input is a folder. Written into it is `house/` with `3D-FRONT/UID.json`, `3D-FRONT-texture/JID/texture.png`,
+//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json`, `LICENSE.txt` and
+//! `FAULTS.txt`. The bytes are the same on every machine.
 //!
-//! Between: `layout` says which rooms there are and builds them of `surfaces`; `materials` and `textures` are what they
-//! show. `shapes` and `models` are the furniture, `swatches` what covers it, `font` the letters on everything; `pieces`
-//! says what stands where. `house_json` writes a house without a fault, `faults` spoils it, `model_files` writes the rest.
+//! `layout` defines the rooms and builds them with `surfaces`; their appearance is in `materials` and `textures`. The
+//! furniture's geometry is in `shapes`, its library in `models`, its textures in `swatches`, and `pieces` places it.
+//! `font` draws the letters in all textures. `house_json` makes the JSON of a sound house, `faults` plants the faults, and
+//! `model_files` writes the models.
 //!
-//! Two rooms are sound, but for some normals; what is wrong is in the third and in what stands there.
+//! The first two rooms are sound except for the normals of two walls. All other faults are in the third room.
 
 pub mod faults;
 mod font;
 mod house_json;
+mod json_number;
 mod layout;
 mod materials;
 mod model_files;
@@ -32,7 +34,7 @@ use mateval_image::png_io::write_rgb_bytes;
 use super::write_text;
 use crate::SampleError;
 
-/// CC0 1.0, and what it covers.
+/// The house's licence file: CC0 1.0.
 const LICENSE: &str = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\
 of 3D-FRONT and 3D-FUTURE, and without anything of theirs.\n\n\
 This scene was released under a CC0 license and is in the public domain.\n\
@@ -53,7 +55,7 @@ pub fn write(out: &Path) -> Result<(), SampleError> {
     models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
 }
 
-/// As [`write`], without pictures, which take most of the time.
+/// As [`write`], but without textures, which take most of the time.
 pub fn write_without_pictures(out: &Path) -> Result<(), SampleError> {
     write_shapes(out, &models::all(), &textures::all())
 }
@@ -77,7 +79,7 @@ pub fn sound_house() -> serde_json::Value {
     house_json::house(&models::all(), &textures::all())
 }
 
-/// The house's JSON with its faults, as it is on disk.
+/// The house's JSON with its faults, as [`write`] writes it.
 pub fn faulty_house() -> serde_json::Value {
     with_faults(&models::all(), &textures::all())
 }

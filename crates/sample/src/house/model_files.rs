@@ -1,5 +1,5 @@
-//! The files of the furniture: per model a folder with `raw_model.obj`, `model.mtl` and `texture.png`, and the list
-//! `model_info.json` of all.
+//! Writes the models: for each a folder with `raw_model.obj`, `model.mtl` and `texture.png`, and `model_info.json`, which
+//! lists them.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -15,10 +15,10 @@ use crate::SampleError;
 use crate::solid::Solid;
 use crate::write_text;
 
-/// Decimals of numbers in the files: hundredths of millimetres.
+/// Decimals of numbers in OBJ files, which are in metres.
 const DECIMALS: usize = 5;
 
-/// Writes a model's folder into `library`, but for its picture.
+/// Writes a model's folder into `library`, without its texture.
 pub(super) fn write_shape(library: &Path, model: &Model) -> Result<(), SampleError> {
     let folder = library.join(model.jid());
     std::fs::create_dir_all(&folder).map_err(SampleError::io("create", &folder))?;
@@ -26,7 +26,7 @@ pub(super) fn write_shape(library: &Path, model: &Model) -> Result<(), SampleErr
     write_text(&folder.join("model.mtl"), &mtl(model))
 }
 
-/// Writes a model's picture into its folder in `library`.
+/// Writes a model's texture into its folder in `library`.
 pub(super) fn write_picture(library: &Path, model: &Model) -> Result<(), SampleError> {
     let path = library.join(model.jid()).join("texture.png");
     let picture = swatches::picture(&model.swatches, model.side);
@@ -43,7 +43,7 @@ pub(super) fn write_picture(library: &Path, model: &Model) -> Result<(), SampleE
     Ok(())
 }
 
-/// The list of what the models are.
+/// The text of `model_info.json`.
 pub(super) fn info(models: &[Model]) -> String {
     let word = |word: &str| if word.is_empty() { Value::Null } else { word.into() };
     let entry = |model: &Model| {
@@ -53,13 +53,13 @@ pub(super) fn info(models: &[Model]) -> String {
             "material": material,
         })
     };
-    // A model without words is not in the list.
+    // A model without a super-category is left out of the list.
     let mut list: Value = models.iter().filter(|model| !model.info[0].is_empty()).map(entry).collect();
     list.sort_all_objects();
     mateval_scene::json::to_text(&list)
 }
 
-/// The names of a model's groups, one a part.
+/// The names of a model's OBJ groups, one for each part.
 fn groups(model: &Model) -> Vec<String> {
     let last = model.parts.len() - 1;
     let (mut solids, mut glasses) = (0, 0);
@@ -74,7 +74,8 @@ fn groups(model: &Model) -> Vec<String> {
     (0..model.parts.len()).map(name).collect()
 }
 
-/// Materials in 3ds Max's style, one a group. None says what the thing looks like: that does the picture.
+/// Materials in 3ds Max's style, one for each group. As in the data, they do not describe the appearance; the texture
+/// does.
 fn mtl(model: &Model) -> String {
     let values = if model.quirk == Some(Quirk::MisleadingMtl) {
         "Ka 0 0 0\n\tKd 0 0 0\n\tKs 0 0 0\n\tTf 1 1 1\n\tKe 1 1 1"
@@ -92,7 +93,7 @@ fn mtl(model: &Model) -> String {
     text
 }
 
-/// Numbers seen before and the lines that hold them.
+/// Rows of numbers, each stored once, and their line numbers.
 #[derive(Default)]
 struct Numbered<const N: usize> {
     seen: BTreeMap<[i64; N], usize>,
@@ -100,7 +101,7 @@ struct Numbered<const N: usize> {
 }
 
 impl<const N: usize> Numbered<N> {
-    /// The number, from 1, of the line with these values.
+    /// The line number, from 1, of the row with these values.
     fn number(&mut self, values: [f64; N]) -> usize {
         let whole = values.map(|value| (value * 1e5).round() as i64);
         *self.seen.entry(whole).or_insert_with(|| {
@@ -122,17 +123,19 @@ impl<const N: usize> Numbered<N> {
     }
 }
 
-/// The mesh, in one of the two dialects that the data has.
+/// The mesh as OBJ, in one of the two dialects found in the data.
 fn obj(model: &Model) -> String {
     let other = model.quirk == Some(Quirk::OtherDialect);
     let scale = if model.quirk == Some(Quirk::Centimetres) { 100.0 } else { 1.0 };
+    // Faces come first, since they collect the rows that they refer to.
     let (mut positions, mut uvs, mut normals) = Default::default();
     let mut faces = String::new();
-    for ((part, group), lay) in model.parts.iter().zip(groups(model)).zip(lays(model)) {
+    for ((part, group), field_uv) in model.parts.iter().zip(groups(model)).zip(field_uvs(model)) {
         let name = if other { String::new() } else { format!("usemtl {group}\ns 1\n") };
         let _ = write!(faces, "g {group}\n{name}");
-        push_faces(&mut faces, &part.1, scale, other, lay, (&mut positions, &mut uvs, &mut normals));
+        push_faces(&mut faces, &part.1, scale, other, field_uv, (&mut positions, &mut uvs, &mut normals));
     }
+    // In the file the rows stand before the faces.
     let mut text = String::from("# made by MatEval, CC0 1.0\n");
     if !other {
         text.push_str("mtllib ./model.mtl\n");
@@ -144,13 +147,13 @@ fn obj(model: &Model) -> String {
     if other { text.replace('\n', "\r\n") } else { text }
 }
 
-/// A solid's faces: quads where they are quads in the other dialect, else triangles.
+/// Appends a solid's faces. The other dialect keeps quads; the usual one splits them into triangles.
 fn push_faces(
     text: &mut String,
     solid: &Solid,
     scale: f64,
     other: bool,
-    lay: impl Fn(DVec2) -> DVec2,
+    field_uv: impl Fn(DVec2) -> DVec2,
     (positions, uvs, normals): (&mut Numbered<3>, &mut Numbered<2>, &mut Numbered<3>),
 ) {
     for face in &solid.faces {
@@ -158,7 +161,7 @@ fn push_faces(
             .iter()
             .map(|&i| {
                 let p = positions.number((solid.positions[i] * scale).to_array());
-                let uv = uvs.number(lay(solid.uvs[i]).to_array());
+                let uv = uvs.number(field_uv(solid.uvs[i]).to_array());
                 format!("{p}/{uv}/{}", normals.number(solid.normals[i].to_array()))
             })
             .collect();
@@ -172,9 +175,9 @@ fn push_faces(
     }
 }
 
-/// From each part's own texture coordinates into its field of the picture: letters from edge to edge, all else at one
-/// scale a field, so that grain is as wide on small parts as on large ones.
-fn lays(model: &Model) -> Vec<impl Fn(DVec2) -> DVec2 + use<>> {
+/// For each part the map from its own texture coordinates into its field of the texture. Letters fill their field. All
+/// parts of any other field share one scale, so that grain is as wide on small parts as on large ones.
+fn field_uvs(model: &Model) -> Vec<impl Fn(DVec2) -> DVec2 + use<>> {
     let bounds = |solid: &Solid| {
         let low = solid.uvs.iter().fold(DVec2::MAX, |low, uv| low.min(*uv));
         (low, solid.uvs.iter().fold(DVec2::MIN, |high, uv| high.max(*uv)) - low)
@@ -183,12 +186,12 @@ fn lays(model: &Model) -> Vec<impl Fn(DVec2) -> DVec2 + use<>> {
         let parts = model.parts.iter().filter(|(other, _)| *other == field);
         parts.fold(0.0_f64, |most, (_, solid)| most.max(bounds(solid).1.max_element()))
     };
-    let lay = |(field, solid): &(usize, Solid)| {
+    let into_field = |(field, solid): &(usize, Solid)| {
         let (low, size) = bounds(solid);
         let letters = matches!(model.swatches[*field], Swatch::Text { .. });
         let span = if letters { size } else { DVec2::splat(largest(*field)) };
         let (corner, width) = swatches::field(*field, model.side);
         move |uv: DVec2| DVec2::from(corner) + (uv - low) / span * width
     };
-    model.parts.iter().map(lay).collect()
+    model.parts.iter().map(into_field).collect()
 }

@@ -1,50 +1,51 @@
-//! The furniture that there is to place: what each model is, what covers it, and what is wrong with its files.
+//! The library of furniture models: their categories, textures and parts, and the faults planted in their files.
 
 use super::shapes::{self, Parts};
 use super::swatches::Swatch::{self, Fabric, Plain, Text, Wood};
 use super::uids;
 
-/// What is wrong with a model's files, on purpose.
+/// A fault planted in the files of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quirk {
-    /// A hundred times too large.
+    /// Coordinates are in centimetres.
     Centimetres,
-    /// Quads, doubled blanks, three texture coordinates, CRLF, no names of materials.
+    /// The OBJ has quads, doubled blanks, three texture coordinates, CRLF, and no material names.
     OtherDialect,
-    /// `model.mtl` is black, lets light through and glows.
+    /// `model.mtl` describes a black, transmitting and emitting material.
     MisleadingMtl,
-    /// The last part is a patch of shadow.
+    /// The last part is a painted shadow.
     Shadow,
-    /// The picture ends in the middle.
+    /// The texture's file ends in the middle.
     TruncatedTexture,
-    /// The picture is grey.
+    /// The texture is grey with opacity.
     GreyTexture,
-    /// The picture has no opacity anywhere.
+    /// The texture's opacity is 0 everywhere.
     ClearTexture,
-    /// There is no picture.
+    /// The texture is missing.
     NoTexture,
 }
 
 /// A model of the library.
 pub(super) struct Model {
-    /// What pieces call it.
+    /// The name by which records refer to it.
     pub(super) name: &'static str,
     /// The number in its id.
     number: u32,
-    /// Super-category, category, style, theme and material; no category is empty, as is all of what has no entry.
+    /// Super-category, category, style, theme and material. An empty text is written as null; a model without a
+    /// super-category is left out of `model_info.json`.
     pub(super) info: [&'static str; 5],
-    /// What covers its parts.
+    /// The fields of its texture.
     pub(super) swatches: Vec<Swatch>,
-    /// Texels across its picture.
+    /// Width and height of its texture in texels.
     pub(super) side: usize,
     pub(super) parts: Parts,
-    /// The part that is glass.
+    /// The index of the part that is glass.
     pub(super) glass: Option<usize>,
     pub(super) quirk: Option<Quirk>,
 }
 
 impl Model {
-    /// The name of its folder.
+    /// Its id, which names its folder.
     pub(super) fn jid(&self) -> String {
         uids::model(self.number)
     }
@@ -66,12 +67,12 @@ const fn letters(lines: &'static [&'static str], ground: [f64; 3], aspect: f64) 
     Text { lines, ground, ink: [0.16, 0.2, 0.3], aspect }
 }
 
-/// A model with nothing special about it; numbers follow the list's order.
+/// A model without a fault or glass. Its number follows from its position in [`all`].
 fn model(name: &'static str, info: [&'static str; 5], swatches: &[Swatch], parts: Parts) -> Model {
     Model { name, number: 0, info, swatches: swatches.to_vec(), side: 256, parts, glass: None, quirk: None }
 }
 
-/// All of them; the first thirteen are sound.
+/// Every model; the first thirteen are sound.
 pub(super) fn all() -> Vec<Model> {
     let mut models = sound();
     models.extend(faulty());
@@ -247,7 +248,7 @@ mod tests {
 
     use super::*;
 
-    /// The footprint's middle is the origin and the floor is y = 0, as in the data; shadows aside.
+    /// As in the data, the origin is on the floor in the middle of the footprint, painted shadows aside.
     #[test]
     fn models_stand_on_their_origin() {
         for model in all() {
@@ -261,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn every_super_category_is_there() {
+    fn every_super_category_is_used() {
         let mut found: Vec<&str> = all().iter().map(|model| model.info[0]).filter(|name| !name.is_empty()).collect();
         found.sort_unstable();
         found.dedup();
@@ -269,7 +270,7 @@ mod tests {
         assert_eq!(found, all);
     }
 
-    /// The long seat of the sofa is on one side only, so that a mirrored one is told.
+    /// The long seat of the sofa is on one side only, so that a mirrored sofa can be recognised.
     #[test]
     fn the_sofa_is_not_its_own_mirror_image() {
         let sofa = shapes::l_sofa();

@@ -1,62 +1,62 @@
-//! Which piece of furniture stands where.
+//! The furniture records of the house and where their pieces stand.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use super::layout;
 
-/// A turn about y as the data writes it: x, y, z, w.
+/// A rotation about y as a quaternion in the data's order x, y, z, w.
 pub(super) type Turn = [f64; 4];
 
-/// Where fronts look: a model's own looks along +z, which is south.
+/// Rotations by the direction that the front faces. A model's own front faces +z, which is south.
 const SOUTH: Turn = [0.0, 0.0, 0.0, 1.0];
 const EAST: Turn = [0.0, FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2];
 const NORTH: Turn = [0.0, 1.0, 0.0, 0.0];
 const WEST: Turn = [0.0, -FRAC_1_SQRT_2, 0.0, FRAC_1_SQRT_2];
 
-/// What a record of the `furniture` list says beside its id.
+/// The key `valid` of a record of the `furniture` list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum Validity {
     /// `valid` is true.
     Valid,
     /// `valid` is false.
     Invalid,
-    /// There is no such key.
-    Unsaid,
+    /// The key is absent.
+    Absent,
 }
 
 /// A record of the `furniture` list.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Record {
-    /// Its id.
+    /// The record's id.
     pub(super) uid: &'static str,
-    /// The model's name, or that of one that is not in the library.
+    /// The model's name; some models are not in the library.
     pub(super) model: &'static str,
-    pub(super) shown: Shown,
+    pub(super) validity: Validity,
     /// As in "sofa/l-shaped sofa"; may be empty.
     pub(super) title: &'static str,
 }
 
-/// A place where a record's model stands.
+/// One placement of a record's model.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
     /// The record's id.
     pub(super) uid: &'static str,
-    /// Place in [`layout::ROOMS`].
+    /// Index in [`layout::ROOMS`].
     pub(super) room: usize,
-    /// Metres.
+    /// Position in metres.
     pub(super) at: [f64; 3],
     pub(super) turn: Turn,
 }
 
-/// Where the pendant and the ceiling lamp begin, so that they end at the ceiling.
+/// Heights of the lower ends of the pendant and the ceiling lamp, whose upper ends touch the ceiling.
 const PENDANT_Y: f64 = layout::HEIGHT - 0.95;
 const CEILING_LAMP_Y: f64 = layout::HEIGHT - 0.15;
 
 const fn record(uid: &'static str, model: &'static str, title: &'static str) -> Record {
-    Record { uid, model, shown: Shown::Valid, title }
+    Record { uid, model, validity: Validity::Valid, title }
 }
 
-/// Every record; the nightstand's is placed twice.
+/// Every record. The nightstand 2002 is placed twice.
 pub(super) const RECORDS: [Record; 30] = [
     record("1001/model", "l_sofa", "sofa/l-shaped sofa"),
     record("1002/model", "coffee_table", "table/coffee table"),
@@ -86,15 +86,15 @@ pub(super) const RECORDS: [Record; 30] = [
     record("3010/model", "picture", "accessory/picture"),
     record("3011/model", "nightstand", "cabinet/nightstand"),
     record("3012/model", "vase that was lost", "accessory/vase"),
-    Record { shown: Shown::Invalid, ..record("3013/model", "plant that is not public", "plants/plant") },
-    Record { shown: Shown::Unsaid, ..record("3014/model", "door leaf that is not public", "door/door") },
+    Record { validity: Validity::Invalid, ..record("3013/model", "plant that is not public", "plants/plant") },
+    Record { validity: Validity::Absent, ..record("3014/model", "door leaf that is not public", "door/door") },
 ];
 
 const fn piece(uid: &'static str, room: usize, at: [f64; 3], turn: Turn) -> Piece {
     Piece { uid, room, at, turn }
 }
 
-/// Every place, by rooms.
+/// Every placement, room by room.
 pub(super) const PIECES: [Piece; 31] = [
     piece("1001/model", 0, [1.6, 0.0, 3.59], NORTH),
     piece("1002/model", 0, [1.75, 0.0, 2.35], SOUTH),
@@ -129,7 +129,7 @@ pub(super) const PIECES: [Piece; 31] = [
     piece("3014/model", 2, [5.05, 0.0, 4.5], NORTH),
 ];
 
-/// The record of an id.
+/// The record with this id.
 pub(super) fn record_of(uid: &str) -> &'static Record {
     RECORDS.iter().find(|record| record.uid == uid).expect("pieces name records of the list")
 }

@@ -1,13 +1,14 @@
-//! Shapes of the house's furniture, in metres, y up, front towards +z, about the middle of the footprint on the floor.
+//! Geometry of the house's furniture, in metres, +y up, fronts towards +z, with the origin on the floor in the middle of
+//! the footprint.
 //!
-//! A shape is a list of parts: the field of the model's picture that covers one, and its solid.
+//! A shape is a list of parts. A part is the number of a field of the model's texture and the solid that it covers.
 
 use glam::{DVec2, DVec3};
 
 use crate::furniture;
 use crate::solid::Solid;
 
-/// Fields of a model's picture and what they cover.
+/// Texture fields and the solids that they cover.
 pub(super) type Parts = Vec<(usize, Solid)>;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
@@ -26,12 +27,12 @@ fn turned(profile: &[(f64, f64)]) -> Solid {
     Solid::default().turned(DVec3::ZERO, profile, 20, 1.0)
 }
 
-/// A rectangle that shows a field of letters from edge to edge.
+/// A rectangle that shows a whole field of letters.
 fn label(corner: DVec3, right: DVec3, up: DVec3) -> Solid {
     Solid::default().rectangle(corner, right, up, DVec2::new(right.length(), up.length()))
 }
 
-/// Four legs `wide` across that reach up to `top`, in the corners of a footprint of half size `x`, `z`.
+/// Four square legs `wide` metres across and `top` metres high, in the corners of a footprint of half size `x`, `z`.
 fn legs(x: f64, z: f64, wide: f64, top: f64) -> Solid {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].into_iter().fold(Solid::default(), |legs, (sx, sz)| {
         let middle = v(sx * (x - wide / 2.0), top / 2.0, sz * (z - wide / 2.0));
@@ -40,7 +41,7 @@ fn legs(x: f64, z: f64, wide: f64, top: f64) -> Solid {
     })
 }
 
-/// 2.4 m wide; the long seat is on the right of who sits in it looking at +z, that is on the side of +x.
+/// An L-shaped sofa, 2.4 m wide, with its long seat on the side of +x.
 pub(super) fn l_sofa() -> Parts {
     let feet = [(-1.15, -0.72), (1.15, -0.72), (1.15, 0.72), (0.35, 0.72), (-1.15, 0.07)];
     let feet = feet
@@ -60,7 +61,7 @@ pub(super) fn l_sofa() -> Parts {
     ]
 }
 
-/// 0.8 m wide and deep.
+/// An armchair, 0.8 m wide and deep.
 pub(super) fn armchair() -> Parts {
     vec![
         (1, legs(0.36, 0.36, 0.05, 0.12)),
@@ -72,12 +73,12 @@ pub(super) fn armchair() -> Parts {
     ]
 }
 
-/// 1.1 m by 0.6 m.
+/// A coffee table of 1.1 m by 0.6 m.
 pub(super) fn coffee_table() -> Parts {
     vec![(0, furniture::table())]
 }
 
-/// 1.6 m wide, with three compartments.
+/// A TV stand, 1.6 m wide, with three doors.
 pub(super) fn tv_stand() -> Parts {
     let mut doors = Solid::default();
     for x in [-0.78, -0.25, 0.28] {
@@ -91,13 +92,13 @@ pub(super) fn tv_stand() -> Parts {
     ]
 }
 
-/// 1.6 m by 0.9 m.
+/// A dining table of 1.6 m by 0.9 m.
 pub(super) fn dining_table() -> Parts {
     let apron = boxed(v(-0.74, 0.64, -0.39), v(0.74, 0.71, 0.39));
     vec![(0, boxed(v(-0.8, 0.71, -0.45), v(0.8, 0.75, 0.45))), (0, apron), (0, legs(0.76, 0.41, 0.07, 0.71))]
 }
 
-/// 0.45 m wide.
+/// A dining chair, 0.45 m wide.
 pub(super) fn dining_chair() -> Parts {
     let back =
         boxed(v(-0.22, 0.46, -0.25), v(-0.18, 0.92, -0.21)).boxed(v(0.18, 0.46, -0.25), v(0.22, 0.92, -0.21), 1.0);
@@ -108,7 +109,7 @@ pub(super) fn dining_chair() -> Parts {
     ]
 }
 
-/// Hangs 0.95 m down from where its upper side is fixed.
+/// A pendant lamp, 0.95 m high with its rod.
 pub(super) fn pendant_lamp() -> Parts {
     let shade = [(0.26, 0.0), (0.24, 0.08), (0.16, 0.18), (0.04, 0.24), (0.0, 0.24)];
     let bulb = [(0.0, 0.06), (0.03, 0.07), (0.045, 0.1), (0.03, 0.14), (0.0, 0.15)];
@@ -120,18 +121,18 @@ pub(super) fn pendant_lamp() -> Parts {
     ]
 }
 
-/// 1.64 m high.
+/// A floor lamp, 1.64 m high.
 pub(super) fn floor_lamp() -> Parts {
     vec![(1, furniture::lamp_stand()), (0, furniture::lamp_shade())]
 }
 
-/// A base and a dome of glass below it, 0.15 m high.
+/// A ceiling lamp: a base with a dome of glass below it, 0.15 m high.
 pub(super) fn ceiling_lamp() -> Parts {
     let dome = [(0.0, 0.0), (0.12, 0.01), (0.22, 0.04), (0.28, 0.09), (0.28, 0.12)];
     vec![(0, turned(&[(0.0, 0.11), (0.3, 0.11), (0.3, 0.15), (0.0, 0.15)])), (1, turned(&dome))]
 }
 
-/// 0.9 m by 0.65 m, to be hung on a wall behind it.
+/// A framed picture of 0.9 m by 0.65 m with its back at z = -0.02.
 pub(super) fn picture() -> Parts {
     let mut bars = furniture::frame(DVec2::new(0.8, 0.55), 0.05, -0.02, 0.02);
     bars.positions.iter_mut().for_each(|p| *p += v(-0.4, 0.05, 0.0));
@@ -142,7 +143,7 @@ pub(super) fn picture() -> Parts {
     ]
 }
 
-/// For two, 1.9 m wide and 2.15 m long, the head towards -z.
+/// A double bed, 1.9 m wide and 2.15 m long, its head towards -z.
 pub(super) fn bed() -> Parts {
     vec![
         (0, boxed(v(-0.95, 0.0, -1.075), v(0.95, 1.1, -0.995))),
@@ -156,7 +157,7 @@ pub(super) fn bed() -> Parts {
     ]
 }
 
-/// 0.5 m wide, with two drawers.
+/// A nightstand, 0.5 m wide, with two drawers.
 pub(super) fn nightstand() -> Parts {
     let drawer = |y: f64| boxed(v(-0.22, y, 0.18), v(0.22, y + 0.17, 0.195));
     vec![
@@ -168,7 +169,7 @@ pub(super) fn nightstand() -> Parts {
     ]
 }
 
-/// 1.8 m wide, 2.2 m high, with three doors.
+/// A wardrobe, 1.8 m wide and 2.2 m high, with three doors.
 pub(super) fn wardrobe() -> Parts {
     let (mut doors, mut handles) = (Solid::default(), Solid::default());
     for x in [-0.895, -0.295, 0.305] {
@@ -178,7 +179,7 @@ pub(super) fn wardrobe() -> Parts {
     vec![(0, boxed(v(-0.9, 0.0, -0.3), v(0.9, 2.2, 0.27))), (1, doors), (2, handles)]
 }
 
-/// 1.2 m wide, with a cushion on it.
+/// A stool for the end of a bed, 1.2 m wide, with a cushion.
 pub(super) fn bed_end_stool() -> Parts {
     vec![
         (1, legs(0.58, 0.18, 0.05, 0.3)),
@@ -187,7 +188,7 @@ pub(super) fn bed_end_stool() -> Parts {
     ]
 }
 
-/// 1 m wide, 2 m high, with books.
+/// A bookcase with books, 1 m wide and 2 m high.
 pub(super) fn bookcase() -> Parts {
     let mut case = boxed(v(-0.5, 0.0, -0.16), v(0.5, 2.0, -0.15))
         .boxed(v(-0.5, 0.0, -0.15), v(-0.475, 2.0, 0.16), 1.0)
@@ -207,7 +208,7 @@ pub(super) fn bookcase() -> Parts {
     vec![(0, case.boxed(v(-0.475, 1.975, -0.15), v(0.475, 2.0, 0.155), 1.0)), (1, first), (2, second)]
 }
 
-/// 0.9 m wide, with three drawers and letters on the lowest.
+/// A chest, 0.9 m wide, with three drawers and letters on the lowest.
 pub(super) fn chest() -> Parts {
     let drawer = |y: f64| boxed(v(-0.42, y, 0.2), v(0.42, y + 0.22, 0.22));
     vec![
@@ -219,12 +220,12 @@ pub(super) fn chest() -> Parts {
     ]
 }
 
-/// 1.2 m wide, open, 0.8 m high, on a patch of shadow 6 m wide.
+/// An open shelf, 1.2 m wide and 0.8 m high, on a painted shadow 6 m wide.
 pub(super) fn shelf() -> Parts {
     vec![(0, furniture::shelf()), (1, label(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0)))]
 }
 
-/// A round top on one leg.
+/// A side table: a round top on one leg.
 pub(super) fn side_table() -> Parts {
     let foot = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.02), (0.03, 0.04), (0.025, 0.5), (0.0, 0.5)];
     vec![
@@ -234,7 +235,7 @@ pub(super) fn side_table() -> Parts {
     ]
 }
 
-/// 0.6 m wide, low, leaning back.
+/// A low lounge chair, 0.6 m wide.
 pub(super) fn lounge_chair() -> Parts {
     vec![
         (1, legs(0.28, 0.3, 0.04, 0.34)),
@@ -243,12 +244,12 @@ pub(super) fn lounge_chair() -> Parts {
     ]
 }
 
-/// 0.4 m wide.
+/// A stool, 0.4 m wide.
 pub(super) fn stool() -> Parts {
     vec![(1, legs(0.18, 0.18, 0.04, 0.4)), (0, cushion(v(-0.2, 0.38, -0.2), v(0.2, 0.45, 0.2), 0.03))]
 }
 
-/// Half a metre each way.
+/// A cube with sides of 0.5 m.
 pub(super) fn crate_box() -> Parts {
     vec![(0, boxed(v(-0.25, 0.0, -0.25), v(0.25, 0.5, 0.25)))]
 }

@@ -1,5 +1,5 @@
-//! Meshes of floors, walls and what is built in: rectangles and boxes in metres, texture coordinates in metres too, as
-//! the data has them.
+//! Meshes of floors, walls and fittings, made of rectangles and boxes. Positions and texture coordinates are in metres,
+//! as in the data.
 
 use glam::{DVec2, DVec3};
 
@@ -8,9 +8,9 @@ use crate::solid::sides;
 /// A mesh of the house's layout.
 #[derive(Clone, Debug)]
 pub(super) struct LayoutMesh {
-    /// What the data calls its kind, as in "WallInner".
+    /// The data's type of mesh, as in "WallInner".
     pub(super) kind: &'static str,
-    /// Which of `materials` it shows.
+    /// The name of its material in `materials`.
     pub(super) material: &'static str,
     pub(super) positions: Vec<DVec3>,
     pub(super) normals: Vec<DVec3>,
@@ -18,7 +18,7 @@ pub(super) struct LayoutMesh {
     pub(super) faces: Vec<[usize; 3]>,
 }
 
-/// A rectangular hole of a wall, in metres from the wall's foot.
+/// A rectangular hole in a wall, in metres from the wall's start on the floor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WallHole {
     /// Along the wall.
@@ -34,8 +34,8 @@ impl LayoutMesh {
         Self { kind, material, positions: vec![], normals: vec![], uvs: vec![], faces: vec![] }
     }
 
-    /// Two triangles from `corner` along `right` and `up`, front towards their cross product; `uv` is the corner's. The
-    /// triangles share no vertices.
+    /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. The corner's texture
+    /// coordinates are `uv`. The two triangles share no vertices.
     pub(super) fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, uv: DVec2) -> Self {
         let (width, height) = (right.length(), up.length());
         for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)] {
@@ -48,7 +48,7 @@ impl LayoutMesh {
         self
     }
 
-    /// A box between two corners; the two triangles of a side share vertices.
+    /// Adds a box between two corners. The two triangles of a side share vertices.
     pub(super) fn boxed(mut self, low: DVec3, high: DVec3) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
@@ -64,13 +64,13 @@ impl LayoutMesh {
         self
     }
 
-    /// An upright wall from `foot` along `along`, which runs to the right of who looks at it; u from the foot, v downwards
-    /// from the top.
+    /// Adds an upright wall that starts at `foot` and runs along `along`, to the right seen from its front. u is measured
+    /// from the start, v downwards from the top.
     pub(super) fn wall(self, foot: DVec3, along: DVec3, height: f64, holes: &[WallHole]) -> Self {
         let (length, right) = (along.length(), along.normalize());
         let mut holes = holes.to_vec();
         holes.sort_by(|a, b| a.left.total_cmp(&b.left));
-        // Full strips between the holes, and what is below and above each.
+        // The wall is cut into full-height strips between the holes and rectangles below and above each hole.
         let mut pieces = Vec::new();
         let mut from = 0.0;
         for hole in holes {
@@ -86,22 +86,22 @@ impl LayoutMesh {
         })
     }
 
-    /// A level rectangle between two corners (x, z) that faces up; u along +x, v along -z.
+    /// Adds a horizontal rectangle between two corners (x, z) that faces up. u runs along +x, v along -z.
     pub(super) fn facing_up(self, low: DVec2, high: DVec2, y: f64) -> Self {
         let size = high - low;
         let (right, up) = (DVec3::X * size.x, DVec3::NEG_Z * size.y);
         self.rectangle(DVec3::new(low.x, y, high.y), right, up, DVec2::new(0.0, -size.y))
     }
 
-    /// A level rectangle between two corners (x, z) that faces down; u along +x, v along +z.
+    /// Adds a horizontal rectangle between two corners (x, z) that faces down. u runs along +x, v along +z.
     pub(super) fn facing_down(self, low: DVec2, high: DVec2, y: f64) -> Self {
         let size = high - low;
         let (right, up) = (DVec3::X * size.x, DVec3::Z * size.y);
         self.rectangle(DVec3::new(low.x, y, low.y), right, up, DVec2::new(0.0, -size.y))
     }
 
-    /// The inner sides of a hole through a wall, between two corners, seen from within it: the two upright ones, the upper
-    /// one and, with `sill`, the lower one. The wall is thin along x or z.
+    /// Adds the inner sides of a hole through a wall, between two corners, facing into the hole: the left, right and upper
+    /// sides and, with `sill`, the lower one. The hole passes through the wall along the shorter of x and z.
     pub(super) fn reveal(mut self, low: DVec3, high: DVec3, sill: bool) -> Self {
         let size = high - low;
         let through_x = size.x < size.z;
@@ -111,7 +111,7 @@ impl LayoutMesh {
             if open || (normal.y < 0.0 && !sill) {
                 continue;
             }
-            // The side's own front looks out of the hole; turned about, it looks into it.
+            // `sides` face out of a box; here right and the front are reversed.
             let corner = middle + normal * half + right * half - up * half;
             self = self.rectangle(corner, -right * half * 2.0, up * half * 2.0, DVec2::ZERO);
         }
@@ -142,14 +142,14 @@ mod tests {
         let wall = LayoutMesh::new("WallInner", "paint").wall(DVec3::ZERO, DVec3::X * 4.0, 2.5, &holes);
         assert!((area(&wall) - (10.0 - 1.0 - 1.0)).abs() < 1e-12);
         assert!(faces_agree_with_normals(&wall));
-        // u is the way along the wall and v the height below its top, wherever the rectangles' edges are.
+        // u is the distance along the wall and v the height relative to its top, however the wall is cut.
         for (p, uv) in wall.positions.iter().zip(&wall.uvs) {
             assert!((DVec2::new(p.x, p.y - 2.5) - uv).length() < 1e-12);
         }
     }
 
     #[test]
-    fn reveals_look_into_their_hole() {
+    fn reveals_face_into_their_hole() {
         let (low, high) = (DVec3::new(1.0, 0.5, 0.0), DVec3::new(2.0, 1.5, 0.2));
         for (sill, rectangles) in [(true, 4), (false, 3)] {
             let reveal = LayoutMesh::new("Window", "paint").reveal(low, high, sill);

@@ -1,26 +1,26 @@
-//! What furniture is covered with: up to four fields, two by two, in the one picture that a model has. A field that is
-//! not used has no opacity, as in the data.
+//! Textures of furniture: up to four fields, two by two, in the single texture of a model. An unused field has opacity 0,
+//! as in the data.
 
 use mateval_image::Picture;
 
 use super::font::Lettering;
 use crate::pattern::{self, Color, noise};
 
-/// One field of a model's picture.
+/// The content of one field of a model's texture.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Swatch {
-    /// Wood of this colour, grain along u.
+    /// Wood of this colour with its grain along u.
     Wood(Color),
     /// A weave of this colour.
     Fabric(Color),
-    /// Something smooth: metal, paint, a lampshade.
+    /// A smooth surface such as metal, paint or a lampshade.
     Plain(Color),
-    /// Dark letters on this colour, for something `aspect` times as wide as high. Fills its field from edge to edge.
+    /// Dark letters on this colour that fill the field, for a surface `aspect` times as wide as high.
     Text { lines: &'static [&'static str], ground: Color, ink: Color, aspect: f64 },
 }
 
 impl Swatch {
-    /// The colour at a place of the field, v downwards.
+    /// The colour at a point of the field, v downwards.
     fn color(&self, u: f64, v: f64) -> Color {
         match *self {
             Self::Wood(tone) => {
@@ -44,7 +44,7 @@ impl Swatch {
     }
 }
 
-/// The picture of a model, `side` texels wide and high.
+/// The texture of a model, `side` texels wide and high.
 pub(super) fn picture(swatches: &[Swatch], side: usize) -> Picture<[u8; 4]> {
     let half = side / 2;
     Picture::from_fn(side, side, |x, y| {
@@ -55,7 +55,7 @@ pub(super) fn picture(swatches: &[Swatch], side: usize) -> Picture<[u8; 4]> {
     })
 }
 
-/// The lower left corner and the width of a field in texture coordinates, v upwards, within two texels of its edges.
+/// The lower left corner and the width of a field in texture coordinates, v upwards, inset by two texels on every side.
 pub(super) fn field(number: usize, side: usize) -> ([f64; 2], f64) {
     let inset = 2.0 / side as f64;
     let (column, row) = ((number % 2) as f64, (number / 2) as f64);

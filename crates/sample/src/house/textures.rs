@@ -1,24 +1,24 @@
-//! The pictures on floors and walls: each says by letters and arrows how it is meant to hang. Some are stored mirrored
-//! or turned, and their materials' `UVTransform` sets that right.
+//! The textures of floors and walls, whose letters and arrows show their orientation. Some are stored mirrored or rotated,
+//! which their materials' `UVTransform` undoes.
 
 use mateval_image::Picture;
 
 use super::font::Lettering;
 use crate::pattern::{self, Color, noise, paint, ramp, random};
 
-/// How a picture lies in its file.
+/// How a texture is stored in its file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stored {
-    /// As it is to be seen.
+    /// As it appears on the wall.
     Upright,
     /// Left and right swapped.
     Mirrored,
-    /// A quarter turn away.
+    /// Rotated by 90 degrees.
     Turned,
 }
 
 impl Stored {
-    /// The matrix, by rows, from texture coordinates in metres to those of the file, whose picture spans `tile` metres.
+    /// The row-major matrix from texture coordinates in metres to those of the file, whose texture spans `tile` metres.
     pub(super) fn uv_transform(self, tile: f64) -> [f64; 9] {
         let s = 1.0 / tile;
         match self {
@@ -28,7 +28,7 @@ impl Stored {
         }
     }
 
-    /// The file's picture of what is to be seen; square pictures only.
+    /// The content of the file for a texture that appears as `seen`, which is square.
     fn stored(self, seen: &Picture<[u8; 3]>) -> Picture<[u8; 3]> {
         let n = seen.width();
         Picture::from_fn(n, n, |x, y| match self {
@@ -39,27 +39,27 @@ impl Stored {
     }
 }
 
-/// A picture for floors or walls.
+/// A texture for floors or walls.
 pub(super) struct LayoutTexture {
-    /// What materials call it.
+    /// The name by which materials refer to it.
     pub(super) name: &'static str,
     /// The number in its id.
     pub(super) number: u32,
     /// Metres that it spans on a wall.
     pub(super) tile: f64,
     pub(super) stored: Stored,
-    /// As it is to be seen.
+    /// The texture as it appears on the wall.
     pub(super) seen: Picture<[u8; 3]>,
 }
 
 impl LayoutTexture {
-    /// What the file holds.
+    /// The texture as the file stores it.
     pub(super) fn file(&self) -> Picture<[u8; 3]> {
         self.stored.stored(&self.seen)
     }
 }
 
-/// All of them.
+/// Every layout texture.
 pub(super) fn all() -> Vec<LayoutTexture> {
     let texture = |name, number, tile, stored, seen| LayoutTexture { name, number, tile, stored, seen };
     vec![
@@ -72,12 +72,12 @@ pub(super) fn all() -> Vec<LayoutTexture> {
     ]
 }
 
-/// `color`, or `ink` where one of the texts is.
+/// `ink` where one of the texts covers the point, else `color`.
 fn lettered(texts: &[Lettering], u: f64, v: f64, color: Color, ink: Color) -> Color {
     if texts.iter().any(|text| text.covers(u, v)) { ink } else { color }
 }
 
-/// Sage with the project's name above an arrow up, in a rounded field.
+/// Sage green with a thin frame, the project's name and an arrow up.
 fn wallpaper(u: f64, v: f64) -> Color {
     let name = Lettering::fitted(&["MATEVAL"], [0.14, 0.16], [0.86, 0.42], 1.0);
     let top = Lettering::fitted(&["^ TOP"], [0.3, 0.55], [0.7, 0.9], 1.0);
@@ -87,15 +87,15 @@ fn wallpaper(u: f64, v: f64) -> Color {
     lettered(&[name, top], u, v, ground, [0.36, 0.47, 0.41])
 }
 
-/// Oak planks; in their middle an arrow along +u with an X, and one along -v (downwards) with a Z. On a floor, whose u
-/// runs along +x and v along -z, those are the room's axes.
+/// Oak planks with an arrow X along +u and an arrow Z along -v (downwards). On a floor, whose u runs along +x and v along
+/// -z, these are the room's axes.
 fn planks(u: f64, v: f64) -> Color {
     let x = Lettering::fitted(&["X>"], [0.55, 0.40], [0.80, 0.52], 1.0);
     let z = Lettering::fitted(&["Z", "_"], [0.42, 0.55], [0.52, 0.80], 1.0);
     lettered(&[x, z], u, v, pattern::planks(u, v), [0.15, 0.22, 0.36])
 }
 
-/// Two creams in stripes, with the word that is the bedroom's.
+/// Stripes in two creams with the words BED ROOM.
 fn stripes(u: f64, v: f64) -> Color {
     let word = Lettering::fitted(&["BED", "ROOM", "^"], [0.3, 0.2], [0.7, 0.8], 1.0);
     let stripe = (u * 8.0) as i64 % 2 == 0;
@@ -104,13 +104,13 @@ fn stripes(u: f64, v: f64) -> Color {
     lettered(&[word], u, v, ground.map(|c: f64| c * grain), [0.52, 0.43, 0.50])
 }
 
-/// Wood with the grain along u, branded with an arrow up and a word.
+/// Wood with its grain along u, an arrow up and an arrow right.
 fn panel(u: f64, v: f64) -> Color {
     let word = Lettering::fitted(&["UP ^", "EAST >"], [0.15, 0.25], [0.85, 0.75], 1.0);
     lettered(&[word], u, v, pattern::wood(u, v).map(|c| 0.25 + 0.8 * c), [0.95, 0.85, 0.6])
 }
 
-/// A floor tile with joints, a compass and the room's number; north is up, which on a floor is -z.
+/// A floor tile with joints, a compass and the room's number. North is up, which is -z on a floor.
 fn tiles(u: f64, v: f64) -> Color {
     let compass = [
         Lettering::fitted(&["N"], [0.44, 0.12], [0.56, 0.26], 1.0),
@@ -137,17 +137,17 @@ mod tests {
 
     use super::*;
 
-    /// The texel at texture coordinates, v upwards, repeated.
+    /// The texel at texture coordinates, v upwards, with repetition.
     fn look_up(picture: &Picture<[u8; 3]>, u: f64, v: f64) -> [u8; 3] {
         let n = picture.width() as f64;
         picture.get((u.rem_euclid(1.0) * n) as usize, ((1.0 - v.rem_euclid(1.0)) * n).min(n - 1.0) as usize)
     }
 
-    /// Looked up through its matrix, a file shows what is to be seen; looked up without its minus and its turn, it does
-    /// not.
+    /// Looked up through its matrix, a file shows the texture as it appears on the wall. Looked up without the matrix's
+    /// mirror or rotation, it does not.
     #[test]
-    fn the_matrix_sets_the_picture_right() {
-        let mut told = 0;
+    fn the_matrix_undoes_how_the_texture_is_stored() {
+        let mut differing = 0;
         for texture in all() {
             let rows = texture.stored.uv_transform(texture.tile);
             let matrix = DMat3::from_cols_array(&rows).transpose();
@@ -164,15 +164,15 @@ mod tests {
             let plain = DMat3::from_diagonal(DVec3::new(1.0 / texture.tile, 1.0 / texture.tile, 1.0));
             if texture.stored != Stored::Upright {
                 assert!(wrong(plain) > n * n / 20, "{}", texture.name);
-                told += 1;
+                differing += 1;
             }
         }
-        assert_eq!(told, 2);
+        assert_eq!(differing, 2);
     }
 
-    /// Every picture with letters changes when it is mirrored or turned upside down.
+    /// Every texture with letters changes when it is mirrored or turned upside down.
     #[test]
-    fn no_lettered_picture_is_its_own_mirror_image() {
+    fn no_lettered_texture_is_its_own_mirror_image() {
         for texture in all().iter().filter(|texture| texture.name != "door_wood") {
             let (seen, n) = (&texture.seen, texture.seen.width());
             let ink = |a: [u8; 3], b: [u8; 3]| a[0].abs_diff(b[0]) > 60;

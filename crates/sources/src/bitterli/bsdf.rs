@@ -1,4 +1,4 @@
-//! BSDFs: wrappers (`twosided`, `mask`, `bumpmap`) in any order around one model become one flat material.
+//! BSDFs. Any nesting of wrappers (`twosided`, `mask`, `bumpmap`) around one model becomes one material.
 
 use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput};
 use mateval_scene::reference::MaterialIndex;
@@ -8,11 +8,12 @@ use super::parameters::Parameters;
 use super::reader::Reader;
 use mateval_scene::findings::shortened;
 
-/// More wrappers than this are a loop of references.
+/// The deepest nesting of wrappers. A deeper one is taken for a cycle of references.
 const MOST_WRAPPERS: usize = 16;
 
 impl<'a> Reader<'a> {
-    /// The material of the BSDF `element`, made once. Without an id it is called after `owner`, the shape.
+    /// The material of the BSDF `element`, which is made at its first use. Without an id it is named after `owner`, the
+    /// shape.
     pub(super) fn material(&mut self, element: &'a Element, owner: &str) -> MaterialIndex {
         if let Some(known) = self.materials.get(&element.serial) {
             return *known;
@@ -23,7 +24,7 @@ impl<'a> Reader<'a> {
         index
     }
 
-    /// What a shape without a BSDF is made of, as in Mitsuba: grey, or black where it emits.
+    /// The material of a shape without a BSDF. As in Mitsuba, it is diffuse grey, or black where the shape emits.
     pub(super) fn default_material(&mut self, owner: &str, emits: bool) -> MaterialIndex {
         let reflectance = if emits { 0.0 } else { 0.5 };
         self.add_material(Material {
@@ -46,9 +47,11 @@ impl<'a> Reader<'a> {
         let mut named = false;
         let mut element = outer;
         for _ in 0..MOST_WRAPPERS {
+            // The outermost id names the material.
             if let (Some(id), false) = (element.attribute("id"), named) {
                 (material.name, named) = (id.to_owned(), true);
             }
+            // One layer is read, then the BSDF within it.
             let place = if named { format!("bsdf '{}'", shortened(&material.name)) } else { place_of(element, owner) };
             let mut from = self.parameters(element, place);
             let inner = self.unwrap_layer(element, &mut from, &mut material);
@@ -58,12 +61,12 @@ impl<'a> Reader<'a> {
                 None => return material,
             }
         }
-        let message = format!("more than {MOST_WRAPPERS} BSDFs within each other");
+        let message = format!("more than {MOST_WRAPPERS} nested BSDFs");
         self.log.warn("nested_too_deep", &place_of(outer, owner), message, "used diffuse grey 0.5");
         material
     }
 
-    /// Takes one layer into `material`; gives the BSDF within, or none at the innermost.
+    /// Reads one layer into `material`. Returns the BSDF within it, or none for the innermost.
     fn unwrap_layer(
         &mut self,
         element: &'a Element,
@@ -81,7 +84,9 @@ impl<'a> Reader<'a> {
                 self.set_opacity(material, Some(ScalarInput::Constant(0.0)), &from.place);
                 return None;
             }
-            "normalmap" | "blendbsdf" | "mixturebsdf" | "coating" | "roughcoating" => self.replaced(element, from),
+            "normalmap" | "blendbsdf" | "mixturebsdf" | "coating" | "roughcoating" => {
+                self.report_unsupported_wrapper(element, from);
+            }
             _ => {
                 material.model = self.model(element, from);
                 return None;
@@ -98,7 +103,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Mitsuba moves the surface by `scale` times the texture's luminance, in scene units.
+    /// Reads a bump map. Mitsuba displaces the surface by `scale` times the texture's luminance, in scene units.
     fn bump(&mut self, from: &mut Parameters<'a>, material: &mut Material) {
         let scale = from.number("scale", &mut self.log).unwrap_or(1.0) as f32;
         let textures = from.objects("texture");
@@ -114,8 +119,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Wrappers that we have no word for.
-    fn replaced(&mut self, element: &Element, from: &mut Parameters<'a>) {
+    fn report_unsupported_wrapper(&mut self, element: &Element, from: &mut Parameters<'a>) {
         let message = format!("line {}: the bsdf '{}' is not supported", element.line, element.kind());
         self.log.warn("unsupported", &from.place, message, "used the first bsdf in it");
         from.objects("texture");
@@ -135,7 +139,7 @@ impl<'a> Reader<'a> {
         children.first().copied()
     }
 
-    /// An unknown model is diffuse grey.
+    /// Reports an unknown model, which becomes diffuse grey.
     pub(super) fn unknown_model(&mut self, element: &Element, from: &mut Parameters<'a>) -> MaterialModel {
         let message = format!("line {}: the bsdf '{}' is not known", element.line, shortened(element.kind()));
         self.log.warn("unknown_plugin", &from.place, message, "used diffuse grey 0.5");

@@ -1,4 +1,4 @@
-//! The innermost BSDF: what scatters light, with Mitsuba's defaults for what is not given.
+//! The innermost BSDF, which scatters light, with Mitsuba's defaults for absent parameters.
 
 use mateval_scene::material::{ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput};
 
@@ -9,11 +9,11 @@ use super::texture::Bounds;
 use super::{ior, value};
 use mateval_scene::findings::shortened;
 
-/// Mitsuba's own lower bound of alpha.
+/// Mitsuba's lower bound of alpha.
 const LEAST_ALPHA: f32 = 1e-4;
 
 impl<'a> Reader<'a> {
-    /// The model of `element`, which is no wrapper.
+    /// The model of `element`, which is not a wrapper.
     pub(super) fn model(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> MaterialModel {
         match element.kind() {
             "diffuse" => MaterialModel::Diffuse { reflectance: self.color(from, "reflectance", 0.5), alpha: None },
@@ -58,8 +58,9 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Mitsuba 0.x assumes copper where nothing is said, Mitsuba 3 a perfect mirror. `ext_eta` divides eta and k.
+    /// The default is copper in Mitsuba 0.x and a perfect mirror in Mitsuba 3. `ext_eta` divides eta and k.
     fn conductor_ior(&mut self, from: &mut Parameters<'a>) -> ConductorIor {
+        // Given numbers take precedence over the name of a material.
         let outside = self.index(from, "ext_eta").unwrap_or(1.0) as f32;
         let mut constant = |name: &str| {
             let element = from.take(&[name])?;
@@ -88,7 +89,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Index inside over index outside.
+    /// The index of refraction inside divided by that outside.
     fn relative_index(&mut self, from: &mut Parameters<'a>, inside: &str) -> f32 {
         let named = |name| ior::dielectric(name).unwrap_or(1.0);
         let inside = self.index(from, "int_ior").unwrap_or_else(|| named(inside));
@@ -96,22 +97,10 @@ impl<'a> Reader<'a> {
         (inside / outside) as f32
     }
 
-    /// An index of refraction as a number or a name.
+    /// Takes an index of refraction, given as a number or a name.
     fn index(&mut self, from: &mut Parameters<'a>, name: &str) -> Option<f64> {
-        let element = from.take(&[name])?;
-        let text = element.attribute("value").unwrap_or("");
-        let found = match ior::dielectric(text) {
-            Some(index) => Ok(index),
-            None => value::number(text).and_then(|index| {
-                if (0.01..=100.0).contains(&index) { Ok(index) } else { Err(format!("{index} is no index")) }
-            }),
-        };
-        found
-            .map_err(|what| {
-                let message = format!("line {}: '{name}': {what}", element.line);
-                self.log.warn("bad_value", &from.place, message, "used the default");
-            })
-            .ok()
+        let index = |text: &str| ior::dielectric(text).map_or_else(|| value::number_within(text, 0.01, 100.0), Ok);
+        from.value(name, index, &mut self.log)
     }
 
     fn microfacets(&mut self, from: &mut Parameters<'a>) -> Microfacets {
@@ -150,7 +139,7 @@ impl<'a> Reader<'a> {
 
     fn principled(&mut self, from: &mut Parameters<'a>) -> MaterialModel {
         let specular = match from.number_within("eta", 1.0, 100.0, &mut self.log) {
-            // Disney's: F0 = 0.08 specular.
+            // Disney's definition: F0 = 0.08 specular.
             Some(eta) => ((eta - 1.0) / (eta + 1.0)).powi(2) / 0.08,
             None => from.number_within("specular", 0.0, 1.0, &mut self.log).unwrap_or(0.5),
         };

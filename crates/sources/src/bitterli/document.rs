@@ -1,44 +1,44 @@
-//! The XML as a tree of plain elements: variables put in, names in snake_case, depth and size checked first.
+//! The XML as a tree of plain elements, with variables substituted and names in snake_case. Depth and size are checked
+//! first.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
+use super::error::BitterliError;
 use super::limits::Limits;
-use crate::SourceError;
 use crate::log::Log;
 use mateval_scene::findings::shortened;
 
 /// One XML element.
 #[derive(Debug)]
 pub(super) struct Element {
-    /// Its tag; every spelling of `lookat` is `lookat`.
+    /// The tag, with `lookAt` and `look_at` written `lookat`.
     pub(super) tag: String,
-    /// Its line, from 1.
+    /// The line, from 1.
     pub(super) line: usize,
-    /// Its number in the document; tells elements apart.
+    /// A number that identifies the element in the document.
     pub(super) serial: usize,
     attributes: Vec<(String, String)>,
-    /// What it contains, `<default>`s left out.
+    /// Child elements, without `<default>`.
     pub(super) children: Vec<Element>,
 }
 
 impl Element {
-    /// An attribute's value.
+    /// The value of an attribute.
     pub(super) fn attribute(&self, name: &str) -> Option<&str> {
         self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
     }
 
-    /// The plugin's kind, as in `roughplastic`; empty where none is given.
+    /// The attribute `type`, as in `roughplastic`; empty where it is absent.
     pub(super) fn kind(&self) -> &str {
         self.attribute("type").unwrap_or("")
     }
 
-    /// The parameter's name in snake_case; empty where none is given.
+    /// The attribute `name` in snake_case; empty where it is absent.
     pub(super) fn name(&self) -> &str {
         self.attribute("name").unwrap_or("")
     }
 
-    /// The element for a finding's place: `bsdf 'Wood'`, or `line 12` where it has no id.
+    /// The place of a finding about this element: `bsdf 'Wood'`, or `line 12` where it has no id.
     pub(super) fn place(&self) -> String {
         match self.attribute("id") {
             Some(id) => format!("{} '{}'", self.tag, shortened(id)),
@@ -47,35 +47,33 @@ impl Element {
     }
 }
 
-/// The whole scene file.
+/// A scene file.
 #[derive(Debug)]
 pub(super) struct Document {
     /// The `<scene>`.
     pub(super) root: Element,
-    /// First number of the scene's version: 0 for Mitsuba 0.5 and 0.6, 3 for Mitsuba 3.
+    /// The first number of the scene's version: 0 for Mitsuba 0.5 and 0.6, 3 for Mitsuba 3.
     pub(super) major_version: u32,
 }
 
-/// Elements by their id, aliases included.
+/// Elements by id and alias.
 pub(super) type Ids<'a> = BTreeMap<&'a str, &'a Element>;
 
 impl Document {
-    /// Reads the XML `text` of `path`. Fails where it is not a sound `<scene>` or breaks a limit.
-    pub(super) fn parse(path: &Path, text: &str, limits: &Limits, log: &mut Log) -> Result<Self, SourceError> {
-        let invalid = |what: String| SourceError::Invalid { path: path.to_owned(), what };
-        check_depth(text, limits.xml_depth).map_err(invalid)?;
-        let xml = roxmltree::Document::parse(text).map_err(|error| invalid(format!("not sound XML: {error}")))?;
+    /// Parses XML. Fails where it is not well-formed, is not a `<scene>`, or exceeds a limit.
+    pub(super) fn parse(text: &str, limits: &Limits, log: &mut Log) -> Result<Self, BitterliError> {
+        check_depth(text, limits.xml_depth)?;
+        let xml = roxmltree::Document::parse(text).map_err(|reason| BitterliError::NotXml { reason })?;
         let mut builder = Builder::new(text, limits, log);
-        let root = builder.element(xml.root_element(), 0).map_err(invalid)?;
+        let root = builder.element(xml.root_element(), 0)?;
         if root.tag != "scene" {
-            let found = shortened(&root.tag);
-            return Err(invalid(format!("expected a Mitsuba scene, so the root element <scene>, found <{found}>")));
+            return Err(BitterliError::NotAScene { found: shortened(&root.tag) });
         }
         let major_version = major_version(&root, log);
         Ok(Self { root, major_version })
     }
 
-    /// Every element that has an id; the first of equal ones.
+    /// Every element that has an id. Of several with the same id, the first counts.
     pub(super) fn ids<'a>(&'a self, log: &mut Log) -> Ids<'a> {
         let mut ids = Ids::new();
         let mut aliases = Vec::new();
@@ -101,8 +99,8 @@ fn collect_ids<'a>(
         ("alias", Some(id), new) => aliases.extend(new.map(|new| (id, new, element))),
         (_, Some(id), _) => {
             if ids.contains_key(id) {
-                let message = format!("the id '{}' is used before, line {} has it again", shortened(id), element.line);
-                log.warn("duplicate_id", &element.place(), message, "references mean the first");
+                let message = format!("line {}: the id '{}' is already used", element.line, shortened(id));
+                log.warn("duplicate_id", &element.place(), message, "resolved references to the first element");
             } else {
                 ids.insert(id, element);
             }
@@ -126,13 +124,14 @@ fn major_version(root: &Element, log: &mut Log) -> u32 {
     }
 }
 
-/// Refuses XML nested deeper than `limit` without building anything: a parser may recurse.
-fn check_depth(text: &str, limit: usize) -> Result<(), String> {
+/// Refuses XML nested deeper than `limit` before it is parsed, since the parser may recurse.
+fn check_depth(text: &str, limit: usize) -> Result<(), BitterliError> {
     let bytes = text.as_bytes();
     let (mut at, mut depth) = (0, 0_usize);
     while let Some(step) = bytes[at..].iter().position(|&b| b == b'<') {
         at += step;
         let rest = &bytes[at..];
+        // Comments, character data and instructions are skipped; a tag opens or closes an element, or does both.
         if rest.starts_with(b"<!--") {
             at += after(rest, b"-->", 4);
         } else if rest.starts_with(b"<![CDATA[") {
@@ -150,19 +149,19 @@ fn check_depth(text: &str, limit: usize) -> Result<(), String> {
         }
         if depth > limit {
             let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
-            return Err(format!("line {line}: elements are nested more than {limit} deep"));
+            return Err(BitterliError::TooDeep { line, most: limit });
         }
     }
     Ok(())
 }
 
-/// Bytes up to and with `end`, looked for from `from`; all of them where it does not come.
+/// The number of bytes up to and including the first `end` at or after `from`, or of all bytes where there is none.
 fn after(bytes: &[u8], end: &[u8], from: usize) -> usize {
     let from = from.min(bytes.len());
     bytes[from..].windows(end.len()).position(|window| window == end).map_or(bytes.len(), |at| from + at + end.len())
 }
 
-/// Bytes of a tag up to and with its `>`, quoted ones passed over.
+/// The number of bytes of a tag up to and including its `>`. A quoted `>` does not count.
 fn tag_length(bytes: &[u8]) -> usize {
     let mut quote = None;
     for (at, &byte) in bytes.iter().enumerate() {
@@ -177,7 +176,7 @@ fn tag_length(bytes: &[u8]) -> usize {
     bytes.len()
 }
 
-/// Turns roxmltree's nodes into elements, in document order, so that a `<default>` serves what follows it.
+/// Turns the parser's nodes into elements, in document order, so that a `<default>` applies to what follows it.
 struct Builder<'l> {
     line_starts: Vec<usize>,
     variables: BTreeMap<String, String>,
@@ -200,11 +199,11 @@ impl<'l> Builder<'l> {
         }
     }
 
-    fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, String> {
-        if depth > self.depth_limit {
-            return Err(format!("elements are nested more than {} deep", self.depth_limit));
-        }
+    fn element(&mut self, node: roxmltree::Node, depth: usize) -> Result<Element, BitterliError> {
         let line = self.line_starts.partition_point(|&start| start <= node.range().start);
+        if depth > self.depth_limit {
+            return Err(BitterliError::TooDeep { line, most: self.depth_limit });
+        }
         self.serial += 1;
         let serial = self.serial;
         let attributes = node.attributes().map(|a| self.attribute(&a, line)).collect::<Result<_, _>>()?;
@@ -220,24 +219,27 @@ impl<'l> Builder<'l> {
         Ok(element)
     }
 
-    fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), String> {
+    fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), BitterliError> {
         let value = self.with_variables(attribute.value(), line)?;
         let key = attribute.name();
         Ok((key.to_owned(), if key == "name" { snake_case(&value) } else { value }))
     }
 
-    /// A variable keeps the value that it has first, as in Mitsuba. Its name is compared as written.
+    /// Defines a variable. As in Mitsuba, the first definition counts, and names are compared as written.
     fn define(&mut self, default: &Element) {
         match (default.attribute("name"), default.attribute("value")) {
             (Some(name), Some(value)) if !name.is_empty() => {
                 self.variables.entry(name.to_owned()).or_insert_with(|| value.to_owned());
             }
-            _ => self.log.warn("bad_default", &default.place(), "a <default> needs a name and a value", "ignored"),
+            _ => {
+                let message = "expected a name and a value of <default>, found one of them missing";
+                self.log.warn("bad_default", &default.place(), message, "ignored it");
+            }
         }
     }
 
-    /// `text` with every `$name` replaced by the longest variable of such a name.
-    fn with_variables(&mut self, text: &str, line: usize) -> Result<String, String> {
+    /// `text` with every `$` and the longest variable name that follows replaced by the variable's value.
+    fn with_variables(&mut self, text: &str, line: usize) -> Result<String, BitterliError> {
         let mut out = String::new();
         let mut rest = text;
         while let Some(at) = rest.find('$') {
@@ -251,7 +253,7 @@ impl<'l> Builder<'l> {
                 }
                 None => {
                     let message = format!("'${}' is not defined before it is used", shortened(rest));
-                    self.log.warn("unknown_variable", &format!("line {line}"), message, "kept as it stands");
+                    self.log.warn("unknown_variable", &format!("line {line}"), message, "kept the text unchanged");
                     out.push('$');
                 }
             }
@@ -260,7 +262,7 @@ impl<'l> Builder<'l> {
         Ok(out)
     }
 
-    /// The variable whose spelling in the file begins `text`: how much of it, and its value.
+    /// The longest variable whose name `text` begins with: the length of the name in bytes, and its value.
     fn longest_variable(&self, text: &str) -> Option<(usize, &str)> {
         let word = text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
         let ends = text[..word].char_indices().map(|(at, c)| at + c.len_utf8()).take(256);
@@ -268,17 +270,14 @@ impl<'l> Builder<'l> {
         longest.map(|(end, value)| (end, value.as_str()))
     }
 
-    /// Variables within variables can double with each line; their total is bounded.
-    fn spend(&mut self, bytes: usize, line: usize) -> Result<(), String> {
-        match self.budget.checked_sub(bytes as u64) {
-            Some(left) => self.budget = left,
-            None => return Err(format!("line {line}: the variables put in make the scene too large")),
-        }
+    /// Takes `bytes` from the budget of substituted text, since variables within variables can grow exponentially.
+    fn spend(&mut self, bytes: usize, line: usize) -> Result<(), BitterliError> {
+        self.budget = self.budget.checked_sub(bytes as u64).ok_or(BitterliError::TooLarge { line })?;
         Ok(())
     }
 }
 
-/// `diffuseReflectance` as `diffuse_reflectance`; what is snake_case already stays.
+/// `diffuseReflectance` as `diffuse_reflectance`. A name in snake_case is returned unchanged.
 pub(super) fn snake_case(name: &str) -> String {
     let mut out = String::with_capacity(name.len() + 4);
     let mut after_small = false;
@@ -296,9 +295,9 @@ pub(super) fn snake_case(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> (Result<Document, SourceError>, Vec<mateval_scene::Finding>) {
+    fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_scene::Finding>) {
         let mut log = Log::new("scene.xml".into(), 100);
-        let document = Document::parse(Path::new("scene.xml"), text, &Limits::default(), &mut log);
+        let document = Document::parse(text, &Limits::default(), &mut log);
         (document, log.into_findings())
     }
 
@@ -335,14 +334,14 @@ mod tests {
             text += &format!(r#"<default name="a{step}" value="$a{p}$a{p}"/>"#, p = step - 1);
         }
         let error = parse(&(text + "</scene>")).0.unwrap_err();
-        assert!(error.to_string().contains("too large"), "{error}");
+        assert!(matches!(error, BitterliError::TooLarge { line: 1 }), "{error}");
     }
 
     #[test]
     fn ten_thousand_deep_is_an_error() {
         let deep = format!("{}{}", "<scene>".repeat(10_000), "</scene>".repeat(10_000));
-        assert!(parse(&deep).0.unwrap_err().to_string().contains("deep"));
-        // Twin: as many elements side by side are no trouble, nor are brackets in comments and quotes.
+        assert!(matches!(parse(&deep).0, Err(BitterliError::TooDeep { line: 1, most: 64 })));
+        // Twin: the same number of siblings passes, as do brackets in comments and quotes.
         let wide = format!("<scene version='3.0.0'>{}</scene>", "<a b='>'/><!-- <a><a> -->".repeat(10_000));
         assert_eq!(parse(&wide).0.unwrap().root.children.len(), 10_000);
     }

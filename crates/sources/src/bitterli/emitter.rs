@@ -1,4 +1,4 @@
-//! Emitters: areas on shapes, an environment map, a constant world, sun and sky.
+//! Emitters: area lights on shapes, environment maps, constant environments, sun and sky.
 
 use glam::{DMat3, DMat4};
 use mateval_image::Wrap;
@@ -13,7 +13,7 @@ use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 
 impl<'a> Reader<'a> {
-    /// The emitter of a shape: it glows on its front side.
+    /// Adds the emitter of a shape, which emits on its front side.
     pub(super) fn area_light(&mut self, element: &'a Element, surface: SurfaceIndex, owner: &str) {
         let mut from = self.parameters(element, format!("emitter of '{}'", shortened(owner)));
         if element.kind() == "area" {
@@ -29,17 +29,17 @@ impl<'a> Reader<'a> {
         from.finish(&mut self.log);
     }
 
-    /// An emitter of the scene itself.
+    /// Adds an emitter that belongs to the scene and not to a shape.
     pub(super) fn scene_emitter(&mut self, element: &'a Element) {
         let mut from = self.parameters(element, element.place());
         from.ignore(&["sampling_weight"]);
-        let world = matches!(element.kind(), "envmap" | "constant" | "sunsky" | "sun" | "sky");
-        if world && self.has_environment {
+        let is_environment = matches!(element.kind(), "envmap" | "constant" | "sunsky" | "sun" | "sky");
+        if is_environment && self.has_environment {
             let message = format!("line {}: a second environment, '{}'", element.line, element.kind());
             self.log.warn("unsupported", &from.place, message, "left it out");
             return;
         }
-        self.has_environment |= world;
+        self.has_environment |= is_environment;
         let light = match element.kind() {
             "envmap" => self.environment_map(element, &mut from),
             "constant" => {
@@ -60,7 +60,7 @@ impl<'a> Reader<'a> {
         from.finish(&mut self.log);
     }
 
-    /// What a shape glows with: a constant, or 1 times a bitmap.
+    /// The radiance of a shape: a constant, or 1 times a bitmap.
     fn area_radiance(&mut self, from: &mut Parameters<'a>) -> ([f32; 3], Option<EmissionMap>) {
         let Some(element) = from.take(&["radiance"]) else { return ([1.0; 3], None) };
         if element.tag != "texture" {
@@ -68,18 +68,18 @@ impl<'a> Reader<'a> {
         }
         match self.color_bitmap(element, &from.place) {
             ColorInput::Constant(rgb) => (rgb, None),
-            ColorInput::Texture { texture, uv } if self.is_light(texture) => {
+            ColorInput::Texture { texture, uv } if self.is_not_negative(texture) => {
                 ([1.0; 3], Some(EmissionMap { texture, uv }))
             }
             ColorInput::Texture { texture, .. } => {
                 let message = format!("line {}: a texture with values below 0 as radiance", element.line);
-                self.log.warn("out_of_range", &from.place, message, "used its mean colour, 0 where that is below");
+                self.log.warn("out_of_range", &from.place, message, "used its mean colour, clamped at 0");
                 (self.mean_of(texture).map(|v| v.max(0.0)), None)
             }
         }
     }
 
-    fn is_light(&self, texture: TextureIndex) -> bool {
+    fn is_not_negative(&self, texture: TextureIndex) -> bool {
         all_texels(&self.scene.textures[texture.0].texture, |texel| texel.iter().all(|v| *v >= 0.0))
     }
 
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
         mean_color(&self.scene.textures[texture.0].texture).map(|v| v as f32)
     }
 
-    /// What comes from everywhere outside: a constant.
+    /// The radiance of a constant environment.
     fn radiance(&mut self, from: &mut Parameters<'a>, name: &str, default: [f32; 3]) -> [f32; 3] {
         let Some(element) = from.take(&[name]) else { return default };
         if element.tag != "texture" {
@@ -115,23 +115,23 @@ impl<'a> Reader<'a> {
                 Some(("environment", Emission::Environment { texture, scale, world_from_environment }))
             }
             Err(fault) => {
-                self.report_file(name, &from.place, element.line, &fault, "left the environment out: it is black");
+                self.report_file(name, &from.place, element.line, &fault, "left the environment out");
                 None
             }
         }
     }
 
-    /// The rotation in a transform, row-major; what else is in it is a finding.
+    /// The rotation of a transform, row-major. Scale and shear are reported.
     pub(super) fn rotation(&mut self, transform: DMat4, place: &str) -> [[f32; 3]; 3] {
         let linear = DMat3::from_mat4(transform);
         let x = linear.x_axis.normalize_or(glam::DVec3::X);
         let y = (linear.y_axis - x * x.dot(linear.y_axis)).try_normalize().unwrap_or(x.any_orthonormal_vector());
         let z = x.cross(y);
-        // A mirror is kept: its axes are orthonormal too.
+        // A reflection is kept, since its axes are orthonormal too.
         let rotation = DMat3::from_cols(x, y, if z.dot(linear.z_axis) < 0.0 { -z } else { z });
         let miss = (rotation - linear).to_cols_array().iter().fold(0.0_f64, |worst, v| worst.max(v.abs()));
         if miss > 1e-4 {
-            let message = "the emitter's to_world holds scale or shear";
+            let message = "the emitter's to_world contains scale or shear";
             self.log.warn("not_a_rotation", place, message, "used its rotation alone");
         }
         rotation.transpose().to_cols_array_2d().map(|row| row.map(|v| v as f32))

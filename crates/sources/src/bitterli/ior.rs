@@ -30,7 +30,7 @@ const DIELECTRICS: [(&str, f64); 24] = [
     ("glass", 1.5),
 ];
 
-/// The index of the dielectric `name`; none where it is not known.
+/// The index of refraction of the dielectric `name`; none where it is unknown.
 pub(super) fn dielectric(name: &str) -> Option<f64> {
     let name = name.trim().to_ascii_lowercase();
     DIELECTRICS.iter().find(|(known, _)| *known == name).map(|(_, index)| *index)
@@ -57,7 +57,7 @@ const METALS: [(&str, [f32; 3], [f32; 3]); 16] = [
     ("w", [4.37082, 3.30025, 2.99841], [3.50064, 2.60487, 2.27323]),
 ];
 
-/// The conductor `name`: `none` is a perfect mirror; none where it is not known.
+/// The conductor `name`, where `none` names a perfect mirror. None where the name is unknown.
 pub(super) fn conductor(name: &str) -> Option<ConductorIor> {
     let name = name.trim().to_ascii_lowercase();
     if name == "none" {
@@ -80,7 +80,7 @@ mod tests {
         assert!(dielectric("unobtainium").is_none());
     }
 
-    /// Gold is yellow: ((eta-1)^2 + k^2) / ((eta+1)^2 + k^2) worked out by hand; silver is grey.
+    /// Gold is yellow: ((eta-1)^2 + k^2) / ((eta+1)^2 + k^2), computed by hand. Silver is grey.
     #[test]
     fn metals_have_their_colours() {
         let gold = conductor("Au").unwrap().reflectance_at_normal();

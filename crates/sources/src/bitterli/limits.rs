@@ -1,25 +1,25 @@
-//! How much of a stranger's scene is taken; checked before memory is.
+//! Limits on an untrusted scene, checked before memory is taken.
 
-/// Upper bounds of what is read. What goes beyond is a finding, or an error where it is the XML itself.
+/// Upper bounds. Exceeding one is an error for the XML itself, and a finding for anything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of the XML, before and after its variables are put in.
+    /// Bytes of the XML, before and after variables are substituted.
     pub xml_bytes: u64,
-    /// Elements within elements.
+    /// Depth of nested elements.
     pub xml_depth: usize,
     /// Bytes of any other file.
     pub file_bytes: u64,
-    /// Bytes of all OBJ files together, each counted as often as it is named; none is read once they are more.
+    /// Bytes of all OBJ files, each counted as often as it is named. Once exceeded, no further file is read.
     pub mesh_bytes: u64,
-    /// Shapes.
+    /// Number of shapes.
     pub shapes: usize,
-    /// Triangles of all shapes together.
+    /// Triangles of all shapes.
     pub triangles: usize,
-    /// Vertices of all shapes together.
+    /// Vertices of all shapes.
     pub vertices: usize,
-    /// Texels of all textures together.
+    /// Texels of all textures.
     pub texels: usize,
-    /// Findings; the rest is only counted.
+    /// Number of findings. Further ones are only counted.
     pub findings: usize,
 }
 

@@ -1,16 +1,20 @@
 //! Reads Bitterli's scenes: Mitsuba XML of versions 0.5, 0.6 and 3, with OBJ meshes and textures beside it.
 //!
-//! In: the path of a scene's XML; nothing outside of its folder is read. Out: a [`BitterliScene`]. Whatever is not known,
-//! missing or faulty is a finding, and the scene goes on without it; an error is left for what is no scene at all.
+//! The input is the path of a scene's XML; no file outside its folder is read. The output is a [`BitterliScene`]. Elements
+//! that are unknown, missing or faulty are left out or replaced and reported as findings. An error means that there is no
+//! scene to read or no camera to look through.
 //!
-//! Between: `document` makes a tree of the XML (depth and size checked, variables put in, names in snake_case),
-//! `parameters` takes what a plugin knows and reports the rest, and each kind of plugin has its file: `sensor`, `shape`
-//! (with `primitives`), `bsdf` (with `bsdf_model`, `ior`), `texture`, `emitter` (with `sun_sky`, `sun`). Where the documentation of Mitsuba leaves room, Mitsuba 3.9.1 was asked; the tests cite its answers.
+//! `document` parses the XML into a tree: it checks depth and size, substitutes variables and writes names in snake_case.
+//! `parameters` hands a plugin the parameters it knows and reports the others. Each kind of plugin has its own file:
+//! `sensor`, `shape` (with `primitives`), `bsdf` (with `bsdf_model` and `ior`), `texture`, and `emitter` (with `sun_sky`
+//! and `sun`). Where Mitsuba's documentation is silent, the reader does what Mitsuba 3.9.1 does; the tests cite its
+//! results.
 
 mod bsdf;
 mod bsdf_model;
 mod document;
 mod emitter;
+mod error;
 mod ior;
 mod limits;
 mod parameters;
@@ -25,6 +29,7 @@ mod tests;
 #[cfg(test)]
 mod tests_real;
 mod texture;
+mod texture_key;
 mod transform;
 mod value;
 
@@ -34,10 +39,11 @@ use std::path::Path;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
-use crate::error::SourceError;
+use crate::error::{InvalidSource, SourceError};
 use crate::log::Log;
 use crate::source_scene::LicenceText;
 use document::Document;
+pub use error::{BitterliError, ValueError};
 pub use limits::Limits;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
@@ -46,19 +52,19 @@ use reader::{Reader, Totals};
 /// A scene of Bitterli's resources.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BitterliScene {
-    /// The scene's name and author as its licence tells them, as in `'Modern Hall' by NewSee2l035`; else the folder's.
+    /// Name and author from the licence, as in `'Modern Hall' by NewSee2l035`, or else the folder's name.
     pub title: String,
-    /// Everything in it, world space.
+    /// Surfaces, materials, textures and lights, in world space.
     pub scene: ReferenceScene,
-    /// Its first sensor; the picture's size is that of the film's crop window.
+    /// The first sensor. The picture's size is that of the film's crop window.
     pub camera: Camera,
-    /// What was left out, replaced or approximated; sorted.
+    /// Everything that was left out, replaced or approximated; sorted.
     pub findings: Vec<Finding>,
-    /// `LICENSE.txt` beside the XML, if there is one.
+    /// The licence file beside the XML, if any.
     pub licence: Option<LicenceText>,
-    /// Every file read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
+    /// Every file that was read, relative to the XML's folder with forward slashes, and its SHA-256 in hex; sorted.
     pub source_files: Vec<(String, String)>,
-    /// Every file that was looked for and was not there; sorted.
+    /// Every file that was looked for but is missing; sorted.
     pub absent_files: Vec<String>,
 }
 
@@ -66,12 +72,14 @@ pub struct BitterliScene {
 ///
 /// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
 pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceError> {
-    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
+    // The XML as a tree.
+    let invalid = |error| SourceError::invalid(xml_path, InvalidSource::Bitterli(error));
     let (mut source, name, text) = read_xml_file(xml_path, limits)?;
     let mut log = Log::new(name, limits.findings);
-    let document = Document::parse(xml_path, &text, limits, &mut log)?;
+    let document = Document::parse(&text, limits, &mut log).map_err(invalid)?;
     let ids = document.ids(&mut log);
     let licence = read_licence(&mut source, &mut log);
+    // The scene.
     let mut reader = Reader {
         ids,
         major_version: document.major_version,
@@ -90,6 +98,7 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
     };
     let camera = read_elements(&mut reader, &document).map_err(invalid)?;
     report_unused(&mut reader, &document);
+    // Its title, findings and files.
     let title = title(licence.as_ref(), xml_path);
     let Reader { scene, log, source, .. } = reader;
     let files = source.into_files();
@@ -106,18 +115,17 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
 
 fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
     let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
-    let invalid = |what: String| SourceError::Invalid { path: xml_path.to_owned(), what };
-    let text = String::from_utf8(bytes).map_err(|_| invalid("expected UTF-8, found other bytes".to_owned()))?;
+    let text = String::from_utf8(bytes).map_err(|_| SourceError::invalid(xml_path, InvalidSource::NotUtf8))?;
     Ok((source, name, text))
 }
 
-/// The licence beside the scene. It must travel with it, so one that cannot be read is a finding.
+/// The licence beside the scene. A scene must not be passed on without it, so an unreadable licence is a finding.
 fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<LicenceText> {
     let file = ["LICENSE.txt", "LICENSE", "license.txt"].into_iter().find(|name| source.path(name).is_ok())?;
     match source.read(file) {
         Ok(bytes) => Some(LicenceText { file: file.to_owned(), text: String::from_utf8_lossy(&bytes).into_owned() }),
         Err(fault) => {
-            let action = "left it out; carry it along by hand";
+            let action = "left it out; copy it by hand";
             log.push(mateval_scene::Severity::Warning, fault.code, file, "", fault.message, action);
             None
         }
@@ -134,8 +142,8 @@ fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
     folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
 }
 
-/// Reads everything at the top of the scene; the camera is what it must have.
-fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<Camera, String> {
+/// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor.
+fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<Camera, BitterliError> {
     let mut camera = None;
     let mut shapes = 0;
     for element in &document.root.children {
@@ -154,8 +162,8 @@ fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<
             "medium" => reader.log.warn("unsupported", &element.place(), "a medium", "ignored it"),
             "bsdf" | "texture" | "integrator" | "sampler" | "film" | "alias" => {}
             "include" => {
-                let message = format!("line {}: <include> is not followed", element.line);
-                reader.log.warn("unsupported", &element.place(), message, "left out what it includes");
+                let message = format!("line {}: <include> is not supported", element.line);
+                reader.log.warn("unsupported", &element.place(), message, "left the included file out");
             }
             other => {
                 let message = format!("line {}: <{}> is not known", element.line, shortened(other));
@@ -163,11 +171,11 @@ fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<
             }
         }
     }
-    camera.ok_or_else(|| "expected a <sensor>, found none: there is nothing to look through".to_owned())
+    camera.ok_or(BitterliError::NoSensor)
 }
 
-/// BSDFs that no shape uses. A `bumpmap` around the BSDF with the id is one: references mean what has the id, so in
-/// Mitsuba, too, such bumps do not show.
+/// Reports BSDFs that no shape uses. One of them can be a `bumpmap` around the BSDF that has the id: references resolve to
+/// the element with the id, so such bumps do not show in Mitsuba either.
 fn report_unused(reader: &mut Reader, document: &Document) {
     for element in document.root.children.iter().filter(|e| e.tag == "bsdf") {
         if reader.materials.contains_key(&element.serial) {
@@ -176,7 +184,7 @@ fn report_unused(reader: &mut Reader, document: &Document) {
         let inner = element.children.iter().find(|c| c.tag == "bsdf" && reader.materials.contains_key(&c.serial));
         let (message, action) = match inner {
             Some(inner) => (
-                format!("shapes refer to the {} within, not to this {}", inner.place(), element.kind()),
+                format!("shapes refer to the inner {}, not to this {}", inner.place(), element.kind()),
                 format!("left the {} out, as Mitsuba does", element.kind()),
             ),
             None => ("no shape uses this bsdf".to_owned(), "left it out".to_owned()),

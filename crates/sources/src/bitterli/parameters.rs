@@ -1,15 +1,16 @@
-//! The parameters of one plugin: taken by name, with defaults; what nobody took is reported at the end.
+//! The parameters of one plugin. A reader takes those that it knows by name; the others are reported at the end.
 
 use glam::DMat4;
 
 use super::document::{Element, Ids};
+use super::error::ValueError;
 use super::{transform, value};
 use crate::log::Log;
 use mateval_scene::findings::shortened;
 
-/// A plugin's children, references followed.
+/// A plugin's children with references resolved.
 pub(super) struct Parameters<'a> {
-    /// For findings: `bsdf 'Wood'`.
+    /// The place that findings name, as in `bsdf 'Wood'`.
     pub(super) place: String,
     kind: String,
     children: Vec<Child<'a>>,
@@ -21,12 +22,12 @@ struct Child<'a> {
     taken: bool,
 }
 
-/// Tags of parameters that hold one value and those of objects.
+/// Tags of parameters that hold a value. All other tags are objects.
 const VALUES: [&str; 11] =
     ["float", "integer", "boolean", "string", "rgb", "srgb", "spectrum", "vector", "point", "transform", "blackbody"];
 
 impl<'a> Parameters<'a> {
-    /// The children of `element`; a reference to nothing is a finding.
+    /// The children of `element`. An unresolved reference is a finding.
     pub(super) fn new(element: &'a Element, place: String, ids: &Ids<'a>, log: &mut Log) -> Self {
         let mut children = Vec::new();
         for child in &element.children {
@@ -49,72 +50,76 @@ impl<'a> Parameters<'a> {
         found.map(|child| (child.taken = true, child.element).1).collect()
     }
 
-    /// Known, and of no meaning here.
+    /// Takes parameters of these names that are known but have no effect here.
     pub(super) fn ignore(&mut self, names: &[&str]) {
         for child in &mut self.children {
             child.taken |= names.contains(&child.name);
         }
     }
 
-    /// Everything that is left, of a plugin that is not known.
+    /// Takes all remaining parameters, which then are not reported.
     pub(super) fn take_all(&mut self) {
         self.children.iter_mut().for_each(|child| child.taken = true);
     }
 
-    fn value<T>(&mut self, name: &str, read: impl Fn(&str) -> Result<T, String>, log: &mut Log) -> Option<T> {
+    /// Takes a value that `read` makes of its text. A faulty value is a finding.
+    pub(super) fn value<T>(
+        &mut self,
+        name: &str,
+        read: impl Fn(&str) -> Result<T, ValueError>,
+        log: &mut Log,
+    ) -> Option<T> {
         let element = self.take(&[name])?;
-        match read(element.attribute("value").unwrap_or("")) {
-            Ok(value) => Some(value),
-            Err(what) => {
-                let message = format!("line {}: '{name}': {what}", element.line);
-                log.warn("bad_value", &self.place, message, "used the default");
-                None
-            }
-        }
+        let value = read(element.attribute("value").unwrap_or(""));
+        self.value_or_finding(name, element, value, log)
     }
 
-    /// A finite number.
+    fn value_or_finding<T>(
+        &self,
+        name: &str,
+        element: &Element,
+        value: Result<T, ValueError>,
+        log: &mut Log,
+    ) -> Option<T> {
+        let report = |error| {
+            let message = format!("line {}: '{name}': {error}", element.line);
+            log.warn("bad_value", &self.place, message, "used the default");
+        };
+        value.map_err(report).ok()
+    }
+
+    /// Takes a finite number.
     pub(super) fn number(&mut self, name: &str, log: &mut Log) -> Option<f64> {
         self.value(name, value::number, log)
     }
 
-    /// A finite number from `least` to `most`; beyond it is a finding.
+    /// Takes a finite number from `least` to `most`. Any other is a finding.
     pub(super) fn number_within(&mut self, name: &str, least: f64, most: f64, log: &mut Log) -> Option<f64> {
-        let within = |text: &str| match value::number(text)? {
-            number if number < least || number > most => Err(format!("expected {least} to {most}, found {number}")),
-            number => Ok(number),
-        };
-        self.value(name, within, log)
+        self.value(name, |text| value::number_within(text, least, most), log)
     }
 
-    /// `true` or `false`.
+    /// Takes `true` or `false`.
     pub(super) fn boolean(&mut self, name: &str, default: bool, log: &mut Log) -> bool {
         self.value(name, value::boolean, log).unwrap_or(default)
     }
 
-    /// A text.
+    /// Takes a text.
     pub(super) fn string(&mut self, name: &str) -> Option<&'a str> {
         self.take(&[name]).and_then(|element| element.attribute("value"))
     }
 
-    /// A vector or point.
+    /// Takes a vector or point.
     pub(super) fn vector(&mut self, name: &str, log: &mut Log) -> Option<[f64; 3]> {
         let element = self.take(&[name])?;
-        let found = value::vector(element, 0.0);
-        found
-            .map_err(|what| {
-                let message = format!("line {}: '{name}': {what}", element.line);
-                log.warn("bad_value", &self.place, message, "used the default");
-            })
-            .ok()
+        self.value_or_finding(name, element, value::vector(element, 0.0), log)
     }
 
-    /// A transform; the identity where there is none.
+    /// Takes a transform. The default is the identity.
     pub(super) fn transform(&mut self, name: &str, log: &mut Log) -> DMat4 {
         self.take(&[name]).map_or(DMat4::IDENTITY, |element| transform::read(element, &self.place, log))
     }
 
-    /// Reports what nobody took.
+    /// Reports parameters that were not taken.
     pub(super) fn finish(self, log: &mut Log) {
         for child in self.children.iter().filter(|c| !c.taken) {
             let (line, tag) = (child.element.line, shortened(&child.element.tag));
@@ -123,7 +128,7 @@ impl<'a> Parameters<'a> {
             } else {
                 ("unknown_element", format!("<{tag} type='{}'>", shortened(child.element.kind())))
             };
-            log.warn(code, &self.place, format!("line {line}: {} does not take {what} here", self.kind), "ignored");
+            log.warn(code, &self.place, format!("line {line}: {} does not take {what} here", self.kind), "ignored it");
         }
     }
 }
@@ -133,7 +138,7 @@ fn resolve<'a>(reference: &Element, place: &str, ids: &Ids<'a>, log: &mut Log) -
     let found = ids.get(id).copied();
     if found.is_none() {
         let message = format!("line {}: no element has the id '{}'", reference.line, shortened(id));
-        log.warn("unknown_id", place, message, "went on without it");
+        log.warn("unknown_id", place, message, "ignored the reference");
     }
     found
 }

@@ -1,12 +1,12 @@
-//! Mitsuba's shapes without a file, in their own space, as triangles. Normals point to the front; v grows upwards, so it
-//! is one minus Mitsuba's.
+//! Mitsuba's analytic shapes as triangles in object space. Normals point to the front. v grows upwards, so it is one minus
+//! Mitsuba's.
 
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
 
-/// Straight pieces of a full circle.
+/// Segments of a full circle.
 pub(super) const SEGMENTS: u32 = 64;
 
 /// A mesh under construction.
@@ -19,7 +19,7 @@ struct Builder {
 }
 
 impl Builder {
-    /// `uv` is Mitsuba's.
+    /// Adds a vertex and returns its index. `uv` follows Mitsuba's convention.
     fn vertex(&mut self, position: DVec3, normal: DVec3, uv: DVec2) -> u32 {
         self.positions.push(position.as_vec3());
         self.normals.push(normal.as_vec3());
@@ -27,7 +27,7 @@ impl Builder {
         self.positions.len() as u32 - 1
     }
 
-    /// Two triangles of four corners, counter-clockwise.
+    /// Adds two triangles between four vertices, given counter-clockwise.
     fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangles.extend([[a, b, c], [a, c, d]]);
     }
@@ -42,7 +42,7 @@ impl Builder {
     }
 }
 
-/// [-1, 1]^2 at z = 0, front +z; Mitsuba's uv (0, 0) lies at (-1, -1).
+/// The square [-1, 1]^2 at z = 0, facing +z. Mitsuba's uv (0, 0) is at (-1, -1).
 pub(crate) fn rectangle() -> TriangleMesh {
     let mut build = Builder::default();
     let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
@@ -52,7 +52,7 @@ pub(crate) fn rectangle() -> TriangleMesh {
     build.finish()
 }
 
-/// The box [-1, 1]^3, each face with its own uv.
+/// The cube [-1, 1]^3, whose faces each cover the whole uv square.
 pub(crate) fn cube() -> TriangleMesh {
     let mut build = Builder::default();
     for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
@@ -70,7 +70,7 @@ pub(crate) fn cube() -> TriangleMesh {
     build.finish()
 }
 
-/// Radius 1 at z = 0, front +z, as a fan whose area is the disk's; uv = (radius, angle / 2 pi).
+/// The disk of radius 1 at z = 0, facing +z, as a fan with the area of the disk; uv = (radius, angle / 2 pi).
 pub(super) fn disk() -> TriangleMesh {
     let mut build = Builder::default();
     let step = 2.0 * PI / f64::from(SEGMENTS);
@@ -87,7 +87,7 @@ pub(super) fn disk() -> TriangleMesh {
     build.finish()
 }
 
-/// The side of a cylinder, open at both ends, front outside.
+/// The side of a cylinder, open at both ends, facing outwards.
 pub(super) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
     let mut build = Builder::default();
     let axis = (end - start).normalize_or_zero();
@@ -106,7 +106,7 @@ pub(super) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
     build.finish()
 }
 
-/// A sphere, front outside, poles at +-z; uv = (phi / 2 pi, theta / pi).
+/// A sphere that faces outwards, with poles at +-z; uv = (phi / 2 pi, theta / pi).
 pub(super) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
     let mut build = Builder::default();
     let (columns, rows) = (SEGMENTS, SEGMENTS / 2);
@@ -135,7 +135,7 @@ pub(super) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
     build.finish()
 }
 
-/// A point of the unit circle in the plane z = 0, after `turn` full turns from +x.
+/// The point of the unit circle in the plane z = 0 at `turn` full turns from +x.
 fn on_circle(turn: f64) -> DVec3 {
     let (sin, cos) = libm::sincos(2.0 * PI * turn);
     DVec3::new(cos, sin, 0.0)
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// Mitsuba 3.9.1: the rectangle's point (0.5, -0.5) has uv (0.75, 0.25); in ours v is one minus that.
+    /// In Mitsuba 3.9.1 the rectangle's point (0.5, -0.5) has uv (0.75, 0.25). Here v is one minus that.
     #[test]
     fn rectangle_uv() {
         let mesh = rectangle();

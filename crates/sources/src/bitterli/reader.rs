@@ -1,4 +1,4 @@
-//! What the parts of the reader share: the scene that grows, its sources and its findings.
+//! The state that all parts of the reader share: the scene under construction, its files and its findings.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,11 +9,11 @@ use mateval_scene::reference::{LightGroup, MaterialIndex, ReferenceScene};
 use super::document::{Element, Ids};
 use super::limits::Limits;
 use super::parameters::Parameters;
-use super::texture::TextureKey;
+use super::texture_key::TextureKey;
 use crate::log::Log;
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 
-/// A scene while it is read.
+/// A scene under construction.
 pub(super) struct Reader<'a> {
     pub(super) ids: Ids<'a>,
     /// 0 for Mitsuba 0.5 and 0.6.
@@ -22,21 +22,22 @@ pub(super) struct Reader<'a> {
     pub(super) log: Log,
     pub(super) source: SourceFolder,
     pub(super) scene: ReferenceScene,
-    /// None: the file could not be used, which was reported.
+    /// Every texture looked up so far. None stands for a file that could not be used, which has been reported.
     pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
+    /// Texels of all textures.
     pub(super) texels: usize,
-    /// By file: whether its alpha channel is more than 1 everywhere.
+    /// By file: whether it has an alpha channel that is not 1 everywhere.
     pub(super) alphas: BTreeMap<String, bool>,
     /// By the serial number of the BSDF's element.
     pub(super) materials: BTreeMap<usize, MaterialIndex>,
     pub(super) totals: Totals,
     pub(super) has_environment: bool,
     pub(super) light_names: BTreeSet<String>,
-    /// By name: the last number that was added to it.
+    /// By name: the last number that was appended to it.
     pub(super) light_numbers: BTreeMap<String, usize>,
 }
 
-/// What the shapes read so far come to.
+/// Totals over the shapes read so far.
 #[derive(Debug, Default)]
 pub(super) struct Totals {
     pub(super) triangles: usize,
@@ -45,19 +46,19 @@ pub(super) struct Totals {
 }
 
 impl<'a> Reader<'a> {
-    /// The parameters of `element`, for findings at `place`.
+    /// The parameters of `element`; their findings are reported at `place`.
     pub(super) fn parameters(&mut self, element: &'a Element, place: String) -> Parameters<'a> {
         Parameters::new(element, place, &self.ids, &mut self.log)
     }
 
-    /// Reports that the file `name` could not be used, as a fault of that file where it is one.
+    /// Reports that the file `name` could not be used. The finding names that file where the name is valid, else the XML.
     pub(super) fn report_file(&mut self, name: &str, place: &str, line: usize, fault: &FileFault, action: &str) {
         let about = SourceFolder::relative(name).unwrap_or_else(|_| self.log.file().to_owned());
         let message = format!("{} (named in '{}' line {line})", fault.message, self.log.file());
         self.log.push(Severity::Warning, fault.code, &about, place, message, action);
     }
 
-    /// Adds a light; its name is made unique by a number.
+    /// Adds a light. A number makes its name unique.
     pub(super) fn add_light(&mut self, mut light: LightGroup) {
         let stem = light.name.clone();
         while !self.light_names.insert(light.name.clone()) {

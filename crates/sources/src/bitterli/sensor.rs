@@ -1,20 +1,20 @@
-//! The sensor: Mitsuba's camera looks along +z with +x to the left; ours along -z with +x to the right.
+//! Sensors. Mitsuba's camera looks along +z with +x to the left, MatEval's along -z with +x to the right.
 
 use glam::{DMat3, DMat4, DVec3};
 use mateval_scene::{Camera, Intrinsics};
 
 use super::document::Element;
+use super::error::{BitterliError, ValueError};
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::value;
 use crate::log::Log;
 use mateval_scene::findings::shortened;
 
-/// Columns of a camera's rotation may miss right angles and unit length by this much without being reported; the scenes
-/// at hand are written with six digits.
+/// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six digits.
 const SKEW_WITHOUT_FINDING: f64 = 1e-4;
 
-/// What the film says.
+/// The film's size and crop window in pixels.
 struct Film {
     size: [f64; 2],
     crop_size: [f64; 2],
@@ -22,8 +22,8 @@ struct Film {
 }
 
 impl<'a> Reader<'a> {
-    /// The camera of the sensor `element`; what is wrong with it where it cannot be one.
-    pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, String> {
+    /// The camera of the sensor `element`. Fails where it has no field of view or its `to_world` is singular.
+    pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, BitterliError> {
         let mut from = self.parameters(element, element.place());
         if element.kind() != "perspective" {
             let message = format!("line {}: the sensor '{}'", element.line, shortened(element.kind()));
@@ -35,14 +35,14 @@ impl<'a> Reader<'a> {
             Some(film) => self.film(film),
             None => Film { size: [768.0, 576.0], crop_size: [768.0, 576.0], crop_offset: [0.0; 2] },
         };
-        let fov_x = self.fov_x(&mut from, film.size)?;
+        let fov_x = self.fov_x(element.line, &mut from, film.size)?;
         let mut offset = |name| from.number_within(name, -10.0, 10.0, &mut self.log).unwrap_or(0.0);
         let principal = [offset("principal_point_offset_x"), offset("principal_point_offset_y")];
         from.objects("sampler");
         from.ignore(&["near_clip", "far_clip", "shutter_open", "shutter_close", "focus_distance", "aperture_radius"]);
         from.finish(&mut self.log);
         let camera = camera(world_from_sensor, intrinsics(&film, fov_x, principal), &element.place(), &mut self.log);
-        camera.ok_or_else(|| format!("line {}: the sensor's to_world is flat", element.line))
+        camera.ok_or(BitterliError::SingularSensor { line: element.line })
     }
 
     fn film(&mut self, element: &'a Element) -> Film {
@@ -59,28 +59,32 @@ impl<'a> Reader<'a> {
             whole("crop_width", 1.0, rest[0]).unwrap_or(rest[0]),
             whole("crop_height", 1.0, rest[1]).unwrap_or(rest[1]),
         ];
-        // The film's other parameters say how a picture is stored, which is not ours to follow.
+        // The film's other parameters control how a picture is stored.
         from.take_all();
         Film { size, crop_size, crop_offset }
     }
 
-    /// Horizontal field of view in radians.
-    fn fov_x(&mut self, from: &mut Parameters<'a>, [width, height]: [f64; 2]) -> Result<f64, String> {
+    /// The horizontal field of view in radians.
+    fn fov_x(
+        &mut self,
+        line: usize,
+        from: &mut Parameters<'a>,
+        [width, height]: [f64; 2],
+    ) -> Result<f64, BitterliError> {
+        // The tangent of half the angle, and the axis along which it is measured.
         let axis = from.string("fov_axis").unwrap_or("x");
         let focal_length = from.string("focal_length");
         let fov = from.number_within("fov", 1e-3, 179.9, &mut self.log);
         let (half_tangent, axis) = match (fov, focal_length) {
             (Some(degrees), _) => (libm::tan(degrees.to_radians() / 2.0), axis),
             (None, Some(text)) => {
-                // Of a 35 mm film of 36 mm by 24 mm, along its diagonal (Mitsuba's convention).
-                let millimetres = value::number(text.trim().trim_end_matches("mm"))?;
-                if millimetres <= 0.0 {
-                    return Err(format!("a focal length of {millimetres} mm"));
-                }
+                // Mitsuba's convention: a film of 36 mm by 24 mm, measured along its diagonal.
+                let millimetres = millimetres(text).map_err(|reason| BitterliError::FocalLength { line, reason })?;
                 ((36.0_f64 * 36.0 + 24.0 * 24.0).sqrt() / 2.0 / millimetres, "diagonal")
             }
-            (None, None) => return Err("the sensor has neither fov nor focal length".to_owned()),
+            (None, None) => return Err(BitterliError::NoFieldOfView { line }),
         };
+        // The same along x.
         let aspect = width / height;
         let half_width = match axis {
             "x" => half_tangent,
@@ -99,7 +103,13 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The field of view spans the whole film, of which the crop is the picture.
+/// A focal length as in `50mm`.
+fn millimetres(text: &str) -> Result<f64, ValueError> {
+    let found = value::number(text.trim().trim_end_matches("mm"))?;
+    if found > 0.0 { Ok(found) } else { Err(ValueError::NotPositive { found }) }
+}
+
+/// Intrinsics of the crop window, from the field of view of the whole film.
 fn intrinsics(film: &Film, fov_x: f64, principal: [f64; 2]) -> Intrinsics {
     let focal = film.size[0] / 2.0 / libm::tan(fov_x / 2.0);
     let center = |axis: usize| film.size[axis] * (0.5 - principal[axis]) - film.crop_offset[axis];
@@ -113,7 +123,8 @@ fn intrinsics(film: &Film, fov_x: f64, principal: [f64; 2]) -> Intrinsics {
     }
 }
 
-/// The nearest camera to a sensor's matrix: direction of view first, then up. None where there is none.
+/// A camera with the position and direction of view of a sensor's matrix, and its up vector as far as it is perpendicular
+/// to the direction. None where the matrix is singular.
 fn camera(world_from_sensor: DMat4, intrinsics: Intrinsics, place: &str, log: &mut Log) -> Option<Camera> {
     let sensor = DMat3::from_mat4(world_from_sensor);
     let back = (-sensor.z_axis).try_normalize()?;
@@ -122,8 +133,8 @@ fn camera(world_from_sensor: DMat4, intrinsics: Intrinsics, place: &str, log: &m
     let wanted = DMat3::from_cols(-sensor.x_axis, sensor.y_axis, -sensor.z_axis);
     let miss = (rotation - wanted).to_cols_array().iter().fold(0.0_f64, |worst, v| worst.max(v.abs()));
     if miss > SKEW_WITHOUT_FINDING {
-        let message = format!("its to_world is no rotation and translation: off by {miss:.6}");
-        log.warn("camera_not_rigid", place, message, "kept place, direction of view and up");
+        let message = format!("expected a to_world of rotation and translation, found one off by {miss:.6}");
+        log.warn("camera_not_rigid", place, message, "kept position, direction of view and up vector");
     }
     let position: DVec3 = world_from_sensor.w_axis.truncate();
     Some(Camera::from_rotation(rotation, position, intrinsics))
@@ -149,7 +160,7 @@ mod tests {
         2.0 * (f64::from(camera.intrinsics.width) / 2.0 / camera.intrinsics.fx).atan().to_degrees()
     }
 
-    /// The values that Mitsuba 3.9.1 computes for a film of 100x50.
+    /// Values that Mitsuba 3.9.1 computes for a film of 100x50.
     #[test]
     fn fields_of_view_as_mitsuba() {
         for (axis, expected) in
@@ -164,7 +175,7 @@ mod tests {
         assert!((fov_x_degrees(&camera) - 42.311714).abs() < 1e-4);
     }
 
-    /// The rays that Mitsuba 3.9.1 makes, in the world of an identity to_world (so +x is left, the view along +z).
+    /// Rays that Mitsuba 3.9.1 generates for an identity to_world, so +x is left and the view is along +z.
     #[test]
     fn rays_as_mitsuba() {
         let fov = "<float name='fov' value='90'/>";

@@ -1,4 +1,4 @@
-//! Shapes: each becomes one surface in world space, and one light where it emits.
+//! Shapes. Each becomes one surface in world space, and one light if it emits.
 
 use glam::{DMat3, DMat4, DVec3};
 use mateval_scene::TriangleMesh;
@@ -16,7 +16,7 @@ use mateval_scene::source_folder::{FileFault, SourceFolder};
 const LEFT_OUT: &str = "left the shape out";
 
 impl<'a> Reader<'a> {
-    /// Adds the shape `element` to the scene, unless there is nothing of it.
+    /// Adds the shape `element` to the scene, unless it has no triangles.
     pub(super) fn shape(&mut self, element: &'a Element) {
         let name = shape_name(element);
         let place = format!("shape '{}'", shortened(&name));
@@ -25,7 +25,7 @@ impl<'a> Reader<'a> {
         let world_from_object = from.transform("to_world", &mut self.log);
         let flip = from.boolean("flip_normals", false, &mut self.log);
         let (bsdfs, emitters) = (from.objects("bsdf"), from.objects("emitter"));
-        // Also for a shape that is left out: what its material lacks is to be told too.
+        // The material of a shape that is left out is read too, so that its faults are reported.
         let material = self.shape_material(&bsdfs, &name, &from);
         if let Some(mesh) = self.mesh(element, &mut from, world_from_object, flip) {
             let material = material.unwrap_or_else(|| self.default_material(&name, !emitters.is_empty()));
@@ -59,7 +59,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The shape's triangles in world space; none, after a finding, where there are none.
+    /// The shape's triangles in world space. A shape without triangles, or one that exceeds a limit, is reported and gives
+    /// none.
     fn mesh(
         &mut self,
         element: &'a Element,
@@ -67,14 +68,16 @@ impl<'a> Reader<'a> {
         world_from_object: DMat4,
         flip: bool,
     ) -> Option<TriangleMesh> {
+        // Normals of the file are dropped where flat ones are wanted.
         let object = self.object_mesh(element, from)?;
         let smooth = from.boolean("face_normals", false, &mut self.log);
         let mirrored = DMat3::from_mat4(world_from_object).determinant() < 0.0;
         let (object, smooth) = (TriangleMesh { normals: object.normals.filter(|_| !smooth), ..object }, !smooth);
         if mirrored && object.normals.is_none() {
             let message = "a mirroring transform of a mesh without normals";
-            self.log.note("mirrored", &from.place, message, "kept its front side, which Mitsuba turns over");
+            self.log.note("mirrored", &from.place, message, "kept its front side; Mitsuba swaps front and back");
         }
+        // In world space, impossible triangles are gone and missing normals are made.
         let (mut mesh, repairs) = to_world(object, world_from_object, flip);
         self.report_repairs(&from.place, &repairs, &mesh);
         if mesh.triangles.is_empty() {
@@ -96,7 +99,7 @@ impl<'a> Reader<'a> {
         let of = mesh.triangles.len() + repairs.not_finite;
         if repairs.not_finite > 0 {
             let message =
-                format!("{} of {of} triangles have corners that are not finite or far off", repairs.not_finite);
+                format!("{} of {of} triangles have corners that are not finite or too far away", repairs.not_finite);
             self.log.warn("not_finite", place, message, "left them out");
         }
         if repairs.degenerate > 0 {
@@ -105,7 +108,7 @@ impl<'a> Reader<'a> {
         }
         if repairs.normals > 0 {
             let message = format!("{} normals are zero or not finite", repairs.normals);
-            self.log.note("bad_normals", place, message, "took those of the faces around");
+            self.log.note("bad_normals", place, message, "computed them from the adjacent faces");
         }
         if repairs.uvs > 0 {
             let message = format!("{} texture coordinates are not finite", repairs.uvs);
@@ -150,7 +153,7 @@ impl<'a> Reader<'a> {
 
     fn tessellated(&mut self, from: &Parameters<'a>) {
         let message = "a round shape";
-        let action = format!("made it of straight pieces, {} to a full circle", primitives::SEGMENTS);
+        let action = format!("approximated it with {} segments per circle", primitives::SEGMENTS);
         self.log.note("tessellated", &from.place, message, action);
     }
 
@@ -173,7 +176,7 @@ impl<'a> Reader<'a> {
             }
             Err(fault) => {
                 self.report_file(name, &from.place, element.line, &fault, LEFT_OUT);
-                // Whatever else the element says is of no use now.
+                // Without a mesh, the other parameters have no effect and are not reported.
                 from.take_all();
                 None
             }
@@ -183,7 +186,7 @@ impl<'a> Reader<'a> {
     fn read_obj(&mut self, name: &str) -> Result<obj::ObjMesh, FileFault> {
         let relative = SourceFolder::relative(name)?;
         if self.totals.mesh_bytes > self.limits.mesh_bytes {
-            let message = format!("the OBJ files before have more than {} bytes", self.limits.mesh_bytes);
+            let message = format!("the OBJ files read so far have more than {} bytes", self.limits.mesh_bytes);
             return Err(FileFault { code: "limit", message });
         }
         let bytes = self.source.read(&relative)?;
@@ -197,7 +200,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The shape's id, or its file's name without folder and ending, or its kind.
+/// The shape's id, or else its file's name without folder and extension, or else its type.
 fn shape_name(element: &Element) -> String {
     if let Some(id) = element.attribute("id") {
         return id.to_owned();

@@ -1,13 +1,13 @@
 //! The sun's radiance through the atmosphere, after Preetham, Shirley and Smits, "A practical analytic model for
 //! daylight" (SIGGRAPH 1999), appendix 2; its water vapour and mixed gases, which matter beyond 690 nm, are left out.
 
-/// Degrees across: the disc's mean size seen from the Earth.
+/// The mean angular diameter of the sun in degrees, seen from the Earth.
 pub(super) const SUN_DIAMETER_DEG: f64 = 0.5358;
 
-/// What Mitsuba divides spectra by on their way to colours: the integral of the CIE 1931 y curve over nanometres.
+/// The integral of the CIE 1931 y curve over nanometres, by which Mitsuba divides when it turns spectra into colours.
 pub(super) const CIE_Y_INTEGRAL: f64 = 106.856_980;
 
-/// The sun's temperature as a black body, in kelvin (its effective temperature).
+/// The sun's effective temperature in kelvin.
 const SUN_KELVIN: f64 = 5778.0;
 
 /// Ozone absorption in 1/cm every 20 nm from 440 nm (Preetham's table 2).
@@ -16,8 +16,8 @@ const OZONE: [f64; 18] = [
     0.009,
 ];
 
-/// Linear Rec. 709 radiance of the disc for a sun `elevation` radians above the horizon, in Mitsuba's unit:
-/// W/(m^2 sr nm) weighed by the CIE curves and divided by [`CIE_Y_INTEGRAL`]. Not negative.
+/// Linear Rec. 709 radiance of the sun's disc `elevation` radians above the horizon, in Mitsuba's unit: W/(m^2 sr nm)
+/// weighted by the CIE curves and divided by [`CIE_Y_INTEGRAL`]. Not negative.
 pub(super) fn radiance(elevation: f64, turbidity: f64) -> [f64; 3] {
     let zenith_deg = 90.0 - elevation.max(0.0).to_degrees();
     // Kasten's relative optical mass.
@@ -56,7 +56,8 @@ fn ozone(nanometres: f64) -> f64 {
     OZONE[lower] * (1.0 - part) + OZONE[lower + 1] * part
 }
 
-/// Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE XYZ color matching functions" (JCGT 2013).
+/// The CIE 1931 colour matching functions, after Wyman, Sloan and Shirley, "Simple analytic approximations to the CIE XYZ
+/// color matching functions" (JCGT 2013).
 fn cie_1931(nanometres: f64) -> [f64; 3] {
     let bump = |height: f64, centre: f64, below: f64, above: f64| {
         let t = (nanometres - centre) * if nanometres < centre { below } else { above };
@@ -69,7 +70,7 @@ fn cie_1931(nanometres: f64) -> [f64; 3] {
     ]
 }
 
-/// IEC 61966-2-1.
+/// The matrix of IEC 61966-2-1.
 fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.240_479 * x - 1.537_150 * y - 0.498_535 * z,
@@ -82,7 +83,7 @@ fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// Mitsuba 3.9.1's `sunsky` (a newer, measured sun) gives these at the centre of the disc.
+    /// The radiance at the centre of the disc in Mitsuba 3.9.1's `sunsky`, which uses a newer, measured sun.
     #[test]
     fn near_mitsubas_newer_model() {
         for (elevation, turbidity, expected) in [

@@ -17,10 +17,10 @@ use super::value;
 /// Rows of the map; it has twice as many columns, so a texel is 0.35 degrees high.
 const ROWS: usize = 512;
 
-/// What the plugins' parameters come to.
+/// The parameters of the plugins `sunsky`, `sun` and `sky`.
 #[derive(Clone, Copy, Debug)]
 struct SunSky {
-    /// Unit vector in the map's frame, +y up, not below the horizon.
+    /// Unit vector towards the sun in the map's frame (+y up), not below the horizon.
     sun: DVec3,
     turbidity: f64,
     albedo: [f64; 3],
@@ -30,7 +30,7 @@ struct SunSky {
 }
 
 impl<'a> Reader<'a> {
-    /// `sunsky`, `sun` or `sky`. Radiance in Mitsuba's unit; black below the horizon.
+    /// The environment of the plugin `sunsky`, `sun` or `sky`: radiance in Mitsuba's unit, black below the horizon.
     pub(super) fn sun_sky(&mut self, kind: &str, from: &mut Parameters<'a>) -> Option<(&'static str, Emission)> {
         let to_world = from.transform("to_world", &mut self.log);
         let world_from_map = self.world_from_map(to_world, &from.place);
@@ -45,7 +45,7 @@ impl<'a> Reader<'a> {
         Some(("sunsky", Emission::Environment { texture, scale: 1.0, world_from_environment }))
     }
 
-    /// Up is +y in Mitsuba 0.x and +z in Mitsuba 3; the map's own up is always +y.
+    /// Up is +y in Mitsuba 0.x and +z in Mitsuba 3. The map's own up is always +y.
     fn world_from_map(&mut self, to_world: DMat4, place: &str) -> DMat3 {
         let rows = self.rotation(to_world, place);
         let world_from_local = DMat3::from_cols_array_2d(&rows.map(|row| row.map(f64::from))).transpose();
@@ -69,15 +69,15 @@ impl<'a> Reader<'a> {
         SunSky { sun, turbidity, albedo, sky_scale, sun_scale, sun_diameter_deg: aperture * radius_scale }
     }
 
-    /// Mitsuba 0.x assumes a ground albedo of 0.15, Mitsuba 3 of 0.3.
+    /// The default ground albedo is 0.15 in Mitsuba 0.x and 0.3 in Mitsuba 3.
     fn ground_albedo(&mut self, from: &mut Parameters<'a>) -> [f64; 3] {
         let default = if self.major_version == 0 { 0.15 } else { 0.3 };
         let Some(element) = from.take(&["albedo"]) else { return [default; 3] };
-        let constant = self.constant(element, &from.place, super::texture::Bounds::Share);
+        let constant = self.constant(element, &from.place, super::texture::Bounds::Fraction);
         constant.map_or([default; 3], |rgb| rgb.map(f64::from))
     }
 
-    /// Towards the sun, in the map's frame. A sun given by time and place is not worked out.
+    /// The direction towards the sun in the map's frame. A sun given by time and place is not supported.
     fn sun_direction(&mut self, from: &mut Parameters<'a>, world_from_map: DMat3) -> DVec3 {
         let given = from.take(&["sun_direction"]).map(|element| value::vector(element, 0.0));
         from.ignore(&["year", "month", "day", "hour", "minute", "second", "latitude", "longitude", "timezone"]);
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
             _ => None,
         };
         let Some(direction) = direction else {
-            let message = "no usable sunDirection; a sun by time and place is not worked out";
+            let message = "expected a sunDirection, found none; a sun by time and place is not supported";
             self.log.warn("sun_by_time", &from.place, message, "put the sun 45 degrees high");
             return fallback;
         };
@@ -99,7 +99,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The map: linear Rec. 709, rows from the zenith down, columns by u = atan2(x, -z) / (2 pi).
+/// The map in linear Rec. 709, with rows from the zenith down and columns by u = atan2(x, -z) / (2 pi).
 fn bake(sky: &SunSky) -> Option<Texture> {
     let columns = 2 * ROWS;
     let dome = Dome::new(sky)?;
@@ -111,7 +111,7 @@ fn bake(sky: &SunSky) -> Option<Texture> {
     Texture::new(columns, ROWS, Texels::Linear(texels), Wrap::Repeat).ok()
 }
 
-/// The direction of a place in a texel, `right` and `down` of which are from 0 to 1.
+/// The direction of a point in a texel. `right` and `down` run from 0 to 1 over the texel.
 fn texel_direction(column: usize, row: usize, right: f64, down: f64) -> DVec3 {
     let phi = 2.0 * PI * (column as f64 + right) / (2 * ROWS) as f64;
     let theta = PI * (row as f64 + down) / ROWS as f64;
@@ -120,9 +120,10 @@ fn texel_direction(column: usize, row: usize, right: f64, down: f64) -> DVec3 {
     DVec3::new(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta)
 }
 
-/// Spreads the sun's power over the texels that its disc covers, so that the power is that of a disc of ordinary size
-/// whatever size is asked for, as in Mitsuba.
+/// Spreads the sun's power over the texels that its disc covers. As in Mitsuba, the power is that of a disc of the sun's
+/// real size, whatever size is set.
 fn add_sun(texels: &mut [[f32; 3]], sky: &SunSky) {
+    // The fraction of a texel that the disc covers, by 16 x 16 samples.
     const PARTS: usize = 16;
     let radius = (sky.sun_diameter_deg / 2.0).to_radians().max(PI / ROWS as f64 / 2.0);
     let least_cos = libm::cos(radius);
@@ -135,7 +136,7 @@ fn add_sun(texels: &mut [[f32; 3]], sky: &SunSky) {
         };
         (0..PARTS * PARTS).filter(|&part| inside(part)).count() as f64 / (PARTS * PARTS) as f64
     };
-    // A texel reaches at most 0.36 degrees from its centre.
+    // Only texels near the disc are sampled; a texel reaches at most 0.36 degrees from its centre.
     let near = libm::cos((radius + 0.01).min(PI));
     let close = |index: usize| texel_direction(index % columns, index / columns, 0.5, 0.5).dot(sky.sun) >= near;
     let shares: Vec<(usize, f64)> = (0..texels.len()).filter(|&i| close(i)).map(|i| (i, covered(i))).collect();
@@ -143,6 +144,7 @@ fn add_sun(texels: &mut [[f32; 3]], sky: &SunSky) {
     if solid_angle <= 0.0 {
         return;
     }
+    // Each covered texel takes its share of the power.
     let true_solid_angle = 2.0 * PI * (1.0 - libm::cos((SUN_DIAMETER_DEG / 2.0).to_radians()));
     let radiance = sun::radiance(libm::asin(sky.sun.y.clamp(0.0, 1.0)), sky.turbidity);
     for (index, share) in shares {
@@ -156,7 +158,7 @@ fn texel_solid_angle(row: usize) -> f64 {
     PI / ROWS as f64 * (edge(row) - edge(row + 1))
 }
 
-/// The sky alone.
+/// The sky without the sun.
 struct Dome {
     parameters: [f32; 27],
     radiances: [f32; 3],
@@ -176,7 +178,7 @@ impl Dome {
         Some(Self { parameters, radiances, sun: sky.sun, scale: sky.sky_scale / CIE_Y_INTEGRAL })
     }
 
-    /// The paper's formula 8, in f64 and without the system's libm, so that every machine makes the same map.
+    /// Formula 8 of the paper, in f64 and without the system's libm, so that every machine makes the same map.
     fn radiance(&self, direction: DVec3) -> [f64; 3] {
         let cos_theta = direction.y.max(0.0);
         let cos_gamma = direction.dot(self.sun).clamp(-1.0, 1.0);
@@ -212,9 +214,9 @@ mod tests {
         }
     }
 
-    /// Mitsuba 3.9.1's `sunsky` with the sun towards (0, cos, sin) of its z-up frame, here (0, sin, cos).
+    /// Radiance of Mitsuba 3.9.1's `sunsky` with the sun towards (0, cos, sin) of its z-up frame, here (0, sin, cos).
     #[test]
-    fn the_dome_is_mitsubas() {
+    fn the_sky_matches_mitsuba() {
         for (elevation, direction, expected) in [
             (30.0, [0.0, 1.0, 0.0], [0.01537107, 0.02916951, 0.05835234]),
             (30.0, [1.0, 0.3, 0.0], [0.04989075, 0.08438515, 0.13316135]),
@@ -240,9 +242,9 @@ mod tests {
         }
     }
 
-    /// The sun's power does not depend on its size in the map, and its place is where it is asked for.
+    /// The sun's power does not depend on its size in the map, and its centre is in the given direction.
     #[test]
-    fn the_sun_has_its_power_and_place() {
+    fn the_sun_has_its_power_and_direction() {
         for (elevation, diameter) in [(30.0, SUN_DIAMETER_DEG), (30.0, 4.0), (80.0, 0.0), (0.5, 3.0)] {
             let sky = SunSky { sky_scale: 0.0, sun_diameter_deg: diameter, ..sky(elevation) };
             let texture = bake(&sky).unwrap();

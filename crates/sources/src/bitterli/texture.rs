@@ -1,4 +1,4 @@
-//! Colours and numbers of plugins: constants, or bitmaps read from files.
+//! Colour and number parameters: constants, or bitmaps read from files.
 
 use mateval_image::texture_io::{Encoding, read_alpha, read_texture};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
@@ -6,36 +6,27 @@ use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform
 use mateval_scene::reference::SourceTexture;
 
 use super::document::Element;
+use super::error::ValueError;
 use super::parameters::Parameters;
 use super::reader::Reader;
+use super::texture_key::{Aspect, TextureKey};
 use super::value;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 
-/// What stands for a texture that cannot be read: linear mid-grey. (Mitsuba would refuse the scene.)
+/// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
 
-/// What of a picture is looked up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Aspect {
-    Color,
-    Luminance,
-    Alpha,
-}
-
-/// Textures with equal keys are the same: file, whether it is linear, how it wraps (0 repeat, 1 clamp, 2 mirror), aspect.
-pub(super) type TextureKey = (String, bool, u8, Aspect);
-
-/// Which values a constant may have.
+/// The range of a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Bounds {
-    /// A share of light: 0 to 1.
-    Share,
-    /// Radiance or an index of refraction: 0 and more.
+    /// A fraction of light: 0 to 1.
+    Fraction,
+    /// Radiance or an index of refraction: 0 or more.
     NotNegative,
 }
 
-/// A `<texture type="bitmap">`, not read yet.
+/// A `<texture type="bitmap">` whose file has not been read.
 struct Bitmap {
     file: String,
     linear: bool,
@@ -47,17 +38,17 @@ struct Bitmap {
 }
 
 impl<'a> Reader<'a> {
-    /// The colour `name`, linear Rec. 709, or `default` where it is absent.
+    /// Takes the colour `name`, linear Rec. 709. The default is grey.
     pub(super) fn color(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ColorInput {
         let Some(element) = from.take(&[name]) else { return ColorInput::Constant([default; 3]) };
         if element.tag != "texture" {
-            let constant = self.constant(element, &from.place, Bounds::Share);
+            let constant = self.constant(element, &from.place, Bounds::Fraction);
             return ColorInput::Constant(constant.unwrap_or([default; 3]));
         }
         self.color_bitmap(element, &from.place)
     }
 
-    /// The bitmap `element` as a colour; mid-grey, after a finding, where it cannot be read.
+    /// The bitmap `element` as a colour. One that cannot be read is reported and becomes mid-grey.
     pub(super) fn color_bitmap(&mut self, element: &'a Element, place: &str) -> ColorInput {
         let Some(bitmap) = self.bitmap(element, place) else { return ColorInput::Constant(MISSING) };
         if bitmap.channel.is_some() {
@@ -70,29 +61,31 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The number `name` from 0 to 1, or `default` where it is absent. A colour counts by its luminance, as in Mitsuba.
+    /// Takes the number `name` from 0 to 1. As in Mitsuba, the luminance of a colour counts.
     pub(super) fn scalar(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ScalarInput {
         let Some(element) = from.take(&[name]) else { return ScalarInput::Constant(default) };
         if element.tag != "texture" {
-            let constant = self.constant(element, &from.place, Bounds::Share);
+            let constant = self.constant(element, &from.place, Bounds::Fraction);
             return ScalarInput::Constant(constant.map_or(default, luminance));
         }
         self.scalar_texture(element, &from.place, false).unwrap_or(ScalarInput::Constant(default))
     }
 
-    /// The coverage `name`: where the picture has an alpha channel that says anything, that channel.
+    /// Takes the opacity `name`: the alpha channel of a picture whose alpha is not 1 everywhere, else its luminance.
     ///
-    /// Mitsuba takes the luminance of the colours and drops alpha, which makes the white background of a cut-out leaf
-    /// opaque and the leaf itself half clear; the scenes were converted from a renderer that takes alpha.
+    /// Mitsuba always takes the luminance and ignores alpha, which makes the white background of a cut-out leaf opaque and
+    /// the leaf half transparent. The scenes were converted from a renderer that takes alpha.
     pub(super) fn opacity(&mut self, from: &mut Parameters<'a>, name: &str) -> Option<ScalarInput> {
         let Some(element) = from.take(&[name]) else { return Some(ScalarInput::Constant(0.5)) };
         if element.tag != "texture" {
-            return self.constant(element, &from.place, Bounds::Share).map(|rgb| ScalarInput::Constant(luminance(rgb)));
+            return self
+                .constant(element, &from.place, Bounds::Fraction)
+                .map(|rgb| ScalarInput::Constant(luminance(rgb)));
         }
         self.scalar_texture(element, &from.place, true)
     }
 
-    /// Heights from a texture by luminance; none where it cannot be read.
+    /// The luminance of a texture as heights; none where it cannot be read.
     pub(super) fn height(&mut self, element: &'a Element, place: &str) -> Option<ScalarInput> {
         self.scalar_texture(element, place, false)
     }
@@ -102,29 +95,31 @@ impl<'a> Reader<'a> {
         let (aspect, channel) = match bitmap.channel {
             Some('a') => (Aspect::Alpha, 0),
             Some(letter) => (Aspect::Color, "rgb".find(letter).unwrap_or(0)),
-            None if prefer_alpha && self.alpha_says_something(&bitmap) => (Aspect::Alpha, 0),
+            None if prefer_alpha && self.has_transparency(&bitmap) => (Aspect::Alpha, 0),
             None => (Aspect::Luminance, 0),
         };
         if aspect == Aspect::Alpha && bitmap.channel.is_none() {
-            let message = format!("opacity from '{}', whose alpha is not the same everywhere", shortened(&bitmap.file));
-            self.log.note("opacity_from_alpha", place, message, "used alpha, not the luminance that Mitsuba takes");
+            let message = format!("opacity from '{}', whose alpha is not 1 everywhere", shortened(&bitmap.file));
+            self.log.note("opacity_from_alpha", place, message, "used alpha; Mitsuba uses the luminance");
         }
         let texture = self.texture(&bitmap, aspect)?;
         Some(ScalarInput::Texture { texture, channel, uv: bitmap.uv })
     }
 
-    /// A constant colour: `<rgb>`, `<srgb>`, `<spectrum>`, `<float>`; none, after a finding, where it is none.
+    /// The constant colour of `<rgb>`, `<srgb>`, `<spectrum>`, `<float>` or `<integer>`. Anything else is reported and gives
+    /// none.
     pub(super) fn constant(&mut self, element: &Element, place: &str, bounds: Bounds) -> Option<[f32; 3]> {
         match constant_color(element) {
-            Ok((rgb, approximated)) => {
-                if let Some(what) = approximated {
-                    let message = format!("line {}: '{}': {what}", element.line, element.name());
+            Ok((rgb, wavelengths)) => {
+                if let Some(count) = wavelengths {
+                    let message =
+                        format!("line {}: '{}': a spectrum of {count} wavelengths", element.line, element.name());
                     self.log.warn("spectrum_approximated", place, message, "used the mean of its values");
                 }
                 Some(self.bounded(rgb, element, place, bounds))
             }
-            Err(what) => {
-                let message = format!("line {}: '{}': {what}", element.line, shortened(element.name()));
+            Err(error) => {
+                let message = format!("line {}: '{}': {error}", element.line, shortened(element.name()));
                 self.log.warn("bad_value", place, message, "used the default");
                 None
             }
@@ -132,7 +127,7 @@ impl<'a> Reader<'a> {
     }
 
     fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, bounds: Bounds) -> [f32; 3] {
-        let most = if bounds == Bounds::Share { 1.0 } else { 1e9 };
+        let most = if bounds == Bounds::Fraction { 1.0 } else { 1e9 };
         if rgb.iter().any(|v| *v < 0.0 || *v > most) {
             let message = format!("line {}: '{}': expected 0 to {most}, found {rgb:?}", element.line, element.name());
             self.log.warn("out_of_range", place, message, "clamped");
@@ -165,7 +160,8 @@ impl<'a> Reader<'a> {
         Some(Bitmap { file, linear, wrap, uv, channel, place: place.to_owned(), line: element.line })
     }
 
-    /// `raw`, or a gamma of 1. Otherwise files of whole numbers are sRGB, and files of floats linear in any case.
+    /// Whether a file of integers is decoded as linear (`raw`, or a gamma of 1) instead of as sRGB. Files of floats are
+    /// always linear.
     fn is_linear(&mut self, from: &mut Parameters<'a>, element: &Element) -> bool {
         let raw = from.boolean("raw", false, &mut self.log);
         let Some(gamma) = from.number("gamma", &mut self.log) else { return raw };
@@ -204,7 +200,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Mitsuba's v grows downwards in the picture (OBJ's vt is flipped on loading), ours upwards: v = 1 - v there.
+    /// Mitsuba's v grows downwards in the picture (it flips the vt of an OBJ on loading), MatEval's grows upwards, so each is
+    /// 1 minus the other.
     fn uv_transform(&mut self, from: &mut Parameters<'a>) -> UvTransform {
         let m = from.transform("to_uv", &mut self.log);
         let number = |from: &mut Parameters<'a>, name, default, log: &mut _| from.number(name, log).unwrap_or(default);
@@ -218,25 +215,21 @@ impl<'a> Reader<'a> {
         UvTransform(rows.map(|row| row.map(|v| v as f32 + 0.0)))
     }
 
-    fn alpha_says_something(&mut self, bitmap: &Bitmap) -> bool {
+    /// Whether the file has an alpha channel that is not 1 everywhere.
+    fn has_transparency(&mut self, bitmap: &Bitmap) -> bool {
         if let Some(known) = self.alphas.get(&bitmap.file) {
             return *known;
         }
         let path = self.source.path(&bitmap.file).ok();
         let alpha = path.and_then(|path| read_alpha(&path, bitmap.wrap).ok()).flatten();
-        let says = alpha.is_some_and(|alpha| !all_texels(&alpha, |value| value[0] == 1.0));
-        self.alphas.insert(bitmap.file.clone(), says);
-        says
+        let transparent = alpha.is_some_and(|alpha| !all_texels(&alpha, |value| value[0] == 1.0));
+        self.alphas.insert(bitmap.file.clone(), transparent);
+        transparent
     }
 
-    /// Reads a texture once; a fault of its file is reported once.
+    /// Reads a texture, unless it has been read before. A fault of its file is reported once.
     fn texture(&mut self, bitmap: &Bitmap, aspect: Aspect) -> Option<TextureIndex> {
-        let wrap = match bitmap.wrap {
-            Wrap::Repeat => 0,
-            Wrap::Clamp => 1,
-            Wrap::Mirror => 2,
-        };
-        let key = (bitmap.file.clone(), bitmap.linear, wrap, aspect);
+        let key = TextureKey::new(&bitmap.file, bitmap.linear, bitmap.wrap, aspect);
         if let Some(known) = self.textures.get(&key) {
             return *known;
         }
@@ -251,7 +244,7 @@ impl<'a> Reader<'a> {
         index
     }
 
-    /// Keeps a texture; its hash is that of the file `name`, if it is one that was read.
+    /// Adds a texture to the scene. It carries the hash of the file `name`, if that was read.
     pub(super) fn add_texture(&mut self, name: String, texture: Texture) -> TextureIndex {
         let sha256 = self.source.hash(&name);
         self.scene.textures.push(SourceTexture { name, sha256, texture });
@@ -263,7 +256,7 @@ impl<'a> Reader<'a> {
         if aspect == Aspect::Luminance { luminance_texture(&texture) } else { Ok(texture) }
     }
 
-    /// The picture in the file `file` of the scene's folder.
+    /// Reads the picture `file` of the scene's folder.
     pub(super) fn read_picture(
         &mut self,
         file: &str,
@@ -291,7 +284,7 @@ impl<'a> Reader<'a> {
 
 const TEXTURE_LEFT_OUT: &str = "used linear mid-grey 0.5; as opacity or bump map, nothing";
 
-/// The fault in words that do not hold this machine's folders.
+/// The fault of a picture. Its message names the file relative to the scene, without the folders of this machine.
 fn picture_fault(file: &str, error: &ImageError) -> FileFault {
     let what = match error {
         ImageError::Io { source, .. } => source.to_string(),
@@ -335,8 +328,8 @@ pub(super) fn mean_color(texture: &Texture) -> [f64; 3] {
     sum.map(|s| s / (texture.width() * texture.height()) as f64)
 }
 
-/// A linear colour, and what of it is approximated, if anything.
-fn constant_color(element: &Element) -> Result<([f64; 3], Option<String>), String> {
+/// A linear colour, and the number of wavelengths that it approximates, if it is a spectrum.
+fn constant_color(element: &Element) -> Result<([f64; 3], Option<usize>), ValueError> {
     let text = element.attribute("value").unwrap_or("");
     match element.tag.as_str() {
         "float" | "integer" => Ok(([value::number(text)?; 3], None)),
@@ -349,9 +342,9 @@ fn constant_color(element: &Element) -> Result<([f64; 3], Option<String>), Strin
             let values = text.split(',').map(|pair| value::number(pair.rsplit(':').next().unwrap_or("")));
             let values = values.take(4096).collect::<Result<Vec<_>, _>>()?;
             let mean = values.iter().sum::<f64>() / values.len() as f64;
-            Ok(([mean; 3], Some(format!("a spectrum of {} wavelengths", values.len()))))
+            Ok(([mean; 3], Some(values.len())))
         }
         "spectrum" => Ok((value::triple(text)?, None)),
-        other => Err(format!("expected a colour, found <{}>", shortened(other))),
+        other => Err(ValueError::NotAColor { found: shortened(other) }),
     }
 }

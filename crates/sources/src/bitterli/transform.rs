@@ -1,20 +1,42 @@
-//! `<transform>`: its elements in order, each applied after those before it.
+//! `<transform>`: a product of steps, each applied after those before it.
 
 use glam::{DMat3, DMat4, DVec3};
 
 use super::document::Element;
+use super::error::ValueError;
 use super::value::{number, numbers, vector};
 use crate::log::Log;
 
-/// The product of a transform's elements. A faulty element is a finding and counts as the identity.
+/// Why a step of a transform is not a matrix.
+#[derive(Debug, thiserror::Error)]
+enum StepError {
+    #[error(transparent)]
+    Value(#[from] ValueError),
+    #[error("{key}: {reason}")]
+    Point { key: &'static str, reason: ValueError },
+    #[error("expected {key}, found none")]
+    MissingPoint { key: &'static str },
+    #[error("expected matrix, translate, rotate, scale or lookat")]
+    UnknownStep,
+    #[error("expected a last row of 0 0 0 1, found a projection")]
+    Projection,
+    #[error("expected an axis, found a vector of length 0")]
+    NoAxis,
+    #[error("expected origin and target to differ")]
+    NoDirection,
+    #[error("expected an up vector that is not parallel to the direction of view")]
+    UpAlongView,
+}
+
+/// The product of a transform's steps. A faulty step is a finding and counts as the identity.
 pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
     let mut product = DMat4::IDENTITY;
     for element in &transform.children {
         match step(element) {
             Ok(matrix) => product = matrix * product,
-            Err(what) => {
-                let message =
-                    format!("line {}: <{}>: {what}", element.line, mateval_scene::findings::shortened(&element.tag));
+            Err(error) => {
+                let tag = mateval_scene::findings::shortened(&element.tag);
+                let message = format!("line {}: <{tag}>: {error}", element.line);
                 log.warn("bad_transform", place, message, "left this step out");
             }
         }
@@ -27,34 +49,34 @@ pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
     }
 }
 
-fn step(element: &Element) -> Result<DMat4, String> {
-    let sized = |missing| vector(element, missing).map(DVec3::from_array);
+fn step(element: &Element) -> Result<DMat4, StepError> {
+    let vector = |missing| vector(element, missing).map(DVec3::from_array);
     match element.tag.as_str() {
         "matrix" => matrix(element.attribute("value").unwrap_or("")),
-        "translate" => Ok(DMat4::from_translation(sized(0.0)?)),
-        "scale" => Ok(DMat4::from_scale(sized(1.0)?)),
+        "translate" => Ok(DMat4::from_translation(vector(0.0)?)),
+        "scale" => Ok(DMat4::from_scale(vector(1.0)?)),
         "rotate" => {
             let angle = number(element.attribute("angle").unwrap_or(""))?;
-            let axis = sized(0.0)?.try_normalize().ok_or("expected an axis, found a vector of length 0")?;
+            let axis = vector(0.0)?.try_normalize().ok_or(StepError::NoAxis)?;
             Ok(DMat4::from_mat3(rotation(axis, angle.to_radians())))
         }
         "lookat" => look_at(element),
-        _ => Err("expected matrix, translate, rotate, scale or lookat".to_owned()),
+        _ => Err(StepError::UnknownStep),
     }
 }
 
-/// Row-major: 16 numbers, or 9 without translation.
-fn matrix(text: &str) -> Result<DMat4, String> {
+/// A row-major matrix of 16 numbers, or of 9 without translation.
+fn matrix(text: &str) -> Result<DMat4, StepError> {
     let list = numbers(text)?;
     if let Ok(rows) = <[f64; 16]>::try_from(list.as_slice()) {
         if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
-            return Err("expected a last row of 0 0 0 1, found a projection".to_owned());
+            return Err(StepError::Projection);
         }
         return Ok(DMat4::from_cols_array(&rows).transpose());
     }
     match <[f64; 9]>::try_from(list.as_slice()) {
         Ok(rows) => Ok(DMat4::from_mat3(DMat3::from_cols_array(&rows).transpose())),
-        Err(_) => Err(format!("expected 16 or 9 numbers, found {}", list.len())),
+        Err(_) => Err(ValueError::Count { expected: "16 or 9", found: list.len() }.into()),
     }
 }
 
@@ -65,22 +87,24 @@ pub(super) fn rotation(axis: DVec3, angle: f64) -> DMat3 {
     DMat3::from_cols(turned(DVec3::X), turned(DVec3::Y), turned(DVec3::Z))
 }
 
-/// Mitsuba's camera space: +z towards the target, +y up, +x left.
-fn look_at(element: &Element) -> Result<DMat4, String> {
-    let point = |key| -> Result<Option<DVec3>, String> {
+/// The transform from Mitsuba's camera space: +z towards the target, +y up, +x left.
+fn look_at(element: &Element) -> Result<DMat4, StepError> {
+    let given = |key| -> Result<Option<DVec3>, StepError> {
         let Some(text) = element.attribute(key) else { return Ok(None) };
-        let list = numbers(text)?;
-        let array = <[f64; 3]>::try_from(list.as_slice()).map_err(|_| format!("{key}: expected 3 numbers"))?;
-        Ok(Some(DVec3::from_array(array)))
+        let list = numbers(text).map_err(|reason| StepError::Point { key, reason })?;
+        let count = ValueError::Count { expected: "3", found: list.len() };
+        let point = <[f64; 3]>::try_from(list).map_err(|_| StepError::Point { key, reason: count })?;
+        Ok(Some(DVec3::from_array(point)))
     };
-    let (origin, target) = (point("origin")?.ok_or("no origin")?, point("target")?.ok_or("no target")?);
-    let forward = (target - origin).try_normalize().ok_or("origin and target are the same point")?;
-    let up = match point("up")? {
+    let needed = |key| given(key)?.ok_or(StepError::MissingPoint { key });
+    let (origin, target) = (needed("origin")?, needed("target")?);
+    let forward = (target - origin).try_normalize().ok_or(StepError::NoDirection)?;
+    let up = match given("up")? {
         Some(up) => up,
         None if forward.y.abs() < 0.999 => DVec3::Y,
         None => DVec3::Z,
     };
-    let left = up.cross(forward).try_normalize().ok_or("up lies along the direction of view")?;
+    let left = up.cross(forward).try_normalize().ok_or(StepError::UpAlongView)?;
     let rotation = DMat3::from_cols(left, forward.cross(left), forward);
     Ok(DMat4::from_translation(origin) * DMat4::from_mat3(rotation))
 }
@@ -94,13 +118,12 @@ mod tests {
     fn read_text(steps: &str) -> (DMat4, usize) {
         let mut log = Log::new("scene.xml".into(), 100);
         let text = format!("<scene version='3.0.0'><transform>{steps}</transform></scene>");
-        let document =
-            Document::parse(std::path::Path::new("a"), &text, &Limits::default(), &mut log).expect("sound XML");
+        let document = Document::parse(&text, &Limits::default(), &mut log).unwrap();
         let matrix = read(&document.root.children[0], "shape", &mut log);
         (matrix, log.into_findings().len())
     }
 
-    /// Mitsuba 3.9.1 gives a rectangle under this transform the box (0, -2, -4) to (0, 2, 0).
+    /// In Mitsuba 3.9.1 a rectangle under this transform has the bounding box (0, -2, -4) to (0, 2, 0).
     #[test]
     fn each_step_is_applied_after_those_before() {
         let (matrix, _) = read_text("<translate x='1'/><scale value='2'/><rotate y='1' angle='90'/>");

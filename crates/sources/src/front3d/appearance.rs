@@ -1,4 +1,4 @@
-//! What surfaces of a house look like: textures by folder, and the materials that use them.
+//! Materials of a house's surfaces and the textures that they use.
 
 use std::collections::BTreeMap;
 
@@ -15,32 +15,33 @@ use super::house::{House, HouseMaterial};
 use super::model::{Library, is_folder_name};
 use crate::log::Log;
 use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::FileFault;
 
-/// What stands for a colour that cannot be read: linear mid-grey.
+/// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
-/// Blender's default, which BlenderProc leaves: the data says nothing of roughness.
+/// Blender's default, which BlenderProc does not change. The data has no roughness.
 const ROUGHNESS: f32 = 0.5;
 
-/// Materials and textures so far, each once.
+/// The materials and textures made so far, each once.
 #[derive(Debug)]
 pub(super) struct Appearances {
     pub(super) materials: Vec<Material>,
     pub(super) textures: Vec<SourceTexture>,
-    /// Texels of all textures together, and the most there may be.
+    /// Texels of all textures.
     texels: usize,
     most_texels: usize,
-    /// By file; none: it is not there or not sound, and that has been told.
+    /// By file. None stands for a file that is missing or faulty, which has been reported.
     known_textures: BTreeMap<String, Option<TextureIndex>>,
-    /// By their place in the house.
+    /// By index in [`House::materials`].
     of_layout: BTreeMap<Option<usize>, MaterialIndex>,
-    /// By model.
+    /// By model id.
     of_models: BTreeMap<String, MaterialIndex>,
-    /// Materials with a texture, where no folder of textures was given.
+    /// Number of materials that name a texture although no folder of textures was given.
     untextured: usize,
 }
 
 impl Appearances {
-    /// None yet; `most_texels` may come.
+    /// No materials yet. All textures may have at most `most_texels` texels.
     pub(super) fn new(most_texels: usize) -> Self {
         Self {
             materials: Vec::new(),
@@ -54,9 +55,9 @@ impl Appearances {
         }
     }
 
-    /// The material of a model, and whether its texture was there.
+    /// The material of a model, and whether its texture could be read.
     pub(super) fn of_model(&mut self, jid: &str, models: &mut Library, log: &mut Log) -> (MaterialIndex, bool) {
-        let texture = self.texture(jid, models, "took linear mid-grey", log);
+        let texture = self.texture(jid, models, "used linear mid-grey", log);
         if let Some(known) = self.of_models.get(jid) {
             return (*known, texture.is_some());
         }
@@ -69,17 +70,17 @@ impl Appearances {
         (index, texture.is_some())
     }
 
-    /// The material at this place in the house, and its plain colour.
+    /// The material made of `house.materials[material]`, and its colour. Without a material it is mid-grey.
     pub(super) fn of_layout(
         &mut self,
         house: &House,
-        place: Option<usize>,
+        material: Option<usize>,
         textures: Option<&mut Library>,
         log: &mut Log,
     ) -> (MaterialIndex, [f32; 3]) {
-        let source = place.map(|place| &house.materials[place]);
+        let source = material.map(|material| &house.materials[material]);
         let plain = source.map_or(MISSING, |source| source.color.map(|v| linear_from_srgb(v as f32 / 255.0)));
-        if let Some(known) = self.of_layout.get(&place) {
+        if let Some(known) = self.of_layout.get(&material) {
             return (*known, plain);
         }
         let texture = source.and_then(|source| self.layout_texture(source, textures, log));
@@ -89,7 +90,7 @@ impl Appearances {
         };
         let name = source.map_or("none", |source| source.uid.as_str());
         let index = self.add(name.to_owned(), color);
-        self.of_layout.insert(place, index);
+        self.of_layout.insert(material, index);
         (index, plain)
     }
 
@@ -101,15 +102,15 @@ impl Appearances {
     ) -> Option<TextureIndex> {
         let jid = source.texture.as_deref()?;
         if !is_folder_name(jid) {
-            let message = format!("'{}' is no folder's name", shortened(jid));
-            log.warn("bad_jid", &format!("{}/jid", source.place), message, "took the colour");
+            let message = format!("expected the name of a folder, found '{}'", shortened(jid));
+            log.warn("bad_jid", &format!("{}/jid", source.place), message, "used the colour");
             return None;
         }
         self.untextured += usize::from(textures.is_none());
-        self.texture(jid, textures?, "took the colour", log)
+        self.texture(jid, textures?, "used the colour", log)
     }
 
-    /// `<id>/texture.png`; none, after one finding, where it cannot be read.
+    /// The texture `<id>/texture.png`. One that cannot be read is reported once and gives none.
     fn texture(&mut self, id: &str, library: &mut Library, action: &str, log: &mut Log) -> Option<TextureIndex> {
         let relative = format!("{id}/texture.png");
         let shown = library.shown(&relative);
@@ -121,8 +122,8 @@ impl Appearances {
                 self.textures.push(texture);
                 Some(TextureIndex(self.textures.len() - 1))
             }
-            Err((code, message)) => {
-                log.push(Severity::Warning, code, &shown, "", message, action);
+            Err(fault) => {
+                log.push(Severity::Warning, fault.code, &shown, "", fault.message, action);
                 None
             }
         };
@@ -130,21 +131,17 @@ impl Appearances {
         index
     }
 
-    /// A texture; or the code and the words of what is wrong with it.
-    fn read(
-        &mut self,
-        relative: &str,
-        shown: &str,
-        library: &mut Library,
-    ) -> Result<SourceTexture, (&'static str, String)> {
-        // Read for its hash first: the reader of pictures tells none.
-        library.folder.read(relative).map_err(|fault| (missing_texture(fault.code), fault.message))?;
-        let path = library.folder.path(relative).map_err(|fault| (fault.code, fault.message))?;
-        let texture = read_texture(&path, Encoding::Srgb, Wrap::Repeat);
-        let texture = texture.map_err(|error| ("unreadable_texture", told(&error)))?;
+    /// Reads a texture of the library.
+    fn read(&mut self, relative: &str, shown: &str, library: &mut Library) -> Result<SourceTexture, FileFault> {
+        // The folder reads the file for its hash, which the reader of pictures does not give.
+        let code = |code| if code == "missing_file" { "missing_texture" } else { code };
+        library.folder.read(relative).map_err(|fault| FileFault { code: code(fault.code), ..fault })?;
+        let path = library.folder.path(relative)?;
+        let texture = read_texture(&path, Encoding::Srgb, Wrap::Repeat).map_err(|error| picture_fault(&error))?;
         self.texels = self.texels.saturating_add(texture.width() * texture.height());
         if self.texels > self.most_texels {
-            return Err(("limit", format!("more than {} texels in all", self.most_texels)));
+            let message = format!("all textures together have more than {} texels", self.most_texels);
+            return Err(FileFault { code: "limit", message });
         }
         let sha256 = library.folder.hash(relative);
         Ok(SourceTexture { name: shown.to_owned(), sha256, texture: texture.collapsed() })
@@ -167,24 +164,21 @@ impl Appearances {
         MaterialIndex(self.materials.len() - 1)
     }
 
-    /// Tells once of all materials that have a texture where no folder of textures was given.
-    pub(super) fn note_untextured(&self, log: &mut Log) {
+    /// Reports the materials that name a texture although no folder of textures was given.
+    pub(super) fn report_untextured(&self, log: &mut Log) {
         if self.untextured > 0 {
-            let message = format!("{} materials have a texture, and no folder of textures was given", self.untextured);
-            log.warn("no_textures", "/material", message, "took their colours");
+            let message = format!("{} materials have a texture, but no folder of textures was given", self.untextured);
+            log.warn("no_textures", "/material", message, "used their colours");
         }
     }
 }
 
-fn missing_texture(code: &'static str) -> &'static str {
-    if code == "missing_file" { "missing_texture" } else { code }
-}
-
-/// What is wrong with a picture, without its path, which is the finding's own.
-fn told(error: &ImageError) -> String {
-    match error {
+/// The fault of a picture. Its message leaves out the path, which the finding gives.
+fn picture_fault(error: &ImageError) -> FileFault {
+    let message = match error {
         ImageError::Io { source, .. } => source.to_string(),
         ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
         ImageError::PixelCount { .. } => error.to_string(),
-    }
+    };
+    FileFault { code: "unreadable_texture", message }
 }

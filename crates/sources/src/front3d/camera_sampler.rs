@@ -1,11 +1,10 @@
-//! Cameras that nobody set: drawn in a room until one stands free and sees enough of it.
+//! Draws cameras in a room until one keeps its distance from everything and sees enough of the room.
 //!
-//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples (SOURCE_FORMATS 3.7): height and
-//! pitch uniform, the place uniform over the floor's bounding box with that very floor straight below, ten by ten rays for
-//! nearness and for a score of what is seen.
+//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples (SOURCE_FORMATS 3.7). Height and
+//! pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and ten by ten
+//! rays decide on the distances and on a score of what is seen.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::camera::{Camera, Intrinsics};
@@ -13,24 +12,24 @@ use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
-use super::furnish::{FurnishedHouse, Role};
+use super::furnished_house::{FurnishedHouse, Role};
 
-/// What a camera must keep to.
+/// The rules for a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplerRules {
-    /// Metres above the floor, least and most.
+    /// Range of the height above the floor, in metres.
     pub height_m: [f64; 2],
-    /// Degrees below the horizon, least and most.
+    /// Range of the pitch below the horizon, in degrees.
     pub pitch_down_deg: [f64; 2],
-    /// Metres to the nearest thing in any view.
+    /// The least distance to anything seen in any view, in metres.
     pub min_distance_m: f64,
-    /// Metres to the nearest thing on any side, seen or not.
+    /// The least distance to anything in any direction, in metres.
     pub clearance_m: f64,
-    /// Metres, the mean distance in the input view: least and most.
+    /// Range of the mean distance in the input view, in metres.
     pub mean_distance_m: [f64; 2],
-    /// What the score of the input view must exceed.
+    /// The score that the input view must exceed.
     pub min_score: f64,
-    /// Draws before it is given up.
+    /// The number of draws.
     pub tries: u32,
 }
 
@@ -38,7 +37,7 @@ impl Default for SamplerRules {
     fn default() -> Self {
         Self {
             height_m: [1.4, 1.8],
-            // BlenderProc's 1.2217 to 1.338 rad from straight down.
+            // In BlenderProc 1.2217 to 1.338 rad, measured from straight down.
             pitch_down_deg: [13.34, 20.0],
             min_distance_m: 1.0,
             clearance_m: 0.3,
@@ -54,46 +53,89 @@ impl Default for SamplerRules {
 pub struct FoundCamera {
     /// The input camera.
     pub camera: Camera,
-    /// What it sees; see [`score`].
+    /// The [`score`] of the input view.
     pub score: f64,
-    /// Metres to the nearest thing in any view.
+    /// The distance to the nearest surface seen in any view, in metres.
     pub nearest_m: f64,
-    /// Metres on the average, input view.
+    /// The mean distance in the input view, in metres.
     pub mean_m: f64,
-    /// Draws that it took, this one included.
+    /// The number of draws, including this one.
     pub tries: u32,
 }
 
-/// Why a draw is thrown away.
+/// The rule that a draw breaks first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Refusal {
-    /// Not above the room's floor alone.
+    /// Something else than the room's floor is below the camera.
     OffFloor,
-    /// Sees the outside.
-    Open,
-    /// Sees something too near.
-    Near,
+    /// A view sees the outside.
+    SeesOutside,
+    /// A view sees something nearer than allowed.
+    TooNear,
     /// The mean distance is out of range.
-    Mean,
+    MeanDistance,
     /// The score is too low.
-    Dull,
-    /// Something is within the clearance, seen or not.
-    Crowded,
+    LowScore,
+    /// Something is within the clearance.
+    NoClearance,
 }
 
-/// Draws cameras in room number `room` until one keeps to the rules. `turns` are the novel views', degrees about x and y.
-///
-/// Fails, in words, where the room has no floor, or where none of all draws will do.
-pub fn sample(
-    house: &FurnishedHouse,
-    room: usize,
-    intrinsics: Intrinsics,
-    turns: &[[f64; 2]],
-    rules: &SamplerRules,
-    seed: u64,
-) -> Result<FoundCamera, String> {
-    let world = World::new(Arc::new(house.scene.clone())).map_err(|error| error.to_string())?;
-    RoomSampler::new(house, &world, room)?.sample(intrinsics, turns, rules, seed)
+/// How many draws broke each rule.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Refusals {
+    /// Draws above something else than the room's floor.
+    pub off_floor: u32,
+    /// Draws that see the outside.
+    pub sees_outside: u32,
+    /// Draws that see something nearer than allowed.
+    pub too_near: u32,
+    /// Draws whose mean distance is out of range.
+    pub mean_distance: u32,
+    /// Draws whose score is too low.
+    pub low_score: u32,
+    /// Draws with something within the clearance.
+    pub no_clearance: u32,
+}
+
+impl Refusals {
+    fn count(&mut self, refusal: Refusal) {
+        *match refusal {
+            Refusal::OffFloor => &mut self.off_floor,
+            Refusal::SeesOutside => &mut self.sees_outside,
+            Refusal::TooNear => &mut self.too_near,
+            Refusal::MeanDistance => &mut self.mean_distance,
+            Refusal::LowScore => &mut self.low_score,
+            Refusal::NoClearance => &mut self.no_clearance,
+        } += 1;
+    }
+}
+
+/// Why no camera can be drawn in a room.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CameraError {
+    /// The room has no floor.
+    #[error("room '{room}' has no floor for a camera to stand on; give a camera by hand")]
+    NoFloor {
+        /// The room's id.
+        room: String,
+    },
+    /// Every draw breaks a rule.
+    #[error(
+        "none of {} cameras drawn in room '{room}' keeps the rules: {} are not above the room's floor, {} see the outside, \
+         {} see something nearer than {} m, {} have a mean distance outside {} to {} m, {} have a score of at most {}, {} \
+         are within {} m of something; give a camera by hand, or try another seed",
+        rules.tries, refusals.off_floor, refusals.sees_outside, refusals.too_near, rules.min_distance_m,
+        refusals.mean_distance, rules.mean_distance_m[0], rules.mean_distance_m[1], refusals.low_score, rules.min_score,
+        refusals.no_clearance, rules.clearance_m
+    )]
+    NoneFound {
+        /// The room's id.
+        room: String,
+        /// The rules.
+        rules: Box<SamplerRules>,
+        /// How many draws broke each rule.
+        refusals: Refusals,
+    },
 }
 
 /// A room made ready for drawing many cameras.
@@ -105,19 +147,18 @@ pub struct RoomSampler<'a> {
 }
 
 impl<'a> RoomSampler<'a> {
-    /// `world` is of the whole house. Fails, in words, where the room has no floor.
-    pub fn new(house: &'a FurnishedHouse, world: &'a World, room: usize) -> Result<Self, String> {
-        let name = &house.house.rooms[room].id;
+    /// A sampler of room number `room`; `world` was made of `house.scene`. Fails where the room has no floor.
+    pub fn new(house: &'a FurnishedHouse, world: &'a World, room: usize) -> Result<Self, CameraError> {
         let floors = (0..house.placed.len()).filter(|&surface| is_floor(house, surface, room));
         let positions =
             || floors.clone().flat_map(|surface| house.scene.surfaces[surface].mesh.positions.iter().copied());
         let (Some(low), Some(high)) = (positions().reduce(Vec3::min), positions().reduce(Vec3::max)) else {
-            return Err(format!("room '{name}' has no floor for a camera to stand on; give it one by hand"));
+            return Err(CameraError::NoFloor { room: house.house.rooms[room].id.clone() });
         };
         Ok(Self { house, world, room, floor: [low, high] })
     }
 
-    /// Whether the first floor straight below a place is the room's own; furniture may be in between.
+    /// Whether the first floor below a position belongs to the room. Furniture in between is ignored.
     pub fn stands_in_room(&self, place: DVec3) -> bool {
         let is_any_floor = |hit: &Hit| is_architecture(self.house, hit.surface.0, "Floor");
         let down = Ray::endless(place.as_vec3(), Vec3::NEG_Y);
@@ -125,48 +166,30 @@ impl<'a> RoomSampler<'a> {
         floor.is_some_and(|hit| is_floor(self.house, hit.surface.0, self.room))
     }
 
-    /// Draws until a camera keeps to the rules.
+    /// Draws until a camera keeps to the rules. `turns` are the novel views', degrees about x and y.
+    ///
+    /// Fails where none of all draws will do.
     pub fn sample(
         &self,
         intrinsics: Intrinsics,
         turns: &[[f64; 2]],
         rules: &SamplerRules,
         seed: u64,
-    ) -> Result<FoundCamera, String> {
-        let mut refusals = Vec::new();
+    ) -> Result<FoundCamera, CameraError> {
+        let mut refusals = Refusals::default();
         for number in 0..rules.tries {
-            // One pixel of a picture of the room: every draw follows from seed, room and number alone.
+            // Every draw follows from seed, room and number alone.
             let sampler = Sampler::new(seed, [self.room as u32, 0], number);
             match self.draw(&sampler, intrinsics, rules).and_then(|camera| self.judge(camera, turns, rules)) {
                 Ok(found) => return Ok(FoundCamera { tries: number + 1, ..found }),
-                Err(refusal) => refusals.push(refusal),
+                Err(refusal) => refusals.count(refusal),
             }
         }
-        Err(self.told(&refusals, rules))
+        let room = self.house.house.rooms[self.room].id.clone();
+        Err(CameraError::NoneFound { room, rules: Box::new(*rules), refusals })
     }
 
-    fn told(&self, refusals: &[Refusal], rules: &SamplerRules) -> String {
-        let count = |which: Refusal| refusals.iter().filter(|refusal| **refusal == which).count();
-        format!(
-            "none of {} cameras will do in room '{}': {} not above its floor alone, {} see the outside, {} see something \
-             nearer than {} m, {} have a mean distance out of {:?} m, {} score no more than {}, {} within {} m of something; \
-             give one by hand, or try another seed",
-            rules.tries,
-            self.house.house.rooms[self.room].id,
-            count(Refusal::OffFloor),
-            count(Refusal::Open),
-            count(Refusal::Near),
-            rules.min_distance_m,
-            count(Refusal::Mean),
-            rules.mean_distance_m,
-            count(Refusal::Dull),
-            rules.min_score,
-            count(Refusal::Crowded),
-            rules.clearance_m,
-        )
-    }
-
-    /// A camera above the room's floor.
+    /// Draws a camera above the room's floor.
     fn draw(&self, sampler: &Sampler, intrinsics: Intrinsics, rules: &SamplerRules) -> Result<Camera, Refusal> {
         let [x, z, height, pitch] = sampler.set(0).map(f64::from);
         let [yaw, ..] = sampler.set(1).map(f64::from);
@@ -183,29 +206,31 @@ impl<'a> RoomSampler<'a> {
         Ok(Camera::from_rotation(rotation, position, intrinsics))
     }
 
-    /// Whether a camera keeps to the rules; what costs least is asked first.
+    /// Checks a camera against the rules, the cheapest first.
     fn judge(&self, camera: Camera, turns: &[[f64; 2]], rules: &SamplerRules) -> Result<FoundCamera, Refusal> {
         let holds = |holds: bool, refusal: Refusal| if holds { Ok(()) } else { Err(refusal) };
-        let seen = self.rays(&camera).ok_or(Refusal::Open)?;
-        holds(nearest(&seen) >= rules.min_distance_m, Refusal::Near)?;
+        // The input view, with few rays.
+        let seen = self.rays(&camera).ok_or(Refusal::SeesOutside)?;
+        holds(nearest(&seen) >= rules.min_distance_m, Refusal::TooNear)?;
         let mean_m = seen.iter().map(|(_, distance)| distance).sum::<f64>() / seen.len() as f64;
-        holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::Mean)?;
+        holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::MeanDistance)?;
         let score = score(self.house, &seen.iter().map(|(surface, _)| Some(*surface)).collect::<Vec<_>>());
-        holds(score > rules.min_score, Refusal::Dull)?;
+        holds(score > rules.min_score, Refusal::LowScore)?;
+        // All views, with few rays and then with many.
         let turned: Vec<Camera> = turns.iter().map(|turn| camera.turned(turn[0], turn[1])).collect();
         for view in &turned {
-            self.rays(view).ok_or(Refusal::Open)?;
+            self.rays(view).ok_or(Refusal::SeesOutside)?;
         }
         let views = turned.iter().chain([&camera]);
-        let nearest_m = views.map(|view| self.nearest_between(view)).fold(nearest(&seen), f64::min);
-        holds(nearest_m >= rules.min_distance_m, Refusal::Near)?;
+        let nearest_m = views.map(|view| self.nearest_by_dense_rays(view)).fold(nearest(&seen), f64::min);
+        holds(nearest_m >= rules.min_distance_m, Refusal::TooNear)?;
+        // Everything around the camera.
         let clearance_m = self.distance_to_anything(camera.position(), rules.clearance_m);
-        holds(clearance_m >= rules.clearance_m, Refusal::Crowded)?;
+        holds(clearance_m >= rules.clearance_m, Refusal::NoClearance)?;
         Ok(FoundCamera { camera, score, nearest_m, mean_m, tries: 0 })
     }
 
-    /// The place at the drawn height above the floor below; none where something else is below, or nothing above that
-    /// keeps the room in (a lamp or a ceiling, or the open sky, may be there).
+    /// The position at the drawn height above the floor below `above`; none where something else is below.
     fn on_own_floor(&self, above: DVec3, rules: &SamplerRules, height: f64) -> Option<DVec3> {
         let down = self.world.first_hit(&Ray::endless(above.as_vec3(), Vec3::NEG_Y))?;
         if !is_floor(self.house, down.surface.0, self.room) {
@@ -216,7 +241,7 @@ impl<'a> RoomSampler<'a> {
         Some(DVec3::new(above.x, lifted, above.z))
     }
 
-    /// To the nearest point of any triangle of the house; anything beyond `enough` may come out as `enough`.
+    /// The distance to the nearest triangle of the house, or `enough` where that is smaller.
     fn distance_to_anything(&self, from: DVec3, enough: f64) -> f64 {
         let from = from.as_vec3();
         let mut nearest = enough as f32;
@@ -226,9 +251,9 @@ impl<'a> RoomSampler<'a> {
         f64::from(nearest)
     }
 
-    /// Metres to the nearest thing that many more rays meet: table edges and lamps fit between ten by ten. Only cameras that
-    /// keep to all other rules are worth it.
-    fn nearest_between(&self, view: &Camera) -> f64 {
+    /// The distance to the nearest surface that a dense grid of rays meets, since table edges and lamps fit between ten by
+    /// ten rays. It is expensive and so checked late.
+    fn nearest_by_dense_rays(&self, view: &Camera) -> f64 {
         let met = grid(&view.intrinsics, DENSE_GRID).filter_map(|place| {
             let hit = hit_through(self.world, view, place)?;
             Some(view.camera_direction(place).length() * hit.depth)
@@ -236,7 +261,7 @@ impl<'a> RoomSampler<'a> {
         met.fold(f64::INFINITY, f64::min)
     }
 
-    /// What ten by ten rays meet, corners included, and how far away; none where one leaves the house.
+    /// The surfaces that ten by ten rays meet and their distances; none where a ray leaves the house.
     fn rays(&self, camera: &Camera) -> Option<Vec<(usize, f64)>> {
         grid(&camera.intrinsics, GRID)
             .map(|place| {
@@ -261,12 +286,12 @@ fn nearest(seen: &[(usize, f64)]) -> f64 {
     seen.iter().map(|(_, distance)| *distance).fold(f64::INFINITY, f64::min)
 }
 
-/// Rays of a side.
+/// Rays along a side of the coarse grid.
 const GRID: usize = 10;
-/// Rays of a side, where nothing may be missed.
+/// Rays along a side of the dense grid.
 const DENSE_GRID: usize = 60;
 
-/// The places of ten by ten rays over the picture, corners included.
+/// The pixel positions of ten by ten rays over the picture, corners included.
 pub fn score_grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> + use<> {
     grid(intrinsics, GRID)
 }
@@ -274,14 +299,16 @@ pub fn score_grid(intrinsics: &Intrinsics) -> impl Iterator<Item = DVec2> + use<
 fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + use<> {
     let size = DVec2::new(f64::from(intrinsics.width), f64::from(intrinsics.height));
     let share = move |k: usize| k as f64 / (side - 1) as f64;
-    // A hair within the frame: its border belongs to the pixel beyond.
+    // Slightly within the frame, since its right and lower borders belong to pixels outside.
     let within = move |place: DVec2| (size - DVec2::splat(1e-3)) * place;
     (0..side * side).map(move |k| within(DVec2::new(share(k % side), share(k / side))))
 }
 
-/// BlenderProc's coverage score of the surfaces met by 100 rays: chairs, sofas, tables and beds count ten times, all else
-/// once; the sum over 100, times a third of the number of different kinds, times the product over kinds of one minus the
-/// kind's share. Walls and floors are kinds too; a ray that meets nothing adds nothing.
+/// BlenderProc's coverage score of the surfaces that the rays of [`score_grid`] meet.
+///
+/// It is the product of three factors: the mean weight of the rays, which is 10 for chairs, sofas, tables and beds, 0 for
+/// a ray that meets nothing, and 1 otherwise; a third of the number of different kinds, where walls and floors are kinds
+/// too; and the product over all kinds of one minus the kind's fraction of the rays.
 pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
     const SPECIAL: [&str; 4] = ["chair", "sofa", "table", "bed"];
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
@@ -299,12 +326,12 @@ pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
     f64::from(weighted) / all * (kinds.len() as f64 / 3.0) * spread
 }
 
-/// To the nearest point of a mesh, or `enough` where that is nearer.
+/// The distance to the nearest point of a mesh, or `enough` where that is smaller.
 fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
     let mut nearest = enough;
     for index in 0..mesh.triangles.len() {
         let corners = mesh.corners(index);
-        // Most triangles are far: their box tells.
+        // The bounding box excludes most triangles.
         let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
         if (from.clamp(low, high) - from).length() < nearest {
             let corners = corners.map(|corner| corner.as_dvec3());

@@ -1,40 +1,42 @@
-//! Designers' cameras: of the house's JSON, and of a file beside it (`camera_data.json` of the data's owner).
+//! Designers' cameras, from the house's JSON or from a file beside it (`camera_data.json` of the data's owner).
 
 use serde_json::Value;
 
 use super::document;
-use super::furnish::{HouseFiles, shown_path};
 use super::house::{DesignerCamera, House};
+use super::house_files::{HouseFiles, shown_path};
 use super::house_reader::designer_camera;
 use super::limits::Limits;
-use crate::SourceError;
+use crate::error::{InvalidSource, SourceError};
 use crate::log::Log;
 
-/// All cameras of a house.
+/// The designers' cameras of a house.
 pub(super) struct Cameras {
-    /// Sorted by number.
+    /// The cameras, sorted by number.
     pub(super) all: Vec<DesignerCamera>,
-    /// The file beside, and its hash.
+    /// The path and the hash of the file beside the house, if it was read.
     pub(super) hash: Option<(String, String)>,
 }
 
-/// Those of the file beside where there is one, else those of the JSON.
+/// The cameras from the file beside the house. Without such a file, or where it has none for this house, those from the
+/// house's JSON.
 pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut Log) -> Result<Cameras, SourceError> {
     let Some(beside) = &files.cameras else { return Ok(Cameras { all: house.cameras.clone(), hash: None }) };
     let path = files.root.join(beside);
     let (folder, _, bytes) = crate::source_scene::open(&path, limits.json_bytes, limits.json_bytes)?;
-    let invalid = |what: String| SourceError::Invalid { path: path.clone(), what };
+    let invalid = |error| SourceError::invalid(&path, InvalidSource::House(error));
     let tree = document::parse(&bytes, limits).map_err(invalid)?;
     let all = of_house(&tree, &house.uid);
     if all.is_empty() {
-        let message = format!("it has no camera of the house '{}'", house.uid);
-        log.push(mateval_scene::Severity::Note, "no_camera", &shown_path(beside), "", message, "used the house's own");
+        let message = format!("expected cameras of the house '{}', found none", house.uid);
+        let action = "used the cameras in the house's JSON";
+        log.push(mateval_scene::Severity::Note, "no_camera", &shown_path(beside), "", message, action);
     }
     let hash = folder.into_files().hashes.into_iter().next().map(|(_, hash)| (shown_path(beside), hash));
     Ok(Cameras { all: if all.is_empty() { house.cameras.clone() } else { all }, hash })
 }
 
-/// Entries `<uid>_<number>.jpg` with `camera`: pos, target, fov.
+/// The cameras of the entries `<uid>_<number>.jpg`, sorted by number.
 fn of_house(tree: &Value, uid: &str) -> Vec<DesignerCamera> {
     let entries = tree.as_object().into_iter().flatten();
     let mut all: Vec<DesignerCamera> = entries
@@ -54,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cameras_of_the_house_by_number() {
+    fn only_cameras_of_the_house_sorted_by_number() {
         let camera = |x: f64| json!({"camera": {"pos": [x, 1, 0], "target": [0, 1, 0], "fov": 60}});
         let tree = json!({"u_10.jpg": camera(10.0), "u_2.jpg": camera(2.0), "v_1.jpg": camera(1.0), "u_x.jpg": camera(3.0),
             "u_3.jpg": {"camera": {"pos": [1, 1], "target": [0, 1, 0], "fov": 60}}});

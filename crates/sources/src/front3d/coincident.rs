@@ -1,8 +1,8 @@
-//! Sheets of architecture that lie in one another, told apart.
+//! Separates sheets of architecture that coincide.
 //!
-//! Houses draw a feature wall, a door's pocket or a second ceiling exactly into the wall or ceiling behind it. A ray
-//! meets either of two such sheets, and each throws its shadow on the other: what comes of it depends on the renderer
-//! (Blender loses up to half the light that leaves them), so no truth can be made of it.
+//! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind it.
+//! A ray meets either of two such sheets, and each shadows the other. The result depends on the renderer (Blender loses
+//! up to half of the light that leaves them), so it cannot serve as ground truth.
 
 use std::collections::BTreeMap;
 
@@ -12,31 +12,32 @@ use mateval_scene::reference::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use super::furnish::{Placed, Role};
+use super::furnished_house::{Placed, Role};
 use crate::log::Log;
 
-/// Sheets no further apart lie in one another: a few steps of a 32-bit coordinate at 20 m.
-const TOGETHER_M: f64 = 1e-5;
-/// How far apart they are put: a hundred steps of a coordinate, a fiftieth of a pixel.
-const APART_M: f64 = 1e-4;
+/// Sheets no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
+const COINCIDENT_M: f64 = 1e-5;
+/// The distance by which a sheet is moved: a hundred steps of a coordinate, a fiftieth of a pixel.
+const LAYER_M: f64 = 1e-4;
 /// Triangles that overlap by no more than this only touch.
 const TOUCHING_M: f64 = 1e-4;
-/// Triangles of a smaller area are none, in m^2.
+/// Triangles with a smaller area, in m^2, are ignored.
 const SMALLEST_AREA: f64 = 1e-8;
-/// No sheet is moved further than this many times [`APART_M`].
+/// No sheet is moved further than this many times [`LAYER_M`].
 const MOST_LAYERS: usize = 8;
-/// Pairs of triangles that are looked at; a real house has less than a hundredth of it.
+/// The most pairs of triangles that are compared. A real house has less than a hundredth of it.
 const MOST_PAIRS: usize = 50_000_000;
 
-/// Moves every sheet of architecture that lies in a larger one by a hair to the side that it faces.
+/// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces.
 ///
-/// A sheet is what one source mesh has in one plane, facing one way. Of two that overlap the smaller is put before the
-/// larger, as what is drawn onto a wall is smaller than the wall; of equal ones the later.
+/// A sheet is the set of triangles of one source mesh that lie in one plane and face one way. Of two that overlap, the
+/// smaller is moved, since a decoration is smaller than its wall; of two of equal area, the later.
 pub(super) fn separate(surfaces: &mut [Surface], placed: &[Placed], log: &mut Log) {
+    // Which sheets overlap.
     let faces = faces(surfaces, placed);
     let Some(pairs) = overlapping_pairs(&faces) else {
         let message = format!("more than {MOST_PAIRS} pairs of triangles of the architecture are near each other");
-        return log.warn("coincident_sheets", "/mesh", message, "left sheets that lie in others where they are");
+        return log.warn("coincident_sheets", "/mesh", message, "did not move sheets that coincide with others");
     };
     let sheets = Sheets::new(&faces, &pairs);
     let layers = sheets.layers();
@@ -44,10 +45,11 @@ pub(super) fn separate(surfaces: &mut [Surface], placed: &[Placed], log: &mut Lo
     if moved.is_empty() {
         return;
     }
+    // How far each triangle moves.
     let mut shifts: BTreeMap<usize, BTreeMap<usize, DVec3>> = BTreeMap::new();
     for (face, &sheet) in faces.iter().zip(&sheets.of_face) {
         if layers[sheet] > 0 {
-            let shift = sheets.all[sheet].normal * (layers[sheet] as f64 * APART_M);
+            let shift = sheets.all[sheet].normal * (layers[sheet] as f64 * LAYER_M);
             shifts.entry(face.surface).or_default().insert(face.triangle, shift);
         }
     }
@@ -55,7 +57,7 @@ pub(super) fn separate(surfaces: &mut [Surface], placed: &[Placed], log: &mut Lo
         shift(&mut surfaces[surface].mesh, &shift_of);
     }
     let area: f64 = moved.iter().map(|&sheet| sheets.all[sheet].area).sum();
-    let message = format!("{} sheets of {area:.2} m2 in all lie exactly in larger ones", moved.len());
+    let message = format!("{} sheets with a total area of {area:.2} m2 coincide with larger ones", moved.len());
     log.note("coincident_sheets", "/mesh", message, "moved each by 0.1 mm, or more in a stack, to the side it faces");
 }
 
@@ -80,10 +82,10 @@ impl Face {
         AABB::from_corners(low.to_array(), high.to_array())
     }
 
-    /// Whether the two lie in one plane and cover a place together.
-    fn lies_in(&self, other: &Self) -> bool {
+    /// Whether the two triangles lie in one plane and overlap.
+    fn coincides_with(&self, other: &Self) -> bool {
         let (large, small) = if self.area >= other.area { (self, other) } else { (other, self) };
-        small.corners.iter().all(|&corner| large.distance(corner) <= TOGETHER_M) && cover_together(large, small)
+        small.corners.iter().all(|&corner| large.distance(corner) <= COINCIDENT_M) && overlap(large, small)
     }
 }
 
@@ -102,21 +104,21 @@ fn faces(surfaces: &[Surface], placed: &[Placed]) -> Vec<Face> {
     faces.filter(|face| face.area >= SMALLEST_AREA).collect()
 }
 
-/// Faces that lie in each other, the lower first; none where there are too many to look at.
+/// Pairs of faces that coincide, the lower index first; none where there are more than [`MOST_PAIRS`] to compare.
 fn overlapping_pairs(faces: &[Face]) -> Option<Vec<[usize; 2]>> {
     let boxed = |(number, face): (usize, &Face)| {
         let bounds = face.bounds(0.0);
         GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), number)
     };
     let tree = RTree::bulk_load(faces.iter().enumerate().map(boxed).collect());
-    let (mut pairs, mut looked_at) = (Vec::new(), 0);
+    let (mut pairs, mut compared) = (Vec::new(), 0);
     for (number, face) in faces.iter().enumerate() {
-        for near in tree.locate_in_envelope_intersecting(&face.bounds(TOGETHER_M)) {
-            looked_at += 1;
-            if looked_at > MOST_PAIRS {
+        for near in tree.locate_in_envelope_intersecting(&face.bounds(COINCIDENT_M)) {
+            compared += 1;
+            if compared > MOST_PAIRS {
                 return None;
             }
-            if number < near.data && face.lies_in(&faces[near.data]) {
+            if number < near.data && face.coincides_with(&faces[near.data]) {
                 pairs.push([number, near.data]);
             }
         }
@@ -124,10 +126,10 @@ fn overlapping_pairs(faces: &[Face]) -> Option<Vec<[usize; 2]>> {
     Some(pairs)
 }
 
-/// Whether two triangles of one plane overlap by more than they touch: no line along an edge of either parts them
-/// (separating axes).
-fn cover_together(one: &Face, other: &Face) -> bool {
-    let parts = |edge: DVec3| {
+/// Whether two triangles in one plane overlap by more than [`TOUCHING_M`], by the separating axis theorem: no line along an
+/// edge of either separates them.
+fn overlap(one: &Face, other: &Face) -> bool {
+    let separates = |edge: DVec3| {
         let axis = edge.cross(one.normal).normalize_or_zero();
         let reach = |face: &Face| {
             let along = face.corners.map(|corner| axis.dot(corner - one.corners[0]));
@@ -136,10 +138,10 @@ fn cover_together(one: &Face, other: &Face) -> bool {
         let (a, b) = (reach(one), reach(other));
         a.1.min(b.1) - a.0.max(b.0) <= TOUCHING_M
     };
-    ![one, other].iter().any(|face| (0..3).any(|k| parts(face.corners[(k + 1) % 3] - face.corners[k])))
+    ![one, other].iter().any(|face| (0..3).any(|k| separates(face.corners[(k + 1) % 3] - face.corners[k])))
 }
 
-/// What one source mesh has in one plane, facing one way.
+/// The triangles of one source mesh that lie in one plane and face one way.
 struct Sheet {
     normal: DVec3,
     area: f64,
@@ -158,7 +160,7 @@ impl Sheets {
         let of_face: Vec<usize> = faces
             .iter()
             .map(|face| {
-                // Faces of one plane may fall to two sides of a rounding: two sheets then, that need not move together.
+                // Rounding may split the faces of one plane into two sheets, which is harmless.
                 let plane = (face.normal * 1e3).round().as_i64vec3();
                 let offset = (face.normal.dot(face.corners[0]) * 1e3).round() as i64;
                 let key = (face.surface, face.part, plane.to_array(), offset);
@@ -180,7 +182,8 @@ impl Sheets {
         Self { all, of_face }
     }
 
-    /// How many steps each sheet is moved: from the largest to the smallest, the first that none that it overlaps has.
+    /// The number of steps by which each sheet is moved. From the largest sheet to the smallest, each takes the smallest
+    /// number that no sheet it overlaps has taken.
     fn layers(&self) -> Vec<usize> {
         let mut by_area: Vec<usize> =
             (0..self.all.len()).filter(|&sheet| !self.all[sheet].overlaps.is_empty()).collect();
@@ -194,7 +197,7 @@ impl Sheets {
     }
 }
 
-/// Moves triangles; those get vertices of their own.
+/// Moves triangles of a mesh, which get vertices of their own.
 fn shift(mesh: &mut TriangleMesh, shift_of: &BTreeMap<usize, DVec3>) {
     let mut copies = BTreeMap::new();
     for (&triangle, &shift) in shift_of {
@@ -241,7 +244,7 @@ mod tests {
         Role::Architecture { kind: "WallInner".to_owned() }
     }
 
-    /// The meshes after they were told apart, and the codes of what was said.
+    /// The meshes after [`separate`], and the codes of the findings.
     fn separated(meshes: Vec<TriangleMesh>, role: &Role) -> (Vec<TriangleMesh>, Vec<String>) {
         let placed: Vec<Placed> = meshes
             .iter()
@@ -255,8 +258,8 @@ mod tests {
         let mut surfaces: Vec<Surface> = meshes.into_iter().map(surface).collect();
         let mut log = Log::new("house.json".to_owned(), 10);
         separate(&mut surfaces, &placed, &mut log);
-        let said = log.into_findings().into_iter().map(|finding| finding.code).collect();
-        (surfaces.into_iter().map(|surface| surface.mesh).collect(), said)
+        let codes = log.into_findings().into_iter().map(|finding| finding.code).collect();
+        (surfaces.into_iter().map(|surface| surface.mesh).collect(), codes)
     }
 
     fn heights(mesh: &TriangleMesh) -> (f32, f32) {
@@ -264,13 +267,13 @@ mod tests {
     }
 
     #[test]
-    fn the_smaller_sheet_comes_before_the_larger() {
+    fn the_smaller_sheet_is_moved() {
         let wall = square(0.0, 3.0, true);
-        let (meshes, said) = separated(vec![square(1.0, 1.0, true), wall.clone()], &architecture());
+        let (meshes, codes) = separated(vec![square(1.0, 1.0, true), wall.clone()], &architecture());
         assert_eq!(heights(&meshes[0]), (1e-4, 1e-4));
         assert_eq!(meshes[0].uvs, square(1.0, 1.0, true).uvs);
         assert_eq!(meshes[1], wall);
-        assert_eq!(said, ["coincident_sheets"]);
+        assert_eq!(codes, ["coincident_sheets"]);
     }
 
     #[test]
@@ -280,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_has_a_place_for_each() {
+    fn every_sheet_of_a_stack_has_its_own_layer() {
         let sizes = [2.0, 3.0, 3.0, 1.0];
         let meshes = sizes.map(|side| square(0.0, side, true)).into();
         let (meshes, _) = separated(meshes, &architecture());
@@ -288,7 +291,7 @@ mod tests {
         assert_eq!(found, [2, 0, 1, 3]);
     }
 
-    /// Neighbours in one plane, sheets that are apart already, and furniture.
+    /// Neighbours in one plane, sheets at a distance, crossing sheets, and furniture stay.
     #[test]
     fn nothing_else_moves() {
         let mut near = square(0.5, 1.0, true);
@@ -302,7 +305,7 @@ mod tests {
         assert_eq!(separated(inside.clone(), &piece), (inside, vec![]));
     }
 
-    /// Only what lies in the other's plane leaves it; the mesh's other faces and vertices stay.
+    /// Only the faces in the other sheet's plane are moved; the mesh's other faces and vertices stay.
     #[test]
     fn the_rest_of_a_mesh_stays() {
         let mut folded = square(0.0, 1.0, true);

@@ -1,19 +1,25 @@
-//! A house's JSON as a tree, refused before it takes more memory than its file can justify; and lookups in it that
-//! forgive every missing or odd key, since each was seen missing or odd.
+//! Parses JSON within limits on memory, and looks up values in it. Lookups treat a value of the wrong type as missing,
+//! since the data has both.
 
 use serde_json::Value;
 
+use super::error::HouseError;
 use super::limits::Limits;
 
-/// The tree. Fails, in words, where the text is no JSON, no object, or holds more than `limits` allow.
-pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, String> {
-    check_size(text, limits)?;
-    let tree: Value = serde_json::from_slice(text).map_err(|error| format!("not JSON: {error}"))?;
-    if tree.is_object() { Ok(tree) } else { Err(format!("expected an object, found {}", kind(&tree))) }
+/// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
+pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
+    let tree = parse_any(text, limits)?;
+    if tree.is_object() { Ok(tree) } else { Err(HouseError::NotAnObject { found: kind(&tree) }) }
 }
 
-/// Counts what a tree of the text would hold: two bytes of text can cost a hundred of memory.
-pub(super) fn check_size(text: &[u8], limits: &Limits) -> Result<(), String> {
+/// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
+pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
+    check_size(text, limits)?;
+    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason })
+}
+
+/// Counts the values in the text before it is parsed, since two bytes of text can take a hundred bytes of memory.
+fn check_size(text: &[u8], limits: &Limits) -> Result<(), HouseError> {
     let (mut values, mut containers, mut in_text, mut escaped) = (0_usize, 0_usize, false, false);
     for byte in text {
         if in_text {
@@ -29,15 +35,13 @@ pub(super) fn check_size(text: &[u8], limits: &Limits) -> Result<(), String> {
         }
     }
     if values > limits.json_values || containers > limits.json_containers {
-        return Err(format!(
-            "expected at most {} values and {} lists and objects, found {values} and {containers}: no file of the data is that large",
-            limits.json_values, limits.json_containers
-        ));
+        let (most_values, most_containers) = (limits.json_values, limits.json_containers);
+        return Err(HouseError::TooLarge { values, containers, most_values, most_containers });
     }
     Ok(())
 }
 
-/// What a value is, in words.
+/// The type of a value, for messages.
 pub(super) fn kind(value: &Value) -> &'static str {
     match value {
         Value::Null => "null",
@@ -49,10 +53,10 @@ pub(super) fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// Longer texts are none: names are copied to each thing that they name.
+/// Longer texts are treated as missing, since names are copied to everything that they name.
 const LONGEST_TEXT: usize = 4096;
 
-/// The text at `key`, unless it is empty, absurdly long or no text.
+/// The trimmed text at `key`, unless it is empty or longer than [`LONGEST_TEXT`].
 pub(super) fn text<'a>(from: &'a Value, key: &str) -> Option<&'a str> {
     from.get(key).and_then(Value::as_str).map(str::trim).filter(|text| (1..=LONGEST_TEXT).contains(&text.len()))
 }
@@ -79,23 +83,26 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_much_is_refused_before_it_is_read() {
+    fn large_json_is_refused_before_it_is_parsed() {
         assert!(parse(b"{\"a\": [1, 2, 3]}", &small()).is_ok());
-        assert!(parse(b"{\"a\": [1,2,3,4,5,6,7,8,9,10,11]}", &small()).unwrap_err().contains("at most 10 values"));
-        assert!(parse(b"{\"a\": [[], [], []]}", &small()).unwrap_err().contains("at most 10 values and 3 lists"));
-        // What stands in a text does not count.
+        let many_values = parse(b"{\"a\": [1,2,3,4,5,6,7,8,9,10,11]}", &small());
+        assert!(matches!(many_values, Err(HouseError::TooLarge { values: 11, containers: 2, .. })), "{many_values:?}");
+        let many_lists = parse(b"{\"a\": [[], [], []]}", &small()).unwrap_err();
+        assert!(many_lists.to_string().contains("at most 10 values and 3 lists"), "{many_lists}");
+        // Brackets and commas within texts do not count.
         assert!(parse(br#"{"a": "[[[[[[{{{,,,,,,,,,,,,,,,, \" [[[ \\"}"#, &small()).is_ok());
     }
 
     #[test]
-    fn what_is_no_house_is_told() {
-        assert!(parse(b"[]", &small()).unwrap_err().contains("found a list"));
-        assert!(parse(b"{", &small()).unwrap_err().contains("not JSON"));
-        assert!(parse("[".repeat(1000).as_bytes(), &Limits::default()).unwrap_err().contains("not JSON"));
+    fn other_texts_are_refused() {
+        assert!(matches!(parse(b"[]", &small()), Err(HouseError::NotAnObject { found: "a list" })));
+        assert!(matches!(parse(b"{", &small()), Err(HouseError::NotJson { .. })));
+        let deep = "[".repeat(1000);
+        assert!(matches!(parse(deep.as_bytes(), &Limits::default()), Err(HouseError::NotJson { .. })));
     }
 
     #[test]
-    fn lookups_forgive() {
+    fn values_of_the_wrong_type_are_missing() {
         let value = serde_json::json!({"t": " x ", "e": "", "n": [1, 2.5], "bad": [1, null]});
         assert_eq!((text(&value, "t"), text(&value, "e"), text(&value, "n")), (Some("x"), None, None));
         let long = serde_json::json!({"t": "x".repeat(LONGEST_TEXT), "u": "x".repeat(LONGEST_TEXT + 1)});

@@ -1,4 +1,4 @@
-//! Places a house room by room: architecture by mesh type and material, furniture by its models.
+//! Places the surfaces of a house room by room: architecture grouped by mesh type and material, then furniture.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -8,8 +8,8 @@ use mateval_scene::{Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
 use super::coincident;
-use super::furnish::{Placed, Role, world_from_layout};
-use super::house::{Child, ChildKind, House};
+use super::furnished_house::{Placed, Role};
+use super::house::{Child, ChildKind, House, world_from_layout};
 use super::limits::Limits;
 use super::model::{self, Library, Model, is_folder_name};
 use super::model_info::ModelInfo;
@@ -19,10 +19,10 @@ use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::{Repairs, to_world};
 use mateval_scene::findings::shortened;
 
-/// Below this a scale makes a piece a speck (ATISS drops such rooms).
+/// A piece with a smaller scale is left out. (ATISS drops rooms with such pieces.)
 const SMALLEST_SCALE: f64 = 1e-5;
 
-/// A house on its way to its scene.
+/// A house's scene under construction.
 pub(super) struct Furnisher<'a> {
     house: &'a House,
     info: ModelInfo,
@@ -31,7 +31,7 @@ pub(super) struct Furnisher<'a> {
     limits: Limits,
     compat: bool,
     log: Log,
-    /// None: it is not there or not sound, and that has been told.
+    /// Models read so far. None stands for one that is missing or faulty, which has been reported.
     known_models: BTreeMap<String, Option<Rc<Model>>>,
     appearances: Appearances,
     triangles: usize,
@@ -39,14 +39,14 @@ pub(super) struct Furnisher<'a> {
     placed: Vec<Placed>,
 }
 
-/// What came of it.
+/// The result of a [`Furnisher`].
 pub(super) struct Furnished {
-    /// Without lights.
+    /// The scene, without lights.
     pub(super) scene: ReferenceScene,
-    /// Of each surface.
+    /// Facts about each surface.
     pub(super) placed: Vec<Placed>,
     pub(super) log: Log,
-    /// For their hashes.
+    /// The folders of models and textures, which know the hashes of the files read.
     pub(super) libraries: Vec<Library>,
 }
 
@@ -75,10 +75,10 @@ impl<'a> Furnisher<'a> {
         }
     }
 
-    /// The scene, after the findings that tell of all rooms at once.
+    /// Finishes the scene and reports the findings that concern all rooms.
     pub(super) fn finish(mut self) -> Furnished {
-        self.note_private_pieces();
-        self.appearances.note_untextured(&mut self.log);
+        self.report_private_pieces();
+        self.appearances.report_untextured(&mut self.log);
         coincident::separate(&mut self.surfaces, &self.placed, &mut self.log);
         let Appearances { materials, textures, .. } = self.appearances;
         let scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
@@ -86,7 +86,7 @@ impl<'a> Furnisher<'a> {
         Furnished { scene, placed: self.placed, log: self.log, libraries }
     }
 
-    /// Places all that is in a room. Gives how many valid pieces it should have.
+    /// Places all children of a room. Returns how many of them are valid pieces of furniture.
     pub(super) fn room(&mut self, room: usize) -> usize {
         self.architecture(room);
         let mut wanted = 0;
@@ -101,14 +101,15 @@ impl<'a> Furnisher<'a> {
         wanted
     }
 
-    /// One surface for each mesh type and material of the room, its meshes as parts.
+    /// Adds one surface for each mesh type and material of the room; the meshes merged into it are its parts.
     fn architecture(&mut self, room: usize) {
+        // The meshes in world space, grouped.
         let house = self.house;
         let mut groups: Vec<((&str, Option<usize>), Merged)> = Vec::new();
         for child in &house.rooms[room].children {
             let ChildKind::Mesh(mesh) = child.what else { continue };
             let source = &house.meshes[mesh];
-            if !self.has_room_for(&source.mesh, &source.place) {
+            if !self.fits_limit(&source.mesh, &source.place) {
                 continue;
             }
             let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * child.placement.matrix();
@@ -123,6 +124,7 @@ impl<'a> Furnisher<'a> {
             });
             groups[at].1.append(&mesh);
         }
+        // A surface for each group.
         for ((kind, material), merged) in groups {
             let (index, color) = self.appearances.of_layout(house, material, self.textures.as_mut(), &mut self.log);
             let parts = parts_of_labels(&merged.mesh, &merged.mesh_of_triangle);
@@ -133,7 +135,8 @@ impl<'a> Furnisher<'a> {
         }
     }
 
-    fn has_room_for(&mut self, mesh: &TriangleMesh, place: &str) -> bool {
+    /// Counts the mesh's triangles and reports whether they are within the limit on triangles.
+    fn fits_limit(&mut self, mesh: &TriangleMesh, place: &str) -> bool {
         self.triangles += mesh.triangles.len();
         let fits = self.triangles <= self.limits.triangles;
         if !fits {
@@ -143,24 +146,26 @@ impl<'a> Furnisher<'a> {
         fits
     }
 
-    /// Whether its room's and its own transform lead to no place at all; that is told.
+    /// Whether the transforms of a child move its triangles beyond any sensible position, which is reported.
     fn is_too_far(&mut self, repairs: &Repairs, place: &str) -> bool {
         if repairs.not_finite > 0 {
-            let message = format!("{} triangles lie absurdly far away", repairs.not_finite);
+            let message = format!("{} triangles are too far away or not finite", repairs.not_finite);
             self.log.warn("bad_placement", place, message, "left it out");
         }
         repairs.not_finite > 0
     }
 
+    /// Adds a piece of furniture, unless it has no model or an impossible placement.
     fn piece(&mut self, room: usize, child: &Child, record: usize) {
+        // Its mesh in world space.
         let house = self.house;
         let record = &house.furniture[record];
         if child.placement.scale.abs().min_element() < SMALLEST_SCALE {
-            let message = format!("a scale of {}", child.placement.scale);
+            let message = format!("expected a scale of at least {SMALLEST_SCALE}, found {}", child.placement.scale);
             return self.log.warn("scale_tiny", &format!("{}/scale", child.place), message, "left the piece out");
         }
         let Some(model) = self.model(&record.jid, &record.place) else { return };
-        if !self.has_room_for(&model.mesh, &child.place) {
+        if !self.fits_limit(&model.mesh, &child.place) {
             return;
         }
         let own = if self.compat { child.placement.mirrored_matrix() } else { child.placement.matrix() };
@@ -169,17 +174,18 @@ impl<'a> Furnisher<'a> {
         if self.is_too_far(&repairs, &child.place) {
             return;
         }
-        // Two negative signs are half a turn.
+        // Two negative factors are a rotation by 180 degrees, one or three mirror the piece.
         if child.placement.scale.element_product() < 0.0 {
             let message = format!("a scale of {}", child.placement.scale);
             let place = format!("{}/scale", child.place);
-            self.log.note("mirrored_piece", &place, message, "mirrored it, its front sides outwards");
+            self.log.note("mirrored_piece", &place, message, "mirrored it and kept its front sides outside");
         }
+        // Its material, categories and names.
         let (material, complete) = self.appearances.of_model(&record.jid, &mut self.models, &mut self.log);
         let kind = self.info.kind(record);
         if !kind.known {
             let message = format!("model_info.json does not list '{}'", shortened(&record.jid));
-            let action = format!("took it for '{}'", kind.super_category);
+            let action = format!("guessed the super-category '{}'", kind.super_category);
             self.log.note("unlisted_model", &record.place, message, action);
         }
         let name = kind.category.clone().unwrap_or_else(|| kind.super_category.clone());
@@ -198,9 +204,10 @@ impl<'a> Furnisher<'a> {
         });
     }
 
+    /// The model with this id, read at its first use.
     fn model(&mut self, jid: &str, place: &str) -> Option<Rc<Model>> {
         if !is_folder_name(jid) {
-            let message = format!("'{}' is no folder's name", shortened(jid));
+            let message = format!("expected the name of a folder, found '{}'", shortened(jid));
             self.log.warn("bad_jid", &format!("{place}/jid"), message, "left its pieces out");
             return None;
         }
@@ -214,13 +221,13 @@ impl<'a> Furnisher<'a> {
         model
     }
 
-    /// Windows, doors and cabinets whose models are not public are no fault of anybody: one finding for all.
-    fn note_private_pieces(&mut self) {
+    /// Reports pieces whose models are not public, such as windows, doors and cabinets, in one finding.
+    fn report_private_pieces(&mut self) {
         let house = self.house;
         let is_private = |child: &&Child| matches!(child.what, ChildKind::Furniture(k) if !house.furniture[k].valid);
         let count = house.rooms.iter().flat_map(|room| &room.children).filter(is_private).count();
         if count > 0 {
-            let message = format!("{count} children are pieces that are not valid: their models are not public");
+            let message = format!("{count} children refer to furniture whose model is not public");
             self.log.note("not_public", "/furniture", message, "left them out");
         }
     }
@@ -239,7 +246,7 @@ fn read_model_info(models: &mut Library, limits: &Limits, log: &mut Log) -> Mode
     }
 }
 
-/// Meshes one behind the other, and of which of them each triangle is.
+/// Meshes merged into one, and the index of the source mesh of each triangle.
 #[derive(Default)]
 struct Merged {
     mesh: TriangleMesh,

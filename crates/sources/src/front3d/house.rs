@@ -1,4 +1,4 @@
-//! A 3D-FRONT house as its JSON tells it, checked: what is in which room, and where.
+//! The content of a 3D-FRONT house's JSON after checking: its rooms, what they contain, and where.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use mateval_scene::TriangleMesh;
@@ -15,71 +15,71 @@ pub enum Release {
     R3,
 }
 
-/// A house.
+/// The checked content of a house's JSON.
 #[derive(Clone, Debug)]
 pub struct House {
-    /// Its uid; the file's stem where it has none.
+    /// Its uid, or the file's stem where it has none.
     pub uid: String,
-    /// Which release it is of.
+    /// The release that the file belongs to.
     pub release: Release,
-    /// Pieces of furniture, those that are not valid included.
+    /// Records of furniture, including those that are not valid.
     pub furniture: Vec<FurnitureRecord>,
     /// Meshes of the architecture.
     pub meshes: Vec<HouseMesh>,
-    /// What they are made of.
+    /// Materials of the meshes.
     pub materials: Vec<HouseMaterial>,
     /// Rooms, in the file's order.
     pub rooms: Vec<Room>,
-    /// The designers' cameras that the file holds.
+    /// The designers' cameras in the file.
     pub cameras: Vec<DesignerCamera>,
-    /// How many V-Ray lights it has; their units are V-Ray's own, and nobody uses them.
+    /// Number of V-Ray lights. They are not used, since their units are V-Ray's own.
     pub lights: usize,
 }
 
-/// A piece of furniture, which rooms place.
+/// A record of furniture, to which children of rooms refer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FurnitureRecord {
-    /// What children refer to.
+    /// The uid by which children refer to it.
     pub uid: String,
-    /// Its model's folder.
+    /// The name of its model's folder.
     pub jid: String,
-    /// Only valid pieces have a public model.
+    /// Whether its model is public.
     pub valid: bool,
-    /// As the file says it.
+    /// The file's category.
     pub category: Option<String>,
-    /// As the file says it, as in `lighting/pendant light`.
+    /// The file's title, as in `lighting/pendant light`.
     pub title: Option<String>,
-    /// Where it is in the file, a JSON pointer.
+    /// JSON pointer to the record.
     pub place: String,
 }
 
 /// A mesh of the architecture, in the house's space.
 #[derive(Clone, Debug)]
 pub struct HouseMesh {
-    /// What children refer to.
+    /// The uid by which children refer to it.
     pub uid: String,
-    /// As in `WallInner`; `Other` where it is empty.
+    /// Its type, as in `WallInner`; `Other` where the file gives none.
     pub kind: String,
-    /// Without normals: the file's are often garbage.
+    /// The triangles, without the file's normals, which are often wrong.
     pub mesh: TriangleMesh,
-    /// A place in [`House::materials`]; none where the file names none that is there.
+    /// Index in [`House::materials`]; none where the file names no known material.
     pub material: Option<usize>,
-    /// Where it is in the file, a JSON pointer.
+    /// JSON pointer to the record.
     pub place: String,
 }
 
-/// What a mesh is made of.
+/// A material of the architecture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HouseMaterial {
-    /// What meshes refer to.
+    /// The uid by which meshes refer to it.
     pub uid: String,
-    /// Its texture's folder; none where its colour is all.
+    /// The name of its texture's folder; none where the colour counts.
     pub texture: Option<String>,
-    /// sRGB-encoded, 0 to 255.
+    /// sRGB-encoded colour, 0 to 255.
     pub color: [f64; 3],
-    /// From the mesh's uv to the texture's.
+    /// The map from the mesh's uv to the texture's.
     pub uv: UvTransform,
-    /// Where it is in the file, a JSON pointer.
+    /// JSON pointer to the record.
     pub place: String,
 }
 
@@ -88,63 +88,68 @@ pub struct HouseMaterial {
 pub struct Room {
     /// Its instanceid, as in `LivingDiningRoom-1912`.
     pub id: String,
-    /// As in `LivingDiningRoom`.
+    /// Its type, as in `LivingDiningRoom`.
     pub kind: String,
-    /// The scene's and the room's own transforms; the identity in every file seen.
+    /// The product of the scene's and the room's transforms, which is the identity in every known file.
     pub world_from_room: DMat4,
-    /// What is in it.
+    /// Its meshes and pieces of furniture.
     pub children: Vec<Child>,
-    /// Where it is in the file, a JSON pointer.
+    /// JSON pointer to the record.
     pub place: String,
 }
 
-/// Something in a room.
+/// A mesh or a piece of furniture in a room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Child {
-    /// What it is.
+    /// The record that it refers to.
     pub what: ChildKind,
     /// Its instanceid, as in `furniture/147`.
     pub id: String,
-    /// Where it stands in its room.
+    /// Its placement in the room.
     pub placement: Placement,
-    /// Where it is in the file, a JSON pointer.
+    /// JSON pointer to the child.
     pub place: String,
 }
 
-/// What a child is.
+/// The record that a child refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChildKind {
-    /// A place in [`House::furniture`].
+    /// Index in [`House::furniture`].
     Furniture(usize),
-    /// A place in [`House::meshes`].
+    /// Index in [`House::meshes`].
     Mesh(usize),
 }
 
-/// Translation, rotation, scale: `world = T * R * S * v`, scale first.
+/// Translation, rotation and scale: `world = T * R * S * v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Metres.
     pub position: DVec3,
-    /// Unit length; the file's order is x, y, z, w.
+    /// Unit quaternion; the file's order is x, y, z, w.
     pub rotation: DQuat,
-    /// Negative where it mirrors.
+    /// Factors along the axes; a negative one mirrors.
     pub scale: DVec3,
 }
 
 impl Placement {
-    /// Nothing moved.
+    /// The identity.
     pub const IDENTITY: Self = Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
 
-    /// As a matrix.
+    /// The placement as a matrix.
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_scale_rotation_translation(self.scale, self.rotation, self.position)
     }
 
-    /// `T * R * diag(-1, 1, 1) * S`: the piece mirrored along its own x.
+    /// `T * R * diag(-1, 1, 1) * S`, which mirrors the piece along its own x axis.
     pub fn mirrored_matrix(&self) -> DMat4 {
         let mirror = DMat4::from_mat3(DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)));
         DMat4::from_rotation_translation(self.rotation, self.position) * mirror * DMat4::from_scale(self.scale)
     }
+}
+
+/// BlenderProc's world in MatEval's axes: BlenderProc swaps y and z instead of rotating, which mirrors the third axis.
+pub(super) fn world_from_layout(compat: bool) -> DMat4 {
+    DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
 
 /// A camera that a designer set.
@@ -152,16 +157,16 @@ impl Placement {
 pub struct DesignerCamera {
     /// Its number in its file.
     pub number: usize,
-    /// Metres.
+    /// Position in metres.
     pub position: DVec3,
-    /// A point in the middle of the picture, metres.
+    /// A point in the middle of the picture, in metres.
     pub target: DVec3,
     /// Vertical field of view in degrees.
     pub fov_y_deg: f64,
 }
 
 impl House {
-    /// The room of this id.
+    /// Index of the room with this id.
     pub fn room(&self, id: &str) -> Option<usize> {
         self.rooms.iter().position(|room| room.id == id)
     }

@@ -1,4 +1,4 @@
-//! A mesh of the architecture: flat lists of numbers to triangles, and what had to be mended on the way.
+//! Meshes of the architecture: turns flat lists of numbers into triangles and reports what had to be repaired.
 
 use glam::{Vec2, Vec3};
 use mateval_scene::TriangleMesh;
@@ -8,13 +8,14 @@ use super::document::{kind, list};
 use crate::log::Log;
 use crate::surface_mesh::has_area;
 
-/// Beyond this many metres a coordinate is a fault, not a place.
+/// Coordinates beyond this many metres are faults.
 const FARTHEST: f64 = 1e5;
-/// A normal counts as one of unit length within this.
+/// The largest deviation of a normal's length from 1 that is not reported.
 const UNIT: f64 = 0.01;
 
-/// Reads `xyz`, `uv` and `faces` of the mesh at `place`. None, after a finding, where no triangle is left.
+/// Reads `xyz`, `uv` and `faces` of the mesh at `place`. A mesh without usable triangles is reported and gives none.
 pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleMesh> {
+    // Anything that is not a number is read as NaN and then handled with the numbers that are not finite.
     let floats = |key: &str| list(from, key).iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
     let (xyz, uv) = (floats("xyz"), floats("uv"));
     let positions = positions(&xyz);
@@ -27,11 +28,11 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleM
         log.note("empty_mesh", place, "it has no triangle that covers anything", "left it out");
         return None;
     }
-    // Vertices that no triangle uses may be nowhere.
+    // Unused vertices may have positions that are not finite, so they are dropped.
     Some(mesh.picked(|_| true))
 }
 
-/// Impossible ones are not finite.
+/// One position for every three numbers. A coordinate beyond [`FARTHEST`] becomes NaN.
 fn positions(xyz: &[f64]) -> Vec<Vec3> {
     let sound = |v: f64| if v.abs() <= FARTHEST { v as f32 } else { f32::NAN };
     xyz.as_chunks::<3>().0.iter().map(|p| Vec3::from_array(p.map(sound))).collect()
@@ -40,15 +41,15 @@ fn positions(xyz: &[f64]) -> Vec<Vec3> {
 fn faces(from: &Value, place: &str, log: &mut Log) -> Vec<[u32; 3]> {
     let all = list(from, "faces");
     if !all.len().is_multiple_of(3) {
-        let message = format!("{} vertex numbers, which is no multiple of 3", all.len());
+        let message = format!("expected a multiple of 3 vertex indices, found {}", all.len());
         log.warn("bad_faces", &format!("{place}/faces"), message, "left the last ones out");
     }
-    // What is no vertex number becomes one that no mesh has.
-    let number = |value: &Value| value.as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(u32::MAX);
-    all.as_chunks::<3>().0.iter().map(|face| [0, 1, 2].map(|corner| number(&face[corner]))).collect()
+    // Anything that is not an index becomes an index that no mesh has.
+    let index = |value: &Value| value.as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(u32::MAX);
+    all.as_chunks::<3>().0.iter().map(|face| [0, 1, 2].map(|corner| index(&face[corner]))).collect()
 }
 
-/// Triangles of vertices that are not there, or are nowhere.
+/// Drops triangles whose vertices are missing or have positions that are not finite.
 fn drop_impossible(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     let before = mesh.triangles.len();
     let positions = &mesh.positions;
@@ -56,7 +57,7 @@ fn drop_impossible(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     mesh.triangles.retain(|triangle| triangle.iter().all(sound));
     let dropped = before - mesh.triangles.len();
     if dropped > 0 {
-        let message = format!("{dropped} of {before} triangles name vertices that are not there or not finite");
+        let message = format!("{dropped} of {before} triangles name vertices that are missing or not finite");
         log.warn("bad_faces", &format!("{place}/faces"), message, "left them out");
     }
 }
@@ -72,17 +73,18 @@ fn drop_without_area(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     }
 }
 
-/// Two numbers a vertex; none where there are none at all. What is not finite becomes 0.
+/// One pair of numbers for each vertex, or none where the list is empty. Missing and impossible numbers become 0.
 fn uvs(uv: &[f64], mesh: &TriangleMesh, place: &str, log: &mut Log) -> Option<Vec<Vec2>> {
     let (pairs, count) = (uv.as_chunks::<2>().0, mesh.positions.len());
     let place = format!("{place}/uv");
     if pairs.len() < count {
-        let message = format!("{} texture coordinates for {count} vertices", pairs.len());
-        log.warn("bad_uv", &place, message, "took (0, 0) for the others");
+        let message = format!("expected {count} texture coordinates, one for each vertex, found {}", pairs.len());
+        log.warn("bad_uv", &place, message, "used (0, 0) for the others");
     }
     let bad = pairs.iter().flatten().filter(|v| v.is_nan() || v.abs() > FARTHEST).count();
     if bad > 0 {
-        log.warn("bad_uv", &place, format!("{bad} of {} numbers are no numbers", uv.len()), "took 0 for them");
+        let message = format!("{bad} of {} values are not finite numbers", uv.len());
+        log.warn("bad_uv", &place, message, "used 0 for them");
     }
     let sound = |v: f64| if v.abs() <= FARTHEST { v as f32 } else { 0.0 };
     let pair = |at: usize| pairs.get(at).map_or(Vec2::ZERO, |pair| Vec2::from_array(pair.map(sound)));
@@ -94,14 +96,15 @@ fn note_bad_normals(from: &Value, vertices: usize, place: &str, log: &mut Log) {
     let Some(normals) = from.get("normal") else { return };
     let Some(all) = normals.as_array() else {
         let message = format!("expected a list of numbers, found {}", kind(normals));
-        return log.note("bad_normals", &place, message, "took the triangles' own normals");
+        return log.note("bad_normals", &place, message, "used the triangles' geometric normals");
     };
     let floats: Vec<f64> = all.iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect();
     let is_unit = |n: &[f64; 3]| (n.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0).abs() <= UNIT;
     let bad = floats.as_chunks::<3>().0.iter().filter(|normal| !is_unit(normal)).count();
     if bad > 0 || floats.len() != 3 * vertices {
-        let message = format!("{} numbers for {vertices} vertices, {bad} normals are not of unit length", floats.len());
-        log.note("bad_normals", &place, message, "took the triangles' own normals");
+        let (expected, found) = (3 * vertices, floats.len());
+        let message = format!("expected {expected} numbers, found {found}, and {bad} normals are not of unit length");
+        log.note("bad_normals", &place, message, "used the triangles' geometric normals");
     }
 }
 
@@ -139,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn each_fault_is_mended_and_told() {
+    fn each_fault_is_repaired_and_reported() {
         for (key, value, triangles, finding) in [
             ("faces", json!([0, 1, 2, 0, 2, 9]), 1, "bad_faces /mesh/0/faces"),
             ("faces", json!([0, 1, 2, 0, 2, -3]), 1, "bad_faces /mesh/0/faces"),
@@ -163,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_left_is_none() {
+    fn a_mesh_without_triangles_is_none() {
         for (key, value) in [("faces", json!([])), ("faces", json!(null)), ("xyz", json!("x")), ("faces", json!({}))] {
             let (mesh, findings) = read_one(with(key, value));
             assert!(mesh.is_none());

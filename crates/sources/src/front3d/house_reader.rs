@@ -1,4 +1,4 @@
-//! From a house's JSON to a [`House`]: every key may be missing, doubled or odd; what was mended is a finding.
+//! Turns a house's JSON into a [`House`]. Every key may be missing, repeated or of the wrong type; repairs are findings.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,6 +7,7 @@ use mateval_scene::material::UvTransform;
 use serde_json::Value;
 
 use super::document::{kind, list, numbers, text};
+use super::error::HouseError;
 use super::house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
 };
@@ -15,8 +16,8 @@ use super::limits::Limits;
 use crate::log::Log;
 use mateval_scene::findings::shortened;
 
-/// Reads the whole tree. Fails, in words, where it has more rooms or children than `limits` allow.
-pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, String> {
+/// Reads the whole tree; `stem` is that of the file's name. Fails where it has no scene or exceeds `limits`.
+pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> Result<House, HouseError> {
     let release = release(tree);
     let materials = materials(tree, log);
     let material_of: BTreeMap<&str, usize> = materials.iter().enumerate().map(|(k, m)| (m.uid.as_str(), k)).collect();
@@ -44,7 +45,7 @@ fn release(tree: &Value) -> Release {
     }
 }
 
-/// The first record of each uid, by its place in the list.
+/// The records of the list at `key` with their index and uid. Of several with one uid, the first counts.
 fn first_of_each_uid<'a>(tree: &'a Value, key: &str, log: &mut Log) -> Vec<(usize, String, &'a Value)> {
     let mut seen = BTreeSet::new();
     let mut records = Vec::new();
@@ -58,8 +59,8 @@ fn first_of_each_uid<'a>(tree: &'a Value, key: &str, log: &mut Log) -> Vec<(usiz
         if seen.insert(uid) {
             records.push((at, uid.to_owned(), record));
         } else {
-            let message = format!("the uid '{}' is there already", shortened(uid));
-            log.note("duplicate_uid", &place, message, "kept the first one");
+            let message = format!("the uid '{}' is already used", shortened(uid));
+            log.note("duplicate_uid", &place, message, "kept the first record");
         }
     }
     records
@@ -82,8 +83,8 @@ fn materials(tree: &Value, log: &mut Log) -> Vec<HouseMaterial> {
     records.into_iter().map(|(at, uid, record)| material(uid, record, format!("/material/{at}"), log)).collect()
 }
 
-/// Which of texture and colour counts is the rule of Trescope's Blender renderer: without a texture the colour; else
-/// what `colorMode` says, if it is there; else the colour if `useColor` is true; else the texture.
+/// Whether the texture or the colour counts follows Trescope's Blender renderer. Without a texture, the colour counts.
+/// Otherwise `colorMode` decides if it is present, else `useColor`; the default is the texture.
 fn material(uid: String, record: &Value, place: String, log: &mut Log) -> HouseMaterial {
     let by_color = match text(record, "colorMode") {
         Some(mode) => mode.eq_ignore_ascii_case("color"),
@@ -92,7 +93,7 @@ fn material(uid: String, record: &Value, place: String, log: &mut Log) -> HouseM
     let jid = text(record, "jid").filter(|jid| !by_color && *jid != "local");
     if text(record, "normaltexture").is_some() {
         let place = format!("{place}/normaltexture");
-        log.note("normal_map", &place, "a normal map, whose file is not public", "left it out");
+        log.note("normal_map", &place, "a normal map whose file is not public", "left it out");
     }
     HouseMaterial {
         uid,
@@ -110,19 +111,19 @@ fn color(record: &Value, place: &str, log: &mut Log) -> [f64; 3] {
         Some(rgb) if rgb.iter().all(|v| (0.0..=255.0).contains(v)) => *rgb,
         _ => {
             let message = format!("expected 3 or 4 numbers of 0 to 255, found {}", kind(found));
-            log.warn("bad_color", &format!("{place}/color"), message, "took white");
+            log.warn("bad_color", &format!("{place}/color"), message, "used white");
             [255.0; 3]
         }
     }
 }
 
-/// The first two rows of a row-major 3x3.
+/// The first two rows of a row-major 3x3 matrix.
 fn uv_transform(record: &Value, place: &str, log: &mut Log) -> UvTransform {
     let Some(found) = record.get("UVTransform").filter(|found| !found.is_null()) else { return UvTransform::default() };
     let Some([a, b, c, d, e, f, ..]) = numbers::<9>(record, "UVTransform").filter(|m| m.iter().all(|v| v.abs() < 1e6))
     else {
         let message = format!("expected 9 finite numbers, found {}", kind(found));
-        log.warn("bad_uv_transform", &format!("{place}/UVTransform"), message, "took the identity");
+        log.warn("bad_uv_transform", &format!("{place}/UVTransform"), message, "used the identity");
         return UvTransform::default();
     };
     UvTransform([[a, b, c], [d, e, f]].map(|row| row.map(|v| v as f32)))
@@ -133,7 +134,7 @@ fn meshes(
     material_of: &BTreeMap<&str, usize>,
     limits: &Limits,
     log: &mut Log,
-) -> Result<Vec<HouseMesh>, String> {
+) -> Result<Vec<HouseMesh>, HouseError> {
     let mut meshes = Vec::new();
     let mut triangles = 0;
     for (at, uid, record) in first_of_each_uid(tree, "mesh", log) {
@@ -141,13 +142,13 @@ fn meshes(
         let Some(mesh) = house_mesh::read(record, &place, log) else { continue };
         triangles += mesh.triangles.len();
         if triangles > limits.triangles {
-            return Err(format!("{place}: expected at most {} triangles in all", limits.triangles));
+            return Err(HouseError::TooManyTriangles { place, most: limits.triangles });
         }
         let named = text(record, "material");
         let material = named.and_then(|uid| material_of.get(uid)).copied();
         if material.is_none() {
-            let message = format!("there is no material '{}'", shortened(named.unwrap_or("")));
-            log.warn("no_material", &format!("{place}/material"), message, "took mid-grey");
+            let message = format!("no material has the uid '{}'", shortened(named.unwrap_or("")));
+            log.warn("no_material", &format!("{place}/material"), message, "used mid-grey");
         }
         let kind = text(record, "type").unwrap_or("Other").to_owned();
         meshes.push(HouseMesh { uid, kind, mesh, material, place });
@@ -161,35 +162,36 @@ fn rooms(
     meshes: &[HouseMesh],
     limits: &Limits,
     log: &mut Log,
-) -> Result<Vec<Room>, String> {
-    let Some(scene) = tree.get("scene").filter(|scene| scene.is_object()) else {
-        return Err("expected an object 'scene' with rooms, found none".to_owned());
-    };
+) -> Result<Vec<Room>, HouseError> {
+    let scene = tree.get("scene").filter(|scene| scene.is_object()).ok_or(HouseError::NoScene)?;
     let found = list(scene, "room");
     if found.len() > limits.rooms {
-        return Err(format!("/scene/room: expected at most {} rooms, found {}", limits.rooms, found.len()));
+        return Err(HouseError::TooManyRooms { most: limits.rooms, found: found.len() });
     }
+    // The records that children may refer to.
     let world_from_scene = placement(scene, "/scene", log).matrix();
-    let things = Things {
+    let records = Records {
         furniture: furniture.iter().enumerate().map(|(k, record)| (record.uid.as_str(), k)).collect(),
         meshes: meshes.iter().enumerate().map(|(k, mesh)| (mesh.uid.as_str(), k)).collect(),
         listed_meshes: list(tree, "mesh").iter().filter_map(|record| text(record, "uid")).collect(),
     };
+    // Every room, within the limit on children.
     let mut rooms: Vec<Room> = Vec::new();
     let mut children = 0;
     for (at, record) in found.iter().enumerate() {
         let place = format!("/scene/room/{at}");
         children += list(record, "children").len();
         if children > limits.children {
-            return Err(format!("{place}: expected at most {} children in all", limits.children));
+            return Err(HouseError::TooManyChildren { place, most: limits.children });
         }
         let id = room_id(record, at, &rooms, &place, log);
-        rooms.push(room(record, id, place, world_from_scene, &things, log));
+        rooms.push(room(record, id, place, world_from_scene, &records, log));
     }
     Ok(rooms)
 }
 
-/// The instanceid, or a number where there is none; a number behind it where it is taken.
+/// A unique id for a room: its instanceid, or one made of its index where it has none, with a number appended where the
+/// instanceid is already used.
 fn room_id(record: &Value, at: usize, rooms: &[Room], place: &str, log: &mut Log) -> String {
     let id = text(record, "instanceid").map_or_else(|| format!("Room-{at}"), str::to_owned);
     if rooms.iter().all(|room| room.id != id) {
@@ -197,16 +199,16 @@ fn room_id(record: &Value, at: usize, rooms: &[Room], place: &str, log: &mut Log
     }
     let free = |other: &String| rooms.iter().all(|room| room.id != *other);
     let other = (at..).map(|number| format!("{id}-{number}")).find(free).expect("rooms are finitely many");
-    let message = format!("the instanceid '{}' is there already", shortened(&id));
+    let message = format!("the instanceid '{}' is already used", shortened(&id));
     log.note("duplicate_room", place, message, format!("named it '{}'", shortened(&other)));
     other
 }
 
-/// Where uids lead.
-struct Things<'a> {
+/// The records that children refer to, by uid.
+struct Records<'a> {
     furniture: BTreeMap<&'a str, usize>,
     meshes: BTreeMap<&'a str, usize>,
-    /// Those that were left out, too.
+    /// The uids of all meshes, including those that were left out.
     listed_meshes: BTreeSet<&'a str>,
 }
 
@@ -215,14 +217,14 @@ fn room(
     id: String,
     place: String,
     world_from_scene: DMat4,
-    things: &Things<'_>,
+    records: &Records<'_>,
     log: &mut Log,
 ) -> Room {
     let children = list(record, "children").iter().enumerate();
     let children = children
         .filter_map(|(at, child)| {
             let place = format!("{place}/children/{at}");
-            let what = child_kind(child, &place, things, log)?;
+            let what = child_kind(child, &place, records, log)?;
             let id = text(child, "instanceid").unwrap_or("").to_owned();
             Some(Child { what, id, placement: placement(child, &place, log), place })
         })
@@ -236,16 +238,17 @@ fn room(
     }
 }
 
-/// What a child refers to. Half of all furniture references of later releases lead nowhere: those pieces are not public.
-fn child_kind(child: &Value, place: &str, things: &Things<'_>, log: &mut Log) -> Option<ChildKind> {
+/// The record that a child refers to. In later releases half of the references to furniture are dangling, since those
+/// pieces are not public.
+fn child_kind(child: &Value, place: &str, records: &Records<'_>, log: &mut Log) -> Option<ChildKind> {
     let target = text(child, "ref").unwrap_or("");
-    let furniture = || things.furniture.get(target).copied().map(ChildKind::Furniture);
-    let mesh = || things.meshes.get(target).copied().map(ChildKind::Mesh);
+    let furniture = || records.furniture.get(target).copied().map(ChildKind::Furniture);
+    let mesh = || records.meshes.get(target).copied().map(ChildKind::Mesh);
     let is_mesh = text(child, "instanceid").is_some_and(|id| id.starts_with("mesh/"));
     let found = if is_mesh { mesh().or_else(furniture) } else { furniture().or_else(mesh) };
-    // Why a mesh was left out has been told at the mesh.
-    if found.is_none() && !things.listed_meshes.contains(target) {
-        let message = format!("there is no record '{}'", shortened(target));
+    // A mesh that was left out has been reported already.
+    if found.is_none() && !records.listed_meshes.contains(target) {
+        let message = format!("no record has the uid '{}'", shortened(target));
         log.note("dangling_ref", &format!("{place}/ref"), message, "left it out");
     }
     found
@@ -258,7 +261,7 @@ fn placement(record: &Value, place: &str, log: &mut Log) -> Placement {
             Some(values) => DVec3::from_array(values),
             None => {
                 let message = format!("expected 3 finite numbers, found {}", kind(found));
-                log.warn("bad_placement", &format!("{place}/{key}"), message, "took the default");
+                log.warn("bad_placement", &format!("{place}/{key}"), message, "used the default");
                 default
             }
         }
@@ -267,7 +270,7 @@ fn placement(record: &Value, place: &str, log: &mut Log) -> Placement {
     Placement { position, rotation: rotation(record, place, log), scale }
 }
 
-/// x, y, z, w. A length that is off by more than a rounding is told.
+/// A quaternion x, y, z, w, normalised. A length that differs from 1 by more than rounding is reported.
 fn rotation(record: &Value, place: &str, log: &mut Log) -> DQuat {
     const ROUNDING: f64 = 1e-3;
     let Some(found) = record.get("rot").filter(|found| !found.is_null()) else { return DQuat::IDENTITY };
@@ -275,11 +278,11 @@ fn rotation(record: &Value, place: &str, log: &mut Log) -> DQuat {
     let values = numbers::<4>(record, "rot").map(DQuat::from_array).filter(|q| (1e-6..1e6).contains(&q.length()));
     let Some(quaternion) = values else {
         let message = format!("expected a quaternion x, y, z, w, found {}", kind(found));
-        log.warn("bad_placement", &place, message, "took no rotation");
+        log.warn("bad_placement", &place, message, "used no rotation");
         return DQuat::IDENTITY;
     };
     if (quaternion.length() - 1.0).abs() > ROUNDING {
-        let message = format!("a quaternion of length {:.3}, expected 1", quaternion.length());
+        let message = format!("expected a quaternion of length 1, found {:.3}", quaternion.length());
         log.note("rotation_not_unit", &place, message, "scaled it to unit length");
     }
     quaternion.normalize()
@@ -295,11 +298,11 @@ fn report_unused(rooms: &[Room], meshes: &[HouseMesh], log: &mut Log) {
         })
         .collect();
     for (_, mesh) in meshes.iter().enumerate().filter(|(at, _)| !used.contains(at)) {
-        log.note("unused_mesh", &mesh.place, "no room holds it", "left it out");
+        log.note("unused_mesh", &mesh.place, "no room contains the mesh", "left it out");
     }
 }
 
-/// `extension.snapshots`: designers' cameras of the last release.
+/// The designers' cameras in `extension.snapshots`, which the last release has.
 fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
     let all = tree.get("extension").map_or(&[][..], |extension| list(extension, "snapshots"));
     let camera = |(at, record): (usize, &Value)| {
@@ -313,7 +316,7 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
     all.iter().enumerate().filter_map(camera).collect()
 }
 
-/// A camera with `pos`, `target` and a vertical `fov` in degrees.
+/// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or faulty.
 pub(super) fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);
     let fov_y_deg = record.get("fov")?.as_f64().filter(|fov| (1.0..179.0).contains(fov))?;

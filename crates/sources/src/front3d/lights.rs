@@ -1,24 +1,25 @@
-//! BlenderProc's lights: ceilings and lamps glow, but the camera sees their ordinary surface; a grey world around.
+//! The lights of a room, as BlenderProc sets them: ceilings and lamps emit although the camera sees their ordinary
+//! surface, and a grey environment surrounds the house.
 
 use mateval_scene::material::{ColorInput, MaterialModel};
 use mateval_scene::reference::{Emission, EmissionMap, LightGroup, ReferenceScene, SurfaceIndex};
 
-use super::furnish::{FurnishedHouse, Role};
+use super::furnished_house::{FurnishedHouse, Role};
 
 /// Radiance of ceilings, times their colour.
 const CEILING: f32 = 0.8;
-/// Radiance of lamps, times their texture.
+/// Radiance of lamps, times their base colour.
 const LAMP: f32 = 7.0;
-/// What the light from outside is called.
+/// The name of the environment's light group.
 pub(super) const WORLD_NAME: &str = "world";
-/// Radiance of everything outside.
+/// Radiance of the environment.
 const WORLD: f32 = 0.05;
 
-/// What a surface is among the lights.
+/// Whether and how a surface emits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Glow {
     No,
-    /// All of one colour in a room are one group.
+    /// With this radiance. Ceilings of one room with equal radiance form one light group.
     Ceiling([f32; 3]),
     Lamp,
 }
@@ -37,7 +38,8 @@ fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
     }
 }
 
-/// The lights of the surfaces that `kept` lists, numbered as they stand in `scene`. Blender's emission is on both sides.
+/// The light groups of the house's surfaces `kept`, which are the surfaces of `scene` in this order. As in Blender, both
+/// sides emit.
 pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceScene) -> Vec<LightGroup> {
     let mut groups: Vec<LightGroup> = Vec::new();
     let mut ceilings: Vec<((usize, [f32; 3]), usize)> = Vec::new();
@@ -45,6 +47,7 @@ pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceSc
         let (radiance, map) = match glow(house, *surface) {
             Glow::No | Glow::Ceiling(BLACK) => continue,
             Glow::Lamp => lamp(scene, at),
+            // A ceiling joins the group of its room and radiance, if that exists.
             Glow::Ceiling(radiance) => {
                 let key = (house.placed[*surface].room, radiance);
                 let known = ceilings.iter().find(|(known, _)| *known == key).map(|(_, group)| *group);
@@ -66,7 +69,7 @@ pub(super) fn groups(house: &FurnishedHouse, kept: &[usize], scene: &ReferenceSc
 
 const BLACK: [f32; 3] = [0.0; 3];
 
-/// What a lamp sends out: its base colour is the map.
+/// The emission of a lamp, whose base colour is the emission's map or factor.
 fn lamp(scene: &ReferenceScene, surface: usize) -> ([f32; 3], Option<EmissionMap>) {
     let material = &scene.materials[scene.surfaces[surface].material.0];
     match material.model {

@@ -1,25 +1,25 @@
-//! How much of a stranger's house is taken; checked before memory is.
+//! Limits on an untrusted house, checked before memory is taken.
 
-/// Upper bounds of what is read. Beyond them a house is refused, a model is a finding.
+/// Upper bounds. A house that exceeds them is refused; a model or texture that does is a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a house's JSON. The largest house known to us has a twentieth of it.
+    /// Bytes of a house's JSON. The largest known house has a twentieth of it.
     pub json_bytes: u64,
-    /// Values in it: numbers, texts, lists, objects.
+    /// Values in the JSON: numbers, texts, lists, objects.
     pub json_values: usize,
-    /// Lists and objects in it, each of which costs more than a number.
+    /// Lists and objects in the JSON, each of which takes more memory than a number.
     pub json_containers: usize,
     /// Bytes of any other file.
     pub file_bytes: u64,
-    /// Triangles of one model or mesh, and of all together.
+    /// Triangles of all models and meshes.
     pub triangles: usize,
-    /// Texels of all textures together.
+    /// Texels of all textures.
     pub texels: usize,
-    /// Rooms of a house.
+    /// Number of rooms.
     pub rooms: usize,
-    /// Children of all rooms together.
+    /// Children of all rooms.
     pub children: usize,
-    /// Findings; the rest is only counted.
+    /// Number of findings. Further ones are only counted.
     pub findings: usize,
 }
 

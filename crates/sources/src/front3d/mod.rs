@@ -1,21 +1,29 @@
-//! Reads 3D-FRONT: houses as JSON in three releases, their furniture from 3D-FUTURE, their textures.
+//! Reads 3D-FRONT: houses as JSON in three releases, their furniture from 3D-FUTURE, and their textures.
 //!
-//! In: the path of a house and the folders of models and textures. Out: a [`FurnishedHouse`] in world space, and of one of
-//! its rooms and a camera a [`crate::source_scene::SourceScene`]. The data is dirty and most of its keys are optional: whatever
-//! is missing or mended is a finding with its JSON pointer; an error is left for what is no house at all.
+//! The inputs are the path of a house and the folders of models and textures. The output is a [`FurnishedHouse`] in world
+//! space, and a [`SourceScene`](crate::source_scene::SourceScene) for one of its rooms and the views of a camera. The data
+//! has many faults and most of its keys are optional, so everything that is missing or repaired is a finding with its JSON
+//! pointer. An error means that the file is not a house.
 //!
-//! Between: `document` makes a tree of the JSON (bounded), `house_reader` with `house_mesh` a [`House`] of it; `model`,
-//! `model_info` read 3D-FUTURE; [`furnish`] places everything, by `furnisher` and `appearance`; `cameras` are the designers', [`camera_sampler`] finds
-//! others; `lights` lets ceilings and lamps glow; [`room_scene`] takes one room and what its views see of the others.
+//! The steps:
+//! - `document` parses the JSON within limits; `house_reader` and `house_mesh` turn it into a [`House`];
+//! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `coincident` separates
+//!   surfaces that coincide; `cameras` adds the designers' cameras;
+//! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
+//! - [`camera_sampler`] draws cameras in it;
+//! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
 
 mod appearance;
 pub mod camera_sampler;
 mod cameras;
 mod coincident;
 mod document;
+mod error;
 mod furnish;
+mod furnished_house;
 mod furnisher;
 mod house;
+mod house_files;
 mod house_mesh;
 mod house_reader;
 mod lights;
@@ -24,10 +32,13 @@ mod model;
 mod model_info;
 pub mod room_scene;
 
-pub use furnish::{FurnishedHouse, HouseFiles, Placed, Role, furnish, read_house};
+pub use error::HouseError;
+pub use furnish::{furnish, read_house};
+pub use furnished_house::{FurnishedHouse, Placed, Role};
 pub use house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
 };
+pub use house_files::HouseFiles;
 pub use limits::Limits;
 
 #[cfg(test)]

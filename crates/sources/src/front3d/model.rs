@@ -1,4 +1,4 @@
-//! A 3D-FUTURE model: its mesh in metres and its parts; and what had to be mended.
+//! 3D-FUTURE models: reads a model's mesh in metres and its parts, and reports what had to be repaired.
 
 use glam::{DMat4, DVec3, Vec3};
 use mateval_scene::{Severity, TriangleMesh};
@@ -11,44 +11,51 @@ use mateval_scene::findings::shortened;
 use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
 use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
-/// A larger model is in centimetres: no furniture is ten metres long.
+/// A model larger than this is taken to be in centimetres, since no furniture is ten metres long.
 const LARGEST_M: f32 = 10.0;
 
-/// A model as it stands in its own space: metres, +Y up, origin on the floor under its middle.
+/// A model in object space: metres, +y up, origin on the floor under its middle.
 #[derive(Clone, Debug)]
 pub(super) struct Model {
     pub(super) mesh: TriangleMesh,
-    /// By group, then by connected component.
+    /// The part of each triangle. Parts are the connected components of each group.
     pub(super) part_of_triangle: Vec<usize>,
 }
 
-/// Where files of models or textures lie, and what that folder is called in findings and hashes.
+/// A folder of models or textures, and its name in findings and lists of files.
 #[derive(Debug)]
 pub(super) struct Library {
     pub(super) folder: SourceFolder,
-    /// As the recipe names it.
+    /// The folder's path as the recipe gives it.
     pub(super) name: String,
 }
 
 impl Library {
-    /// The name of a file of it, as findings and hashes tell it.
+    /// The path of a file in it, as findings and lists of files give it.
     pub(super) fn shown(&self, relative: &str) -> String {
         if self.name.is_empty() { relative.to_owned() } else { format!("{}/{relative}", self.name) }
     }
+
+    /// Every file that was looked for in it, with paths as [`Self::shown`] gives them.
+    pub(super) fn into_files(self) -> LookedFor {
+        let name = self.name;
+        self.folder.into_files().renamed(|file| if name.is_empty() { file } else { format!("{name}/{file}") })
+    }
 }
 
-/// Whether an id may be a folder's name: those of the data are UUIDs.
+/// Whether an id is safe as the name of a folder. Ids of the data are UUIDs.
 pub(super) fn is_folder_name(id: &str) -> bool {
     (1..=64).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_'))
 }
 
-/// Reads `<jid>/raw_model.obj`; none, after a finding, where there is no sound mesh in it.
+/// Reads `<jid>/raw_model.obj`. A file without a usable mesh is reported and gives none.
 pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut Log) -> Option<Model> {
     let relative = format!("{jid}/raw_model.obj");
     let file = library.shown(&relative);
     let mut warn = |code: &str, place: &str, message: String, action: &str| {
         log.push(Severity::Warning, code, &file, place, message, action);
     };
+    // The file, then the OBJ in it; a fault of either is reported at its line.
     let bytes = match library.folder.read(&relative) {
         Ok(bytes) => bytes,
         Err(fault) => {
@@ -67,12 +74,15 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         }
     };
     if read.mixed_uvs || read.mixed_normals {
-        warn("mixed_faces", "", "some faces have uvs or normals and some have none".to_owned(), "dropped them for all");
+        let message = "only some faces have texture coordinates or normals".to_owned();
+        warn("mixed_faces", "", message, "dropped them for all faces");
     }
+    // What is kept of it, in metres.
     let (mesh, group_of_triangle) = without_shadows(read, &file, log);
     let model = in_metres(mesh, group_of_triangle, &file, log);
     if model.is_none() {
-        log.push(Severity::Warning, "bad_model", &file, "", "it has no triangle", "left its pieces out");
+        let message = "expected a triangle with an area, found none";
+        log.push(Severity::Warning, "bad_model", &file, "", message, "left its pieces out");
     }
     model
 }
@@ -81,7 +91,8 @@ fn missing_model(code: &'static str) -> &'static str {
     if code == "missing_file" { "missing_model" } else { code }
 }
 
-/// Groups named after a shadow are flat pictures on the floor that break a model's size (3D-FRONT-ToolBox issue 7).
+/// Drops groups named after a shadow: flat pictures on the floor that falsify a model's size (3D-FRONT-ToolBox issue 7).
+/// Returns the group of each remaining triangle too.
 fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, Vec<usize>) {
     let ObjMesh { mut mesh, groups, .. } = read;
     let (mut triangles, mut kept, mut first) = (Vec::new(), Vec::new(), 0);
@@ -101,9 +112,9 @@ fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, V
     (mesh, kept)
 }
 
-/// Drops what is not finite or has no area, scales what is then still too large, and finds its parts.
+/// Drops triangles that are not finite or have no area, scales a model in centimetres, and finds its parts.
 fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<Model> {
-    // One triangle a group number: `to_world` keeps the order, so what it drops is found again by counting.
+    // Triangles without area go first, and their group numbers with them.
     let sound: Vec<bool> = (0..mesh.triangles.len()).map(|t| has_area(mesh.corners(t))).collect();
     let dropped = sound.iter().filter(|sound| !**sound).count();
     if dropped > 0 {
@@ -113,17 +124,18 @@ fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) 
     let pick = |all: &[[u32; 3]]| all.iter().zip(&sound).filter(|(_, s)| **s).map(|(t, _)| *t).collect();
     let groups: Vec<usize> = groups.iter().zip(&sound).filter(|(_, sound)| **sound).map(|(g, _)| *g).collect();
     let mesh = TriangleMesh { triangles: pick(&mesh.triangles), ..mesh };
-    let size = size_of_used(&mesh);
+    // The scale follows from the size of the remaining triangles.
+    let size = longest_side(&mesh);
     let centimetres = size > LARGEST_M;
     if centimetres {
-        let message = format!("it is {size:.1} m large");
-        log.push(Severity::Note, "centimetres", file, "", message, "took its numbers for centimetres");
+        let message = format!("read in metres, the model is {size:.1} m long");
+        log.push(Severity::Note, "centimetres", file, "", message, "read its numbers as centimetres");
     }
     let scale = if centimetres { 0.01 } else { 1.0 };
     let (mesh, repairs) = to_world(mesh, DMat4::from_scale(DVec3::splat(scale)), false);
     if repairs.normals > 0 || repairs.uvs > 0 {
-        let message = format!("{} normals and {} uvs are not sound", repairs.normals, repairs.uvs);
-        log.push(Severity::Note, "bad_normals", file, "", message, "made new normals, took uv 0");
+        let message = format!("{} normals are zero or not finite, {} uvs are not finite", repairs.normals, repairs.uvs);
+        log.push(Severity::Note, "bad_normals", file, "", message, "computed new normals, used uv 0");
     }
     if mesh.triangles.is_empty() || mesh.triangles.len() != groups.len() {
         return None;
@@ -131,18 +143,10 @@ fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) 
     Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh })
 }
 
-/// The longest side of the box around all triangles, in the file's unit.
-fn size_of_used(mesh: &TriangleMesh) -> f32 {
+/// The longest side of the bounding box of all triangles, in the file's unit.
+fn longest_side(mesh: &TriangleMesh) -> f32 {
     let corners = || mesh.triangles.iter().flatten().map(|v| mesh.positions[*v as usize]).filter(|p| p.is_finite());
     let low = corners().reduce(Vec3::min).unwrap_or_default();
     let high = corners().reduce(Vec3::max).unwrap_or_default();
     (high - low).max_element()
-}
-
-impl Library {
-    /// Every file looked for in it, as findings tell it.
-    pub(super) fn into_files(self) -> LookedFor {
-        let name = self.name;
-        self.folder.into_files().renamed(|file| if name.is_empty() { file } else { format!("{name}/{file}") })
-    }
 }

@@ -1,17 +1,17 @@
-//! What a piece of furniture is: 3D-FUTURE's `model_info.json`, and guesses where it says nothing.
+//! Categories of furniture from 3D-FUTURE's `model_info.json`, and guesses for models that it does not list.
 
 use std::collections::BTreeMap;
 
 use mateval_scene::Severity;
 use serde_json::Value;
 
-use super::document::{check_size, kind, text};
+use super::document::{kind, parse_any, text};
 use super::house::FurnitureRecord;
 use super::limits::Limits;
 use crate::log::Log;
 use mateval_scene::super_categories::SUPER_CATEGORIES;
 
-/// Words of categories and titles that tell the super-category; the first that fits counts.
+/// Words in categories and titles, and the super-categories that they imply. The first match counts.
 const WORDS: [(&str, &str); 22] = [
     ("lamp", "Lighting"),
     ("light", "Lighting"),
@@ -37,7 +37,7 @@ const WORDS: [(&str, &str); 22] = [
     ("mattress", "Bed"),
 ];
 
-/// Rows of `model_info.json` by model.
+/// Rows of `model_info.json` by model id.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ModelInfo {
     rows: BTreeMap<String, Row>,
@@ -49,30 +49,26 @@ struct Row {
     category: Option<String>,
 }
 
-/// What a piece is.
+/// The categories of a piece of furniture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Kind {
     pub(super) super_category: String,
     pub(super) category: Option<String>,
-    /// Whether `model_info.json` says so.
+    /// Whether `model_info.json` lists the model.
     pub(super) known: bool,
 }
 
 impl ModelInfo {
-    /// From the file's text; rows that say nothing are passed over, a file that is no list is a finding.
+    /// Parses the file's text. Rows without a known super-category are skipped; a file that is not a list is a finding.
     pub(super) fn parse(bytes: &[u8], file: &str, limits: &Limits, log: &mut Log) -> Self {
         let mut warn = |message: String| {
             let action = "guessed categories from names";
             log.push(Severity::Warning, "bad_model_info", file, "", message, action);
         };
-        if let Err(what) = check_size(bytes, limits) {
-            warn(what);
-            return Self::default();
-        }
-        let tree: Value = match serde_json::from_slice(bytes) {
+        let tree = match parse_any(bytes, limits) {
             Ok(tree) => tree,
             Err(error) => {
-                warn(format!("not JSON: {error}"));
+                warn(error.to_string());
                 return Self::default();
             }
         };
@@ -86,12 +82,12 @@ impl ModelInfo {
             let category = text(row, "category").map(tidy);
             Some((text(row, "model_id")?.to_owned(), Row { super_category: (*super_category).to_owned(), category }))
         };
-        // Of two rows for one model the first counts.
+        // Rows are collected in reverse, so that the first of two rows for one model counts.
         let rows = all.iter().rev().filter_map(row).collect();
         Self { rows }
     }
 
-    /// What the piece is.
+    /// The categories of the piece that `record` describes.
     pub(super) fn kind(&self, record: &FurnitureRecord) -> Kind {
         let named = record.category.as_deref().map(tidy).or_else(|| {
             let title = record.title.as_deref()?;
@@ -108,7 +104,7 @@ impl ModelInfo {
     }
 }
 
-/// Near-duplicate names differ by blanks around the stroke: one spelling.
+/// The name without blanks around its slashes, in which the data's spellings differ.
 fn tidy(name: &str) -> String {
     name.split('/').map(str::trim).collect::<Vec<_>>().join("/")
 }
@@ -129,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_list_counts_and_words_help_out() {
+    fn the_list_takes_precedence_over_words() {
         let text = br#"[{"model_id": "a", "super-category": "Sofa", "category": "Three-Seat / Multi-seat Sofa"},
             {"model_id": "a", "super-category": "Bed"}, {"model_id": "b", "super-category": "chair", "category": null}, 7]"#;
         let mut log = Log::new("h".into(), 10);
@@ -148,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_list_is_told() {
+    fn a_file_that_is_not_a_list_is_reported() {
         let small = Limits { json_containers: 3, ..Limits::default() };
         for bad in [&b"{"[..], b"{}", b"7", b"[[],[],[]]"] {
             let mut log = Log::new("h".into(), 10);

@@ -1,37 +1,35 @@
-//! One room of a house as a scene: its furniture, its architecture, and what the views see of other rooms.
+//! Makes a scene of one room of a house: its architecture and furniture, and what the views see of other rooms.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 use mateval_scene::Camera;
 use mateval_scene::ids::id_text_from;
 use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_tracer::World;
 use mateval_tracer::aov::{hit_through, subpixels};
-use mateval_tracer::{TracerError, World};
 use rayon::prelude::*;
 
-use super::furnish::{FurnishedHouse, Role};
+use super::furnished_house::{FurnishedHouse, Role};
 use super::lights;
 use crate::source_scene::SourceScene;
 
-/// Characters of a name that has a number behind it.
+/// The most characters of a name before an appended number.
 const LONGEST_NAME: usize = 40;
 
-/// The scene of room number `room`, seen from `views`, the input view first.
+/// The scene of room number `room`, seen from `views`, the input view first. `world` was made of `house.scene`.
 ///
-/// Of another room that any of them sees, the architecture is kept (its ceiling lights what is seen), and the furniture
-/// that is seen. Everything else of the house is left out.
-pub fn room_scene(house: &FurnishedHouse, room: usize, views: &[Camera]) -> Result<SourceScene, TracerError> {
-    let world = World::new(Arc::new(house.scene.clone()))?;
-    let kept = kept(house, room, &seen(&world, views));
+/// Where a view sees another room, all of that room's architecture is kept, since its ceiling emits, and the furniture that
+/// is seen. The rest of the house is left out.
+pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[Camera]) -> SourceScene {
+    let kept = kept(house, room, &seen(world, views));
     let names = names(house, room, &kept);
     let mut scene = only(&house.scene, &kept);
     for (surface, name) in scene.surfaces.iter_mut().zip(&names) {
         surface.name.clone_from(name);
     }
     scene.lights = lights::groups(house, &kept, &scene);
-    Ok(SourceScene {
+    SourceScene {
         kind: "front3d",
         house: house.house.uid.clone(),
         file: house.file.clone(),
@@ -42,10 +40,10 @@ pub fn room_scene(house: &FurnishedHouse, room: usize, views: &[Camera]) -> Resu
         licence: None,
         files: house.files.clone(),
         absent: house.absent.clone(),
-    })
+    }
 }
 
-/// Surfaces that show at any place of any view where pictures are taken.
+/// The surfaces that any sub-pixel of any view shows.
 fn seen(world: &World, views: &[Camera]) -> BTreeSet<usize> {
     let rows: Vec<(&Camera, usize)> =
         views.iter().flat_map(|view| (0..view.intrinsics.height as usize).map(move |y| (view, y))).collect();
@@ -59,6 +57,7 @@ fn seen(world: &World, views: &[Camera]) -> BTreeSet<usize> {
     })
 }
 
+/// The surfaces of the scene, as indices in the house.
 fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usize> {
     let rooms: BTreeSet<usize> = seen.iter().map(|&surface| house.placed[surface].room).chain([room]).collect();
     let is_kept = |surface: &usize| {
@@ -69,8 +68,8 @@ fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usiz
     (0..house.placed.len()).filter(is_kept).collect()
 }
 
-/// Names of what is kept: what it is, with the room's id before it for other rooms, and a number behind the second. No two
-/// are one as ids, and none is the world's.
+/// Names of the kept surfaces: the house's own, with the room's id in front for other rooms. A number makes repeated names
+/// unique, also once they are turned into ids. No name is that of the environment's light.
 fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
     let mut taken = BTreeSet::from([id_text_from(lights::WORLD_NAME, "")]);
     let mut count: BTreeMap<String, usize> = BTreeMap::new();
@@ -81,7 +80,7 @@ fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
             true => own.clone(),
             false => format!("{} {own}", house.house.rooms[placed.room].id),
         };
-        // An id is cut: what is behind a long name would not show in it.
+        // Ids are cut to a length, so a number behind a long name would be lost.
         let stem: String = name.chars().take(LONGEST_NAME).collect();
         let count = count.entry(id_text_from(&name, "object")).or_insert(0);
         loop {
@@ -95,7 +94,7 @@ fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
     kept.iter().map(name).collect()
 }
 
-/// Those surfaces, with the materials and textures that they use.
+/// A scene of the kept surfaces with the materials and textures that they use.
 fn only(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
     let mut part = ReferenceScene::default();
     let (mut materials, mut textures) = (BTreeMap::new(), BTreeMap::new());

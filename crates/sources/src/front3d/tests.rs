@@ -99,7 +99,7 @@ fn jid(number: u32) -> String {
 }
 
 /// A house read from JSON alone, and the findings.
-fn read_house(json: &Value) -> (Result<House, String>, Vec<mateval_scene::Finding>) {
+fn read_house(json: &Value) -> (Result<House, HouseError>, Vec<mateval_scene::Finding>) {
     let mut log = crate::log::Log::new("house.json".into(), 5_000);
     let house = house_reader::read(json, "stem", &Limits::default(), &mut log);
     (house, log.into_findings())

@@ -3,6 +3,7 @@
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::material::{ColorInput, MaterialModel};
 use mateval_testkit::data::shared_data;
+use mateval_tracer::World;
 
 use super::*;
 
@@ -50,8 +51,9 @@ fn assert_house(house: &FurnishedHouse, pieces: usize, cameras: usize) {
     assert_eq!(house.wanted_pieces.iter().sum::<usize>(), pieces);
     assert_eq!(house.placed.iter().filter(|placed| is_furniture(placed)).count(), pieces);
     assert_eq!(house.cameras.len(), cameras);
+    let world = World::new(house.scene.clone()).unwrap();
     for room in 0..house.house.rooms.len() {
-        assert_room(house, room);
+        assert_room(house, &world, room);
     }
     for surface in 0..house.placed.len() {
         assert_stands(house, surface);
@@ -59,7 +61,7 @@ fn assert_house(house: &FurnishedHouse, pieces: usize, cameras: usize) {
 }
 
 /// A room with furniture is a scene from any camera; here from above its middle.
-fn assert_room(house: &FurnishedHouse, room: usize) {
+fn assert_room(house: &FurnishedHouse, world: &World, room: usize) {
     if house.wanted_pieces[room] == 0 {
         return;
     }
@@ -70,7 +72,7 @@ fn assert_room(house: &FurnishedHouse, room: usize) {
     let intrinsics = Intrinsics::from_fov_y(24, 16, 1.0);
     let camera =
         Camera::look_at(middle, middle + glam::DVec3::new(1.0, -0.2, 0.3), glam::DVec3::Y, intrinsics).unwrap();
-    let scene = room_scene::room_scene(house, room, &[camera]).unwrap();
+    let scene = room_scene::room_scene(house, world, room, &[camera]);
     assert!(scene.scene.surfaces.len() >= own.count());
     assert!(scene.scene.surfaces.iter().all(|surface| surface.material.0 < scene.scene.materials.len()));
     assert_eq!(scene.house, house.house.uid);

@@ -1,7 +1,6 @@
 //! Cameras that the sampler finds keep to the rules, by code that is not its own.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_scene::Camera;
@@ -9,7 +8,7 @@ use mateval_scene::camera::Intrinsics;
 use mateval_tracer::{Ray, World};
 
 use super::*;
-use crate::front3d::camera_sampler::{FoundCamera, RoomSampler, SamplerRules, sample, score};
+use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusals, RoomSampler, SamplerRules, score};
 
 /// The recipe's own.
 const TURNS: [[f64; 2]; 4] = [[5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
@@ -19,7 +18,13 @@ fn intrinsics() -> Intrinsics {
 }
 
 fn world() -> World {
-    World::new(Arc::new(bare().scene.clone())).unwrap()
+    World::new(bare().scene.clone()).unwrap()
+}
+
+/// The living room's camera of a seed.
+fn sample(house: &FurnishedHouse, rules: &SamplerRules, seed: u64) -> Result<FoundCamera, CameraError> {
+    let world = World::new(house.scene.clone()).unwrap();
+    RoomSampler::new(house, &world, LIVING)?.sample(intrinsics(), &TURNS, rules, seed)
 }
 
 /// A few cameras of a room; the seeds that find one.
@@ -64,7 +69,7 @@ fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
 #[test]
 fn same_seed_same_camera() {
     let rules = SamplerRules::default();
-    let of = |seed| sample(bare(), LIVING, intrinsics(), &TURNS, &rules, seed);
+    let of = |seed| sample(bare(), &rules, seed);
     let (one, again, other) = (of(1).unwrap(), of(1).unwrap(), of(2).unwrap());
     assert_eq!(one, again);
     assert_ne!(one.camera, other.camera);
@@ -131,27 +136,35 @@ fn without_the_rule_near_things_are_seen() {
 }
 
 #[test]
-fn rooms_that_will_not_do_are_told() {
+fn rooms_without_a_camera_are_reported() {
     let mut house = bare().clone();
     let rules = SamplerRules { tries: 200, ..SamplerRules::default() };
-    // Too small, for what it is asked.
+    // The room is too small for the wanted distances.
+    let refusals = |error| match error {
+        CameraError::NoneFound { room, refusals, .. } if room == "LivingDiningRoom-101" => refusals,
+        other => panic!("{other}"),
+    };
+    let total =
+        |of: Refusals| of.off_floor + of.sees_outside + of.too_near + of.mean_distance + of.low_score + of.no_clearance;
     let far = SamplerRules { mean_distance_m: [50.0, 60.0], ..rules };
-    let told = sample(&house, LIVING, intrinsics(), &TURNS, &far, 1).unwrap_err();
-    assert!(
-        told.contains("none of 200") && told.contains("LivingDiningRoom-101") && told.contains("by hand"),
-        "{told}"
-    );
+    let error = sample(&house, &far, 1).unwrap_err();
+    let message = error.to_string();
+    assert!(message.contains("none of 200") && message.contains("outside 50 to 60 m"), "{message}");
+    let found = refusals(error);
+    assert!(found.mean_distance > 0 && total(found) == 200, "{found:?}");
     let near = SamplerRules { clearance_m: 3.0, ..rules };
-    let told = sample(&house, LIVING, intrinsics(), &TURNS, &near, 1).unwrap_err();
-    assert!(told.contains("within 3 m"), "{told}");
-    // Without a floor.
+    let error = sample(&house, &near, 1).unwrap_err();
+    assert!(error.to_string().contains("within 3 m"), "{error}");
+    let found = refusals(error);
+    assert!(found.no_clearance > 0 && total(found) == 200, "{found:?}");
+    // The room has no floor.
     for placed in &mut house.placed {
         if placed.room == LIVING && placed.role == (Role::Architecture { kind: "Floor".into() }) {
             placed.role = Role::Architecture { kind: "Other".into() };
         }
     }
-    let told = sample(&house, LIVING, intrinsics(), &TURNS, &rules, 1).unwrap_err();
-    assert!(told.contains("LivingDiningRoom-101") && told.contains("no floor"), "{told}");
+    let error = sample(&house, &rules, 1).unwrap_err();
+    assert_eq!(error, CameraError::NoFloor { room: "LivingDiningRoom-101".to_owned() });
 }
 
 /// BlenderProc's sum, by hand: 50 rays at a sofa, 30 at walls, 20 at the floor:

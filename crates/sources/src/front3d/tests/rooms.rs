@@ -1,7 +1,7 @@
 //! One room as a scene: what is kept of the others, names, lights; and that it can be rendered.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
 use mateval_scene::Camera;
@@ -21,8 +21,14 @@ fn snapshot(number: usize) -> Camera {
     Camera::look_at(own.position, own.target, DVec3::Y, intrinsics).unwrap()
 }
 
+/// The furnished house ready for rays, made once a process.
+fn world() -> &'static World {
+    static WORLD: OnceLock<World> = OnceLock::new();
+    WORLD.get_or_init(|| World::new(furnished().scene.clone()).unwrap())
+}
+
 fn scene_from(number: usize) -> SourceScene {
-    room_scene::room_scene(furnished(), LIVING, &[snapshot(number)]).unwrap()
+    room_scene::room_scene(furnished(), world(), LIVING, &[snapshot(number)])
 }
 
 /// What a surface of the scene is in the house: by its mesh, which nobody changed.
@@ -34,7 +40,7 @@ fn in_house(scene: &SourceScene) -> Vec<usize> {
 
 /// Surfaces that a grid of single rays through the picture meets.
 fn met(camera: &Camera, side: u32) -> BTreeSet<usize> {
-    let world = World::new(Arc::new(furnished().scene.clone())).unwrap();
+    let world = world();
     let origin = camera.position().as_vec3();
     let places = (0..side * side).map(|k| {
         let share = |v: u32, size: u32| (f64::from(v) + 0.5) / f64::from(side) * f64::from(size);
@@ -95,10 +101,10 @@ fn names_of_strangers_are_unique_too() {
     let mut house = furnished().clone();
     let long = "x".repeat(60);
     let names = ["world", "a", "a", "a 2", "a-2", "", "-", "object 2", long.as_str(), long.as_str(), long.as_str()];
-    for (surface, name) in house.scene.surfaces.iter_mut().zip(names.iter().cycle()) {
+    for (surface, name) in Arc::make_mut(&mut house.scene).surfaces.iter_mut().zip(names.iter().cycle()) {
         (*name).clone_into(&mut surface.name);
     }
-    let scene = room_scene::room_scene(&house, LIVING, &[snapshot(1)]).unwrap();
+    let scene = room_scene::room_scene(&house, world(), LIVING, &[snapshot(1)]);
     let ids: BTreeSet<String> =
         scene.scene.surfaces.iter().map(|surface| id_text_from(&surface.name, "object")).collect();
     assert_eq!(ids.len(), scene.scene.surfaces.len());

@@ -1,0 +1,64 @@
+//! A house in world space with its furniture.
+
+use std::sync::Arc;
+
+use mateval_scene::Finding;
+use mateval_scene::reference::ReferenceScene;
+
+use super::house::{DesignerCamera, House};
+use crate::source_scene::InstanceOrigin;
+
+/// The role of a surface in the house.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Architecture of one room, one mesh type and one material.
+    Architecture {
+        /// The mesh type, as in `WallInner`.
+        kind: String,
+    },
+    /// A piece of furniture.
+    Furniture {
+        /// Its model's id.
+        jid: String,
+        /// The name that BlenderProc would give it, in lower case: category, else title.
+        name: String,
+        /// Whether both model and texture could be read.
+        complete: bool,
+    },
+}
+
+/// Facts about a surface besides its mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// Index in [`House::rooms`].
+    pub room: usize,
+    /// Its role.
+    pub role: Role,
+    /// Categories and parts of its instance.
+    pub origin: InstanceOrigin,
+    /// Linear colour, in which a ceiling emits.
+    pub color: [f32; 3],
+}
+
+/// A house with its furniture, without lights.
+#[derive(Clone, Debug)]
+pub struct FurnishedHouse {
+    /// The content of the JSON.
+    pub house: House,
+    /// The house's file, as findings name it.
+    pub file: String,
+    /// All surfaces, room by room, without lights. It is shared with the [`World`](mateval_tracer::World) made of it.
+    pub scene: Arc<ReferenceScene>,
+    /// Facts about each surface, in the order of `scene.surfaces`.
+    pub placed: Vec<Placed>,
+    /// Designers' cameras by number, from the file beside the house or else from the JSON.
+    pub cameras: Vec<DesignerCamera>,
+    /// For each room the number of valid pieces that its children refer to, whether they could be placed or not.
+    pub wanted_pieces: Vec<usize>,
+    /// Faults of the input; sorted.
+    pub findings: Vec<Finding>,
+    /// Every file that was read, relative to the root, and its SHA-256; sorted.
+    pub files: Vec<(String, String)>,
+    /// Every file that was looked for but is missing; sorted.
+    pub absent: Vec<String>,
+}
