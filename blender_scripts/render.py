@@ -1,11 +1,11 @@
 """Renders one job with Blender's Cycles.
 
     python render.py JOB.json                  with the bpy module
-    blender -b -P render.py -- JOB.json        with a Blender
+    blender -b -P render.py -- JOB.json        with the program
 
-Beside the job it writes, for each view, `<view>/geometry.exr`, `centre.exr`, `a.exr`, `b.exr` and `denoised.exr`, and
-`result.json`, which names the views that are whole. Lines on stdout that begin with `mateval:` tell how far it
-is. It ends with 0, or with 1 and the reason in `result.json`.
+For each view it writes `<view>/geometry.exr`, `centre.exr`, `a.exr`, `b.exr` and `denoised.exr` beside the job, and
+`result.json`, which names the complete views. Lines on stdout that begin with `mateval:` report progress. The exit code
+is 0, or 1 with the reason in `result.json`.
 """
 
 import os
@@ -24,11 +24,11 @@ from mateval.job import RESULT_FORMAT, Job, read_job, write_result  # noqa: E402
 from mateval.scene import BuiltScene  # noqa: E402
 
 VERSION = (4, 5)
-"""The Blender that the graphs of nodes are written for."""
+"""The version of Blender that the shader graphs are written for."""
 
 
 def main() -> None:
-    """Carries out the job that the last word of the command line names."""
+    """Runs the job that the last command-line argument names."""
     path = Path(sys.argv[-1]).resolve()
     threading.Thread(target=end_with, kwargs={"parent": os.getppid()}, daemon=True).start()
     result: Job = {
@@ -45,15 +45,15 @@ def main() -> None:
         sys.stdout.flush()
         sys.stderr.flush()
     finally:
-        # bpy 4.5 may hang when it is taken down in the ordinary way; where the disk is full even a word about it fails.
+        # bpy 4.5 may hang in an ordinary exit, and on a full disk even a message about it fails.
         os._exit(code)
 
 
 def carry_out_or_tell(*, path: Path, result: Job) -> None:
-    """Carries the job out; whatever stops it is told in the result."""
+    """Runs the job and records every error in the result."""
     try:
         carry_out(path=path, result=result)
-    except BaseException as error:  # noqa: BLE001 (whatever it is)
+    except BaseException as error:  # noqa: BLE001 (every error is recorded)
         result["error"] = f"{type(error).__name__}: {error}"
         write_result(folder=path.parent, result=result)
         traceback.print_exc()
@@ -62,14 +62,14 @@ def carry_out_or_tell(*, path: Path, result: Job) -> None:
 
 
 def end_with(*, parent: int) -> None:
-    """Ends this process when the one that started it is gone: nobody would read what it renders."""
+    """Ends this process when its parent has ended, since nothing would read the pictures."""
     while os.getppid() == parent:
         time.sleep(1.0)
     os._exit(2)
 
 
 def carry_out(*, path: Path, result: Job) -> None:
-    """Renders all views of the job and tells of each in the result."""
+    """Renders all views of the job and records each in the result."""
     if bpy.app.version[:2] != VERSION:
         raise RuntimeError(f"expected Blender {VERSION[0]}.{VERSION[1]}, found {bpy.app.version_string}")
     job, folder = read_job(path=path), path.parent
@@ -92,7 +92,7 @@ def carry_out(*, path: Path, result: Job) -> None:
 
 
 def render_view(*, built: BuiltScene, job: Job, view: Job, folder: Path) -> dict[str, float]:
-    """Both halves of a view and their denoised mean. Gives the seconds of each."""
+    """Renders both halves of a view and their denoised mean. Returns the seconds of each."""
     place = folder / view["id"]
     built.look_from(camera=view["camera"])
     render_to(scene=built.scene, path=place / "centre.exr", samples=1, seed=0)
@@ -111,7 +111,7 @@ def render_view(*, built: BuiltScene, job: Job, view: Job, folder: Path) -> dict
 
 
 def tell(text: str) -> None:
-    """How far it is, a line at a time."""
+    """Prints a line of progress."""
     print(f"mateval: {text}", flush=True)
 
 

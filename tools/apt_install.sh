@@ -1,5 +1,5 @@
 #!/bin/sh
-# Installs those of the named Debian packages that are missing; says so where this is no Debian.
+# Installs the named Debian packages that are missing. On a system without apt-get it prints them and fails.
 set -eu
 missing=""
 for package in "$@"; do
@@ -7,13 +7,13 @@ for package in "$@"; do
 done
 [ -n "$missing" ] || exit 0
 command -v apt-get >/dev/null 2>&1 || {
-    echo "setup: install these with your system's own tool, then run this again:$missing" >&2
+    echo "setup: install these packages with your system's package manager, then run this again:$missing" >&2
     exit 2
 }
 as_root=""
 [ "$(id -u)" = 0 ] || as_root=sudo
 echo "setup: installing$missing" >&2
 $as_root apt-get update -qq
-# The list of names holds no spaces of its own.
+# Package names contain no spaces.
 # shellcheck disable=SC2086
 DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq --no-install-recommends $missing >/dev/null

@@ -1,12 +1,12 @@
 #!/bin/sh
-# What scoring a room costs, ours and with other projects' parts (Mitsuba, scikit-image, lpips): installs those into
-# target/peers_score (2.9 GB to fetch, 5.8 GB on disk), makes a dataset of two real rooms and a submission, and runs the
-# bench. MATEVAL_DATA is where the rooms are; beside the project where it is not set. Arguments go to the bench: `full`
-# times every iteration of the fit.
+# Measures what scoring a room costs, with MatEval and with other projects' parts (Mitsuba, scikit-image, lpips).
+# Installs those into target/peers_score (2.9 GB to download, 5.8 GB on disk), makes a dataset of two real rooms and a
+# submission, and runs the bench. MATEVAL_DATA is the folder of the rooms; by default it is ../shared/data. Arguments
+# are passed to the bench: `full` times every iteration of the fit.
 set -eu
 cd "$(dirname "$0")/.."
 tools/setup.sh
-# mitsuba: libatomic1, and LLVM 19 for its fast variant.
+# Mitsuba needs libatomic1, and LLVM 19 for its fast variant.
 tools/apt_install.sh libatomic1 libllvm19 python3-venv
 
 data="${MATEVAL_DATA:-$PWD/../shared/data}"
@@ -40,6 +40,6 @@ MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python"
 export MATEVAL_CACHE MATEVAL_PEERS_PYTHON
 for scene in living staircase2; do
     echo "== $scene"
-    # Benches run in their crate's folder.
+    # Benches run in their crate's folder, so paths are absolute.
     cargo bench --quiet --workspace --bench whole_room -- "$PWD/$rooms/dataset" "$scene" "$PWD/$rooms/nn" "$@"
 done

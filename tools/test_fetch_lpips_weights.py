@@ -201,7 +201,7 @@ class WholeRun(unittest.TestCase):
         self.assertEqual(self.run_tool("--sdist", "/nowhere")[:2], (0, out))
         self.assertEqual(path.stat().st_mtime_ns, before)
 
-    def test_a_spoilt_file_is_made_anew(self) -> None:
+    def test_a_damaged_file_is_written_again(self) -> None:
         self.run_tool("--sdist", str(self.sdist))
         path = self.folder / "out" / "tiny.safetensors"
         path.write_bytes(b"spoilt")

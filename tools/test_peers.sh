@@ -1,11 +1,11 @@
 #!/bin/sh
-# The tracer against Mitsuba 3 and Blender: installs Mitsuba into target/peers, then renders the same scenes with each.
-# Arguments go to the test runner: tools/test_peers.sh mitsuba
+# Compares the tracer with Mitsuba 3 and Blender: installs Mitsuba into target/peers, then renders the same scenes with
+# each. Arguments are passed to the test runner: tools/test_peers.sh mitsuba
 set -eu
 cd "$(dirname "$0")/.."
 tools/setup.sh
 
-# mitsuba: libatomic1, and LLVM 19 for its fast variant. setup.sh has installed Blender.
+# Mitsuba needs libatomic1, and LLVM 19 for its fast variant. setup.sh has installed Blender.
 tools/apt_install.sh libatomic1 libllvm19 python3-venv
 
 venv=target/peers

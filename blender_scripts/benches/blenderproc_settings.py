@@ -1,10 +1,11 @@
-"""Times one view of a job under our settings and under BlenderProc's, in turn.
+"""Times one view of a job with MatEval's settings and with BlenderProc's, in turn.
 
     PYTHON_WITH_BPY -I -B blender_scripts/benches/blenderproc_settings.py JOB.json [ROUNDS]
 
-`prep render` leaves a job in `DATASET/.render/<scene>/` when it is stopped. Both render the first view of the job with
-the same materials, lights and passes. BlenderProc's settings are those of its 3D-FRONT examples: up to 1024 samples,
-adaptive to 0.01, 200 bounces, indirect light clamped at 10, glossy filter 1, Blackman-Harris, denoised at once.
+`prep render` leaves a job in `DATASET/.render/<scene>/` when it is interrupted. Both settings render the first view of
+the job with the same materials, lights and passes. BlenderProc's settings are those of its 3D-FRONT examples: up to
+1024 samples, adaptive to 0.01, 200 bounces, indirect light clamped at 10, glossy filter 1, Blackman-Harris, denoised in
+the same run.
 """
 
 import os
@@ -53,7 +54,7 @@ def main() -> None:
     ratio = statistics.median(seconds["ours"]) / statistics.median(seconds["blenderproc"])
     print(f"two halves of {job['samples_each_half']} samples take {ratio:.2f} times as long as BlenderProc's settings")
     sys.stdout.flush()
-    # As in render.py: bpy may hang when it is taken down.
+    # As in render.py: bpy may hang in an ordinary exit.
     os._exit(0)
 
 
@@ -74,11 +75,11 @@ BLENDERPROC = {
     "transparent_max_bounces": BLENDERPROC_BOUNCES,
     "volume_bounces": 0,
 }
-"""Of Cycles, as BlenderProc sets or leaves them."""
+"""Settings of Cycles as BlenderProc sets or leaves them."""
 
 
 def apply(*, settings: bpy.types.PropertyGroup, values: dict) -> None:
-    """Sets each."""
+    """Sets each attribute."""
     for name, value in values.items():
         setattr(settings, name, value)
 

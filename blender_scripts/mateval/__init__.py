@@ -1,1 +1,1 @@
-"""What `render.py` is made of. A package, as Blender itself has modules of such names."""
+"""Modules of `render.py`. They are a package because Blender has modules with the same names."""

@@ -1,24 +1,24 @@
-"""A pinhole camera in Blender's terms. Needs no bpy."""
+"""A pinhole camera as Blender's lens. Needs no bpy."""
 
 import math
 from typing import Any, NamedTuple
 
 
 class Lens(NamedTuple):
-    """What Blender calls a camera with sensor fit HORIZONTAL."""
+    """Blender's settings of a camera with sensor fit HORIZONTAL."""
 
     angle_x: float
-    """Horizontal field of view in radians, as of a lens that looks through the picture's middle."""
+    """Horizontal field of view in radians, for a principal point in the picture's centre."""
     shift_x: float
-    """How far the picture lies to the right of the axis, in widths."""
+    """Shift of the picture to the right of the axis, in picture widths."""
     shift_y: float
-    """How far it lies above the axis, in widths."""
+    """Shift of the picture above the axis, in picture widths."""
     pixel_aspect_y: float
-    """Height of a pixel over its width."""
+    """Height of a pixel divided by its width."""
 
 
 def lens(*, intrinsics: dict[str, Any]) -> Lens:
-    """Blender's lens for focal lengths and a principal point in pixels, from the top left."""
+    """Returns Blender's lens for focal lengths and a principal point in pixels, measured from the top left."""
     width, height = intrinsics["width"], intrinsics["height"]
     fx, fy, cx, cy = (intrinsics[key] for key in ("fx", "fy", "cx", "cy"))
     aspect = fx / fy

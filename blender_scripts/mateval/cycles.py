@@ -9,7 +9,7 @@ from mateval.materials import BASE_COLOR, INSTANCE, PART
 
 
 def set_up(*, scene: bpy.types.Scene, job: Job) -> None:
-    """Cycles on the processor, with nothing clamped, blurred, guessed or denoised, and one file of 32-bit passes."""
+    """Sets up Cycles on the CPU, without clamping, filtering, guiding or denoising, and one file of 32-bit passes."""
     render = scene.render
     render.engine = "CYCLES"
     render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
@@ -48,7 +48,7 @@ def set_up(*, scene: bpy.types.Scene, job: Job) -> None:
 
 
 def add_passes(*, layer: bpy.types.ViewLayer) -> None:
-    """Depth, normals, ids and base colour; light groups have theirs by themselves."""
+    """Enables the passes of depth, normals, ids and base colour. Light groups have passes of their own."""
     layer.use_pass_combined = True
     layer.use_pass_z = True
     layer.use_pass_normal = True
@@ -59,7 +59,7 @@ def add_passes(*, layer: bpy.types.ViewLayer) -> None:
 
 
 def render_to(*, scene: bpy.types.Scene, path: Path, samples: int, seed: int) -> None:
-    """Renders the scene as it stands into the file."""
+    """Renders the scene to the file."""
     scene.cycles.samples = samples
     scene.cycles.seed = seed
     scene.render.filepath = str(path)
@@ -69,5 +69,5 @@ def render_to(*, scene: bpy.types.Scene, path: Path, samples: int, seed: int) ->
 
 
 def light_passes(*, job: Job) -> list[str]:
-    """The passes that hold light: RGB, then each group."""
+    """Returns the names of the passes of light: RGB, then each group."""
     return ["Combined"] + [f"Combined_{group_name(group=group)}" for group in range(len(job["lights"]))]

@@ -8,7 +8,7 @@ ALBEDO, NORMAL = "Denoising Albedo", "Denoising Normal"
 
 
 def denoise_to(*, scene: bpy.types.Scene, halves: tuple[Path, Path], passes: list[str], path: Path) -> None:
-    """Writes the passes of both halves, averaged and denoised, into one file, each under its own name."""
+    """Writes the averaged and denoised passes of both halves to one file under their own names."""
     scene.use_nodes = True
     tree = scene.node_tree
     tree.nodes.clear()
@@ -37,7 +37,7 @@ def denoise_to(*, scene: bpy.types.Scene, halves: tuple[Path, Path], passes: lis
 
 
 def composite(*, scene: bpy.types.Scene) -> None:
-    """Runs the compositor alone: without a node of render layers nothing is rendered."""
+    """Runs the compositor only; without a render-layers node nothing is rendered."""
     scene.render.use_compositing = True
     bpy.ops.render.render(write_still=False)
     scene.render.use_compositing = False
@@ -45,14 +45,14 @@ def composite(*, scene: bpy.types.Scene) -> None:
 
 
 def image_node(*, tree: bpy.types.NodeTree, path: Path) -> bpy.types.Node:
-    """All passes of a file."""
+    """Adds a node with all passes of a file."""
     node = tree.nodes.new("CompositorNodeImage")
     node.image = bpy.data.images.load(str(path))
     return node
 
 
 def mean(*, tree: bpy.types.NodeTree, sources: list, name: str) -> bpy.types.NodeSocket:
-    """The mean of one pass of both halves."""
+    """Adds the mean of one pass of both halves."""
     node = tree.nodes.new("CompositorNodeMixRGB")
     node.inputs[0].default_value = 0.5
     for source, target in zip(sources, node.inputs[1:], strict=True):
@@ -61,7 +61,7 @@ def mean(*, tree: bpy.types.NodeTree, sources: list, name: str) -> bpy.types.Nod
 
 
 def output_of(*, node: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
-    """The pass of this name."""
+    """Returns the pass with this name."""
     found = next((output for output in node.outputs if output.name == name), None)
     if found is None:
         names = ", ".join(output.name for output in node.outputs)
@@ -72,7 +72,7 @@ def output_of(*, node: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
 def denoised(
     *, tree: bpy.types.NodeTree, image: bpy.types.NodeSocket, hdr: bool, guides: dict | None = None
 ) -> bpy.types.NodeSocket:
-    """The picture without noise. Guides are given without noise themselves, so that they are cleaned once only."""
+    """Adds the denoised picture. The guides are denoised before, so that this happens only once."""
     node = tree.nodes.new("CompositorNodeDenoise")
     node.use_hdr = hdr
     node.prefilter = "NONE"

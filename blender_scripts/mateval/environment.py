@@ -1,4 +1,4 @@
-"""Where Blender looks an environment map up. Needs no bpy.
+"""The coordinates at which Blender looks up an environment map. Needs no bpy.
 
 The format (FORMAT.md, "Environment lookup") turns a direction into the map's frame, d = Rt w, and looks up
 u = atan2(d.x, -d.z) / 2 pi, v = acos(d.y) / pi from the top. Blender looks b up at u = 1/2 - atan2(b.y, b.x) / 2 pi,
@@ -9,7 +9,7 @@ Row = tuple[float, float, float]
 
 
 def blender_from_world(*, world_from_environment: list[list[float]]) -> tuple[Row, Row, Row]:
-    """Rows of the matrix that takes a direction of the world to where Blender looks it up."""
+    """Returns the rows of the matrix that takes a world direction to Blender's lookup direction."""
 
     def row_of(axis: int) -> Row:
         # A row of the transposed rotation is a column of the rotation.

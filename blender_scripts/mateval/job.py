@@ -1,4 +1,4 @@
-"""A job: its JSON, and the files beside it. Needs no bpy."""
+"""Reads a job: its JSON and the files beside it. Needs no bpy."""
 
 import array
 import json
@@ -14,11 +14,11 @@ RESULT_FORMAT = "mateval-blender-result/1"
 
 
 class JobError(Exception):
-    """A job that cannot be carried out: what was expected and what was found."""
+    """A job that cannot be run. The message states what was expected and what was found."""
 
 
 def read_job(*, path: Path) -> Job:
-    """The job; every file that it names must be there."""
+    """Returns the job, after checking that every file that it names exists."""
     job: Job = json.loads(path.read_text(encoding="utf-8"))
     if job.get("format") != FORMAT:
         raise JobError(f"'{path}': expected the format '{FORMAT}', found {job.get('format')!r}")
@@ -31,7 +31,7 @@ def read_job(*, path: Path) -> Job:
 
 
 def files_of(*, job: Job) -> list[str]:
-    """Every file that the job names, relative to its folder."""
+    """Returns every file that the job names, relative to its folder."""
     files = [texture["file"] for texture in job["textures"]]
     for surface in job["surfaces"]:
         keys = ("positions", "triangles", "normals", "uvs", "parts")
@@ -40,7 +40,7 @@ def files_of(*, job: Job) -> list[str]:
 
 
 def read_numbers(*, path: Path, code: str) -> array.array:
-    """A file of little-endian numbers: `f` 32-bit floats, `I` 32-bit and `H` 16-bit whole ones."""
+    """Reads little-endian numbers: `f` for 32-bit floats, `I` for 32-bit and `H` for 16-bit unsigned integers."""
     numbers = array.array(code)
     numbers.frombytes(path.read_bytes())
     if sys.byteorder == "big":
@@ -49,7 +49,7 @@ def read_numbers(*, path: Path, code: str) -> array.array:
 
 
 def write_result(*, folder: Path, result: Job) -> None:
-    """Renews `result.json`: it is never there half written."""
+    """Replaces `result.json`, which never exists incomplete."""
     place = folder / "result.json"
     work = folder / ".result.json.partial"
     work.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
@@ -57,7 +57,7 @@ def write_result(*, folder: Path, result: Job) -> None:
 
 
 def lights_of_surfaces(*, job: Job) -> dict[int, int]:
-    """The group of lights of every surface that glows."""
+    """Returns the light group of every emitting surface."""
     owner: dict[int, int] = {}
     for group, light in enumerate(job["lights"]):
         emission = light["emission"]
@@ -66,20 +66,20 @@ def lights_of_surfaces(*, job: Job) -> dict[int, int]:
         for surface in emission["surfaces"]:
             if surface in owner:
                 raise JobError(
-                    f"surface {surface} is in the light groups {owner[surface]} and {group}; Blender knows one"
+                    f"surface {surface} is in the light groups {owner[surface]} and {group}; Blender supports one"
                 )
             owner[surface] = group
     return owner
 
 
 def light_of_world(*, job: Job) -> int | None:
-    """The group that shines from outside; Blender has one world."""
+    """Returns the light group that surrounds the scene. Blender has one world, so there can be one at most."""
     groups = [k for k, light in enumerate(job["lights"]) if light["emission"]["type"] != "area"]
     if len(groups) > 1:
-        raise JobError(f"the light groups {groups} all shine from outside; Blender has one world")
+        raise JobError(f"the light groups {groups} all surround the scene; Blender has one world")
     return groups[0] if groups else None
 
 
 def group_name(*, group: int) -> str:
-    """The name of a light group in Blender, and so of its pass."""
+    """Returns the name of a light group in Blender, which its pass has too."""
     return f"group_{group:02}"

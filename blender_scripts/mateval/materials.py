@@ -1,7 +1,7 @@
 """Materials and lamps of a job as Cycles' shader graphs.
 
-The names of models and inputs are those of `reference.json` and `lights.json` (dataset_spec/FORMAT.md, section 8). What
-Cycles can only come near is said by `approximation`.
+The names of models and inputs are those of `reference.json` and `lights.json` (dataset_spec/FORMAT.md, section 8).
+`approximation` states where Cycles only comes near a model.
 """
 
 from pathlib import Path
@@ -38,7 +38,7 @@ BLACK = (0.0, 0.0, 0.0)
 WHITE = [1.0, 1.0, 1.0]
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
 COVERED = 0.5
-"""From this opacity on a place counts as there, in ids and base colour."""
+"""Smallest opacity at which a place counts as part of the surface, in ids and base colour."""
 
 
 class Textures:
@@ -57,7 +57,7 @@ class Textures:
         return image
 
     def color(self, *, tree: Tree, lookup: Job) -> Socket:
-        """The texture at the surface's uv, linear."""
+        """Adds a lookup of the texture at the surface's uv, with linear values."""
         node = tree.nodes.new("ShaderNodeTexImage")
         node.image = self._images[lookup["texture"]]
         node.interpolation = "Linear"
@@ -72,19 +72,19 @@ class Textures:
         return node.outputs["Color"]
 
     def image(self, *, index: int) -> bpy.types.Image:
-        """The picture itself."""
+        """Returns the image."""
         return self._images[index]
 
 
 def color_of(*, tree: Tree, textures: Textures, given: Job) -> Socket:
-    """A colour of a material: `{"constant": rgb}` or `{"texture": ...}`."""
+    """Adds a colour of a material: `{"constant": rgb}` or `{"texture": ...}`."""
     if "constant" in given:
         return constant(tree=tree, color=given["constant"])
     return textures.color(tree=tree, lookup=given["texture"])
 
 
 def number_of(*, tree: Tree, textures: Textures, given: Job) -> Socket:
-    """A number of a material: `{"constant": value}` or one channel of a texture."""
+    """Adds a number of a material: `{"constant": value}` or one channel of a texture."""
     if "constant" in given:
         return number(tree=tree, value=given["constant"])
     color = textures.color(tree=tree, lookup=given["texture"])
@@ -92,12 +92,12 @@ def number_of(*, tree: Tree, textures: Textures, given: Job) -> Socket:
 
 
 def is_white(*, given: Job) -> bool:
-    """Whether a colour changes nothing."""
+    """Returns whether a colour is constant white, which changes nothing."""
     return given.get("constant") == WHITE
 
 
 def roughness_of(*, tree: Tree, textures: Textures, microfacets: Job | None) -> Socket:
-    """Blender's roughness is the square root of the distribution's alpha; a smooth surface has 0."""
+    """Adds Blender's roughness: the square root of the distribution's alpha, 0 for a smooth surface."""
     if microfacets is None:
         return number(tree=tree, value=0.0)
     alpha = number_of(tree=tree, textures=textures, given=microfacets["alpha"])
@@ -105,12 +105,12 @@ def roughness_of(*, tree: Tree, textures: Textures, microfacets: Job | None) -> 
 
 
 def distribution_of(*, microfacets: Job | None) -> str:
-    """Blender's name of the distribution."""
+    """Returns Blender's name of the distribution."""
     return DISTRIBUTIONS[microfacets["distribution"]] if microfacets else "GGX"
 
 
 def base_color(*, tree: Tree, textures: Textures, model: Job) -> Socket | None:
-    """What a method is to recover (FORMAT.md, "Materials as base_color, roughness, metallic"); none for glass."""
+    """Adds the base_color that methods recover (FORMAT.md, section 8); none for glass."""
     match model["type"]:
         case "diffuse":
             return color_of(tree=tree, textures=textures, given=model["reflectance"])
@@ -126,7 +126,7 @@ def base_color(*, tree: Tree, textures: Textures, model: Job) -> Socket | None:
 
 
 def normal_reflectance(*, ior: Job | str) -> tuple[float, ...]:
-    """F0 of a conductor."""
+    """Returns F0 of a conductor."""
     if ior == "perfect_mirror":
         return (1.0, 1.0, 1.0)
     pairs = zip(ior["eta_k"]["eta"], ior["eta_k"]["k"], strict=True)
@@ -134,7 +134,7 @@ def normal_reflectance(*, ior: Job | str) -> tuple[float, ...]:
 
 
 def reflecting(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """The shader of a model, without lamps, masks and bumps."""
+    """Adds the shader of a model, without emission, opacity and bump map."""
     makers = {
         "diffuse": diffuse,
         "plastic": plastic,
@@ -147,7 +147,7 @@ def reflecting(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def diffuse(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """Lambert, or with a roughness Blender's Oren-Nayar."""
+    """Adds Lambert, or Blender's Oren-Nayar where there is a roughness."""
     color = color_of(tree=tree, textures=textures, given=model["reflectance"])
     roughness: Socket | float = 0.0
     if model["alpha"] is not None:
@@ -156,7 +156,7 @@ def diffuse(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def principled(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """Principled with all else at its default."""
+    """Adds Principled with every other input at its default."""
     return new(
         tree=tree,
         kind="ShaderNodeBsdfPrincipled",
@@ -169,7 +169,7 @@ def principled(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """Principled with the coat's index, and the base colour that light sees after its way through the coat."""
+    """Adds Principled with the coat's index, and with the base colour as it appears through the coat."""
     given = color_of(tree=tree, textures=textures, given=model["diffuse_reflectance"])
     scale, inner = base_under_coat(eta=model["eta"], nonlinear=model["nonlinear"])
     color = times(tree=tree, color=given, factor=(scale, scale, scale))
@@ -190,7 +190,7 @@ def plastic(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def conductor(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """A metal by its complex index; with a tint, by its colour at normal incidence and at the edge."""
+    """Adds a metal by its complex index; a tinted one by its colour at normal incidence and at the edge."""
     roughness = roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"])
     distribution = distribution_of(microfacets=model["microfacets"])
     if model["ior"] == "perfect_mirror":
@@ -214,7 +214,7 @@ def conductor(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """Glass: one colour for what it reflects and what it lets through."""
+    """Adds glass with one colour for reflection and transmission."""
     color = color_of(tree=tree, textures=textures, given=model["specular_transmittance"])
     roughness = roughness_of(tree=tree, textures=textures, microfacets=model["microfacets"])
     node = new(tree=tree, kind="ShaderNodeBsdfGlass", Color=color, Roughness=roughness)
@@ -224,8 +224,8 @@ def dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def thin_dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
-    """A pane: what both its boundaries reflect together is 2 F / (1 + F), the rest goes straight through."""
-    # Blender's Fresnel node inverts the index behind a surface; a pane looks alike from both sides.
+    """Adds a pane: both boundaries together reflect 2 F / (1 + F), and the rest passes straight through."""
+    # Blender's Fresnel node inverts the index for the back of a surface; a pane looks the same from both sides.
     eta = model["eta"]
     behind = backfacing(tree=tree)
     index = operation(tree=tree, operation="MULTIPLY_ADD", values=[behind, 1.0 / eta - eta, eta])
@@ -242,7 +242,7 @@ def thin_dielectric(*, tree: Tree, textures: Textures, model: Job) -> Socket:
 
 
 def approximation(*, model: Job) -> str | None:
-    """What Cycles does not do as the model says; none where it does."""
+    """Returns how Cycles deviates from the model; none where it does not."""
     match model["type"]:
         case "principled" if model["flavour"] != "blender":
             return "Mitsuba's principled is rendered as Blender's"
@@ -259,7 +259,7 @@ def approximation(*, model: Job) -> str | None:
 
 
 def surface_material(*, textures: Textures, material: Job, light: Job | None) -> bpy.types.Material:
-    """A material as light sees it; `light` is the group of lamps that its surface is of."""
+    """Makes the material that is lit; `light` is the light group of its surface."""
     made, tree, output = empty(name=material["name"])
     two_sided_lamp = light is not None and light["emission"]["two_sided"]
     made.cycles.emission_sampling = "FRONT_BACK" if two_sided_lamp else "FRONT" if light else "NONE"
@@ -285,7 +285,7 @@ def surface_material(*, textures: Textures, material: Job, light: Job | None) ->
 
 
 def geometry_material(*, textures: Textures, material: Job) -> bpy.types.Material:
-    """The same surface without light: what it hides, and which instance and part it is."""
+    """Makes the material of the geometry pass: its opacity, and the ids of instance and part, without light."""
     made, tree, output = empty(name=f"geometry of {material['name']}")
     made.cycles.emission_sampling = "NONE"
     shader = new(tree=tree, kind="ShaderNodeBsdfDiffuse").outputs[0]
@@ -303,7 +303,7 @@ def geometry_material(*, textures: Textures, material: Job) -> bpy.types.Materia
 
 
 def empty(*, name: str) -> tuple[bpy.types.Material, Tree, bpy.types.Node]:
-    """A material without a surface, its graph and its output."""
+    """Makes a material without a surface shader; returns it, its graph and its output node."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
     tree = made.node_tree
@@ -312,12 +312,12 @@ def empty(*, name: str) -> tuple[bpy.types.Material, Tree, bpy.types.Node]:
 
 
 def clear(*, tree: Tree) -> Socket:
-    """Lets everything through."""
+    """Adds a fully transparent shader."""
     return new(tree=tree, kind="ShaderNodeBsdfTransparent").outputs[0]
 
 
 def is_covered(*, tree: Tree, opacity: Socket) -> Socket:
-    """1 where the surface counts as there."""
+    """Adds 1 where the opacity is large enough to count, else 0."""
     return operation(
         tree=tree,
         operation="LESS_THAN",
@@ -326,7 +326,7 @@ def is_covered(*, tree: Tree, opacity: Socket) -> Socket:
 
 
 def bend(*, tree: Tree, textures: Textures, bump: Job | None) -> None:
-    """Gives every shader of the graph the normal of the height map: heights in metres times `scale`."""
+    """Gives every shader of the graph the normal of the height map, whose heights are in metres times `scale`."""
     if bump is None:
         return
     height = number_of(tree=tree, textures=textures, given=bump["height"])
@@ -337,7 +337,7 @@ def bend(*, tree: Tree, textures: Textures, bump: Job | None) -> None:
 
 
 def lamp(*, tree: Tree, textures: Textures, surface: Socket, light: Job) -> Socket:
-    """A surface that glows; a hidden one shows the camera the surface alone and every other ray the light alone."""
+    """Adds emission. A hidden light shows its surface to camera rays and its emission to all other rays."""
     emission = light["emission"]
     radiance = constant(tree=tree, color=emission["radiance"])
     if emission.get("map") is not None:
@@ -355,7 +355,7 @@ def lamp(*, tree: Tree, textures: Textures, surface: Socket, light: Job) -> Sock
 
 
 def show_color(*, tree: Tree, name: str, color: Socket, covered: Socket | None) -> None:
-    """Writes the colour to the pass of this name."""
+    """Writes the colour to the pass with this name."""
     node = tree.nodes.new("ShaderNodeOutputAOV")
     node.aov_name = name
     value = color if covered is None else scaled(tree=tree, color=color, factor=covered)
@@ -363,7 +363,7 @@ def show_color(*, tree: Tree, name: str, color: Socket, covered: Socket | None) 
 
 
 def show_number(*, tree: Tree, name: str, value: Socket, covered: Socket | None) -> None:
-    """Writes the number to the pass of this name."""
+    """Writes the number to the pass with this name."""
     node = tree.nodes.new("ShaderNodeOutputAOV")
     node.aov_name = name
     shown = value if covered is None else operation(tree=tree, operation="MULTIPLY", values=[value, covered])

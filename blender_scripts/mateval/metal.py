@@ -3,11 +3,11 @@
 import math
 
 EDGE_COSINE = 1.0 / 7.0
-"""Where Blender's edge tint is meant: at about 82 degrees, where Schlick's curve is furthest off (Kutz et al. 2021)."""
+"""Cosine at Blender's edge tint, about 82 degrees, where Schlick's curve deviates most (Kutz et al. 2021)."""
 
 
 def reflectance(*, cosine: float, eta: float, k: float) -> float:
-    """Share of unpolarised light that a conductor of the complex index eta + i k reflects at this cosine."""
+    """Returns the share of unpolarised light that a conductor with complex index eta + i k reflects at this cosine."""
     sine2 = 1.0 - cosine * cosine
     t = eta * eta - k * k - sine2
     a2b2 = math.sqrt(t * t + 4.0 * eta * eta * k * k)
@@ -20,7 +20,7 @@ def reflectance(*, cosine: float, eta: float, k: float) -> float:
 
 
 def edge_tint(*, eta: float, k: float) -> float:
-    """What Blender's F82 model multiplies Schlick's curve by at 82 degrees, for the same metal."""
+    """Returns the factor of Schlick's curve at 82 degrees in Blender's F82 model of the same metal."""
     normal = reflectance(cosine=1.0, eta=eta, k=k)
     schlick = normal + (1.0 - normal) * (1.0 - EDGE_COSINE) ** 5
     return min(1.0, reflectance(cosine=EDGE_COSINE, eta=eta, k=k) / schlick)

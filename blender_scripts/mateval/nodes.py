@@ -1,4 +1,4 @@
-"""Pieces of shader graphs."""
+"""Functions that add nodes to shader graphs."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ Tree = bpy.types.NodeTree
 
 
 def new(*, tree: Tree, kind: str, **inputs: object) -> bpy.types.Node:
-    """A node; each input is a socket to link, or a value."""
+    """Adds a node; each input is a socket to link or a value."""
     node = tree.nodes.new(kind)
     for name, value in inputs.items():
         put(tree=tree, socket=node.inputs[name.replace("_", " ")], value=value)
@@ -25,21 +25,21 @@ def put(*, tree: Tree, socket: Socket, value: object) -> None:
 
 
 def constant(*, tree: Tree, color: Sequence[float]) -> Socket:
-    """A linear colour."""
+    """Adds a linear colour."""
     node = tree.nodes.new("ShaderNodeRGB")
     node.outputs[0].default_value = (*color, 1.0)
     return node.outputs[0]
 
 
 def number(*, tree: Tree, value: float) -> Socket:
-    """A number."""
+    """Adds a number."""
     node = tree.nodes.new("ShaderNodeValue")
     node.outputs[0].default_value = value
     return node.outputs[0]
 
 
 def math(*, tree: Tree, operation: str, values: Sequence[Socket | float]) -> Socket:
-    """One operation on numbers."""
+    """Adds an operation on numbers."""
     node = tree.nodes.new("ShaderNodeMath")
     node.operation = operation
     for socket, value in zip(node.inputs, values, strict=False):
@@ -48,7 +48,7 @@ def math(*, tree: Tree, operation: str, values: Sequence[Socket | float]) -> Soc
 
 
 def vector_math(*, tree: Tree, operation: str, values: Sequence[Socket | Sequence[float]]) -> Socket:
-    """One operation on vectors or colours, channel by channel."""
+    """Adds an operation on vectors or colours, channel by channel."""
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = operation
     for socket, value in zip(node.inputs, values, strict=False):
@@ -57,12 +57,12 @@ def vector_math(*, tree: Tree, operation: str, values: Sequence[Socket | Sequenc
 
 
 def times(*, tree: Tree, color: Socket, factor: Socket | Sequence[float]) -> Socket:
-    """Two colours multiplied, channel by channel."""
+    """Adds the product of two colours, channel by channel."""
     return vector_math(tree=tree, operation="MULTIPLY", values=[color, factor])
 
 
 def scaled(*, tree: Tree, color: Socket, factor: Socket) -> Socket:
-    """A colour times a number."""
+    """Adds the product of a colour and a number."""
     node = tree.nodes.new("ShaderNodeVectorMath")
     node.operation = "SCALE"
     tree.links.new(color, node.inputs[0])
@@ -71,7 +71,7 @@ def scaled(*, tree: Tree, color: Socket, factor: Socket) -> Socket:
 
 
 def linear_map(*, tree: Tree, vector: Socket, rows: Sequence[Sequence[float]]) -> Socket:
-    """The vector times a matrix of up to three rows; missing ones are zero."""
+    """Adds the product of a matrix and the vector; missing rows are zero."""
     combine = tree.nodes.new("ShaderNodeCombineXYZ")
     for row, target in zip(rows, combine.inputs, strict=False):
         dot = tree.nodes.new("ShaderNodeVectorMath")
@@ -83,7 +83,7 @@ def linear_map(*, tree: Tree, vector: Socket, rows: Sequence[Sequence[float]]) -
 
 
 def mix(*, tree: Tree, factor: Socket | float, first: Socket, second: Socket) -> Socket:
-    """The first shader where the factor is 0, the second where it is 1."""
+    """Adds a mixture: the first shader where the factor is 0, the second where it is 1."""
     node = tree.nodes.new("ShaderNodeMixShader")
     put(tree=tree, socket=node.inputs[0], value=factor)
     tree.links.new(first, node.inputs[1])
@@ -92,10 +92,10 @@ def mix(*, tree: Tree, factor: Socket | float, first: Socket, second: Socket) ->
 
 
 def backfacing(*, tree: Tree) -> Socket:
-    """1 where the surface is seen from behind."""
+    """Adds 1 where the surface is seen from behind, else 0."""
     return tree.nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"]
 
 
 def is_camera_ray(*, tree: Tree) -> Socket:
-    """1 where the ray comes from the camera."""
+    """Adds 1 for camera rays, else 0."""
     return tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]

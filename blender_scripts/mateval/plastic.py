@@ -6,7 +6,7 @@ STEPS = 4096
 
 
 def fresnel(*, cosine: float, eta: float) -> float:
-    """Share of unpolarised light that a boundary of relative index eta (beyond over before) reflects."""
+    """Returns the share of unpolarised light that a boundary reflects; eta is the index beyond over that before."""
     sine2 = (1.0 - cosine * cosine) / (eta * eta)
     if sine2 >= 1.0:
         return 1.0
@@ -17,16 +17,16 @@ def fresnel(*, cosine: float, eta: float) -> float:
 
 
 def diffuse_reflectance(*, eta: float) -> float:
-    """Share of light from all around that the boundary reflects: the cosine-weighted mean of `fresnel`."""
+    """Returns the share of diffuse light that the boundary reflects: the cosine-weighted mean of `fresnel`."""
     places = ((k + 0.5) / STEPS for k in range(STEPS))
     return sum(2.0 * cosine * fresnel(cosine=cosine, eta=eta) for cosine in places) / STEPS
 
 
 def base_under_coat(*, eta: float, nonlinear: bool) -> tuple[float, float]:
-    """(scale, inner): a base of reflectance rho looks like rho * scale / (1 - rho * inner) through the coat.
+    """Returns (scale, inner): through the coat, a base of reflectance rho looks like rho * scale / (1 - rho * inner).
 
-    Mitsuba's plastic: what enters, (1 - F outside) / eta^2, times what leaves after any number of reflections inside.
-    With `nonlinear` the base's colour takes part in each of them, without it none of them takes anything.
+    As in Mitsuba's plastic, the light that enters, (1 - F outside) / eta^2, is multiplied by the light that leaves
+    after any number of inner reflections. With `nonlinear` each of those is tinted by the base; without it none is.
     """
     outside, inside = diffuse_reflectance(eta=eta), diffuse_reflectance(eta=1.0 / eta)
     enters = (1.0 - outside) / (eta * eta)

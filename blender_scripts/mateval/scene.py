@@ -11,11 +11,11 @@ from mateval.materials import INSTANCE, PART, UV_LAYER, Textures, approximation,
 from mateval.world import add_world
 
 SENSOR_WIDTH = 36.0
-"""Millimetres; of no meaning, as the angle decides."""
+"""Width of the sensor in millimetres; any value will do, because the field of view is given as an angle."""
 
 
 class BuiltScene:
-    """A job's scene, with both kinds of material for each object."""
+    """A job's scene. Each object has a material for geometry passes and one for light."""
 
     def __init__(self, *, job: Job, folder: Path) -> None:
         bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -31,17 +31,17 @@ class BuiltScene:
         self.scene.camera = self._camera
 
     def show_geometry(self) -> None:
-        """Every surface tells which it is."""
+        """Gives every surface the material that shows its ids."""
         for thing, (geometry, _) in self._objects:
             thing.data.materials[0] = geometry
 
     def show_light(self) -> None:
-        """Every surface reflects and glows as the job says."""
+        """Gives every surface the material that reflects and emits as the job describes."""
         for thing, (_, lit) in self._objects:
             thing.data.materials[0] = lit
 
     def look_from(self, *, camera: Job) -> None:
-        """Takes the place, the lens and the picture's size of a view."""
+        """Sets the camera's pose, the lens and the picture's size of a view."""
         intrinsics = camera["intrinsics"]
         shape = lens(intrinsics=intrinsics)
         data = self._camera.data
@@ -58,14 +58,14 @@ class BuiltScene:
 
 
 def approximations(*, job: Job) -> list[str]:
-    """What is rendered only nearly as the job says, a line a material that is used."""
+    """Returns how Cycles deviates from the job, one line per used material."""
     used = sorted({surface["material"] for surface in job["surfaces"]})
     said = ((job["materials"][k]["name"], approximation(model=job["materials"][k]["model"])) for k in used)
     return [f"material '{name}': {why}" for name, why in said if why is not None]
 
 
 def add_surfaces(*, job: Job, folder: Path, textures: Textures) -> list[tuple]:
-    """An object a surface, with its two materials."""
+    """Makes one object per surface, with its two materials."""
     light_of = lights_of_surfaces(job=job)
     geometry: dict[int, bpy.types.Material] = {}
     lit: dict[tuple[int, int | None], bpy.types.Material] = {}
@@ -87,7 +87,7 @@ def add_surfaces(*, job: Job, folder: Path, textures: Textures) -> list[tuple]:
 
 
 def add_mesh(*, surface: Job, number: int, folder: Path) -> bpy.types.Object:
-    """A surface's triangles; smooth where it has normals of its own. Its faces know their instance and part."""
+    """Makes a surface's mesh, smooth where it has normals. Face attributes hold the instance and the part."""
     mesh = bpy.data.meshes.new(f"surface {number}")
     corners = read_numbers(path=folder / surface["triangles"], code="I")
     positions = read_numbers(path=folder / surface["positions"], code="f")
@@ -110,7 +110,7 @@ def add_mesh(*, surface: Job, number: int, folder: Path) -> bpy.types.Object:
     mark(mesh=mesh, name=INSTANCE, values=[surface["instance"]] * triangles)
     mark(mesh=mesh, name=PART, values=read_numbers(path=folder / surface["parts"], code="H"))
     thing = bpy.data.objects.new(f"surface {number}", mesh)
-    # Blender moves shadow rays off curved surfaces by default, which is no part of the material.
+    # By default Blender moves the shadow terminator of smooth surfaces, which the material does not describe.
     thing.cycles.shadow_terminator_offset = 0.0
     thing.cycles.shadow_terminator_geometry_offset = 0.0
     bpy.context.scene.collection.objects.link(thing)
@@ -118,12 +118,12 @@ def add_mesh(*, surface: Job, number: int, folder: Path) -> bpy.types.Object:
 
 
 def add_uvs(*, mesh: bpy.types.Mesh, corners: list, uvs: list) -> None:
-    """A pair a corner, from a pair a vertex."""
+    """Sets the uv of each corner from those of its vertex."""
     layer = mesh.uv_layers.new(name=UV_LAYER)
     layer.uv.foreach_set("vector", [number for k in corners for number in uvs[2 * k : 2 * k + 2]])
 
 
 def mark(*, mesh: bpy.types.Mesh, name: str, values: list) -> None:
-    """Gives each face a number; floats hold all of 16 bits."""
+    """Gives each face a number; floats represent 16-bit integers exactly."""
     attribute = mesh.attributes.new(name=name, type="FLOAT", domain="FACE")
     attribute.data.foreach_set("value", [float(value) for value in values])

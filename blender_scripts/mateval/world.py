@@ -1,4 +1,4 @@
-"""What shines from outside."""
+"""The light that surrounds a scene."""
 
 import bpy
 
@@ -9,7 +9,7 @@ from mateval.nodes import constant, is_camera_ray, linear_map, mix, new, times
 
 
 def add_world(*, scene: bpy.types.Scene, job: Job, textures: Textures) -> None:
-    """The world of the job's one group that shines from outside; black where there is none."""
+    """Makes the world of the job's surrounding light group; black where there is none."""
     world = bpy.data.worlds.new("world")
     world.use_nodes = True
     scene.world = world
@@ -31,7 +31,7 @@ def add_world(*, scene: bpy.types.Scene, job: Job, textures: Textures) -> None:
 
 
 def radiance(*, tree: bpy.types.NodeTree, textures: Textures, light: Job) -> bpy.types.NodeSocket:
-    """The same from everywhere, or a latitude-longitude picture's."""
+    """Adds the surrounding radiance: constant, or from a latitude-longitude map."""
     emission = light["emission"]
     if emission["type"] == "constant":
         return constant(tree=tree, color=emission["radiance"])

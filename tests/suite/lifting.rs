@@ -282,7 +282,7 @@ fn what_cannot_be_lifted_is_said() {
     nn(&["--estimate", &here, "--adapter", "no-such"]).says("colorful-shading");
     let mut command = mateval();
     command.args(["baseline", "median-part", "--part-set", "none", "--estimate", "gt", "--dataset"]).arg(&*ROOM);
-    run(command.arg("--out").arg(&out)).ends_with(2).says("no set of parts 'none'");
+    run(command.arg("--out").arg(&out)).ends_with(2).says("no part set 'none'");
     assert!(!out.exists());
 }
 

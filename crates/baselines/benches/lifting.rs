@@ -1,8 +1,8 @@
-//! Where the time of `baseline nn` goes, and its search for nearest points against scipy's cKDTree.
+//! Measures the steps of `baseline nn`, and compares its nearest-point search with scipy's cKDTree.
 //!
-//! `cargo bench -p mateval-baselines --bench lifting -- DATASET [PYTHON]`: every scene at 1024 texels a side, from the
-//! truth's estimate; seconds of the wall clock. With a Python that has scipy, the largest step of all is done by both, in
-//! turn.
+//! `cargo bench -p mateval-baselines --bench lifting -- DATASET [PYTHON]` lifts the ground truth of every scene to atlases
+//! of 1024 x 1024 texels and prints wall-clock seconds. With a Python that has scipy, the largest filling step is done by
+//! both programs in turn.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 use std::io::Write as _;
@@ -29,7 +29,7 @@ const STAGES: [&str; 6] = ["geometry and estimate", "what pixels show", "lifting
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let Some(dataset) = words.first() else {
-        println!("SKIPPED: give a dataset's folder");
+        println!("SKIPPED: expected the folder of a dataset");
         return;
     };
     let dataset = Dataset::open(&PathBuf::from(dataset)).unwrap();
@@ -37,18 +37,18 @@ fn main() {
     for scene in &dataset.scenes {
         let mut whole = 0.0;
         timed(&mut whole, || whole_room(&dataset, scene));
-        println!("{}: {whole:.2} s for {} instances; one after the other:", scene.id, scene.instances.len());
+        println!("{}: {whole:.2} s for {} instances; the steps one after the other:", scene.id, scene.instances.len());
         let (seconds, step) = room(&dataset, scene);
         STAGES.iter().zip(seconds).for_each(|(stage, seconds)| println!("  {seconds:>7.2} s {stage}"));
         largest = largest.into_iter().chain(step).max_by_key(|step| step.unseen());
     }
     match (words.get(1), largest) {
         (Some(python), Some(step)) => against_scipy(&step, Path::new(python)),
-        _ => println!("SKIPPED: scipy; give a Python that has it"),
+        _ => println!("SKIPPED: the comparison with scipy; expected a Python that has scipy"),
     }
 }
 
-/// The filling of one instance, not yet done.
+/// The input of the filling step of one instance.
 struct Step {
     points: Vec<SeenPoint>,
     known: PartialAtlas,
@@ -73,14 +73,14 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     made
 }
 
-/// As `baseline nn` does it.
+/// Lifts a scene as `baseline nn` does.
 fn whole_room(dataset: &Dataset, scene: &SceneFile) {
     let folder = tempfile::tempdir().unwrap();
     let options = NnOptions { atlas_size: Some(SIZE as u32), ..NnOptions::default() };
     nn::write_scene(dataset, scene, folder.path(), &EstimateSource::Truth, &options, &|_, _, _| {}).unwrap();
 }
 
-/// Seconds of each stage, and the filling of the instance with most unseen texels.
+/// Seconds of each stage, and the filling step of the instance with the most unseen texels.
 fn room(dataset: &Dataset, scene: &SceneFile) -> ([f64; 6], Option<Step>) {
     let mut seconds = [0.0; 6];
     let folder = tempfile::tempdir().unwrap();
@@ -97,8 +97,8 @@ fn room(dataset: &Dataset, scene: &SceneFile) -> ([f64; 6], Option<Step>) {
     for instance in (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()) {
         let mut known = timed(&mut seconds[2], || lift(&geometry, &seen, &estimate, instance, SIZE));
         let own: Vec<SeenPoint> = points.iter().filter(|point| point.instance == instance).copied().collect();
-        let said = |point: &SeenPoint| (*point, estimate.at(point.pixel.0, point.pixel.1));
-        let cloud = timed(&mut seconds[3], || SeenCloud::new(FillRule::default(), own.iter().map(said)));
+        let with_values = |point: &SeenPoint| (*point, estimate.at(point.pixel.0, point.pixel.1));
+        let cloud = timed(&mut seconds[3], || SeenCloud::new(FillRule::default(), own.iter().map(with_values)));
         let mesh = geometry.mesh(instance).clone();
         let step = Step { points: own, known: copy(&known), mesh };
         if !cloud.is_empty() && largest.as_ref().is_none_or(|largest| step.unseen() > largest.unseen()) {
@@ -106,7 +106,7 @@ fn room(dataset: &Dataset, scene: &SceneFile) -> ([f64; 6], Option<Step>) {
         }
         if timed(&mut seconds[4], || fill(&cloud, &mut known, geometry.mesh(instance))) {
             let folder = folder.path().join(scene.instances[instance].id.as_str());
-            timed(&mut seconds[5], || Maps::of_atlas(&known, estimate.says()).write(&folder).unwrap());
+            timed(&mut seconds[5], || Maps::of_atlas(&known, estimate.given_maps()).write(&folder).unwrap());
         }
     }
     (seconds, largest)
@@ -116,7 +116,7 @@ fn copy(known: &PartialAtlas) -> PartialAtlas {
     PartialAtlas { atlas: known.atlas.clone(), texels: known.texels.clone() }
 }
 
-/// The same step by both, in turn, and how far apart what they find is.
+/// Does the same step with both programs in turn; the script prints the largest difference of their distances.
 fn against_scipy(step: &Step, python: &Path) {
     let folder = tempfile::tempdir().unwrap();
     let unseen = places(step);
@@ -143,7 +143,7 @@ fn against_scipy(step: &Step, python: &Path) {
     }
 }
 
-/// The unseen texels of a step, and where their centres are.
+/// The unseen texels of a step and the places of their centres.
 fn places(step: &Step) -> Vec<(usize, DVec3)> {
     let of_texel = |at: usize| {
         let (x, y) = (at % SIZE, at / SIZE);
@@ -155,7 +155,7 @@ fn places(step: &Step) -> Vec<(usize, DVec3)> {
     (0..SIZE * SIZE).filter_map(of_texel).collect()
 }
 
-/// Three 64-bit floats a place.
+/// Writes three 64-bit floats per place.
 fn write(path: &Path, places: &[DVec3]) {
     let mut file = std::io::BufWriter::new(std::fs::File::create(path).unwrap());
     places.iter().flat_map(|place| place.to_array()).for_each(|v| file.write_all(&v.to_le_bytes()).unwrap());

@@ -1,7 +1,8 @@
-"""The search for nearest points of `baseline nn` by scipy: `scipy_tree.py FOLDER`, with files of 64-bit floats, three a place.
+"""Repeats the nearest-point search of `baseline nn` with scipy: `scipy_tree.py FOLDER`.
 
-In: `points`, `queries`, and `distances`: what the other found, three times each. Prints seconds for the tree and for all
-queries, on all processors, and how far apart the distances are at most.
+The folder holds `points`, `queries` and `distances`, files of 64-bit floats with three per place. `distances` are those
+that the other program found, each three times. Prints the seconds for building the tree and for all queries, on all
+processors, and the largest difference between the distances.
 """
 
 import sys
@@ -18,7 +19,7 @@ def places(*, folder: Path, name: str) -> numpy.ndarray:
 
 
 def main() -> None:
-    """Times scipy once."""
+    """Builds the tree and runs all queries once, and prints the times."""
     folder = Path(sys.argv[1])
     points, queries = places(folder=folder, name="points"), places(folder=folder, name="queries")
     begun = time.perf_counter()

@@ -1,6 +1,6 @@
-//! Adapters: what files a method writes and what their numbers mean, as data.
+//! Adapters: TOML files that state which pictures a method writes and how their numbers are encoded.
 //!
-//! An adapter is a TOML file; `adapters/` holds those of known methods. Another method needs a file, no code.
+//! `adapters/` holds those of known methods. Support for another method needs another file, and no code.
 
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,15 @@ use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{LinearRgb, Picture, Wrap};
 use serde::Deserialize;
 
-use crate::error::BaselineError;
+use crate::error::{AdapterError, BaselineError};
 use crate::estimate::Estimate;
 
-/// Stands for the scene's id in a path.
+/// The placeholder for the scene's id in a path.
 const SCENE: &str = "{scene}";
-/// Of the pixels of a picture of free scale, this share has its largest channel at or below 1 afterwards.
+/// After a picture of free scale is scaled, this share of its pixels has its largest channel at or below 1.
 const FREE_SCALE_SHARE: f64 = 0.99;
 
-/// The adapters that come with the tool, by name.
+/// The built-in adapters, by name.
 const BUILT_IN: [(&str, &str); 5] = [
     ("colorful-shading", include_str!("../adapters/colorful-shading.toml")),
     ("intrinsic", include_str!("../adapters/intrinsic.toml")),
@@ -26,13 +26,13 @@ const BUILT_IN: [(&str, &str); 5] = [
     ("rgbx", include_str!("../adapters/rgbx.toml")),
 ];
 
-/// What a method writes.
+/// The pictures of a method.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Adapter {
     /// The method's name.
     pub name: String,
-    /// What makes the files, for people.
+    /// A description for people.
     #[serde(default)]
     pub about: String,
     /// Base colour.
@@ -43,24 +43,24 @@ pub struct Adapter {
     pub metallic: Option<AdaptedFile>,
 }
 
-/// One of its files.
+/// The files of one map.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptedFile {
-    /// Path below the folder of estimates; `{scene}` stands for the scene's id. Several: the first that is there.
+    /// Candidate paths below the folder of estimates; the first that exists is read. `{scene}` stands for the scene's id.
     pub files: Vec<String>,
-    /// How its numbers stand for light.
+    /// Transfer function of the stored numbers.
     pub encoding: Encoding,
-    /// The stored numbers that mean 0 and 1; whole numbers are divided by their largest first.
+    /// The stored numbers that stand for 0 and 1, after integers are divided by the largest value of their type.
     #[serde(default = "unit_range")]
     pub range: [f32; 2],
-    /// `free`: known only up to a factor.
+    /// Whether the values are known only up to a factor.
     #[serde(default)]
     pub scale: Scale,
-    /// The channel of a scalar; the first if absent. Colours have none.
+    /// The channel that holds roughness or metallic; the first if absent. `base_color` must have none.
     #[serde(default)]
     pub channel: Option<Channel>,
-    /// Whether a scene may do without: then nothing is said of it.
+    /// Whether a scene may lack the file; it then has no such map.
     #[serde(default)]
     pub optional: bool,
 }
@@ -69,20 +69,20 @@ fn unit_range() -> [f32; 2] {
     [0.0, 1.0]
 }
 
-/// How numbers stand for light.
+/// Transfer function of stored numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
-    /// As they are.
+    /// Linear.
     Linear,
     /// IEC 61966-2-1.
     Srgb,
-    /// The power 2.2.
+    /// A power of 2.2.
     Gamma22,
 }
 
 impl Encoding {
-    /// The linear value of a stored one; below 0 it is 0.
+    /// The linear value of a stored number; negative numbers count as 0.
     pub fn decode(self, stored: f32) -> f32 {
         let stored = stored.max(0.0);
         match self {
@@ -93,31 +93,32 @@ impl Encoding {
     }
 }
 
-/// Whether a factor is known.
+/// Whether values are known absolutely.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// The values are what they say.
+    /// The values are used as they are.
     #[default]
     Absolute,
-    /// One factor is free: the 99th percentile of the pixels' largest channel becomes 1.
+    /// The values are known up to one factor: they are scaled so that the 99th percentile of the pixels' largest channel
+    /// is 1.
     Free,
 }
 
-/// A channel.
+/// A channel of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Channel {
-    /// The first.
+    /// Red.
     R,
-    /// The second.
+    /// Green.
     G,
-    /// The third.
+    /// Blue.
     B,
 }
 
 impl Adapter {
-    /// The adapter of that name, or the one in the file of that path.
+    /// The built-in adapter with this name, or else the adapter in the file at this path.
     pub fn find(name: &str) -> Result<Self, BaselineError> {
         if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
             return Self::parse(text, Path::new(name));
@@ -131,35 +132,33 @@ impl Adapter {
         Self::parse(&text, path)
     }
 
-    /// The names of those that come with the tool.
+    /// The names of the built-in adapters.
     pub fn names() -> [&'static str; BUILT_IN.len()] {
         BUILT_IN.map(|(name, _)| name)
     }
 
     fn parse(text: &str, path: &Path) -> Result<Self, BaselineError> {
-        let invalid = |what: String| BaselineError::BadAdapter { path: path.to_owned(), what };
-        let adapter: Self = toml::from_str(text).map_err(|error| invalid(error.to_string()))?;
+        let invalid = |source: AdapterError| BaselineError::BadAdapter { path: path.to_owned(), source };
+        let adapter: Self = toml::from_str(text).map_err(|error| invalid(error.into()))?;
         let maps = [&adapter.base_color, &adapter.roughness, &adapter.metallic];
         if maps.iter().all(|map| map.is_none()) {
-            return Err(invalid("it names no file; expected base_color, roughness or metallic".to_owned()));
+            return Err(invalid(AdapterError::NoMap));
         }
         if adapter.base_color.as_ref().is_some_and(|file| file.channel.is_some()) {
-            return Err(invalid(
-                "base_color has a `channel`; expected one for roughness and metallic alone".to_owned(),
-            ));
+            return Err(invalid(AdapterError::ColorChannel));
         }
         for map in maps.into_iter().flatten() {
             if map.files.is_empty() {
-                return Err(invalid("`files` is empty; expected a path or several".to_owned()));
+                return Err(invalid(AdapterError::NoFiles));
             }
             if !(map.range[1] > map.range[0] && map.range.iter().all(|v| v.is_finite())) {
-                return Err(invalid(format!("range {:?}; expected a smaller number, then a larger one", map.range)));
+                return Err(invalid(AdapterError::Range(map.range)));
             }
         }
         Ok(adapter)
     }
 
-    /// How many of the scenes have which pictures, as in `base_color of 2 scenes, roughness of none`.
+    /// The number of scenes that have each map, such as `base_color of 2 scenes, roughness of none`.
     pub fn inventory(&self, folder: &Path, scenes: &[&str]) -> String {
         let maps = [("base_color", &self.base_color), ("roughness", &self.roughness), ("metallic", &self.metallic)];
         let count = |file: &AdaptedFile| scenes.iter().filter(|scene| file.path(folder, scene).is_ok()).count();
@@ -171,7 +170,7 @@ impl Adapter {
         words.collect::<Vec<_>>().join(", ")
     }
 
-    /// Reads a scene's pictures below `folder`. Those that are there must have one size.
+    /// Reads a scene's pictures below `folder`, which must all have one size.
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
         let read = |file: &Option<AdaptedFile>| -> Result<_, BaselineError> {
             Ok(file.as_ref().map(|file| file.read(folder, scene, None)).transpose()?.flatten())
@@ -188,7 +187,8 @@ impl Adapter {
 }
 
 impl AdaptedFile {
-    /// The picture, linear; of a scalar its channel, in all three. None where it may be missing, and is.
+    /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. None where an optional
+    /// file is missing.
     fn read(
         &self,
         folder: &Path,
@@ -199,12 +199,12 @@ impl AdaptedFile {
             Err(BaselineError::NoEstimate { .. }) if self.optional => return Ok(None),
             path => path?,
         };
-        // Straight: the adapter says what the numbers mean, in float files too.
+        // Read without decoding: the adapter states the encoding, of float files too.
         let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
         let [low, high] = self.range;
         let decode = |v: f32| self.encoding.decode((v - low) / (high - low));
         let picture = Picture::from_fn(stored.width(), stored.height(), |x, y| {
-            LinearRgb(meant(channel, stored.texel(x, y)).map(decode))
+            LinearRgb(selected(channel, stored.texel(x, y)).map(decode))
         });
         let picture = match self.scale {
             Scale::Absolute => picture,
@@ -226,8 +226,8 @@ impl AdaptedFile {
     }
 }
 
-/// The channel that counts, in all three; all of a colour.
-fn meant(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
+/// The channel's value three times, or all three channels where none is selected.
+fn selected(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
     match channel {
         None => rgb,
         Some(Channel::R) => [rgb[0]; 3],
@@ -236,7 +236,7 @@ fn meant(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
     }
 }
 
-/// One factor for all, so that all but a hundredth of the pixels fit in 0 to 1.
+/// The picture scaled by one factor, so that all but a hundredth of the pixels fit in 0 to 1.
 fn scaled(picture: &Picture<LinearRgb>) -> Picture<LinearRgb> {
     let mut largest: Vec<f32> = picture.pixels().iter().map(|LinearRgb([r, g, b])| r.max(*g).max(*b)).collect();
     largest.sort_by(f32::total_cmp);
@@ -252,7 +252,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn those_that_come_with_the_tool_are_sound() {
+    fn built_in_adapters_are_sound() {
         for name in Adapter::names() {
             let adapter = Adapter::find(name).unwrap();
             assert_eq!(adapter.name, name);
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_ones_are_refused_with_the_reason() {
+    fn bad_adapters_are_refused_with_the_reason() {
         let refused = |text: &str| Adapter::parse(text, Path::new("a.toml")).unwrap_err().to_string();
         assert!(refused("name = \"x\"").contains("names no file"));
         assert!(refused("name = \"x\"\n[base_color]\nfiles = []\nencoding = \"srgb\"").contains("`files` is empty"));
@@ -273,7 +273,7 @@ mod tests {
         assert!(Adapter::find("no-such").unwrap_err().to_string().contains("marigold"));
     }
 
-    /// Roughness in red must not be scaled by what green holds; numbers that a power makes infinite are refused.
+    /// Green must not affect the scale of roughness in red, and numbers that decoding makes infinite are refused.
     #[test]
     fn a_scalar_is_its_channel_and_everything_is_finite() {
         let folder = tempfile::tempdir().unwrap();

@@ -1,152 +1,194 @@
-//! The one error of this crate.
+//! Why a baseline could not be made: the error of this crate.
 
 use std::path::PathBuf;
+
+use crate::import::error::ImportError;
 
 /// Why a baseline could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BaselineError {
-    /// The file system refused.
+    /// A file operation failed.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
-        /// What was tried, as in "read" or "write".
+        /// The operation, such as `read` or `write`.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
     /// The output exists and is never replaced.
     #[error("'{}' is already there; choose another --out", .0.display())]
     InTheWay(PathBuf),
-    /// The output would be a part of the dataset.
+    /// The output would lie in the dataset's folder.
     #[error("'{}' lies in the dataset, which must hold nothing else; choose another --out", .0.display())]
     InDataset(PathBuf),
-    /// `--force` would remove something that is no submission.
-    #[error("'{}' is there and holds no submission.json: it is not replaced; choose another --out", .0.display())]
+    /// `--force` would remove a folder that is no submission.
+    #[error("'{}' exists and holds no submission.json, so it is not replaced; choose another --out", .0.display())]
     NotASubmission(PathBuf),
-    /// A scene without the view that estimates are of.
+    /// A scene has no input view.
     #[error("'{}' has no view 'input'; run `mateval prep verify`", .0.display())]
     NoInputView(PathBuf),
     /// The input picture is missing.
-    #[error("'{}' is not there: the scene has not been rendered; run `mateval prep render`", .0.display())]
+    #[error("'{}' does not exist: the scene has not been rendered; run `mateval prep render`", .0.display())]
     NoPhoto(PathBuf),
-    /// No adapter of that name, and no file.
-    #[error("no adapter '{name}', and no file of that path; expected one of {known}, or a TOML file")]
+    /// No built-in adapter and no file has this name.
+    #[error("'{name}' is neither a built-in adapter nor a file; expected one of {known}, or a TOML file")]
     NoAdapter {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
-        /// Those that come with the tool.
+        /// The built-in adapters, separated by commas.
         known: String,
     },
-    /// An adapter that cannot be used.
-    #[error("adapter '{}': {what}", path.display())]
+    /// An adapter cannot be used.
+    #[error("adapter '{}': {source}", path.display())]
     BadAdapter {
         /// Its file or name.
         path: PathBuf,
         /// What is wrong.
-        what: String,
+        source: AdapterError,
     },
-    /// None of an adapter's files is there.
+    /// None of the files that an adapter lists exists.
     #[error("no estimate: expected {}; fix the adapter's `files`, or run the method", list(paths))]
     NoEstimate {
-        /// Where it was looked for.
+        /// The files that were searched for.
         paths: Vec<PathBuf>,
     },
-    /// An adapter that gives nothing.
+    /// An estimate without any picture.
     #[error("the estimate of scene '{0}' holds no picture")]
     EmptyEstimate(String),
-    /// A number that is infinite or none once it is decoded.
-    #[error("'{}': pixel {pixel:?} is not finite once it is decoded; fix the adapter's `encoding` or `range`, or the picture", path.display())]
+    /// A pixel is infinite or NaN after decoding.
+    #[error("'{}': pixel {pixel:?} is not finite after decoding; fix the adapter's `encoding` or `range`, or the picture", path.display())]
     NotFinite {
         /// The picture.
         path: PathBuf,
         /// Column and row.
         pixel: (usize, usize),
     },
-    /// A picture of other proportions than the view.
+    /// An estimate has other proportions than the input view.
     #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions", size.0, size.1, view.0, view.1)]
     Proportions {
         /// The scene's id.
         scene: String,
-        /// Columns and rows.
+        /// Width and height of the estimate.
         size: (usize, usize),
-        /// Those of the view.
+        /// Width and height of the view.
         view: (usize, usize),
     },
-    /// A bridge that paints colours was given none.
-    #[error("the estimate of scene '{0}' has no base_color; TEXGen paints nothing else: give an estimate that has it")]
+    /// TEXGen paints base colour, and the estimate has none.
+    #[error(
+        "the estimate of scene '{0}' has no base_color, the only map that TEXGen paints; give an estimate with base_color"
+    )]
     NoColor(String),
-    /// Pictures of one estimate differ in size.
+    /// The pictures of one estimate differ in size.
     #[error("the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size", folder.display(), sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]
     Sizes {
         /// The folder.
         folder: PathBuf,
         /// The scene's id.
         scene: String,
-        /// Columns and rows of two.
+        /// Width and height of two of them.
         sizes: [(usize, usize); 2],
     },
-    /// No texture of an object is there.
-    #[error("'{}' holds no <id>.png of an object of this dataset, as living-00012.png; expected what TEXGen made of `baseline texgen-export`", .0.display())]
+    /// A folder without a texture for any object.
+    #[error("'{}' holds no <id>.png for any object of this dataset, such as living-00012.png; expected TEXGen's results for the objects of `baseline texgen-export`", .0.display())]
     NoTextures(PathBuf),
-    /// No labels of any instance.
-    #[error("'{}' holds no <id>_0_{parts:02}.npy or one of fewer parts, as living-00012_0_{parts:02}.npy; expected what PartField made of `baseline partfield-export`", folder.display())]
+    /// A folder without labels for any instance.
+    #[error("'{}' holds no <id>_0_{parts:02}.npy for any instance, such as living-00012_0_{parts:02}.npy, nor one with fewer parts; expected PartField's results for the meshes of `baseline partfield-export`", folder.display())]
     NoLabels {
-        /// Where they were looked for.
+        /// The folder that was searched.
         folder: PathBuf,
-        /// How many parts were asked for.
+        /// The number of parts that was asked for.
         parts: u8,
     },
-    /// Labels that do not fit.
-    #[error("'{}': {what}; export the instances anew and run PartField on them", path.display())]
+    /// Labels that cannot be used for their instance.
+    #[error("'{}': {source}; export the instances again and run PartField on them", path.display())]
     BadLabels {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        what: String,
+        source: LabelsError,
     },
-    /// A folder without anything to import.
-    #[error("'{}' holds nothing for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, .obj) or <scene>.json", .0.display())]
+    /// A folder without a file for any scene.
+    #[error("'{}' holds no file for any scene of the dataset; expected <scene>/<instance>.glb, <scene>.glb (or .gltf, .obj) or <scene>.json", .0.display())]
     NothingToImport(PathBuf),
-    /// A file that cannot be imported.
-    #[error("'{}': {what}", path.display())]
+    /// A file cannot be imported.
+    #[error("'{}': {source}", path.display())]
     BadImport {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
-        what: String,
+        /// Why it was refused.
+        source: ImportError,
     },
-    /// Files that say nothing.
+    /// A scene's files describe none of its instances.
     #[error("'{}': the files for scene '{scene}' hold no triangles and name no part or instance; expected meshes, or the ids of scene.json", folder.display())]
     NothingNamed {
-        /// The folder of imports.
+        /// The folder of imported files.
         folder: PathBuf,
         /// The scene's id.
         scene: String,
     },
-    /// Files that lie elsewhere than the scene.
-    #[error("'{}': nothing for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb", folder.display())]
+    /// A scene's meshes lie too far from all its instances.
+    #[error("'{}': no mesh for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb", folder.display())]
     NothingNear {
-        /// The folder of imports.
+        /// The folder of imported files.
         folder: PathBuf,
         /// The scene's id.
         scene: String,
-        /// How near the files come.
+        /// Smallest distance between a mesh and an instance, in metres.
         nearest_m: f64,
-        /// How near they should.
+        /// Largest distance that counts, in metres.
         max_distance_m: f64,
     },
     /// The geometry cannot be traced.
     #[error(transparent)]
     Tracer(#[from] mateval_tracer::TracerError),
-    /// The dataset could not be read, or the submission not written.
+    /// The dataset could not be read, or the submission could not be written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
-    /// A picture could not be written.
+    /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
 }
 
 fn list(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| format!("'{}'", path.display())).collect::<Vec<_>>().join(" or ")
+}
+
+/// Why an adapter cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum AdapterError {
+    /// The file is not TOML, or its keys are wrong.
+    #[error(transparent)]
+    Toml(#[from] toml::de::Error),
+    /// No map is described.
+    #[error("it names no file; expected base_color, roughness or metallic")]
+    NoMap,
+    /// `base_color` has a channel.
+    #[error("base_color has a `channel`; only roughness and metallic may have one")]
+    ColorChannel,
+    /// A map without paths.
+    #[error("`files` is empty; expected at least one path")]
+    NoFiles,
+    /// A range that is empty, reversed or not finite.
+    #[error("range {0:?}; expected a smaller number, then a larger one")]
+    Range([f32; 2]),
+}
+
+/// Why labels cannot be used for their instance.
+#[derive(Debug, thiserror::Error)]
+pub enum LabelsError {
+    /// The file cannot be read, is too large, or is not a NumPy file.
+    #[error(transparent)]
+    Unreadable(#[from] std::io::Error),
+    /// The number of labels differs from the number of triangles.
+    #[error("{labels} labels; '{instance}' has {triangles} triangles")]
+    Count {
+        /// Labels in the file.
+        labels: u64,
+        /// The instance's id.
+        instance: String,
+        /// The instance's triangles.
+        triangles: usize,
+    },
 }

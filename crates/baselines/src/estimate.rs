@@ -6,42 +6,42 @@ use mateval_image::{LinearRgb, Picture};
 
 use crate::error::BaselineError;
 
-/// Numbers of a texel or pixel: linear red, green, blue; perceptual roughness; metallic.
+/// The values of a texel or pixel: linear red, green and blue, perceptual roughness, metallic.
 pub type Values = [f32; 5];
 
-/// One scene's estimate. Pictures that are there have one size.
+/// The estimate of one scene. All its pictures have one size.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Estimate {
-    /// Linear.
+    /// Linear base colour.
     pub base_color: Option<Picture<LinearRgb>>,
-    /// Perceptual.
+    /// Perceptual roughness.
     pub roughness: Option<Picture<f32>>,
-    /// 0 to 1.
+    /// Metallic, 0 to 1.
     pub metallic: Option<Picture<f32>>,
 }
 
-/// Which of the three is said; what is not has no map, and stays at the format's default.
+/// Which maps a method gives. The others are not written, and score with the format's defaults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Says {
-    /// Linear red, green, blue.
+pub struct GivenMaps {
+    /// Base colour.
     pub base_color: bool,
-    /// Perceptual roughness.
+    /// Roughness.
     pub roughness: bool,
     /// Metallic.
     pub metallic: bool,
 }
 
 impl Estimate {
-    /// Which pictures it has.
-    pub fn says(&self) -> Says {
-        Says {
+    /// Which maps the estimate has.
+    pub fn given_maps(&self) -> GivenMaps {
+        GivenMaps {
             base_color: self.base_color.is_some(),
             roughness: self.roughness.is_some(),
             metallic: self.metallic.is_some(),
         }
     }
 
-    /// Columns and rows; none where there is no picture.
+    /// Width and height in pixels; none without any picture.
     pub fn size(&self) -> Option<(usize, usize)> {
         let color = self.base_color.as_ref().map(|picture| (picture.width(), picture.height()));
         let scalar =
@@ -49,7 +49,7 @@ impl Estimate {
         color.or(scalar(&self.roughness)).or(scalar(&self.metallic))
     }
 
-    /// Itself, where all its pictures have one size; `folder` and `scene` are for the error.
+    /// Fails where its pictures differ in size; `folder` and `scene` are for the error.
     pub(crate) fn of_one_size(self, folder: &Path, scene: &str) -> Result<Self, BaselineError> {
         let size = self.size().unwrap_or_default();
         let scalars = [&self.roughness, &self.metallic].into_iter().flatten();
@@ -63,7 +63,7 @@ impl Estimate {
         }
     }
 
-    /// What it says at a pixel; 0 for what it does not say.
+    /// The values at a pixel; 0 for maps that the estimate lacks.
     pub fn at(&self, x: usize, y: usize) -> Values {
         let [r, g, b] = self.base_color.as_ref().map_or([0.0; 3], |picture| picture.get(x, y).0);
         let scalar = |picture: &Option<Picture<f32>>| picture.as_ref().map_or(0.0, |picture| picture.get(x, y));

@@ -13,25 +13,24 @@ use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::geometry::input_view;
 
-/// Where estimates come from.
+/// Where an estimate comes from.
 #[derive(Clone, Debug)]
 pub enum EstimateSource {
-    /// The truth's own albedo, roughness and metallic of the input view: what a perfect method would say (the paper's
-    /// upper bound).
+    /// The ground truth of the input view, as a perfect method would estimate it (the paper's upper bound).
     Truth,
-    /// The photo itself as base colour: what doing nothing gives.
+    /// The input picture as base colour: the estimate of a method that does nothing.
     Input,
-    /// A method's pictures, as its adapter says.
+    /// A method's pictures.
     Files {
-        /// The folder that the adapter's paths begin in.
+        /// The folder that the adapter's paths are relative to.
         folder: PathBuf,
-        /// What its files are.
+        /// Names and encodings of the files.
         adapter: Box<Adapter>,
     },
 }
 
 impl EstimateSource {
-    /// For submission.json, as in `the truth of the input view`; of a method's pictures which there are.
+    /// A phrase for submission.json, such as `the truth of the input view`; for a method's pictures with their number.
     pub fn description(&self, dataset: &Dataset) -> String {
         match self {
             Self::Truth => "the truth of the input view".to_owned(),
@@ -43,7 +42,7 @@ impl EstimateSource {
         }
     }
 
-    /// For the method's name, as in `gt`.
+    /// A word for the method's name, such as `gt`.
     pub fn name(&self) -> &str {
         match self {
             Self::Truth => "gt",
@@ -52,7 +51,7 @@ impl EstimateSource {
         }
     }
 
-    /// Reads the estimate of one scene. All its pictures have one size, which need not be the view's.
+    /// Reads the estimate of one scene. Its pictures have one size, which need not be the view's.
     pub fn read(&self, dataset: &Dataset, scene: &SceneFile) -> Result<Estimate, BaselineError> {
         let folder = dataset.folder(&scene.id);
         match self {

@@ -1,4 +1,4 @@
-//! Texels that the input view does not show, from those that it shows.
+//! Fills the texels that the input view does not show from the points that it shows.
 
 use glam::DVec2;
 use mateval_scene::TriangleMesh;
@@ -8,8 +8,7 @@ use crate::estimate::Values;
 use crate::lift::{PartialAtlas, Texel, place_of};
 use crate::seen_cloud::SeenCloud;
 
-/// Gives every unseen texel what the points nearest to it say; false where nothing is seen. Seen texels stay as they
-/// are.
+/// Gives every unseen texel the values of the seen points nearest to it. Returns false where no point is seen.
 pub fn fill(cloud: &SeenCloud, known: &mut PartialAtlas, mesh: &TriangleMesh) -> bool {
     if cloud.is_empty() {
         return false;
@@ -46,7 +45,7 @@ mod tests {
     use crate::seen::SeenPoint;
     use crate::seen_cloud::FillRule;
 
-    /// A wall along an axis, two metres wide, its uv the unit square.
+    /// A wall of 2 m x 2 m along an axis; its uv are the unit square.
     fn wall() -> TriangleMesh {
         TriangleMesh {
             positions: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::new(2.0, 2.0, 0.0), Vec3::Y * 2.0],
@@ -56,7 +55,7 @@ mod tests {
         }
     }
 
-    /// The left third is seen; its values say where.
+    /// The left third is seen; the values of a texel are its column and row.
     fn known() -> PartialAtlas {
         let atlas = UvAtlas::new(&wall(), 48);
         let texels = Picture::from_fn(48, 48, |x, y| match x {
@@ -82,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_is_found_as_by_looking_at_all() {
+    fn the_nearest_point_is_that_of_an_exhaustive_search() {
         for weight in [0.0, 0.3] {
             let (filled, all) = (filled(1, weight), seen());
             for (x, y) in (16..48).flat_map(|x| (0..48).map(move |y| (x, y))) {
@@ -112,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_stays() {
+    fn seen_texels_are_unchanged() {
         for neighbours in [1, 3] {
             let filled = filled(neighbours, 0.0);
             for (before, after) in known().texels.pixels().iter().zip(filled.texels.pixels()) {
@@ -123,9 +122,9 @@ mod tests {
     }
 
     #[test]
-    fn from_nothing_follows_nothing() {
+    fn without_points_nothing_is_filled() {
         assert!(!fill(&SeenCloud::new(FillRule::default(), []), &mut known(), &wall()));
-        // All at one place.
+        // Many points at one place.
         let (point, value) = seen()[0];
         let many = std::iter::repeat_n((point, value), 100_000);
         assert!(fill(&SeenCloud::new(FillRule::default(), many), &mut known(), &wall()));

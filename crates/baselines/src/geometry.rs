@@ -1,4 +1,4 @@
-//! A scene as a method sees it: the instances' meshes with their atlas uv, and rays through them.
+//! A scene as methods see it: the instances' meshes with their atlas uv, and rays through them.
 
 use std::sync::Arc;
 
@@ -12,15 +12,15 @@ use mateval_tracer::World;
 
 use crate::error::BaselineError;
 
-/// The public part of one scene. Surface k of the world is instance k of `scene.json`.
+/// The public part of a scene. Surface k of the world is instance k of `scene.json`.
 pub struct SceneGeometry<'a> {
     /// `scene.json`.
     pub scene: &'a SceneFile,
     /// The input view.
     pub view: &'a View,
-    /// Where its files are.
+    /// The scene's folder.
     pub folder: SceneFolder,
-    /// All instances, opaque and without light.
+    /// All instances, opaque and without emission.
     pub world: World,
     /// `valid.png` of the input view.
     pub valid: Mask,
@@ -29,7 +29,7 @@ pub struct SceneGeometry<'a> {
 }
 
 impl<'a> SceneGeometry<'a> {
-    /// Reads what methods may see of a scene; nothing of the truth.
+    /// Reads the files of a scene that methods may see, and none of its ground truth.
     pub fn read(folder: SceneFolder, scene: &'a SceneFile) -> Result<Self, BaselineError> {
         let view = input_view(&folder, scene)?;
         let shown = folder.view(&view.id);
@@ -51,12 +51,12 @@ impl<'a> SceneGeometry<'a> {
         Ok(Self { scene, view, folder, world, valid, instances })
     }
 
-    /// An instance's mesh, its uv the atlas's.
+    /// An instance's mesh, whose uv are those of the atlas.
     pub fn mesh(&self, instance: usize) -> &TriangleMesh {
         &self.world.scene().surfaces[instance].mesh
     }
 
-    /// The input view's picture of a set of parts.
+    /// The input view's picture of part indices, for a part set.
     pub fn part_picture(&self, set: Option<&PartSetId>) -> Result<Picture<u16>, BaselineError> {
         let path = self.folder.view(&self.view.id).join(part_picture(set));
         let picture = png_io::read_ids(&path)?;
@@ -68,7 +68,7 @@ impl<'a> SceneGeometry<'a> {
     }
 }
 
-/// The view that estimates are of.
+/// The input view, which estimates are made for.
 pub(crate) fn input_view<'a>(folder: &SceneFolder, scene: &'a SceneFile) -> Result<&'a View, BaselineError> {
     let missing = || BaselineError::NoInputView(folder.scene_file());
     scene.view(INPUT).ok_or_else(missing)

@@ -1,4 +1,4 @@
-//! The floor: every surface is grey.
+//! `grey`, the floor: every surface is grey.
 
 use std::path::Path;
 
@@ -10,8 +10,8 @@ use mateval_scene::submission::{GREY, MAP_SIZES, Map};
 use crate::error::BaselineError;
 use crate::submission::{self, Method};
 
-/// Writes base colour 0.5 (linear) for every instance; roughness and metallic are left at their defaults. Gives the
-/// number of instances.
+/// Writes base colour 0.5 (linear) for every instance and returns their number. Roughness and metallic have no files, so
+/// that the format's defaults hold.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
     let texel = [byte_from_unit(srgb_from_linear(GREY)); 3];
     let size = *MAP_SIZES.start();

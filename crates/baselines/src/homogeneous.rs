@@ -1,7 +1,7 @@
-//! One colour an instance, or a part: the median of an estimate under its mask.
+//! One colour per instance or per part: the median of an estimate inside its mask.
 //!
-//! By instance this is how IM2CAD (Izadinia et al., CVPR 2017) colours furniture; by part it is the floor that
-//! procedural methods fall back to.
+//! IM2CAD (Izadinia et al., CVPR 2017) colours furniture in this way, per instance; procedural methods fall back to it
+//! per part.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ use crate::submission::{self, Method};
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
 
-/// Writes a submission of one colour an instance. Gives the number of instances.
+/// Writes a submission with one colour per instance and returns the number of instances.
 pub fn write_by_instance(
     dataset: &Dataset,
     out: &Path,
@@ -36,15 +36,16 @@ pub fn write_by_instance(
         let medians = Medians::new(&geometry, &seen_pixels(&geometry, &estimate)?, &estimate);
         let mut written = 0;
         for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
-            Maps::constant(medians.of(&geometry, at), estimate.says()).write(&folder.join(instance.id.as_str()))?;
+            Maps::constant(medians.of(&geometry, at), estimate.given_maps())
+                .write(&folder.join(instance.id.as_str()))?;
             written += 1;
         }
         Ok(written)
     })
 }
 
-/// Writes a submission of one colour a part of the set. A part that is not seen takes its instance's median. Gives the
-/// number of instances.
+/// Writes a submission with one colour per part of the set and returns the number of instances. An unseen part takes the
+/// median of its instance.
 pub fn write_by_part(
     dataset: &Dataset,
     out: &Path,
@@ -67,14 +68,14 @@ pub fn write_by_part(
         for (at, instance) in scene.instances.iter().enumerate() {
             let Some(atlas) = &instance.atlas else { continue };
             let known = parts.paint(&geometry, at, atlas.size as usize);
-            Maps::of_atlas(&known, estimate.says()).write(&folder.join(instance.id.as_str()))?;
+            Maps::of_atlas(&known, estimate.given_maps()).write(&folder.join(instance.id.as_str()))?;
             written += 1;
         }
         Ok(written)
     })
 }
 
-/// The photo is what these take unless told otherwise, and goes without saying.
+/// The method's name; the source is left out where it is the input picture, the default of these methods.
 fn name(stem: &str, source: &EstimateSource) -> String {
     match source {
         EstimateSource::Input => stem.to_owned(),
@@ -82,7 +83,7 @@ fn name(stem: &str, source: &EstimateSource) -> String {
     }
 }
 
-/// The median of each part; of one that is not seen its instance's.
+/// The median of each part, or that of its instance where the part is not seen.
 fn colors_of_parts(
     geometry: &SceneGeometry<'_>,
     set: Option<&PartSetId>,
@@ -93,7 +94,7 @@ fn colors_of_parts(
     let seen = seen_pixels(geometry, estimate)?;
     let medians = Medians::new(geometry, &seen, estimate);
     let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); parts.len()];
-    for (x, y, _) in seen.telling() {
+    for (x, y, _) in seen.shown_pixels() {
         let (x_of_view, y_of_view) = view_pixel(geometry, &seen.camera, x, y);
         let index = picture.get(x_of_view, y_of_view);
         if let Some(at) = parts.iter().position(|part| part.index.0.get() == index) {

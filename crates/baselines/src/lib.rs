@@ -1,13 +1,15 @@
-//! Baselines: methods that come with the tool.
+//! Baselines: methods that come with the tool, and bridges to other projects.
 //!
-//! In: a dataset, and for most an estimate of the input view ([`estimate`]; other people's pictures by an [`adapter`]).
-//! Out: a submission folder like any other. [`truth`] copies the baked truth (the ceiling that an atlas of this size
-//! can reach), [`grey`] knows nothing (the floor), [`nn`] lifts the estimate to the atlases, [`homogeneous`] takes its
-//! medians, [`import`] rebakes meshes with uv of their own, [`texgen`] lets another project's network fill what is not
-//! seen, [`partfield`] lets one split instances into parts.
+//! Input: a dataset, and for most baselines an [`estimate`] of the input view, which may come from another method's
+//! pictures by way of an [`adapter`]. Output: a submission.
 //!
-//! Between: [`geometry`] is the scene as methods see it, [`seen`] which instance each pixel shows; [`lift`] writes the
-//! picture into an atlas, [`fill`] finds what is not seen, [`maps`] writes files.
+//! Baselines: [`truth`] copies the baked ground truth, the ceiling for atlases of this size; [`grey`] is the floor;
+//! [`nn`] lifts the estimate to the atlases; [`homogeneous`] takes medians of it; [`import`] transfers meshes that have
+//! their own uv. Bridges: with [`texgen`] another project's network fills unseen texels, with [`partfield`] one splits
+//! instances into parts.
+//!
+//! Steps: [`geometry`] reads the scene as methods see it; [`seen`] determines which instance each pixel shows; [`lift`]
+//! writes the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
 
 pub mod adapter;
 pub mod error;

@@ -1,4 +1,4 @@
-//! An estimate of the input view written into an instance's atlas, where the view shows the instance.
+//! Writes an estimate of the input view into the texels of an instance's atlas that the view shows.
 
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
@@ -12,32 +12,32 @@ use crate::estimate::{Estimate, Values};
 use crate::geometry::SceneGeometry;
 use crate::seen::SeenPixels;
 
-/// Most places along a texel's side: a texel that covers more pixels is undersampled.
+/// Largest number of places along a texel's side; a texel that covers more pixels is undersampled.
 const MAX_PLACES: f64 = 16.0;
-/// A texel's place is seen where the ray from the camera ends on its instance no further from it than this share of the
-/// distance. The ray is what decides; this only tells two sheets of one instance apart.
+/// A place of a texel is seen if the ray from the camera hits its instance at the place's distance, up to this share of
+/// it. The tolerance only has to separate two sheets of the same instance.
 const SAME_PLACE: f64 = 2e-4;
 
-/// What is known of a texel.
+/// What the input view shows of a texel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Texel {
-    /// No triangle looks it up.
+    /// The texel belongs to no triangle.
     Unused,
-    /// The input view does not show it.
+    /// The input view does not show the texel.
     Unseen,
-    /// The mean of the estimate over what the input view shows of the texel's square.
+    /// The mean of the estimate over the part of the texel that the input view shows.
     Seen(Values),
 }
 
-/// An instance's atlas, as far as the input view tells.
+/// An instance's atlas with the texels that are known.
 pub struct PartialAtlas {
-    /// Which triangle each texel belongs to.
+    /// The triangle that each texel belongs to.
     pub atlas: UvAtlas,
-    /// What is known.
+    /// The texels.
     pub texels: Picture<Texel>,
 }
 
-/// Writes the estimate into the atlas of one instance, `size` texels a side.
+/// Writes the estimate into the atlas of one instance, which has `size` x `size` texels.
 pub fn lift(
     geometry: &SceneGeometry<'_>,
     seen: &SeenPixels,
@@ -64,28 +64,30 @@ pub fn lift(
     PartialAtlas { atlas, texels }
 }
 
-/// The place of a texel's centre on the surface: its triangle's nearest point for a texel beside it.
+/// The surface point at `place` in the atlas, in world space; for a place outside the triangle, the triangle's nearest
+/// point in the atlas.
 pub fn place_of(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize, place: DVec2) -> DVec3 {
     let weights = atlas.nearest_barycentrics(triangle, place);
     let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
     a * weights.x + b * weights.y + c * weights.z
 }
 
-/// How many metres a texel's side covers in a triangle.
+/// The side of a texel on a triangle, in metres.
 pub fn texel_size_m(atlas: &UvAtlas, mesh: &TriangleMesh, triangle: usize) -> f64 {
     let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
     let area = (b - a).cross(c - a).length() / 2.0;
     (area / atlas.texel_area(triangle).max(1e-12)).sqrt()
 }
 
-/// `a_side` times `a_side` places of an owned texel's square, those of its triangle alone, or the centre where that has
-/// none of them; of a texel beside its triangle the triangle's nearest. None for a texel that nobody owns.
-pub fn places_of(atlas: &UvAtlas, mesh: &TriangleMesh, (x, y): (usize, usize), a_side: usize) -> Vec<DVec3> {
+/// Surface points of a texel: of `per_side` x `per_side` places in its square those inside its triangle, or its centre
+/// if none is. A texel whose centre lies outside its triangle gets the triangle's nearest points. Empty for a texel
+/// without a triangle.
+pub fn places_of(atlas: &UvAtlas, mesh: &TriangleMesh, (x, y): (usize, usize), per_side: usize) -> Vec<DVec3> {
     let Some((triangle, inside)) = atlas.owner(x, y) else { return Vec::new() };
     let corner = DVec2::new(x as f64, y as f64);
-    let within = |at: usize| DVec2::new((at % a_side) as f64 + 0.5, (at / a_side) as f64 + 0.5) / a_side as f64;
-    let squares = (0..a_side * a_side).map(|at| corner + within(at));
-    // Another triangle has what lies beside; a texel beside its triangle has no place inside.
+    let within = |at: usize| DVec2::new((at % per_side) as f64 + 0.5, (at / per_side) as f64 + 0.5) / per_side as f64;
+    let squares = (0..per_side * per_side).map(|at| corner + within(at));
+    // Places outside belong to another triangle, unless the texel's centre itself lies outside.
     let is_own = |place: &DVec2| !inside || atlas.barycentrics(triangle, *place).min_element() >= -1e-9;
     let mut own: Vec<DVec2> = squares.filter(is_own).collect();
     if own.is_empty() {
@@ -94,7 +96,7 @@ pub fn places_of(atlas: &UvAtlas, mesh: &TriangleMesh, (x, y): (usize, usize), a
     own.into_iter().map(|place| place_of(atlas, mesh, triangle, place)).collect()
 }
 
-/// The mean of each number; none of nothing.
+/// The mean of each value; none for no entries.
 pub fn mean(all: &[Values]) -> Option<Values> {
     let count = all.len() as f64;
     let sum = |channel: usize| all.iter().map(|values| f64::from(values[channel])).sum::<f64>();
@@ -117,26 +119,26 @@ impl Lifter<'_> {
     fn texel(&self, x: usize, y: usize) -> Texel {
         let Some((triangle, _)) = self.atlas.owner(x, y) else { return Texel::Unused };
         let centre = DVec2::new(x as f64, y as f64) + 0.5;
-        let places = places_of(self.atlas, self.mesh, (x, y), self.places_a_side(triangle, centre));
-        let said: Vec<Values> = places.into_iter().filter_map(|place| self.look(place)).collect();
-        mean(&said).map_or(Texel::Unseen, Texel::Seen)
+        let places = places_of(self.atlas, self.mesh, (x, y), self.places_per_side(triangle, centre));
+        let values: Vec<Values> = places.into_iter().filter_map(|place| self.estimate_at(place)).collect();
+        mean(&values).map_or(Texel::Unseen, Texel::Seen)
     }
 
-    /// So many that neighbours lie half a pixel apart at most.
-    fn places_a_side(&self, triangle: usize, centre: DVec2) -> usize {
+    /// The number of places per side at which neighbours are at most half a pixel apart.
+    fn places_per_side(&self, triangle: usize, centre: DVec2) -> usize {
         let texel_m = texel_size_m(self.atlas, self.mesh, triangle);
         let distance = place_of(self.atlas, self.mesh, triangle, centre).distance(self.origin).max(1e-6);
         (2.0 * self.focal * texel_m / distance).ceil().clamp(1.0, MAX_PLACES) as usize
     }
 
-    /// What the estimate says of a place of the instance, where the camera sees it.
-    fn look(&self, place: DVec3) -> Option<Values> {
+    /// The estimate at a place of the instance, if the camera sees it.
+    fn estimate_at(&self, place: DVec3) -> Option<Values> {
         let (pixel, _) = self.projection.project(place)?;
         if !self.seen.camera.holds(pixel) {
             return None;
         }
         let (x, y) = (pixel.x as usize, pixel.y as usize);
-        if !self.seen.tells_of(self.instance, x, y) {
+        if !self.seen.shows(self.instance, x, y) {
             return None;
         }
         let way = place - self.origin;

@@ -1,4 +1,4 @@
-//! An instance's maps as a submission holds them.
+//! An instance's maps in the form in which a submission holds them.
 
 use std::path::Path;
 
@@ -8,16 +8,16 @@ use mateval_scene::SceneError;
 use mateval_scene::submission::{MAP_SIZES, Map};
 
 use crate::error::BaselineError;
-use crate::estimate::{Says, Values};
+use crate::estimate::{GivenMaps, Values};
 use crate::lift::{PartialAtlas, Texel};
 use crate::median::DEFAULT;
 
-/// A linear colour as PNG holds it, clipped.
+/// A linear colour as sRGB bytes, clipped to 0 to 1.
 pub(crate) fn srgb_bytes(linear: [f32; 3]) -> [u8; 3] {
     linear.map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
 }
 
-/// Base colour as sRGB bytes; roughness and metallic as linear bytes, where anything is said of them.
+/// Base colour as sRGB bytes, roughness and metallic as linear bytes; `None` for maps that are not given.
 pub struct Maps {
     base_color: Option<Picture<[u8; 3]>>,
     roughness: Option<Picture<u8>>,
@@ -25,13 +25,13 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// The whole atlas, its gutters filled. What is not said stays at the format's default, with no file.
-    pub fn of_atlas(known: &PartialAtlas, says: Says) -> Self {
+    /// The maps of an atlas, with filled gutters. Maps that are not given have no file.
+    pub fn of_atlas(known: &PartialAtlas, given: GivenMaps) -> Self {
         let picture = known.texels.map(|texel| match texel {
             Texel::Seen(values) => values,
             Texel::Unused | Texel::Unseen => DEFAULT,
         });
-        let mut maps = Self::of_values(&picture, says);
+        let mut maps = Self::of_values(&picture, given);
         if let Some(map) = &mut maps.base_color {
             known.atlas.fill_gutters(map);
         }
@@ -41,23 +41,24 @@ impl Maps {
         maps
     }
 
-    /// The same everywhere.
-    pub fn constant(values: Values, says: Says) -> Self {
+    /// Maps with the same values everywhere.
+    pub fn constant(values: Values, given: GivenMaps) -> Self {
         let size = *MAP_SIZES.start();
-        Self::of_values(&Picture::filled(size, size, values), says)
+        Self::of_values(&Picture::filled(size, size, values), given)
     }
 
-    fn of_values(values: &Picture<Values>, says: Says) -> Self {
+    fn of_values(values: &Picture<Values>, given: GivenMaps) -> Self {
         let color = || values.map(|[r, g, b, ..]| srgb_bytes([r, g, b]));
-        let scalar = |said: bool, channel: usize| said.then(|| values.map(|values| byte_from_unit(values[channel])));
+        let scalar =
+            |is_given: bool, channel: usize| is_given.then(|| values.map(|values| byte_from_unit(values[channel])));
         Self {
-            base_color: says.base_color.then(color),
-            roughness: scalar(says.roughness, 3),
-            metallic: scalar(says.metallic, 4),
+            base_color: given.base_color.then(color),
+            roughness: scalar(given.roughness, 3),
+            metallic: scalar(given.metallic, 4),
         }
     }
 
-    /// Writes them into the instance's folder, which is made.
+    /// Writes the maps to the instance's folder, which is created.
     pub fn write(&self, folder: &Path) -> Result<(), BaselineError> {
         std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
         let path = |map: Map| folder.join(map.stem()).with_extension("png");

@@ -1,4 +1,4 @@
-//! Medians of an estimate over what its pixels show: what is said of instances and parts as a whole.
+//! Medians of an estimate over the pixels that show an instance or a category.
 
 use std::collections::BTreeMap;
 
@@ -8,21 +8,21 @@ use crate::estimate::{Estimate, Values};
 use crate::geometry::SceneGeometry;
 use crate::seen::SeenPixels;
 
-/// What an instance without any estimate gets: linear grey, and the format's own defaults.
+/// The values of an instance without any estimate: linear grey, and the format's default roughness and metallic.
 pub const DEFAULT: Values = [GREY, GREY, GREY, 0.5, 0.0];
 
-/// The median of each instance that is seen, and of each category.
+/// The median of each seen instance, and of each category.
 pub struct Medians {
     of_instance: BTreeMap<usize, Values>,
     of_category: BTreeMap<String, Values>,
 }
 
 impl Medians {
-    /// Collects them from the pixels that tell of an instance.
+    /// Collects the medians over the pixels that show an instance.
     pub fn new(geometry: &SceneGeometry<'_>, seen: &SeenPixels, estimate: &Estimate) -> Self {
         let mut of_instance: BTreeMap<usize, Vec<Values>> = BTreeMap::new();
         let mut of_category: BTreeMap<String, Vec<Values>> = BTreeMap::new();
-        for (x, y, instance) in seen.telling() {
+        for (x, y, instance) in seen.shown_pixels() {
             let values = estimate.at(x, y);
             of_instance.entry(instance).or_default().push(values);
             if let Some(category) = &geometry.scene.instances[instance].category {
@@ -35,7 +35,7 @@ impl Medians {
         }
     }
 
-    /// The instance's own where it is seen; else its category's; else grey.
+    /// The median of the instance if it is seen, else that of its category, else grey.
     pub fn of(&self, geometry: &SceneGeometry<'_>, instance: usize) -> Values {
         let category = || {
             let category = geometry.scene.instances[instance].category.as_ref()?;
@@ -45,7 +45,7 @@ impl Medians {
     }
 }
 
-/// The median of each number; the lower one of two.
+/// The median of each value; of an even number of entries the lower of the middle two.
 pub fn median(all: &mut [Values]) -> Values {
     if all.is_empty() {
         return DEFAULT;
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_number_has_its_own_median() {
+    fn each_value_has_its_own_median() {
         let mut all = [[3.0, 0.0, 9.0, 0.1, 1.0], [1.0, 5.0, 7.0, 0.2, 0.0], [2.0, 4.0, 8.0, 0.3, 0.0]];
         assert_eq!(median(&mut all), [2.0, 4.0, 8.0, 0.2, 0.0]);
         assert_eq!(median(&mut all[..2])[0], median(&mut [all[0], all[1]])[0]);

@@ -1,7 +1,7 @@
-//! Lifting by nearest neighbours: an estimate of the input view becomes a whole atlas (the paper's strongest family).
+//! Lifting by nearest neighbours: extends an estimate of the input view to whole atlases (the paper's strongest family).
 //!
-//! Seen texels hold the estimate; each unseen one follows from the seen points that are nearest to it on its instance;
-//! an instance that is not seen at all takes the median of its category in the picture, or is grey.
+//! Seen texels hold the estimate. An unseen texel is computed from the nearest seen points of its instance. An instance
+//! that is not seen at all takes the median of its category in the picture, or else grey.
 
 use std::path::Path;
 
@@ -23,17 +23,18 @@ use crate::seen::{SeenPixels, SeenPoint};
 use crate::seen_cloud::{FillRule, SeenCloud};
 use crate::submission::{self, Method};
 
-/// By this share the proportions of an estimate may be off: methods round sizes to multiples of 8 or 16.
+/// Largest relative difference between the proportions of an estimate and the view, because methods round sizes to
+/// multiples of 8 or 16.
 const PROPORTIONS: f64 = 0.05;
 
-/// How unseen texels are found.
+/// How unseen texels are filled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NnOptions {
-    /// From how many, and what is near.
+    /// How many points are used, and how distances are measured.
     pub rule: FillRule,
-    /// Take the nearest seen point of any instance, not only of the same.
+    /// Whether the seen points of all instances are searched, not only those of the texel's own instance.
     pub any_instance: bool,
-    /// Texels a side; none: the dataset's own size of each instance.
+    /// Width and height of every atlas, in texels; `None` stands for the dataset's own size of each instance.
     pub atlas_size: Option<u32>,
 }
 
@@ -58,7 +59,7 @@ impl NnOptions {
     }
 }
 
-/// Writes a submission. Gives the number of instances.
+/// Writes a submission and returns the number of instances.
 pub fn write(
     dataset: &Dataset,
     out: &Path,
@@ -76,7 +77,7 @@ pub fn write(
     })
 }
 
-/// Writes one scene's maps, a folder an instance below `folder`. Gives the number of instances.
+/// Writes the maps of one scene, with one folder per instance below `folder`, and returns the number of instances.
 pub fn write_scene(
     dataset: &Dataset,
     scene: &SceneFile,
@@ -90,22 +91,22 @@ pub fn write_scene(
     let seen = seen_pixels(&geometry, &estimate)?;
     lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
         let maps = match lifted {
-            Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.says()),
-            None => Maps::constant(medians.of(&geometry, instance), estimate.says()),
+            Some(lifted) => Maps::of_atlas(&lifted.whole, estimate.given_maps()),
+            None => Maps::constant(medians.of(&geometry, instance), estimate.given_maps()),
         };
         maps.write(&folder.join(geometry.scene.instances[instance].id.as_str()))
     })
 }
 
-/// An instance's atlas, lifted and filled.
+/// An instance's atlas after lifting and filling.
 pub struct Lifted {
-    /// Every texel that a triangle looks up is known.
+    /// The atlas, in which every texel that belongs to a triangle is known.
     pub whole: PartialAtlas,
-    /// Whether each texel was seen, row by row: what filling found is not.
+    /// Whether each texel was seen before filling, row by row.
     pub seen: Vec<bool>,
 }
 
-/// Which instance each pixel of the estimate shows.
+/// Determines which instance each pixel of the estimate shows.
 pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<SeenPixels, BaselineError> {
     let scene = || geometry.scene.id.to_string();
     let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(scene()))?;
@@ -117,8 +118,8 @@ pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<
     Ok(SeenPixels::new(geometry, size))
 }
 
-/// Lifts an estimate to every instance that has an atlas, several at once: `each` is given its number and its whole
-/// atlas, or none where nothing of it follows from what is seen. Gives how many there were.
+/// Lifts an estimate to every instance that has an atlas, several at once. `each` receives the instance's index and its
+/// atlas, or `None` where no point that it could be filled from is seen. Returns the number of instances.
 pub fn lift_scene(
     geometry: &SceneGeometry<'_>,
     estimate: &Estimate,
@@ -161,7 +162,7 @@ pub fn lift_scene(
     Ok(with_atlas.len())
 }
 
-/// The instances in runs of no more texels than the largest atlas may have: what is held in memory at once.
+/// Splits the instances into batches, each with at most as many texels as the largest atlas: a bound on memory.
 fn batches(with_atlas: &[(usize, usize)]) -> Vec<&[(usize, usize)]> {
     let most = *MAP_SIZES.end() * *MAP_SIZES.end();
     let (mut batches, mut first, mut texels) = (Vec::new(), 0, 0);

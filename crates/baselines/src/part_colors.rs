@@ -1,4 +1,4 @@
-//! One material a part, painted into atlases.
+//! Paints one material per part into atlases.
 
 use std::collections::HashMap;
 
@@ -12,16 +12,16 @@ use crate::estimate::Values;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 
-/// A triangle's corners by their bits: the same in `instances.glb` and `parts.glb`.
+/// The bits of a triangle's corners, which are the same in `instances.glb` and `parts.glb`.
 type Corners = [[u32; 3]; 3];
 
-/// What is said of each triangle of a scene.
+/// The values of each triangle of a scene.
 pub struct PartColors {
     of_instance: Vec<HashMap<Corners, Values>>,
 }
 
 impl PartColors {
-    /// Asks for every part of the set, by its number in [`parts_of`]'s order and its instance's.
+    /// Calls `color_of` for every part of the set, with the part's index in [`parts_of`] and its instance's index.
     pub fn new(
         geometry: &SceneGeometry<'_>,
         set: Option<&PartSetId>,
@@ -41,13 +41,13 @@ impl PartColors {
         Ok(Self { of_instance })
     }
 
-    /// The atlas of an instance, each texel in its part's colour; unseen where nothing is said of its part.
+    /// The atlas of an instance with each texel in its part's colour; texels of parts without a colour are `Unseen`.
     pub fn paint(&self, geometry: &SceneGeometry<'_>, instance: usize, size: usize) -> PartialAtlas {
         let mesh = geometry.mesh(instance);
         let atlas = UvAtlas::new(mesh, size);
-        let said = |triangle| self.of_instance[instance].get(&corners(mesh, triangle));
+        let known = |triangle| self.of_instance[instance].get(&corners(mesh, triangle));
         let of_triangle: Vec<Texel> = (0..mesh.triangles.len())
-            .map(|triangle| said(triangle).map_or(Texel::Unseen, |values| Texel::Seen(*values)))
+            .map(|triangle| known(triangle).map_or(Texel::Unseen, |values| Texel::Seen(*values)))
             .collect();
         let texels = Picture::from_fn(size, size, |x, y| {
             atlas.owner(x, y).map_or(Texel::Unused, |(triangle, _)| of_triangle[triangle])
@@ -60,12 +60,11 @@ fn corners(mesh: &mateval_scene::TriangleMesh, triangle: usize) -> Corners {
     mesh.corners(triangle).map(|corner| corner.to_array().map(f32::to_bits))
 }
 
-/// The parts of a set; of the source's own where none is named.
+/// The parts of a set; `None` stands for the parts of the source.
 pub fn parts_of<'a>(geometry: &SceneGeometry<'a>, set: Option<&PartSetId>) -> Result<&'a [Part], BaselineError> {
     let found = geometry.scene.all_part_sets().find(|(id, _)| *id == set).map(|(_, parts)| parts);
     found.ok_or_else(|| {
-        let what =
-            format!("no set of parts '{}'; `part_labels` in a recipe makes one", set.map_or("", PartSetId::as_str));
+        let what = format!("no part set '{}'; `part_labels` in a recipe makes one", set.map_or("", PartSetId::as_str));
         SceneError::Unsupported { path: geometry.folder.scene_file(), what }.into()
     })
 }

@@ -1,8 +1,8 @@
 //! The bridge to PartField (Liu and others, "PartField: Learning 3D Feature Fields for Part Segmentation and Beyond",
 //! 2025), which splits one mesh at a time into parts.
 //!
-//! [`export`] writes the meshes, [`import`] names the labels that it made as a recipe's `part_labels` wants them: built
-//! anew with these, the dataset has a second set of parts.
+//! [`export`] writes the meshes. [`import`] copies PartField's labels to where `part_labels` in a recipe expects them; a
+//! dataset built from that recipe has a second part set.
 
 use std::path::{Path, PathBuf};
 
@@ -12,15 +12,15 @@ use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{SceneError, SceneId};
 
-use crate::error::BaselineError;
+use crate::error::{BaselineError, LabelsError};
 use crate::geometry::SceneGeometry;
 use crate::objects::{obj_text, object_id};
 use crate::submission::check_new_place;
 
-/// Largest file of labels that is read.
+/// Largest file of labels that is read, in bytes.
 const MAX_LABEL_BYTES: u64 = 1 << 28;
 
-/// Writes `<id>.obj` for every instance that has an atlas. Gives how many there are.
+/// Writes `<id>.obj` for every instance that has an atlas, and returns their number.
 pub fn export(dataset: &Dataset, out: &Path) -> Result<usize, BaselineError> {
     check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
@@ -37,9 +37,10 @@ pub fn export(dataset: &Dataset, out: &Path) -> Result<usize, BaselineError> {
     Ok(count)
 }
 
-/// Copies the labels of `parts` parts an instance, `<id>_0_<parts>.npy` in `clusters` as PartField names them, to
-/// `<scene>/<instance>.npy`. Where an instance has fewer triangles than that PartField writes no such file: the one of
-/// the most parts below is taken. Instances without any keep their own parts. Gives how many have labels.
+/// Copies `<id>_0_<parts>.npy`, PartField's labels of an instance that is split into `parts` parts, from `clusters` to
+/// `<scene>/<instance>.npy`. PartField writes no such file for an instance with fewer triangles than parts; the file with
+/// the next smaller number of parts is taken then. An instance without any such file keeps its own parts. Returns the
+/// number of instances with labels.
 pub fn import(dataset: &Dataset, clusters: &Path, parts: u8, out: &Path) -> Result<usize, BaselineError> {
     check_new_place(dataset, out)?;
     let work = WorkFolder::start(out)?;
@@ -67,15 +68,15 @@ fn labels_of(clusters: &Path, scene: &SceneId, instance: &Instance, parts: u8) -
     candidates.find(|path| path.is_file())
 }
 
-/// The file's bytes, where it holds one label a triangle.
+/// The file's bytes, if it holds one label per triangle.
 fn checked_labels(path: &Path, instance: &Instance) -> Result<Vec<u8>, BaselineError> {
-    let bad = |what: String| BaselineError::BadLabels { path: path.to_owned(), what };
-    let bytes = mateval_image::limits::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.to_string()))?;
-    let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(error.to_string()))?;
+    let bad = |source: LabelsError| BaselineError::BadLabels { path: path.to_owned(), source };
+    let bytes = mateval_image::limits::read_at_most(path, MAX_LABEL_BYTES).map_err(|error| bad(error.into()))?;
+    let file = npyz::NpyFile::new(bytes.as_slice()).map_err(|error| bad(error.into()))?;
     let labels: u64 = file.shape().iter().try_fold(1_u64, |all, axis| all.checked_mul(*axis)).unwrap_or(u64::MAX);
     if labels != instance.triangles as u64 {
-        let what = format!("{labels} labels; '{}' has {} triangles", instance.id, instance.triangles);
-        return Err(bad(what));
+        let (instance, triangles) = (instance.id.to_string(), instance.triangles);
+        return Err(bad(LabelsError::Count { labels, instance, triangles }));
     }
     Ok(bytes)
 }

@@ -1,7 +1,7 @@
-//! What the pixels of an estimate show, as points in space (the paper's partial point cloud), to be found by place.
+//! The pixels of an estimate as points in space (the paper's partial point cloud), with nearest-point queries.
 //!
-//! By an R*-tree, not a k-d tree: what a view shows of a room is flat pieces, and from a place above such a piece a k-d
-//! tree, which knows planes and no boxes, looks through all that lies as near sideways (`benches/lifting.rs`).
+//! The tree is an R*-tree and not a k-d tree: a view shows flat pieces of a room, and for a query above such a piece a
+//! k-d tree, which bounds points by planes and not by boxes, visits many points beside it (`benches/lifting.rs`).
 
 use std::num::NonZero;
 
@@ -12,13 +12,13 @@ use rstar::primitives::GeomWithData;
 use crate::estimate::Values;
 use crate::seen::SeenPoint;
 
-/// How an unseen texel follows from seen ones.
+/// How the values of an unseen texel are computed from seen points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FillRule {
-    /// 1: the nearest (the paper); more: their mean, weighted by the inverse square of the distance (Point-UV Diffusion
-    /// takes 3).
+    /// Number of nearest points: 1 in the paper. Several are averaged with the inverse square of the distance as weight;
+    /// Point-UV Diffusion uses 3.
     pub neighbours: NonZero<usize>,
-    /// Metres that opposite normals count as (normals at right angles 0.71 of it); 0: normals do not count.
+    /// Distance that opposite normals count as, in metres; normals at right angles count 0.71 of it. 0 ignores normals.
     pub normal_weight_m: f64,
 }
 
@@ -28,20 +28,20 @@ impl Default for FillRule {
     }
 }
 
-/// Points of an estimate's pixels, with what it says of each.
+/// Seen points with the values of the estimate at each.
 pub struct SeenCloud {
     rule: FillRule,
     tree: Tree,
 }
 
-/// Three axes are faster: normals are left out where they do not count.
+/// A search in three dimensions is faster, so normals are stored only where they count.
 enum Tree {
     Places(RTree<GeomWithData<[f32; 3], Values>>),
     WithNormals(RTree<GeomWithData<[f32; 6], Values>>),
 }
 
 impl SeenCloud {
-    /// Takes in points and what the estimate says of each.
+    /// Builds the tree of these points and values.
     pub fn new(rule: FillRule, seen: impl IntoIterator<Item = (SeenPoint, Values)>) -> Self {
         let seen = seen.into_iter();
         let tree = if rule.normal_weight_m > 0.0 {
@@ -57,7 +57,7 @@ impl SeenCloud {
         Self { rule, tree }
     }
 
-    /// Whether nothing is seen.
+    /// Whether there are no points.
     pub fn is_empty(&self) -> bool {
         match &self.tree {
             Tree::Places(tree) => tree.size() == 0,
@@ -65,7 +65,7 @@ impl SeenCloud {
         }
     }
 
-    /// What follows for a place of a surface with this normal; none where nothing is seen.
+    /// The values for a place of a surface with this normal; none without any points.
     pub fn values_at(&self, place: DVec3, normal: DVec3) -> Option<Values> {
         match &self.tree {
             Tree::Places(tree) => from_nearest(tree, place.as_vec3().to_array(), self.rule.neighbours),
@@ -75,7 +75,7 @@ impl SeenCloud {
 }
 
 fn with_normal(rule: FillRule, place: DVec3, normal: DVec3) -> [f32; 6] {
-    // Opposite unit normals lie two apart.
+    // Opposite unit normals have distance 2.
     let (place, normal) = (place.as_vec3(), (normal * (rule.normal_weight_m / 2.0)).as_vec3());
     [place.x, place.y, place.z, normal.x, normal.y, normal.z]
 }
@@ -90,7 +90,7 @@ fn from_nearest<P: rstar::Point<Scalar = f32>>(
     }
     let (mut sum, mut weights) = ([0.0_f64; 5], 0.0);
     for (near, distance2) in tree.nearest_neighbor_iter_with_distance_2(&point).take(neighbours.get()) {
-        // At a seen point itself that one outweighs all others.
+        // The bound keeps the weight finite at a seen point, whose values then outweigh all others.
         let weight = 1.0 / f64::from(distance2).max(1e-12);
         sum.iter_mut().zip(near.data).for_each(|(sum, value)| *sum += weight * f64::from(value));
         weights += weight;

@@ -1,4 +1,4 @@
-//! Writing a submission: whole or not at all.
+//! Writes a submission, complete or not at all.
 
 use std::path::Path;
 
@@ -10,24 +10,24 @@ use mateval_scene::{SceneError, json};
 
 use crate::error::BaselineError;
 
-/// What `submission.json` says of a baseline.
+/// Name and description of a baseline in `submission.json`.
 #[derive(Clone, Debug)]
 pub struct Method {
-    /// As tables show it.
+    /// Name in tables.
     pub name: String,
-    /// Everything that was chosen.
+    /// All choices that were made.
     pub description: String,
 }
 
 impl Method {
-    /// Of these words.
+    /// A method with this name and description.
     pub fn new(name: &str, description: &str) -> Self {
         Self { name: name.to_owned(), description: description.to_owned() }
     }
 }
 
-/// Makes a submission at `out`: `write_instance` is called for every instance that has an atlas, with the folder that
-/// its maps belong in. `force` replaces an earlier submission there. Gives the number of instances.
+/// Writes a submission to `out` and returns the number of instances. `write_instance` is called for every instance that
+/// has an atlas, with the folder for its maps. `force` replaces an earlier submission.
 pub fn write(
     dataset: &Dataset,
     out: &Path,
@@ -47,8 +47,8 @@ pub fn write(
     })
 }
 
-/// The same, scene by scene: `write_scene` is given the folder that its instances' folders belong in, and tells how
-/// many it wrote.
+/// Like [`write`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the number
+/// of instances that it wrote.
 pub fn write_scenes(
     dataset: &Dataset,
     out: &Path,
@@ -61,7 +61,7 @@ pub fn write_scenes(
     let work = WorkFolder::start(out)?;
     let mut instances = 0;
     for scene in &dataset.scenes {
-        // A submission names the dataset that it was made for: what it is made of must be what that says.
+        // The submission names the dataset by its manifest, so the files that it is made from must match the manifest.
         dataset.check_files(&scene.id, |path| !path.contains("/renders/"))?;
         let folder = scene_folder(work.path(), &scene.id);
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
@@ -81,13 +81,13 @@ pub fn write_scenes(
     Ok(instances)
 }
 
-/// A place of its own for what bridges write: nothing is there yet, and it is not in the dataset.
+/// Fails where files for another project would replace something or lie in the dataset.
 pub(crate) fn check_new_place(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
     check_outside(dataset, out)?;
     if out.exists() { Err(BaselineError::InTheWay(out.to_owned())) } else { Ok(()) }
 }
 
-/// What lies in a dataset's folder is a fault of the dataset.
+/// Fails where `out` lies in the dataset's folder, which must hold no other files.
 fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
     let found = |path: &Path| path.canonicalize().ok();
     let Some(root) = found(&dataset.root) else { return Ok(()) };

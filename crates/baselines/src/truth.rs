@@ -1,4 +1,4 @@
-//! The ceiling: the truth baked to the atlas, scored like anybody's.
+//! `gt`, the ceiling: the ground truth baked to the atlases, as a submission.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use mateval_scene::submission::Map;
 use crate::error::BaselineError;
 use crate::submission::{self, Method};
 
-/// Copies the baked maps of every instance. Gives the number of instances.
+/// Copies the baked maps of every instance and returns the number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
     let method = Method::new("gt", "the source materials baked to the dataset's own atlases");
     submission::write(dataset, out, force, &method, |scene, instance, folder| {

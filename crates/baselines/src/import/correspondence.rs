@@ -1,4 +1,4 @@
-//! The place of a donor's surface that is nearest to a given one.
+//! Search for the place of a donor's surface that is nearest to a given place.
 
 use glam::DVec3;
 use mateval_scene::triangle::nearest_weights;
@@ -6,13 +6,13 @@ use rstar::{AABB, PointDistance, RTree, RTreeObject};
 
 use super::donor::Donor;
 
-/// Of places no further than this beyond the nearest, one that faces the same way is taken: a board's two sides may lie
-/// closer together than two meshes of it do.
+/// Among places at most this much further away than the nearest, one that faces the same way is preferred, because the
+/// two sides of a board may lie closer together than two meshes of the board do.
 const SAME_SHEET_M: f64 = 1e-3;
-/// Most places that are compared so.
+/// Largest number of places that are compared in this way.
 const MOST_COMPARED: usize = 64;
 
-/// A donor's triangles by place.
+/// A donor's triangles in a tree for nearest-place queries.
 pub struct Correspondence {
     tree: RTree<Leaf>,
 }
@@ -20,11 +20,11 @@ pub struct Correspondence {
 /// A place of a donor's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corresponding {
-    /// The number of the triangle.
+    /// Index of the triangle.
     pub triangle: usize,
-    /// Barycentric weights of the place; they add to one.
+    /// Barycentric weights of the place, with sum 1.
     pub weights: DVec3,
-    /// How far away it is.
+    /// Distance from the query's place, in metres.
     pub distance_m: f64,
 }
 
@@ -64,9 +64,9 @@ impl PointDistance for Leaf {
 }
 
 impl Correspondence {
-    /// Takes in those triangles of the donor that belong; `belongs` is asked by number.
-    pub fn new(donor: &Donor, belongs: impl Fn(usize) -> bool) -> Self {
-        let numbers = (0..donor.triangles.len()).filter(|triangle| belongs(*triangle));
+    /// Builds the tree of those triangles of the donor whose index `is_included` accepts.
+    pub fn new(donor: &Donor, is_included: impl Fn(usize) -> bool) -> Self {
+        let numbers = (0..donor.triangles.len()).filter(|triangle| is_included(*triangle));
         let leaf = |triangle: usize| {
             let corners = donor.triangles[triangle].corners.map(|corner| corner.as_dvec3());
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
@@ -75,8 +75,8 @@ impl Correspondence {
         Self { tree: RTree::bulk_load(numbers.map(leaf).collect()) }
     }
 
-    /// The nearest place; of several that are as good as equally near one that faces as `normal` does. None where the
-    /// donor is empty.
+    /// The nearest place; among nearly equal distances, a place that faces as `normal` does. `None` where the tree is
+    /// empty.
     pub fn nearest(&self, place: DVec3, normal: DVec3) -> Option<Corresponding> {
         let mut leaves = self.tree.nearest_neighbor_iter(&place.to_array()).take(MOST_COMPARED).peekable();
         let nearest = leaves.peek()?.corresponding(place).distance_m;
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_sides_the_one_that_faces_the_same_way() {
+    fn the_side_that_faces_the_same_way_is_preferred() {
         let front = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let back = [Vec3::ZERO, Vec3::Y, Vec3::X].map(|corner| corner - Vec3::Z * 5e-4);
         let far = [Vec3::ZERO, Vec3::Y, Vec3::X].map(|corner| corner - Vec3::Z * 5e-3);
@@ -117,7 +117,7 @@ mod tests {
         let tree = Correspondence::new(&donor(&[front, back]), |_| true);
         assert_eq!(tree.nearest(place, DVec3::Z).unwrap().triangle, 0);
         assert_eq!(tree.nearest(place, -DVec3::Z).unwrap().triangle, 1);
-        // Twin: a sheet that is not the same board.
+        // Twin: the other side is too far away to belong to the same board.
         let tree = Correspondence::new(&donor(&[front, far]), |_| true);
         assert_eq!(tree.nearest(place, -DVec3::Z).unwrap().triangle, 0);
         assert!(Correspondence::new(&donor(&[front]), |_| false).nearest(place, DVec3::Z).is_none());

@@ -1,96 +1,93 @@
-//! Another mesh of a scene's surfaces, with what its maker says of them.
+//! A donor: another method's mesh of a scene's surfaces, with the materials that are transferred to the atlases.
 
 use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_image::Texture;
 
-use crate::estimate::{Says, Values};
+use super::error::{ImportError, Limited};
+use super::limits::MAX_TRIANGLES;
+use crate::estimate::{GivenMaps, Values};
 use crate::median::DEFAULT;
 
 /// Triangles in the dataset's world space, each with a material.
 #[derive(Default)]
 pub struct Donor {
-    /// All of them.
+    /// All triangles of the file.
     pub triangles: Vec<DonorTriangle>,
-    /// What they name by number.
+    /// The materials that triangles refer to by index.
     pub materials: Vec<DonorMaterial>,
-    /// Vertices that were read for them.
+    /// Number of vertices read so far.
     pub(super) vertices: usize,
-    /// Runs of triangles that the file gives names to.
+    /// The named groups of triangles.
     pub groups: Vec<DonorGroup>,
 }
 
-/// A node of a glTF, a group of an OBJ.
+/// A node of a glTF, or a group of an OBJ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DonorGroup {
-    /// Its own name, then those of the nodes above.
+    /// The group's own name, then those of its ancestors, nearest first.
     pub names: Vec<String>,
-    /// Its triangles' numbers.
+    /// Indices of its triangles in [`Donor::triangles`].
     pub triangles: Range<usize>,
 }
-
-/// Most triangles of a file.
-pub const MAX_TRIANGLES: usize = 5_000_000;
-/// Most vertices of a file, counted for each node that has them.
-pub const MAX_VERTICES: usize = 3 * MAX_TRIANGLES;
-/// Most texels of all textures of a file.
-pub const MAX_TEXELS: usize = 1 << 28;
-/// Most nodes of a glTF that hang below each other.
-pub const MAX_DEPTH: usize = 64;
-/// Largest file, and most of all buffers of a file, in bytes.
-pub const MAX_FILE_BYTES: u64 = 1 << 31;
 
 /// A triangle of a donor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DonorTriangle {
-    /// Metres, +Y up.
+    /// World space, in metres, +Y up.
     pub corners: [Vec3; 3],
-    /// Where base_color and where roughness and metallic are looked up; v upwards.
+    /// Texture coordinates of base_color, and those of roughness and metallic; v upwards.
     pub uvs: [[Vec2; 3]; 2],
-    /// What base_color is multiplied with at each corner; linear.
+    /// Linear factor of base_color at each corner.
     pub colors: [Vec3; 3],
-    /// Its place in [`Donor::materials`].
+    /// Index in [`Donor::materials`].
     pub material: usize,
 }
 
-/// Constants, multiplied with textures where there are some. No roughness or metallic: nothing is said of it.
+/// Constants, multiplied by the textures where there are any. Roughness or metallic is `None` where the file gives
+/// none.
 #[derive(Clone)]
 pub struct DonorMaterial {
-    /// Linear.
+    /// Linear factor and texture.
     pub base_color: ([f32; 3], Option<Texture>),
-    /// Perceptual.
+    /// Perceptual roughness.
     pub roughness: Option<Scalar>,
-    /// 0 to 1.
+    /// Metallic, 0 to 1.
     pub metallic: Option<Scalar>,
 }
 
-/// A number of a material.
+/// A scalar of a material.
 #[derive(Clone)]
 pub struct Scalar {
-    /// The constant.
+    /// The constant factor.
     pub factor: f32,
-    /// A linear texture, and the channel of it that counts.
+    /// A linear texture, and the index of the channel that is used.
     pub texture: Option<(Texture, usize)>,
 }
 
 impl Donor {
-    /// Puts a triangle behind the others.
-    pub(super) fn push(&mut self, triangle: DonorTriangle) -> Result<(), String> {
+    /// Appends a triangle.
+    pub(super) fn push(&mut self, triangle: DonorTriangle) -> Result<(), ImportError> {
         if self.triangles.len() >= MAX_TRIANGLES {
-            return Err(format!("more than {MAX_TRIANGLES} triangles"));
+            return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
         }
         self.triangles.push(triangle);
         Ok(())
     }
 
-    /// What the material of any of its triangles says.
-    pub fn says(&self) -> Says {
+    /// Which maps the materials of its triangles give.
+    pub fn given_maps(&self) -> GivenMaps {
         let any = |has: fn(&DonorMaterial) -> bool| self.triangles.iter().any(|t| has(&self.materials[t.material]));
-        Says { base_color: true, roughness: any(|m| m.roughness.is_some()), metallic: any(|m| m.metallic.is_some()) }
+        GivenMaps {
+            base_color: true,
+            roughness: any(|m| m.roughness.is_some()),
+            metallic: any(|m| m.metallic.is_some()),
+        }
     }
 
-    /// How many metres a texel's side covers in a triangle, of the finest of its textures; infinite without any.
+    /// The side of a texel on the triangle, in metres, in the finest of the material's textures; infinite without
+    /// textures.
     pub fn texel_size_m(&self, triangle: usize) -> f64 {
         let triangle = &self.triangles[triangle];
         let material = &self.materials[triangle.material];
@@ -106,7 +103,7 @@ impl Donor {
         sizes.filter(|size| *size > 0.0).fold(f64::INFINITY, f64::min)
     }
 
-    /// What it says at a place of a triangle, given by barycentric weights.
+    /// The material at the place of a triangle with these barycentric weights.
     pub fn values(&self, triangle: usize, weights: DVec3) -> Values {
         let triangle = &self.triangles[triangle];
         let material = &self.materials[triangle.material];

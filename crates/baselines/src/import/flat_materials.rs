@@ -1,4 +1,4 @@
-//! `<scene>.json`: one material a part, or an instance.
+//! `<scene>.json`: one uniform material per part or instance.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -7,27 +7,28 @@ use mateval_scene::{PartSetId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::error::{ImportError, MaterialFault};
 use crate::error::BaselineError;
-use crate::estimate::{Says, Values};
+use crate::estimate::{GivenMaps, Values};
 use crate::geometry::SceneGeometry;
 use crate::median::DEFAULT;
 use crate::part_colors::{PartColors, parts_of};
 
-/// One material, the same everywhere.
+/// A uniform material.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FlatMaterial {
-    /// Linear, 0 to 1.
+    /// Linear base colour, 0 to 1.
     pub base_color: [f32; 3],
-    /// Perceptual, 0 to 1.
+    /// Perceptual roughness, 0 to 1.
     #[serde(default)]
     pub roughness: Option<f32>,
-    /// 0 to 1.
+    /// Metallic, 0 to 1.
     #[serde(default)]
     pub metallic: Option<f32>,
 }
 
-/// By the id of a part, or of an instance: its parts that are not named themselves.
+/// Materials by the id of a part, or of an instance, which stands for all its parts without an entry of their own.
 pub type FlatMaterials = BTreeMap<String, FlatMaterial>;
 
 impl FlatMaterial {
@@ -36,29 +37,29 @@ impl FlatMaterial {
         [r, g, b, self.roughness.unwrap_or(DEFAULT[3]), self.metallic.unwrap_or(DEFAULT[4])]
     }
 
-    fn is_sound(&self) -> bool {
+    fn is_in_range(&self) -> bool {
         let numbers = self.base_color.iter().chain(&self.roughness).chain(&self.metallic);
         numbers.into_iter().all(|v| (0.0..=1.0).contains(v))
     }
 }
 
-/// Reads the file; all that is wrong with it at once.
+/// Reads the file. The error lists every wrong entry.
 pub fn read(
     path: &Path,
     geometry: &SceneGeometry<'_>,
     set: Option<&PartSetId>,
-) -> Result<(PartColors, Says), BaselineError> {
+) -> Result<(PartColors, GivenMaps), BaselineError> {
     let materials: FlatMaterials = json::read(path)?;
     let parts = parts_of(geometry, set)?;
     let instances = geometry.scene.instances.iter().map(|instance| instance.id.as_str());
     let known: BTreeSet<&str> = parts.iter().map(|part| part.id.as_str()).chain(instances).collect();
     let unknown = materials.keys().filter(|id| !known.contains(id.as_str()));
-    let unknown = unknown.map(|id| format!("/{id}: expected the id of a part or an instance"));
-    let unsound = materials.iter().filter(|(_, material)| !material.is_sound());
-    let unsound = unsound.map(|(id, _)| format!("/{id}: expected numbers from 0 to 1"));
-    let wrong: Vec<String> = unknown.chain(unsound).collect();
-    if !wrong.is_empty() {
-        return Err(BaselineError::BadImport { path: path.to_owned(), what: wrong.join("; ") });
+    let unknown = unknown.map(|id| MaterialFault::UnknownId(id.clone()));
+    let out_of_range = materials.iter().filter(|(_, material)| !material.is_in_range());
+    let out_of_range = out_of_range.map(|(id, _)| MaterialFault::OutOfRange(id.clone()));
+    let faults: Vec<MaterialFault> = unknown.chain(out_of_range).collect();
+    if !faults.is_empty() {
+        return Err(BaselineError::BadImport { path: path.to_owned(), source: ImportError::Materials(faults) });
     }
     let colors = PartColors::new(geometry, set, |part, instance| {
         let own = materials.get(parts[part].id.as_str());
@@ -66,7 +67,10 @@ pub fn read(
         material.map(FlatMaterial::values)
     })?;
     let any = |has: fn(&FlatMaterial) -> bool| materials.values().any(has);
-    let says =
-        Says { base_color: true, roughness: any(|m| m.roughness.is_some()), metallic: any(|m| m.metallic.is_some()) };
-    Ok((colors, says))
+    let given = GivenMaps {
+        base_color: true,
+        roughness: any(|m| m.roughness.is_some()),
+        metallic: any(|m| m.metallic.is_some()),
+    };
+    Ok((colors, given))
 }

@@ -1,5 +1,5 @@
-//! A textured glTF as a donor: base colour, roughness and metallic of the default scene's triangles; vertex colours,
-//! `KHR_texture_transform`.
+//! Reads a textured glTF as a donor: base colour, roughness and metallic of the default scene's triangles, with vertex
+//! colours and `KHR_texture_transform`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -13,15 +13,14 @@ use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, tri
 use mateval_scene::gltf_error::GltfError;
 use mateval_scene::source_folder::SourceFolder;
 
-use super::donor::{
-    Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES,
-    MAX_VERTICES, Scalar,
-};
+use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
+use super::error::{ImportError, Limited, Place, Unsupported};
+use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
 
-/// Reads the file `name` of the folder; what is wrong in words.
-pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
-    let bytes = folder.read(name).map_err(|fault| fault.message)?;
-    let file = parse(&bytes).map_err(in_words)?;
+/// Reads the file `name` of the folder.
+pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
+    let bytes = folder.read(name)?;
+    let file = parse(&bytes).map_err(ImportError::gltf)?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
     let mut bytes = 0;
@@ -29,7 +28,7 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
         let read = reader.buffer(&buffer, file.blob.as_deref())?;
         bytes += read.len() as u64;
         if bytes > MAX_FILE_BYTES {
-            return Err(format!("its buffers have more than {MAX_FILE_BYTES} bytes in all"));
+            return Err(ImportError::TooLarge { what: Limited::BufferBytes, limit: MAX_FILE_BYTES });
         }
         reader.buffers.push(read);
     }
@@ -37,10 +36,10 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
     for material in file.materials() {
         donor.materials.push(reader.material(&material)?);
     }
-    // What glTF says of a primitive without a material.
+    // The material that glTF gives to primitives without one.
     let plain = Scalar { factor: 1.0, texture: None };
-    let nothing = DonorMaterial { base_color: ([1.0; 3], None), roughness: Some(plain.clone()), metallic: Some(plain) };
-    donor.materials.push(nothing);
+    let default = DonorMaterial { base_color: ([1.0; 3], None), roughness: Some(plain.clone()), metallic: Some(plain) };
+    donor.materials.push(default);
     reader.walk(&file, &mut donor)?;
     Ok(donor)
 }
@@ -51,35 +50,35 @@ fn in_words(error: GltfError) -> String {
 
 struct Reader<'a> {
     folder: &'a mut SourceFolder,
-    /// The folder of the file, which its uris begin in.
+    /// The file's folder below the root, which its uris are relative to.
     beside: &'a str,
     buffers: Vec<Vec<u8>>,
-    /// By image, encoding and wrap.
+    /// By image, whether it is sRGB, and wrap.
     textures: BTreeMap<(usize, bool, u8), Texture>,
+    /// Texels of all textures so far.
     texels: usize,
 }
 
 impl Reader<'_> {
-    fn buffer(&mut self, buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>) -> Result<Vec<u8>, String> {
+    fn buffer(&mut self, buffer: &gltf::Buffer<'_>, blob: Option<&[u8]>) -> Result<Vec<u8>, ImportError> {
         match buffer.source() {
-            gltf::buffer::Source::Bin => {
-                blob.map(<[u8]>::to_vec).ok_or_else(|| "its first buffer has no data".to_owned())
-            }
+            gltf::buffer::Source::Bin => blob.map(<[u8]>::to_vec).ok_or(ImportError::BufferWithoutData),
             gltf::buffer::Source::Uri(uri) => self.file(uri),
         }
     }
 
-    fn file(&mut self, uri: &str) -> Result<Vec<u8>, String> {
+    fn file(&mut self, uri: &str) -> Result<Vec<u8>, ImportError> {
         if uri.starts_with("data:") {
-            return Err("data uris are not read; write a .glb, or files beside the .gltf".to_owned());
+            return Err(ImportError::Unsupported(Unsupported::DataUri));
         }
-        let name = percent_encoding::percent_decode_str(uri).decode_utf8().map_err(|error| error.to_string())?;
+        let decoded = percent_encoding::percent_decode_str(uri).decode_utf8();
+        let name = decoded.map_err(|source| ImportError::Uri { uri: uri.to_owned(), source })?;
         let name = if self.beside.is_empty() { name.into_owned() } else { format!("{}/{name}", self.beside) };
-        let relative = SourceFolder::relative(&name).map_err(|fault| fault.message)?;
-        self.folder.read(&relative).map_err(|fault| fault.message)
+        let relative = SourceFolder::relative(&name)?;
+        Ok(self.folder.read(&relative)?)
     }
 
-    fn material(&mut self, material: &gltf::Material<'_>) -> Result<DonorMaterial, String> {
+    fn material(&mut self, material: &gltf::Material<'_>) -> Result<DonorMaterial, ImportError> {
         let pbr = material.pbr_metallic_roughness();
         let base_color =
             pbr.base_color_texture().map(|info| self.texture(&info.texture(), Encoding::Srgb)).transpose()?;
@@ -94,7 +93,7 @@ impl Reader<'_> {
         })
     }
 
-    fn texture(&mut self, texture: &gltf::Texture<'_>, encoding: Encoding) -> Result<Texture, String> {
+    fn texture(&mut self, texture: &gltf::Texture<'_>, encoding: Encoding) -> Result<Texture, ImportError> {
         let image = texture.source();
         let wrap = wrap(&texture.sampler())?;
         let key = (image.index(), encoding == Encoding::Srgb, wrap as u8);
@@ -105,30 +104,30 @@ impl Reader<'_> {
             gltf::image::Source::Uri { uri, .. } => (uri.to_owned(), self.file(uri)?),
             gltf::image::Source::View { view, .. } => {
                 let buffer = &self.buffers[view.buffer().index()];
-                (format!("image {}", image.index()), view_bytes(&view, buffer).map_err(in_words)?.to_vec())
+                (format!("image {}", image.index()), view_bytes(&view, buffer).map_err(ImportError::gltf)?.to_vec())
             }
         };
-        let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap).map_err(|error| error.to_string())?;
+        let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap)?;
         self.texels += read.width() * read.height();
         if self.texels > MAX_TEXELS {
-            return Err(format!("its textures have more than {MAX_TEXELS} texels in all"));
+            return Err(ImportError::TooLarge { what: Limited::Texels, limit: MAX_TEXELS as u64 });
         }
         self.textures.insert(key, read.clone());
         Ok(read)
     }
 
-    fn walk(&self, file: &gltf::Gltf, donor: &mut Donor) -> Result<(), String> {
-        let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or("it has no scene")?;
+    fn walk(&self, file: &gltf::Gltf, donor: &mut Donor) -> Result<(), ImportError> {
+        let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or(ImportError::NoScene)?;
         let mut visited = BTreeSet::new();
         let mut open: Vec<(gltf::Node<'_>, DMat4, Vec<String>)> =
             scene.nodes().map(|node| (node, DMat4::IDENTITY, Vec::new())).collect();
         open.reverse();
         while let Some((node, world_from_parent, above)) = open.pop() {
             if !visited.insert(node.index()) {
-                return Err(format!("node {} hangs below two others", node.index()));
+                return Err(ImportError::NotATree { node: node.index() });
             }
             if above.len() >= MAX_DEPTH {
-                return Err(format!("node {} hangs more than {MAX_DEPTH} deep", node.index()));
+                return Err(ImportError::TooDeep { node: node.index() });
             }
             let world_from_node =
                 world_from_parent * DMat4::from_cols_array_2d(&node.transform().matrix().map(|c| c.map(f64::from)));
@@ -136,8 +135,12 @@ impl Reader<'_> {
             let names: Vec<String> = std::iter::once(own).chain(above).collect();
             let first = donor.triangles.len();
             for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
-                let place = || format!("node {} '{}'", node.index(), names.first().map_or("", String::as_str));
-                self.primitive(&primitive, world_from_node, donor).map_err(|what| format!("{}: {what}", place()))?;
+                let in_node = |source| ImportError::Node {
+                    node: node.index(),
+                    name: names.first().cloned().unwrap_or_default(),
+                    source: Box::new(source),
+                };
+                self.primitive(&primitive, world_from_node, donor).map_err(in_node)?;
             }
             donor.groups.push(DonorGroup { names: names.clone(), triangles: first..donor.triangles.len() });
             open.extend(node.children().map(|child| (child, world_from_node, names.clone())));
@@ -150,48 +153,49 @@ impl Reader<'_> {
         primitive: &gltf::Primitive<'_>,
         world_from_node: DMat4,
         donor: &mut Donor,
-    ) -> Result<(), String> {
+    ) -> Result<(), ImportError> {
         match primitive.mode() {
             Mode::Triangles => {}
             Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => return Ok(()),
             Mode::TriangleStrip | Mode::TriangleFan => {
-                return Err("strips and fans are not read; write triangles".to_owned());
+                return Err(ImportError::Unsupported(Unsupported::StripsAndFans));
             }
         }
         let bytes = |accessor: &gltf::Accessor<'_>| {
-            let view = accessor.view().ok_or("sparse accessors are not read")?;
-            Ok::<_, String>(self.buffers[view.buffer().index()].as_slice())
+            let view = accessor.view().ok_or(ImportError::Unsupported(Unsupported::SparseAccessor))?;
+            Ok::<_, ImportError>(self.buffers[view.buffer().index()].as_slice())
         };
-        let positions = primitive.get(&Semantic::Positions).ok_or("expected POSITION")?;
+        let missing = |attribute: String| ImportError::MissingAttribute { attribute };
+        let positions = primitive.get(&Semantic::Positions).ok_or_else(|| missing("POSITION".to_owned()))?;
         donor.vertices += positions.count();
         if donor.vertices > MAX_VERTICES {
-            return Err(format!("more than {MAX_VERTICES} vertices, counted for each node that has them"));
+            return Err(ImportError::TooLarge { what: Limited::Vertices, limit: MAX_VERTICES as u64 });
         }
         let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)
-            .map_err(in_words)?
+            .map_err(ImportError::gltf)?
             .into_iter()
             .map(|place| world_from_node.transform_point3(DVec3::from(place.map(f64::from))).as_vec3())
             .collect();
         if !positions.iter().all(|place| place.is_finite()) {
-            return Err("a place is not finite once its node's transform is applied".to_owned());
+            return Err(ImportError::NotFinite(Place::WorldPosition));
         }
         let numbers = match primitive.indices() {
             Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
-                return Err(format!("more than {MAX_TRIANGLES} triangles"));
+                return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
             }
-            Some(accessor) => indices(&accessor, bytes(&accessor)?).map_err(in_words)?,
+            Some(accessor) => indices(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?,
             None => (0..positions.len() as u32).collect(),
         };
-        let triangles = triangles(numbers, positions.len()).map_err(in_words)?;
-        let same_count = |count: usize, what: &str| match count == positions.len() {
+        let triangles = triangles(numbers, positions.len()).map_err(ImportError::gltf)?;
+        let same_count = |found: usize, attribute: String| match found == positions.len() {
             true => Ok(()),
-            false => Err(format!("{count} {what}, expected as many as POSITION: {}", positions.len())),
+            false => Err(ImportError::Count { attribute, found, expected: positions.len() }),
         };
         let colors = match primitive.get(&Semantic::Colors(0)) {
-            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?).map_err(in_words)?,
+            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?,
             None => vec![[1.0; 3]; positions.len()],
         };
-        same_count(colors.len(), "COLOR_0")?;
+        same_count(colors.len(), "COLOR_0".to_owned())?;
         let pbr = primitive.material().pbr_metallic_roughness();
         let mut uvs = [vec![Vec2::ZERO; positions.len()], vec![Vec2::ZERO; positions.len()]];
         for (uvs, info) in uvs.iter_mut().zip([pbr.base_color_texture(), pbr.metallic_roughness_texture()]) {
@@ -199,9 +203,9 @@ impl Reader<'_> {
             let transform = info.texture_transform();
             let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
             let accessor =
-                primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| format!("expected TEXCOORD_{set}"))?;
-            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?).map_err(in_words)?;
-            same_count(found.len(), "TEXCOORD")?;
+                primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| missing(format!("TEXCOORD_{set}")))?;
+            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?;
+            same_count(found.len(), format!("TEXCOORD_{set}"))?;
             *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
         }
         let material = primitive.material().index().unwrap_or(donor.materials.len() - 1);
@@ -221,21 +225,21 @@ impl Reader<'_> {
     }
 }
 
-/// Where a uv is looked up, v upwards: glTF counts it from the top.
+/// The texture coordinate after its transform, with v upwards; glTF's v points down.
 fn looked_up(uv: Vec2, transform: Option<&gltf::texture::TextureTransform<'_>>) -> Vec2 {
     let uv = transform.map_or(uv, |transform| {
         let (offset, scale) = (Vec2::from(transform.offset()), Vec2::from(transform.scale()));
-        // Counter-clockwise in a space whose v points down: the extension's own matrix, column by column.
+        // The extension's own matrix, column by column: counter-clockwise in a space whose v points down.
         let (sin, cos) = (libm::sinf(transform.rotation()), libm::cosf(transform.rotation()));
         offset + Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos)) * (scale * uv)
     });
     Vec2::new(uv.x, 1.0 - uv.y)
 }
 
-fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, String> {
+fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, ImportError> {
     use gltf::texture::WrappingMode;
     if sampler.wrap_s() != sampler.wrap_t() {
-        return Err("a sampler that wraps u and v in different ways is not read".to_owned());
+        return Err(ImportError::Unsupported(Unsupported::MixedWrap));
     }
     Ok(match sampler.wrap_s() {
         WrappingMode::Repeat => Wrap::Repeat,
@@ -250,7 +254,7 @@ mod tests {
 
     use super::*;
 
-    fn read_bytes(bytes: &[u8]) -> Result<Donor, String> {
+    fn read_bytes(bytes: &[u8]) -> Result<Donor, ImportError> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.glb"), bytes).unwrap();
         read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.glb")
@@ -270,13 +274,13 @@ mod tests {
     }
 
     #[test]
-    fn what_says_no_material_is_what_gltf_says_of_it() {
+    fn a_primitive_without_a_material_has_the_default_of_gltf() {
         let donor = read_bytes(&sound()).unwrap();
         assert_eq!((donor.triangles.len(), donor.groups[0].names.as_slice()), (1, &["a".to_owned()][..]));
         assert_eq!(donor.values(0, DVec3::new(1.0, 0.0, 0.0)), [1.0; 5]);
     }
 
-    /// No panic, whatever a byte says.
+    /// Damaged bytes cause no panic.
     #[test]
     fn damage_is_an_error_or_another_mesh() {
         let sound = sound();
@@ -292,15 +296,15 @@ mod tests {
         assert!(refused > 1000, "{refused}");
     }
 
-    /// glTF's own words: counter-clockwise, in a space whose v points down.
+    /// As glTF defines it: counter-clockwise in a space whose v points down.
     #[test]
-    fn a_quarter_turn_goes_counter_clockwise() {
+    fn a_quarter_turn_is_counter_clockwise() {
         let text = r#"{"asset":{"version":"2.0"},"images":[{"uri":"a"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":
             {"baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":{"rotation":1.5707963267948966}}}}}]}"#;
         let file = parse(text.as_bytes()).unwrap();
         let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
         let turned = looked_up(Vec2::new(1.0, 0.0), info.texture_transform().as_ref());
-        // To the right becomes upwards: -1 in glTF's v.
+        // A step to the right becomes a step up, which is -1 in glTF's v.
         assert!((turned - Vec2::new(0.0, 2.0)).length() < 1e-6, "{turned}");
     }
 }

@@ -1,14 +1,18 @@
-//! Methods that do not write our atlases: their own uv, a textured glTF or OBJ, one material a part. What they say is
-//! carried over by surface: each place of an instance takes what the nearest place of their mesh says.
+//! Imports the output of methods that do not write the dataset's atlases: textured glTF or OBJ meshes with their own
+//! texture coordinates, or one material per part. Each place of an instance takes the material of the nearest place of
+//! such a mesh, the donor.
 //!
-//! `files` finds the files, `gltf_donor` and `obj_donor` read meshes into a `donor`, `correspondence` finds the nearest
-//! place, `rebake` fills atlases, `flat_materials` is for one material a part, `report` tells how well it went.
+//! `files` finds the files; `gltf_donor` and `obj_donor` read them as a `donor`; `correspondence` finds the nearest
+//! place; `rebake` fills the atlases; `flat_materials` reads one material per part; `report` states how much of each
+//! surface was found.
 
 mod correspondence;
 mod donor;
+pub mod error;
 mod files;
 mod flat_materials;
 mod gltf_donor;
+mod limits;
 mod obj_donor;
 mod rebake;
 mod report;
@@ -22,7 +26,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::{InstanceId, PartSetId, Progress};
 
 use crate::error::BaselineError;
-use crate::estimate::Says;
+use crate::estimate::GivenMaps;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;
@@ -35,18 +39,18 @@ pub use flat_materials::{FlatMaterial, FlatMaterials};
 use rebake::{Distances, rebake};
 pub use report::{IMPORT_FORMAT, ImportReport, ImportTotals, ImportedInstance, ImportedScene};
 
-/// How files are read.
+/// Options of an import.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportOptions {
-    /// Places further away than this do not correspond.
+    /// Largest distance, in metres, between a place of an instance and the place of the donor whose material it takes.
     pub max_distance_m: f64,
-    /// The set of parts that `<scene>.json` names; none: the source's own.
+    /// The part set that `<scene>.json` names parts of; `None` stands for the parts of the source.
     pub part_set: Option<PartSetId>,
 }
 
-/// Writes a submission. An instance takes the first of `<scene>/<instance>.glb|gltf|obj`, `<scene>.glb|gltf|obj`,
-/// `<scene>.json` that tells of it; one that none tells of has no maps. Fails where the folder holds nothing for any
-/// scene, or where nothing in a scene's files is near enough to anything.
+/// Writes a submission. An instance takes its material from the first of `<scene>/<instance>.glb|gltf|obj`,
+/// `<scene>.glb|gltf|obj` and `<scene>.json` that describes it; without any it has no maps. Fails where the folder has no
+/// file for any scene, or where a scene's files are too far from all its instances.
 pub fn write(
     dataset: &Dataset,
     folder: &Path,
@@ -70,17 +74,17 @@ pub fn write(
         for (done, &at) in with_atlas.iter().enumerate() {
             progress(&format!("{} import", scene.id), done, with_atlas.len());
             let id = &scene.instances[at].id;
-            let told = sources.instance(&geometry, at)?;
-            instances.push(match told {
-                Some(told) => told.write(id, &out.join(id.as_str()))?,
-                None => nothing_told(id),
+            let imported = sources.instance(&geometry, at)?;
+            instances.push(match imported {
+                Some(imported) => imported.write(id, &out.join(id.as_str()))?,
+                None => undescribed(id),
             });
         }
         progress(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len());
         let written = instances.iter().filter(|instance| instance.has_maps()).count();
         if has_files(&files, scene) && written == 0 {
             let nearest_m = instances.iter().filter_map(|instance| instance.nearest_m).reduce(f64::min);
-            return Err(nothing_near(folder, scene, nearest_m, options.max_distance_m));
+            return Err(nothing_found(folder, scene, nearest_m, options.max_distance_m));
         }
         scenes.borrow_mut().push(ImportedScene { scene: scene.id.clone(), instances });
         Ok(written)
@@ -90,7 +94,7 @@ pub fn write(
     Ok(ImportReport { format, max_distance_m, unused: files.unused(&dataset.scenes), scenes })
 }
 
-fn nothing_told(instance: &InstanceId) -> ImportedInstance {
+fn undescribed(instance: &InstanceId) -> ImportedInstance {
     ImportedInstance {
         instance: instance.clone(),
         file: None,
@@ -102,7 +106,7 @@ fn nothing_told(instance: &InstanceId) -> ImportedInstance {
     }
 }
 
-fn nothing_near(folder: &Path, scene: &SceneFile, nearest_m: Option<f64>, max_distance_m: f64) -> BaselineError {
+fn nothing_found(folder: &Path, scene: &SceneFile, nearest_m: Option<f64>, max_distance_m: f64) -> BaselineError {
     let (folder, scene) = (folder.to_owned(), scene.id.to_string());
     match nearest_m {
         Some(nearest_m) => BaselineError::NothingNear { folder, scene, nearest_m, max_distance_m },
@@ -115,36 +119,37 @@ fn has_files(files: &ImportFolder, scene: &SceneFile) -> bool {
     files.mesh_of_scene(&scene.id).is_some() || files.materials_of_scene(&scene.id).is_some() || of_instance()
 }
 
-/// What the files say of a scene.
+/// The files that describe a scene.
 struct Sources<'a> {
     files: &'a ImportFolder,
     options: &'a ImportOptions,
     mesh: Option<SceneMesh>,
-    parts: Option<(String, PartColors, Says)>,
+    /// The file of one material per part, its colours and the maps that it gives.
+    parts: Option<(String, PartColors, GivenMaps)>,
 }
 
 /// A mesh of a whole scene.
 struct SceneMesh {
     file: String,
     donor: Donor,
-    /// Of the instances that groups are named after, the triangles of those alone.
+    /// For each instance that groups are named after, the triangles of those groups.
     named: BTreeMap<usize, Correspondence>,
-    /// Of what is named after nobody.
+    /// The triangles of groups that are named after no instance.
     others: Correspondence,
 }
 
-/// What is told of an instance.
-struct Told {
+/// An instance's atlas as the files describe it.
+struct ImportedAtlas {
     file: String,
     atlas: PartialAtlas,
     distances: Distances,
-    /// None without a mesh.
+    /// Distance of the donor from the nearest texel, in metres; none without a donor.
     nearest_m: Option<f64>,
-    says: Says,
+    given: GivenMaps,
 }
 
-impl Told {
-    /// Writes its maps, unless nothing was found.
+impl ImportedAtlas {
+    /// Writes the maps, unless no texel found a place of the donor.
     fn write(self, instance: &InstanceId, folder: &Path) -> Result<ImportedInstance, BaselineError> {
         let texels = self.atlas.texels.pixels();
         let mean_m = self.distances.sum / self.distances.count.max(1) as f64;
@@ -156,10 +161,10 @@ impl Told {
             nearest_m: self.nearest_m,
             mean_distance_m: found.then_some(mean_m),
             max_distance_m: found.then_some(self.distances.max),
-            ..nothing_told(instance)
+            ..undescribed(instance)
         };
         if report.has_maps() {
-            Maps::of_atlas(&self.atlas, self.says).write(folder)?;
+            Maps::of_atlas(&self.atlas, self.given).write(folder)?;
         }
         Ok(report)
     }
@@ -175,17 +180,17 @@ impl<'a> Sources<'a> {
         let mesh = files.mesh_of_scene(scene).map(|file| SceneMesh::read(files, file, geometry)).transpose()?;
         let parts = match files.materials_of_scene(scene) {
             Some(file) => {
-                let (colors, says) =
+                let (colors, given) =
                     flat_materials::read(&files.checked_path(&file)?, geometry, options.part_set.as_ref())?;
-                Some((file, colors, says))
+                Some((file, colors, given))
             }
             None => None,
         };
         Ok(Self { files, options, mesh, parts })
     }
 
-    /// The first that tells of the instance.
-    fn instance(&self, geometry: &SceneGeometry<'_>, at: usize) -> Result<Option<Told>, BaselineError> {
+    /// The instance's atlas from the first file that describes it.
+    fn instance(&self, geometry: &SceneGeometry<'_>, at: usize) -> Result<Option<ImportedAtlas>, BaselineError> {
         let instance = &geometry.scene.instances[at];
         let Some(atlas) = &instance.atlas else { return Ok(None) };
         let size = atlas.size as usize;
@@ -196,20 +201,20 @@ impl<'a> Sources<'a> {
         }
         if let Some(mesh) = &self.mesh {
             let own = mesh.named.get(&at).unwrap_or(&mesh.others);
-            let told = self.rebaked(geometry, at, size, mesh.file.clone(), &mesh.donor, own);
-            // A mesh of the scene need not have everything.
-            if told.distances.count > 0 {
-                return Ok(Some(told));
+            let rebaked = self.rebaked(geometry, at, size, mesh.file.clone(), &mesh.donor, own);
+            // A mesh of the scene may leave instances out.
+            if rebaked.distances.count > 0 {
+                return Ok(Some(rebaked));
             }
             if self.parts.is_none() {
-                return Ok(told.nearest_m.is_some().then_some(told));
+                return Ok(rebaked.nearest_m.is_some().then_some(rebaked));
             }
         }
-        Ok(self.parts.as_ref().and_then(|(file, colors, says)| {
+        Ok(self.parts.as_ref().and_then(|(file, colors, given)| {
             let atlas = colors.paint(geometry, at, size);
-            let is_told = atlas.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_)));
+            let is_described = atlas.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_)));
             let (file, distances) = (file.clone(), Distances::default());
-            is_told.then_some(Told { file, atlas, distances, nearest_m: None, says: *says })
+            is_described.then_some(ImportedAtlas { file, atlas, distances, nearest_m: None, given: *given })
         }))
     }
 
@@ -221,10 +226,10 @@ impl<'a> Sources<'a> {
         file: String,
         donor: &Donor,
         correspondence: &Correspondence,
-    ) -> Told {
+    ) -> ImportedAtlas {
         let rebaked = rebake(geometry, at, size, donor, correspondence, self.options.max_distance_m);
         let (atlas, distances, nearest_m) = (rebaked.atlas, rebaked.distances, rebaked.nearest_m);
-        Told { file, atlas, distances, nearest_m, says: donor.says() }
+        ImportedAtlas { file, atlas, distances, nearest_m, given: donor.given_maps() }
     }
 }
 
@@ -246,7 +251,7 @@ impl SceneMesh {
     }
 }
 
-/// Instances by their own ids and by those of their parts, of every set.
+/// Indices of instances by their own ids and by the ids of their parts in every part set.
 fn owners<'a>(geometry: &SceneGeometry<'a>) -> Result<BTreeMap<&'a str, usize>, BaselineError> {
     let instances = geometry.scene.instances.iter().enumerate();
     let by_id: BTreeMap<&str, usize> = instances.map(|(at, instance)| (instance.id.as_str(), at)).collect();

@@ -1,4 +1,5 @@
-//! An OBJ with its MTL as a donor: `map_Kd` (sRGB) or else `Kd` (linear); `map_Pr` or `Pr`, `map_Pm` or `Pm`.
+//! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from `map_Pr`
+//! or `Pr`, metallic from `map_Pm` or `Pm`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,41 +7,43 @@ use std::path::Path;
 use glam::{Vec2, Vec3};
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
-use mateval_scene::findings::shortened;
 use mateval_scene::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_scene::source_folder::SourceFolder;
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, MAX_TEXELS, MAX_TRIANGLES, Scalar};
+use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
+use super::error::{ImportError, Limited, Place, Unsupported};
+use super::limits::{MAX_TEXELS, MAX_TRIANGLES};
 
-/// Reads the file `name` of the folder; what is wrong in words.
-pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
-    let bytes = folder.read(name).map_err(|fault| fault.message)?;
+/// Reads the file `name` of the folder.
+pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
+    let bytes = folder.read(name)?;
     let limits = ObjLimits { triangles: MAX_TRIANGLES, corners: 3 * MAX_TRIANGLES };
-    let read = obj::read(&bytes, limits, Materials::Split).map_err(|error| error.to_string())?;
+    let read = obj::read(&bytes, limits, Materials::Split).map_err(|fault| ImportError::Obj { file: None, fault })?;
     if read.mixed_uvs {
-        return Err("some faces have texture coordinates and some have none".to_owned());
+        return Err(ImportError::MixedUvs);
     }
     if read.mesh.uvs.iter().flatten().any(|uv| !uv.is_finite()) {
-        return Err("a texture coordinate is not finite".to_owned());
+        return Err(ImportError::NotFinite(Place::TextureCoordinate));
     }
     let mut reader = Reader { folder, beside: name.rsplit_once('/').map_or("", |(beside, _)| beside), texels: 0 };
     let mut known = BTreeMap::new();
     for file in obj::material_files(&bytes) {
         let bytes = reader.material_file(&file)?;
-        let materials = obj::read_materials(&bytes).map_err(|error| format!("'{}': {error}", shortened(&file)))?;
+        let materials =
+            obj::read_materials(&bytes).map_err(|fault| ImportError::Obj { file: Some(file.clone()), fault })?;
         known.extend(materials.into_iter().map(|material| (material.name.clone(), material)));
     }
     let (mut donor, mut numbers, mut first) = (Donor::default(), BTreeMap::new(), 0);
     for group in &read.groups {
         let named = group.material.as_ref().and_then(|material| known.get(material));
         let Some(described) = named else {
-            let (group, material) = (shortened(&group.name), shortened(group.material.as_deref().unwrap_or("")));
-            return Err(format!("group '{group}' has the material '{material}', which no mtllib of the file defines"));
+            let (group, material) = (group.name.clone(), group.material.clone().unwrap_or_default());
+            return Err(ImportError::UndefinedMaterial { group, material });
         };
         let textured =
             described.diffuse_map.is_some() || described.roughness_map.is_some() || described.metallic_map.is_some();
         if textured && read.mesh.uvs.is_none() {
-            return Err(format!("material '{}' has a texture, but the faces have no vt", shortened(&described.name)));
+            return Err(ImportError::MissingUvs { material: described.name.clone() });
         }
         let material = match numbers.get(&described.name) {
             Some(number) => *number,
@@ -53,7 +56,7 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
         for triangle in first..first + group.triangles {
             let corners = read.mesh.corners(triangle);
             if !corners.iter().all(|corner| corner.is_finite()) {
-                return Err(format!("a corner of group '{}' is not finite", shortened(&group.name)));
+                return Err(ImportError::NotFinite(Place::GroupCorner(group.name.clone())));
             }
             let uv = |vertex: u32| read.mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| uvs[vertex as usize]);
             let uvs = read.mesh.triangles[triangle].map(uv);
@@ -67,37 +70,39 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, String> {
 
 struct Reader<'a> {
     folder: &'a mut SourceFolder,
-    /// The folder of the file, which its names begin in.
+    /// The file's folder below the root, which its file names are relative to.
     beside: &'a str,
+    /// Texels of all textures so far.
     texels: usize,
 }
 
 impl Reader<'_> {
-    fn relative(&self, name: &str) -> Result<String, String> {
+    fn relative(&self, name: &str) -> Result<String, ImportError> {
         let name = if self.beside.is_empty() { name.to_owned() } else { format!("{}/{name}", self.beside) };
-        SourceFolder::relative(&name).map_err(|fault| fault.message)
+        Ok(SourceFolder::relative(&name)?)
     }
 
-    /// A name may hold blanks, or be several.
-    fn material_file(&mut self, name: &str) -> Result<Vec<u8>, String> {
+    /// The bytes of an `mtllib` line's file. Where no file has the name as it stands, blanks separate several files, whose
+    /// bytes are joined.
+    fn material_file(&mut self, name: &str) -> Result<Vec<u8>, ImportError> {
         let whole = self.relative(name)?;
         if name.contains(char::is_whitespace) && self.folder.path(&whole).is_err() {
             let mut all = Vec::new();
             for word in name.split_whitespace() {
                 let relative = self.relative(word)?;
-                all.extend(self.folder.read(&relative).map_err(|fault| fault.message)?);
+                all.extend(self.folder.read(&relative)?);
                 all.push(b'\n');
             }
             return Ok(all);
         }
-        self.folder.read(&whole).map_err(|fault| fault.message)
+        Ok(self.folder.read(&whole)?)
     }
 
-    fn material(&mut self, material: &ObjMaterial) -> Result<DonorMaterial, String> {
+    fn material(&mut self, material: &ObjMaterial) -> Result<DonorMaterial, ImportError> {
         let base_color = match &material.diffuse_map {
             Some(name) => ([1.0; 3], Some(self.texture(name, Encoding::Srgb)?)),
             None => {
-                let missing = || format!("material '{}' has neither map_Kd nor Kd", shortened(&material.name));
+                let missing = || ImportError::MissingColor { material: material.name.clone() };
                 (material.diffuse.ok_or_else(missing)?, None)
             }
         };
@@ -106,27 +111,23 @@ impl Reader<'_> {
                 let texture = self.texture(name, Encoding::Linear)?;
                 Ok(Some(Scalar { factor: 1.0, texture: Some((texture, 0)) }))
             }
-            None => Ok::<_, String>(factor.map(|factor| Scalar { factor, texture: None })),
+            None => Ok::<_, ImportError>(factor.map(|factor| Scalar { factor, texture: None })),
         };
         let roughness = scalar(material.roughness, &material.roughness_map)?;
         let metallic = scalar(material.metallic, &material.metallic_map)?;
         Ok(DonorMaterial { base_color, roughness, metallic })
     }
 
-    fn texture(&mut self, name: &str, encoding: Encoding) -> Result<Texture, String> {
+    fn texture(&mut self, name: &str, encoding: Encoding) -> Result<Texture, ImportError> {
         if name.starts_with('-') {
-            return Err(format!(
-                "'{}': options of a texture are not read; write its file's name alone",
-                shortened(name)
-            ));
+            return Err(ImportError::Unsupported(Unsupported::TextureOptions(name.to_owned())));
         }
         let relative = self.relative(name)?;
-        let bytes = self.folder.read(&relative).map_err(|fault| fault.message)?;
-        let read = texture_of_bytes(Path::new(&relative), bytes, encoding, Wrap::Repeat);
-        let read = read.map_err(|error| error.to_string())?;
+        let bytes = self.folder.read(&relative)?;
+        let read = texture_of_bytes(Path::new(&relative), bytes, encoding, Wrap::Repeat)?;
         self.texels += read.width() * read.height();
         if self.texels > MAX_TEXELS {
-            return Err(format!("its textures have more than {MAX_TEXELS} texels in all"));
+            return Err(ImportError::TooLarge { what: Limited::Texels, limit: MAX_TEXELS as u64 });
         }
         Ok(read)
     }

@@ -1,4 +1,5 @@
-//! A donor's materials in an instance's atlas: each place of a texel takes what the nearest place of the donor says.
+//! Transfers a donor's materials to an instance's atlas: each place of a texel takes the material of the nearest place
+//! of the donor.
 
 use glam::DVec3;
 use mateval_image::Picture;
@@ -11,29 +12,29 @@ use crate::estimate::Values;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, mean, places_of, texel_size_m};
 
-/// Most places along a texel's side.
+/// Largest number of places along a texel's side.
 const MAX_PLACES: f64 = 8.0;
-/// By so much the donor may be finer than the atlas and count as equally fine.
-const A_LITTLE: f64 = 0.1;
+/// A donor whose texels are smaller than the atlas's by up to this share counts as equally fine.
+const RESOLUTION_TOLERANCE: f64 = 0.1;
 
-/// An atlas, and how it came to be.
+/// An atlas, and how well the donor matched.
 pub struct Rebaked {
-    /// Unseen: nothing of the donor is near enough.
+    /// Texels without a place of the donor near enough are `Unseen`.
     pub atlas: PartialAtlas,
-    /// Of all places that were found, in metres.
+    /// Distances to all places that were used.
     pub distances: Distances,
-    /// The nearest that the donor comes to any texel; none where it has no triangles.
+    /// Smallest distance between a texel and the donor, in metres; none where the donor has no triangles.
     pub nearest_m: Option<f64>,
 }
 
-/// Distances, gathered.
+/// A summary of distances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Distances {
-    /// How many.
+    /// Number of distances.
     pub count: usize,
-    /// In metres.
+    /// Sum, in metres.
     pub sum: f64,
-    /// In metres.
+    /// Largest, in metres.
     pub max: f64,
 }
 
@@ -43,7 +44,8 @@ struct RebakedTexel {
     nearest_m: f64,
 }
 
-/// Fills the atlas of one instance, `size` texels a side; places further away than `max_distance_m` are not taken.
+/// Fills the atlas of one instance, `size` x `size` texels. Places of the donor further away than `max_distance_m` are
+/// not used.
 pub fn rebake(
     geometry: &SceneGeometry<'_>,
     instance: usize,
@@ -59,12 +61,12 @@ pub fn rebake(
         let unused = RebakedTexel { texel: Texel::Unused, distances: Distances::default(), nearest_m: f64::INFINITY };
         let Some((triangle, _)) = atlas.owner(x, y) else { return unused };
         let normal = mesh.geometric_normal(triangle);
-        // One place where the donor is no finer than the atlas: more would only blur it.
+        // Where the donor is no finer than the atlas, one place is enough; more would blur it.
         let centre = places_of(&atlas, mesh, (x, y), 1)[0];
         let found = correspondence.nearest(centre, normal);
         let finer =
             found.map_or(1.0, |found| texel_size_m(&atlas, mesh, triangle) / donor.texel_size_m(found.triangle));
-        let a_side = (finer - A_LITTLE).ceil().clamp(1.0, MAX_PLACES) as usize;
+        let a_side = (finer - RESOLUTION_TOLERANCE).ceil().clamp(1.0, MAX_PLACES) as usize;
         texel(donor, correspondence, &places_of(&atlas, mesh, (x, y), a_side), normal, max_distance_m)
     };
     let all: Vec<RebakedTexel> = (0..size * size).into_par_iter().map(look).collect();
@@ -88,15 +90,15 @@ fn texel(
     normal: DVec3,
     max_distance_m: f64,
 ) -> RebakedTexel {
-    let (mut said, mut distances, mut nearest_m) = (Vec::<Values>::new(), Distances::default(), f64::INFINITY);
+    let (mut values, mut distances, mut nearest_m) = (Vec::<Values>::new(), Distances::default(), f64::INFINITY);
     for found in places.iter().filter_map(|place| correspondence.nearest(*place, normal)) {
         nearest_m = nearest_m.min(found.distance_m);
         if found.distance_m <= max_distance_m {
             distances.count += 1;
             distances.sum += found.distance_m;
             distances.max = distances.max.max(found.distance_m);
-            said.push(donor.values(found.triangle, found.weights));
+            values.push(donor.values(found.triangle, found.weights));
         }
     }
-    RebakedTexel { texel: mean(&said).map_or(Texel::Unseen, Texel::Seen), distances, nearest_m }
+    RebakedTexel { texel: mean(&values).map_or(Texel::Unseen, Texel::Seen), distances, nearest_m }
 }

@@ -1,23 +1,24 @@
-//! What came of an import.
+//! The report of an import: how much of each instance's surface the files cover.
 
 use mateval_scene::{InstanceId, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The word for this version of a report.
+/// The value of `format` for this version of the report.
 pub const IMPORT_FORMAT: &str = "mateval-import/1";
 
-/// How well each instance's surface was found in the files.
+/// How much of each instance's surface the files cover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImportReport {
     /// Always `mateval-import/1`.
     pub format: String,
-    /// Places further away than this do not correspond.
+    /// Largest distance, in metres, between a place of an instance and the place of the mesh that its material is taken
+    /// from.
     pub max_distance_m: f64,
-    /// Meshes, JSON and folders that are for no scene or instance, by their paths below the folder; sorted.
+    /// Meshes, JSON files and folders whose names match no scene or instance: paths below the folder, sorted.
     pub unused: Vec<String>,
-    /// In the dataset's order.
+    /// The scenes, in the dataset's order.
     pub scenes: Vec<ImportedScene>,
 }
 
@@ -25,7 +26,7 @@ pub struct ImportReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImportedScene {
-    /// Its id.
+    /// The scene's id.
     pub scene: SceneId,
     /// Every instance that has an atlas.
     pub instances: Vec<ImportedInstance>,
@@ -35,33 +36,32 @@ pub struct ImportedScene {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImportedInstance {
-    /// Its id.
+    /// The instance's id.
     pub instance: InstanceId,
-    /// The file that tells of it, relative to the folder; null: none does. Where all texels found nothing it has no
-    /// maps.
+    /// The file that describes the instance, relative to the folder; null if none does. An instance has no maps where
+    /// `texels_without` equals `texels`.
     pub file: Option<String>,
-    /// Texels that the surface looks up.
+    /// Number of texels that the surface uses.
     pub texels: usize,
-    /// Those of them that found nothing; they hold the format's defaults.
+    /// Number of those texels that found no place of the mesh near enough; they have the format's default values.
     pub texels_without: usize,
-    /// How near the file's mesh comes to it, in metres; null without a mesh.
+    /// Smallest distance between the instance and the file's mesh, in metres; null without a mesh.
     pub nearest_m: Option<f64>,
-    /// Of the places that were found, in metres; null without any.
+    /// Mean distance of the places that were found, in metres; null without any.
     pub mean_distance_m: Option<f64>,
-    /// The furthest of them.
+    /// Largest distance of the places that were found, in metres; null without any.
     pub max_distance_m: Option<f64>,
 }
 
 impl ImportedInstance {
-    /// Whether anything was found.
+    /// Whether at least one texel found a place of the mesh.
     pub fn has_maps(&self) -> bool {
         self.texels > self.texels_without
     }
 }
 
 impl ImportedScene {
-    /// Sums over its instances: how many have maps; texels of those, and those without; the mean of their mean
-    /// distances by texels, and the largest of all.
+    /// Totals over the scene's instances.
     pub fn totals(&self) -> ImportTotals {
         let with_maps = || self.instances.iter().filter(|instance| instance.has_maps());
         let found = |instance: &ImportedInstance| instance.texels - instance.texels_without;
@@ -79,17 +79,17 @@ impl ImportedScene {
     }
 }
 
-/// See [`ImportedScene::totals`].
+/// Totals of a scene. Texels and distances count instances with maps only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImportTotals {
-    /// Instances with maps.
+    /// Number of instances with maps.
     pub with_maps: usize,
-    /// Their texels.
+    /// Number of their texels.
     pub texels: usize,
-    /// Those that found nothing.
+    /// Number of those texels that found no place.
     pub texels_without: usize,
-    /// Over the texels that found something.
+    /// Mean of the instances' mean distances, weighted by the texels that found a place, in metres.
     pub mean_distance_m: Option<f64>,
-    /// The furthest.
+    /// Largest distance, in metres.
     pub max_distance_m: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Instances as TEXGen's loader reads objects.
+//! Writes instances as TEXGen's loader reads objects.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -24,13 +24,14 @@ use crate::objects::{obj_text, object_id};
 use crate::seen::SeenPixels;
 use crate::submission::check_new_place;
 
-/// Pixels a side of the picture that TEXGen is conditioned on.
+/// Width and height, in pixels, of the picture that TEXGen is conditioned on.
 const PICTURE: usize = 512;
 
-/// Writes `objects.jsonl` and a folder an instance that is seen: `model.obj`, `model.png` (the partial atlas, black
-/// where nothing is seen), `mask.png` (texels of the surface), `mask_partial.png` (those that are seen), `position.exr`
-/// (in TEXGen's own space) and `picture.png` (what the estimate shows of the instance, else white). Gives how many
-/// there are.
+/// Writes `objects.jsonl` and one folder per seen instance, and returns the number of folders.
+///
+/// A folder holds `model.obj`, `model.png` (the partial atlas, black in unseen texels), `mask.png` (texels of the
+/// surface), `mask_partial.png` (seen texels), `position.exr` (places in TEXGen's own space) and `picture.png` (the
+/// estimate's pixels of the instance, all others white).
 pub fn export(
     dataset: &Dataset,
     out: &Path,
@@ -60,7 +61,7 @@ pub fn export(
             png_io::write_rgb_bytes(&folder.join("picture.png"), &picture(&seen, &estimate, at))?;
             let prompt = instance.category.as_deref().unwrap_or(&instance.name);
             let line = json!({ "id": id, "result": prompt, "root_dir": "." });
-            writeln!(lines, "{line}").expect("a text takes any line");
+            writeln!(lines, "{line}").expect("writing to a String cannot fail");
             count += 1;
         }
     }
@@ -86,7 +87,7 @@ fn shown(texel: Texel) -> [u8; 3] {
     }
 }
 
-/// The place of each texel in TEXGen's space: (x, -z, y), centred, the longest side 1; 0 where there is no surface.
+/// The place of each texel in TEXGen's space: (x, -z, y), centred, with the longest side 1; 0 outside the surface.
 fn positions(mesh: &TriangleMesh, known: &PartialAtlas) -> Picture<LinearRgb> {
     let turned = |p: DVec3| DVec3::new(p.x, -p.z, p.y);
     let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -100,10 +101,10 @@ fn positions(mesh: &TriangleMesh, known: &PartialAtlas) -> Picture<LinearRgb> {
     })
 }
 
-/// The square around the instance's pixels, all others white.
+/// The smallest square that contains the instance's pixels, with all other pixels white.
 fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[u8; 3]> {
     let pixels: Vec<(usize, usize)> =
-        seen.telling().filter(|(_, _, of)| *of == instance).map(|(x, y, _)| (x, y)).collect();
+        seen.shown_pixels().filter(|(_, _, of)| *of == instance).map(|(x, y, _)| (x, y)).collect();
     let range =
         |all: &mut dyn Iterator<Item = usize>| all.fold((usize::MAX, 0), |(low, high), v| (low.min(v), high.max(v)));
     let (columns, rows) =
@@ -114,7 +115,7 @@ fn picture(seen: &SeenPixels, estimate: &Estimate, instance: usize) -> Picture<[
     Picture::from_fn(PICTURE, PICTURE, |x, y| {
         let place = |corner: f64, at: usize| corner + (at as f64 + 0.5) * side as f64 / PICTURE as f64;
         let (px, py) = (place(left, x), place(top, y));
-        let inside = seen.camera.holds(DVec2::new(px, py)) && seen.tells_of(instance, px as usize, py as usize);
+        let inside = seen.camera.holds(DVec2::new(px, py)) && seen.shows(instance, px as usize, py as usize);
         if !inside {
             return [255; 3];
         }

@@ -1,4 +1,4 @@
-//! TEXGen's textures as a submission.
+//! Makes a submission of TEXGen's textures.
 
 use std::path::Path;
 
@@ -16,18 +16,18 @@ use crate::nn::{self, NnOptions};
 use crate::objects::object_id;
 use crate::submission::{self, Method};
 
-/// What came of an import.
+/// Counts of an import.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Imported {
-    /// Instances of the submission.
+    /// Number of instances in the submission.
     pub instances: usize,
-    /// Those with a texture of TEXGen's.
+    /// Number of those with a texture by TEXGen.
     pub textured: usize,
 }
 
-/// Writes a submission: seen texels hold the estimate, all others what `results/<id>.png` (sRGB, any square size) says
-/// at their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with its defaults
-/// makes them from the same estimate. Fails where no file at all is there.
+/// Writes a submission. Seen texels hold the estimate; the base colour of all others is that of `results/<id>.png` (sRGB,
+/// any square size) at their uv. An instance without such a file, and roughness and metallic everywhere, are as `nn` with
+/// its defaults makes them from the same estimate. Fails where no file exists for any instance.
 pub fn import(
     dataset: &Dataset,
     results: &Path,
@@ -60,10 +60,10 @@ pub fn import(
             let maps = match (known, texture) {
                 (Some(mut lifted), Some(texture)) => {
                     composite(&mut lifted, &texture);
-                    Maps::of_atlas(&lifted.whole, estimate.says())
+                    Maps::of_atlas(&lifted.whole, estimate.given_maps())
                 }
-                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, estimate.says()),
-                (None, _) => Maps::constant(medians.of(&geometry, at), estimate.says()),
+                (Some(lifted), None) => Maps::of_atlas(&lifted.whole, estimate.given_maps()),
+                (None, _) => Maps::constant(medians.of(&geometry, at), estimate.given_maps()),
             };
             maps.write(&folder.join(instance.id.as_str()))
         })
@@ -75,7 +75,7 @@ fn file(results: &Path, id: &str) -> std::path::PathBuf {
     results.join(format!("{id}.png"))
 }
 
-/// The texture's colour for every texel that was not seen before it was filled.
+/// Replaces the colour of every texel that was not seen by the texture's.
 fn composite(lifted: &mut nn::Lifted, texture: &Texture) {
     let PartialAtlas { atlas, texels } = &mut lifted.whole;
     let size = atlas.size();

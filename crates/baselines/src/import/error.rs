@@ -1,0 +1,210 @@
+//! Why a file of an import was refused.
+
+use mateval_image::ImageError;
+use mateval_scene::findings::shortened;
+use mateval_scene::obj::ObjFault;
+use mateval_scene::source_folder::FileFault;
+
+use super::limits::MAX_DEPTH;
+
+/// Why a file was refused. The caller adds the file's path.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// The file, or one that it names, is missing, unreadable, too large or outside the folder.
+    #[error("{}", .0.message)]
+    File(FileFault),
+    /// The glTF or one of its accessors is unsound.
+    #[error("{0}")]
+    Gltf(Box<dyn std::error::Error + Send + Sync>),
+    /// The OBJ, or the MTL file of this name, is unsound.
+    #[error("{}{}{}", file_prefix(.file), line_prefix(.fault.line), .fault.what)]
+    Obj {
+        /// The MTL file; none for the OBJ itself.
+        file: Option<String>,
+        /// The line and what is wrong.
+        fault: ObjFault,
+    },
+    /// A texture cannot be decoded.
+    #[error(transparent)]
+    Texture(#[from] ImageError),
+    /// A uri is not UTF-8 once it is percent-decoded.
+    #[error("the uri '{}' is not UTF-8: {source}", shortened(.uri))]
+    Uri {
+        /// As the file has it.
+        uri: String,
+        /// Where it fails.
+        source: std::str::Utf8Error,
+    },
+    /// The file has more of something than is read.
+    #[error("the file has more than {limit} {what}")]
+    TooLarge {
+        /// What is limited.
+        what: Limited,
+        /// The largest number that is read.
+        limit: u64,
+    },
+    /// A part of glTF that is not read.
+    #[error("{0}")]
+    Unsupported(Unsupported),
+    /// The first buffer of a .gltf has no uri, or that of a .glb has no chunk.
+    #[error("the first buffer has no data; expected a uri or a binary chunk")]
+    BufferWithoutData,
+    /// A glTF without a scene.
+    #[error("the file has no scene")]
+    NoScene,
+    /// A node is the child of two others, or of itself.
+    #[error("node {node} is the child of two nodes; expected a tree")]
+    NotATree {
+        /// The node's index.
+        node: usize,
+    },
+    /// A node has too many ancestors.
+    #[error("node {node} is nested more than {MAX_DEPTH} deep")]
+    TooDeep {
+        /// The node's index.
+        node: usize,
+    },
+    /// A primitive of a node was refused.
+    #[error("node {node} '{}': {source}", shortened(.name))]
+    Node {
+        /// The node's index.
+        node: usize,
+        /// The node's name; empty where it has none.
+        name: String,
+        /// What is wrong.
+        source: Box<ImportError>,
+    },
+    /// A primitive lacks an attribute.
+    #[error("expected the attribute {attribute}, found none")]
+    MissingAttribute {
+        /// Such as `POSITION`.
+        attribute: String,
+    },
+    /// An attribute has another number of entries than the positions.
+    #[error("{attribute} has {found} entries; expected {expected}, as POSITION has")]
+    Count {
+        /// Such as `COLOR_0`.
+        attribute: String,
+        /// Its entries.
+        found: usize,
+        /// Those of `POSITION`.
+        expected: usize,
+    },
+    /// A number is infinite or NaN.
+    #[error("{0} is not finite")]
+    NotFinite(Place),
+    /// Some faces have texture coordinates, others have none.
+    #[error("some faces have texture coordinates and others have none; expected all or none")]
+    MixedUvs,
+    /// A group has a material that no MTL file defines.
+    #[error("group '{}' has the material '{}', which no mtllib of the file defines", shortened(.group), shortened(.material))]
+    UndefinedMaterial {
+        /// The group's name.
+        group: String,
+        /// The material's name; empty where `usemtl` is missing.
+        material: String,
+    },
+    /// A textured material on faces without texture coordinates.
+    #[error("material '{}' has a texture, but the faces have no vt", shortened(.material))]
+    MissingUvs {
+        /// The material's name.
+        material: String,
+    },
+    /// A material without base colour.
+    #[error("material '{}' has neither map_Kd nor Kd", shortened(.material))]
+    MissingColor {
+        /// The material's name.
+        material: String,
+    },
+    /// Entries of `<scene>.json` that are wrong, all of them.
+    #[error("{}", listed(.0))]
+    Materials(Vec<MaterialFault>),
+}
+
+/// What a file has a limited number of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Limited {
+    /// All buffers of a glTF together.
+    #[error("bytes in its buffers")]
+    BufferBytes,
+    /// All textures together.
+    #[error("texels in its textures")]
+    Texels,
+    /// All meshes together.
+    #[error("triangles")]
+    Triangles,
+    /// All meshes together; a mesh that several nodes share counts for each of them.
+    #[error("vertices, counted for each node that has them")]
+    Vertices,
+}
+
+/// What is not read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unsupported {
+    /// Data inside a uri.
+    #[error("data uris are not read; write a .glb, or files beside the .gltf")]
+    DataUri,
+    /// Triangle strips and fans.
+    #[error("strips and fans are not read; write triangles")]
+    StripsAndFans,
+    /// Sparse accessors.
+    #[error("sparse accessors are not read; write whole buffer views")]
+    SparseAccessor,
+    /// A sampler that wraps u and v in different ways.
+    #[error("a sampler that wraps u and v in different ways is not read")]
+    MixedWrap,
+    /// Options before the file name of an MTL texture.
+    #[error("'{}': options of a texture are not read; write the file name alone", shortened(.0))]
+    TextureOptions(String),
+}
+
+/// Where a number is not finite.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Place {
+    /// Of an OBJ.
+    #[error("a texture coordinate")]
+    TextureCoordinate,
+    /// Of an OBJ's group of this name.
+    #[error("a corner of group '{}'", shortened(.0))]
+    GroupCorner(String),
+    /// Of a glTF, in world space.
+    #[error("a position, once its node's transform is applied,")]
+    WorldPosition,
+}
+
+/// What is wrong with an entry of `<scene>.json`.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum MaterialFault {
+    /// No part or instance has this id.
+    #[error("/{}: expected the id of a part or an instance", shortened(.0))]
+    UnknownId(String),
+    /// A number of the entry with this id is out of range.
+    #[error("/{}: expected numbers from 0 to 1", shortened(.0))]
+    OutOfRange(String),
+}
+
+impl From<FileFault> for ImportError {
+    fn from(fault: FileFault) -> Self {
+        Self::File(fault)
+    }
+}
+
+impl ImportError {
+    /// An unsound glTF, as the reader describes it.
+    pub(super) fn gltf(fault: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Gltf(fault.into())
+    }
+}
+
+fn file_prefix(file: &Option<String>) -> String {
+    file.as_ref().map_or_else(String::new, |file| format!("'{}': ", shortened(file)))
+}
+
+/// Lines count from 1; 0 stands for no line.
+fn line_prefix(line: usize) -> String {
+    if line > 0 { format!("line {line}: ") } else { String::new() }
+}
+
+fn listed(faults: &[MaterialFault]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
