@@ -9,15 +9,15 @@ use mateval_scene::reference::LightIndex;
 use crate::accel::Hit;
 use crate::bsdf::{Bsdf, Shown};
 use crate::emitter::Emitted;
+use crate::material_source::MaterialSource;
 use crate::ray::Ray;
-use crate::render::{LightSampling, RenderSettings};
-use crate::repaint::Repaint;
 use crate::sampler::Sampler;
+use crate::settings::{LightSampling, RenderSettings};
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
-/// The most predictions that the same paths are followed for.
-pub(crate) const TOGETHER: usize = 8;
+/// The most variants that the same paths are followed for.
+pub(crate) const MOST_VARIANTS: usize = 8;
 
 /// What paths had to leave out or would have to explain.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,9 +25,9 @@ pub(crate) struct PathCounts {
     pub(crate) rays: u64,
     pub(crate) shadow_rays: u64,
     pub(crate) capped: u64,
-    /// By prediction, as all that follows.
-    pub(crate) capped_throughput: [f64; TOGETHER],
-    pub(crate) not_finite: [u64; TOGETHER],
+    /// By variant, as `not_finite`.
+    pub(crate) capped_throughput: [f64; MOST_VARIANTS],
+    pub(crate) not_finite: [u64; MOST_VARIANTS],
 }
 
 /// The last scattering: where the ray started and how likely its direction was.
@@ -38,15 +38,7 @@ struct Scattered {
     delta: bool,
 }
 
-/// Predictions that paths look at in place of the world's own materials.
-#[derive(Clone, Copy)]
-pub(crate) struct Painted<'w> {
-    pub(crate) repaint: &'w Repaint,
-    /// Of the `K` predictions that are followed.
-    pub(crate) first: usize,
-}
-
-/// A path under way, for `K` base colours.
+/// A path under way, for `K` variants.
 #[derive(Clone, Copy)]
 struct Path<const K: usize> {
     /// Its place among the starts.
@@ -63,7 +55,7 @@ struct Path<const K: usize> {
 struct Arrival<const K: usize> {
     path: Path<K>,
     place: SurfaceHit,
-    /// In the atlas; of no meaning without predictions.
+    /// What the source of materials asks for.
     uv: Vec2,
     /// Towards where the path came from.
     wo: Vec3,
@@ -80,11 +72,11 @@ struct Offer<const K: usize> {
 /// Follows paths, all those of a batch by one scattering at a time: each step asks early for the memory of the next, which
 /// a path alone would have to wait for. Keeps its room from one batch to the next.
 ///
-/// With predictions `K` of them are followed by the same paths, each with the numbers that it would have alone.
-pub(crate) struct PathTracer<'w, const K: usize = 1> {
+/// The same paths serve `K` variants of the `materials`, each with the numbers that it would have alone.
+pub(crate) struct PathTracer<'w, M, const K: usize> {
     world: &'w World,
-    painted: Option<Painted<'w>>,
-    settings: &'w RenderSettings,
+    materials: M,
+    settings: RenderSettings,
     pub(crate) counts: PathCounts,
     paths: Vec<Path<K>>,
     /// Of `paths`, one each.
@@ -97,11 +89,11 @@ pub(crate) struct PathTracer<'w, const K: usize = 1> {
     stopped: Vec<bool>,
 }
 
-impl<'w, const K: usize> PathTracer<'w, K> {
-    pub(crate) fn new(world: &'w World, painted: Option<Painted<'w>>, settings: &'w RenderSettings) -> Self {
+impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
+    pub(crate) fn new(world: &'w World, materials: M, settings: RenderSettings) -> Self {
         Self {
             world,
-            painted,
+            materials,
             settings,
             counts: PathCounts::default(),
             paths: Vec::new(),
@@ -142,11 +134,9 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         self.counts.rays += self.rays.len() as u64;
         let paths = &self.paths;
         self.world.closest_many(&self.rays, |which| paths[which].sampler.salt(2 * scatterings), &mut self.hits);
-        if let Some(Painted { repaint, .. }) = self.painted {
-            self.hits.iter().flatten().for_each(|hit| repaint.prefetch(hit));
-        }
+        self.hits.iter().flatten().for_each(|hit| self.materials.prefetch(hit));
         self.arrivals.clear();
-        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        let mut found = Found { world: self.world, settings: &self.settings, counts: &mut self.counts, add };
         let on_stage = self.world.emitters().are_on_stage();
         for ((path, ray), hit) in self.paths.drain(..).zip(&self.rays).zip(&self.hits) {
             if on_stage {
@@ -168,17 +158,7 @@ impl<'w, const K: usize> PathTracer<'w, K> {
                 }
                 continue;
             }
-            let uv = match self.painted {
-                Some(Painted { repaint, first }) => {
-                    let uv = repaint.uv(hit);
-                    repaint.prefetch_texels::<K>(first, place.surface.0, uv);
-                    uv
-                }
-                None => {
-                    self.world.prefetch_texels(&place);
-                    Vec2::ZERO
-                }
-            };
+            let uv = self.materials.prefetch_texels(hit, &place);
             self.arrivals.push(Arrival { path, place, uv, wo: -ray.direction() });
         }
     }
@@ -189,23 +169,18 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         self.offers.clear();
         self.shadow_rays.clear();
         for Arrival { path, place, uv, wo } in self.arrivals.drain(..) {
-            let painted = self.painted;
-            let paint = painted.and_then(|painted| painted.repaint.at::<K>(painted.first, place.surface.0, uv));
-            let bsdf = match &paint {
-                Some(paint) => Bsdf::repainted(paint, &place, wo),
-                None => Bsdf::own(self.world, &place, wo),
-            };
+            let bsdf = self.materials.bsdf(&place, uv, wo);
             if bsdf.is_black() {
                 continue;
             }
             if self.settings.light_sampling != LightSampling::Bsdf
-                && let Some((ray, offer)) = offered(self.world, self.settings, &path, &bsdf, &place, scatterings)
+                && let Some((ray, offer)) = offered(self.world, &self.settings, &path, &bsdf, &place, scatterings)
             {
                 self.counts.shadow_rays += 1;
                 self.offers.push(offer);
                 self.shadow_rays.push(ray);
             }
-            if let Some((path, ray)) = scattered(self.world, self.settings, path, &bsdf, &place, scatterings) {
+            if let Some((path, ray)) = scattered(self.world, &self.settings, path, &bsdf, &place, scatterings) {
                 self.paths.push(path);
                 self.rays.push(ray);
             }
@@ -217,7 +192,7 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         let offers = &self.offers;
         let salt = |which: usize| offers[which].sampler.salt(2 * scatterings + 1);
         self.world.occluded_many(&self.shadow_rays, salt, &mut self.stopped);
-        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        let mut found = Found { world: self.world, settings: &self.settings, counts: &mut self.counts, add };
         for (offer, _) in self.offers.iter().zip(&self.stopped).filter(|(_, stopped)| !**stopped) {
             found.contribute(offer.which, offer.light, offer.values);
         }
@@ -340,7 +315,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     }
 
     fn contribute(&mut self, which: usize, light: LightIndex, values: [Vec3; K]) {
-        // One prediction's accident is not the others'.
+        // A value that is not finite in one variant does not spoil the others.
         let finite = values.map(|value| if value.is_finite() { value } else { Vec3::ZERO });
         let counts = self.counts.not_finite.iter_mut().zip(values);
         counts.for_each(|(count, value)| *count += u64::from(!value.is_finite()));

@@ -8,53 +8,12 @@ use mateval_scene::Camera;
 
 use crate::error::TracerError;
 use crate::film::{self, Tile};
+use crate::material_source::OwnMaterials;
 use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
 use crate::sampler::Sampler;
+use crate::settings::RenderSettings;
 use crate::world::World;
-
-/// How light is looked for. All three have the same mean; they differ in noise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LightSampling {
-    /// Emitters are sampled and surfaces too, weighed by the power heuristic.
-    #[default]
-    Both,
-    /// Emitters are sampled; what a scattered ray meets counts only after a mirror or clear glass.
-    Emitters,
-    /// Emitters are found by scattered rays alone.
-    Bsdf,
-}
-
-/// How a picture is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RenderSettings {
-    /// Paths a pixel.
-    pub samples: u32,
-    /// Two seeds make two independent pictures.
-    pub seed: u64,
-    /// Scatterings beyond the first that a path may have before its last piece of direct light: Blender's "max bounces";
-    /// Mitsuba's `max_depth` is 2 more.
-    pub max_bounces: u32,
-    /// From this bounce on, paths end by chance.
-    pub roulette_start: u32,
-    /// The probability to go on then, above 0 and up to 1.
-    pub roulette_survival: f32,
-    /// How light is looked for.
-    pub light_sampling: LightSampling,
-}
-
-impl Default for RenderSettings {
-    fn default() -> Self {
-        Self {
-            samples: 64,
-            seed: 0,
-            max_bounces: 16,
-            roulette_start: 4,
-            roulette_survival: 0.8,
-            light_sampling: LightSampling::Both,
-        }
-    }
-}
 
 /// What happened on the way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -91,7 +50,7 @@ pub fn render(
     settings: &RenderSettings,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Render, TracerError> {
-    check(settings)?;
+    settings.check()?;
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let total = film::tiles(width, height).len();
     let finished = AtomicUsize::new(0);
@@ -105,19 +64,9 @@ pub fn render(
     Ok(Render { picture, stats: stats(paths, &counts, 0) })
 }
 
-pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
-    let RenderSettings { samples, roulette_survival, .. } = *settings;
-    if samples == 0 || !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
-        return Err(TracerError::Invalid(format!(
-            "{samples} samples, roulette survival {roulette_survival}; expected at least 1, and above 0 up to 1"
-        )));
-    }
-    Ok(())
-}
-
 /// The means of the pixels' samples. Each batch of paths holds one a pixel.
 fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile: &Tile) -> (Vec<[f64; 3]>, PathCounts) {
-    let mut tracer = PathTracer::<1>::new(world, None, settings);
+    let mut tracer = PathTracer::<_, 1>::new(world, OwnMaterials(world), *settings);
     let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
     for index in 0..settings.samples {
         let starts = tile.pixels().map(|[x, y]| {
@@ -138,10 +87,10 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
     (sums, tracer.counts)
 }
 
-/// Of one of the predictions that the paths were followed for.
-pub(crate) fn stats(paths: u64, tiles: &[PathCounts], prediction: usize) -> RenderStats {
+/// Of one of the variants that the paths were followed for.
+pub(crate) fn stats(paths: u64, tiles: &[PathCounts], variant: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
-    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[prediction]).sum();
+    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[variant]).sum();
     let all = paths.max(1) as f64;
     RenderStats {
         paths,
@@ -149,6 +98,6 @@ pub(crate) fn stats(paths: u64, tiles: &[PathCounts], prediction: usize) -> Rend
         shadow_rays: sum(|tile| tile.shadow_rays),
         capped_share: sum(|tile| tile.capped) as f64 / all,
         capped_throughput: capped_throughput / all,
-        not_finite: tiles.iter().map(|tile| tile.not_finite[prediction]).sum(),
+        not_finite: tiles.iter().map(|tile| tile.not_finite[variant]).sum(),
     }
 }

@@ -4,15 +4,21 @@
 //! and metallic and on no base colour, so predictions that differ in base colour alone are followed by the same paths.
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
-use mateval_scene::TriangleMesh;
 use mateval_scene::material::PrincipledFlavour;
+use mateval_scene::{Camera, TriangleMesh};
 
 use crate::accel::{Hit, prefetch, prefetch_line};
-use crate::bsdf::{BlenderTables, Principled, eta_from_specular};
+use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
 use crate::error::TracerError;
+use crate::material_source::MaterialSource;
+use crate::path::MOST_VARIANTS;
+use crate::settings::RenderSettings;
+use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
+use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
 /// One surface's atlas: several base colours over one roughness and metallic. Values are clipped to 0..1 when looked up.
@@ -39,10 +45,12 @@ pub struct Repaint {
     tables: BlenderTables,
 }
 
-/// What is painted at one place, for `K` base colours.
-pub(crate) struct PaintAt<'a, const K: usize> {
-    pub(crate) principled: Principled<'a>,
-    pub(crate) base_colors: [Vec3; K],
+/// A world's surfaces as painted: predictions from `first` on are the variants.
+#[derive(Clone, Copy)]
+struct Painted<'w> {
+    world: &'w World,
+    repaint: &'w Repaint,
+    first: usize,
 }
 
 /// Disney's `specular` of predictions: an index of refraction of 1.5.
@@ -89,37 +97,11 @@ impl Repaint {
         self.predictions
     }
 
-    /// How many surfaces there are, painted or not.
-    pub(crate) fn surfaces(&self) -> usize {
-        self.coats.len()
-    }
-
-    /// Asks for the memory that [`Self::at`] reads first.
-    pub(crate) fn prefetch(&self, hit: &Hit) {
-        prefetch(&self.uvs[hit.global as usize]);
-    }
-
-    /// The place in the atlas of a hit.
-    pub(crate) fn uv(&self, hit: &Hit) -> Vec2 {
-        let [a, b, c] = self.uvs[hit.global as usize];
-        a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
-    }
-
-    /// Asks for the texels that [`Self::at`] reads.
-    pub(crate) fn prefetch_texels<const K: usize>(&self, first: usize, surface: usize, uv: Vec2) {
-        let Some(coat) = &self.coats[surface] else { return };
-        let colors = coat.base_colors[first..].iter().take(K);
-        for texture in colors.chain([&coat.roughness, &coat.metallic]) {
-            texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
-        }
-    }
-
-    /// What predictions `first..first + K` say of a place; those beyond the last say what the last does. None where the
-    /// world's own material stays.
-    pub(crate) fn at<const K: usize>(&self, first: usize, surface: usize, uv: Vec2) -> Option<PaintAt<'_, K>> {
-        let coat = self.coats[surface].as_ref()?;
+    /// The principled material that a coat has at a place in its atlas, and the base colours of predictions
+    /// `first..first + K` there; those beyond the last say what the last does.
+    fn look_up<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> (Principled<'_>, [Vec3; K]) {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
-        let base_colors = from_fn(|k| {
+        let base_colors: [Vec3; K] = from_fn(|k| {
             let texture = &coat.base_colors[(first + k).min(self.predictions - 1)];
             Vec3::from_array(texture.sample(uv.to_array())).clamp(Vec3::ZERO, Vec3::ONE)
         });
@@ -130,8 +112,83 @@ impl Repaint {
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         };
-        Some(PaintAt { principled, base_colors })
+        (principled, base_colors)
     }
+}
+
+impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
+    fn prefetch(self, hit: &Hit) {
+        prefetch(&self.repaint.uvs[hit.global as usize]);
+    }
+
+    /// The uv is the place in the atlas.
+    fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2 {
+        let [a, b, c] = self.repaint.uvs[hit.global as usize];
+        let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
+        if let Some(coat) = &self.repaint.coats[place.surface.0] {
+            let colors = coat.base_colors[self.first..].iter().take(K);
+            for texture in colors.chain([&coat.roughness, &coat.metallic]) {
+                texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
+            }
+        }
+        uv
+    }
+
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3) -> Bsdf<'w, K> {
+        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
+        let (principled, base_colors) = self.repaint.look_up(coat, self.first, uv);
+        Bsdf::of_principled(principled, &base_colors, place, wo)
+    }
+}
+
+/// [`crate::render_views`] with predictions in place of the world's own materials; one a prediction of the range `which`.
+///
+/// Up to eight predictions are followed by the same paths. Each gets the same bytes as it gets alone. Fails also where
+/// `which` names predictions that `repaint` does not hold, or mixes do not fit predictions and lights.
+#[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
+pub fn render_repainted(
+    world: &World,
+    repaint: &Repaint,
+    which: Range<usize>,
+    cameras: &[Camera],
+    lighting: Lighting<'_>,
+    settings: &RenderSettings,
+    seeds: &[u64],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<ViewsRender>, TracerError> {
+    check_predictions(world, repaint, &which)?;
+    let subject = |first| Subject { world, materials: Painted { world, repaint, first }, first, lighting };
+    let job = |first| ViewsJob { subject: subject(first), cameras, settings, seeds };
+    let planes = job(0).planes(repaint.predictions)?;
+    let rounds = rounds(which);
+    let progress = Progress::new(job(0).tiles(&planes) * rounds.len(), progress);
+    let mut renders = Vec::new();
+    for round in rounds {
+        let job = job(round.start);
+        match round.len() {
+            1 => renders.extend(job.render::<1>(&planes, &progress)),
+            2 => renders.extend(job.render::<2>(&planes, &progress)),
+            3 | 4 => renders.extend(job.render::<4>(&planes, &progress).into_iter().take(round.len())),
+            _ => renders.extend(job.render::<8>(&planes, &progress).into_iter().take(round.len())),
+        }
+    }
+    Ok(renders)
+}
+
+fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
+    let end = which.end;
+    which.step_by(MOST_VARIANTS).map(|start| start..end.min(start + MOST_VARIANTS)).collect()
+}
+
+fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), TracerError> {
+    let predictions = repaint.predictions;
+    if repaint.coats.len() != world.scene().surfaces.len() {
+        return Err(TracerError::Invalid("the predictions were made for another world".into()));
+    }
+    if which.end > predictions {
+        return Err(TracerError::Invalid(format!("predictions {which:?} of {predictions}")));
+    }
+    Ok(())
 }
 
 fn has_uvs(mesh: &TriangleMesh) -> bool {

@@ -5,7 +5,7 @@ use mateval_scene::reference::SurfaceIndex;
 
 use crate::accel::TriangleIndex;
 use crate::ray::Ray;
-use crate::triangle_record::TriangleRecord;
+use crate::triangle_record::{ROUNDING, TriangleRecord};
 
 /// A place on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +26,6 @@ pub struct SurfaceHit {
     /// How far a ray must start from the surface so that it cannot meet it again, in metres.
     offset: f32,
 }
-
-/// 2^-24, half the spacing of f32 at 1.
-pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
 impl SurfaceHit {
     /// The place with weights `weights` in a triangle, of which `record` tells all.

@@ -4,7 +4,9 @@ use glam::{DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
 
 use crate::accel::TriangleIndex;
-use crate::surface_hit::ROUNDING;
+
+/// 2^-24, half the spacing of f32 at 1.
+pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
 /// A triangle's corners and what is the same all over it: 128 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::{Lookup, Material};
@@ -10,7 +10,7 @@ use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
-use crate::bsdf::MaterialTables;
+use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight};
 use crate::error::TracerError;
 use crate::ray::Ray;
@@ -123,10 +123,6 @@ impl World {
         &self.emitters
     }
 
-    pub(crate) fn tables(&self) -> &MaterialTables {
-        &self.tables
-    }
-
     /// The nearest hit on a surface whose opacity there is at least one half.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
         if !self.masked {
@@ -201,8 +197,17 @@ impl World {
         SurfaceHit::new(hit.surface, hit.triangle, &self.records[hit.global as usize], hit.barycentrics)
     }
 
-    pub(crate) fn mesh(&self, surface: SurfaceIndex) -> &TriangleMesh {
-        &self.scene.surfaces[surface.0].mesh
+    /// The scattering of the surface's own material at `hit`, seen from `wo`.
+    pub fn bsdf(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
+        self.bsdf_of_colors(hit, wo)
+    }
+
+    /// [`Self::bsdf`], the same for all of `K` base colours.
+    pub(crate) fn bsdf_of_colors<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
+        let surface = &self.scene.surfaces[hit.surface.0];
+        let index = surface.material.0;
+        let (material, table) = (&self.scene.materials[index], self.tables.of(index));
+        Bsdf::of_material(material, table, &self.textures, &surface.mesh, hit, wo)
     }
 }
 

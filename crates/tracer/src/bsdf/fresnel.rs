@@ -67,6 +67,11 @@ pub(crate) fn schlick_weight(cos: f32) -> f32 {
     x * x * (x * x) * x
 }
 
+/// The index of refraction that Disney's `specular` stands for: F0 = 0.08 * specular. Blender's IOR level says the same.
+pub(crate) fn eta_from_specular(specular: f32) -> f32 {
+    2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

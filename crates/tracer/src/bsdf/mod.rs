@@ -5,34 +5,30 @@
 //! colours serve for another.
 
 mod bump;
-mod conductor;
-mod dielectric;
-mod diffuse;
 mod facets;
 mod fresnel;
 mod lobe;
-mod plastic;
-mod principled;
 mod principled_tables;
 mod rough_boundary;
+mod sample;
 mod tables;
 #[cfg(test)]
 mod tests;
 
 use glam::Vec3;
+use mateval_image::Texture;
+use mateval_scene::TriangleMesh;
+use mateval_scene::material::Material;
 
 use crate::frame::Frame;
-use crate::repaint::PaintAt;
 use crate::surface_hit::SurfaceHit;
-use crate::world::World;
-use lobe::Lobe;
-pub(crate) use principled::{Principled, eta_from_specular};
-use principled::{PrincipledView, Tint};
+pub(crate) use fresnel::eta_from_specular;
+pub(crate) use lobe::Principled;
+use lobe::{Lobe, PrincipledView, Tint};
 pub(crate) use principled_tables::BlenderTables;
-pub(crate) use tables::MaterialTables;
+pub(crate) use tables::{MaterialTables, Table};
 
-/// A surface's scattering at one place, for `K` base colours at once: of the world's own material for one, of predictions
-/// for more ([`crate::Repaint`]).
+/// A surface's scattering at one place, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<'w, const K: usize = 1> {
     frame: Frame,
@@ -64,15 +60,7 @@ const GRAZING: f32 = 1e-3;
 /// Facets smoother than this roughness do not show the lights of a stage ([`crate::StageLight`]).
 pub const STAGE_ROUGHNESS: f32 = 0.2;
 
-impl<'w> Bsdf<'w> {
-    /// The scattering of the world's own material at `hit`, seen from `wo`.
-    ///
-    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer who
-    /// sees that side of the triangle is turned until it does not.
-    pub fn new(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
-        Self::own(world, hit, wo)
-    }
-
+impl Bsdf<'_> {
     /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
     /// single directions left out. See `Self::evaluate_all`.
     pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
@@ -91,21 +79,34 @@ pub(crate) enum Shown {
 }
 
 impl<'w, const K: usize> Bsdf<'w, K> {
-    /// As [`Bsdf::new`], the same for all colours.
-    pub(crate) fn own(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
-        let material = world.material_of(hit.surface);
-        let table = world.tables().of(world.scene().surfaces[hit.surface.0].material.0);
-        let lobe = Lobe::at(material, table, world.textures(), hit.uv);
+    /// The scattering of `material`, whose integrals are `table`, at `hit` on `mesh`, seen from `wo`; the same `K` times.
+    ///
+    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer who
+    /// sees that side of the triangle is turned until it does not.
+    pub(crate) fn of_material(
+        material: &Material,
+        table: &'w Table,
+        textures: &[Texture],
+        mesh: &TriangleMesh,
+        hit: &SurfaceHit,
+        wo: Vec3,
+    ) -> Self {
+        let lobe = Lobe::at(material, table, textures, hit.uv);
         let normal = match &material.bump {
-            Some(bump) => bump::bumped_normal(bump, world.textures(), world.mesh(hit.surface), hit),
+            Some(bump) => bump::bumped_normal(bump, textures, mesh, hit),
             None => hit.shading_normal,
         };
         Self::at(hit, normal, wo, lobe, material.two_sided, None)
     }
 
-    /// The scattering of predictions at `hit`: two-sided, without bumps.
-    pub(crate) fn repainted(paint: &PaintAt<'w, K>, hit: &SurfaceHit, wo: Vec3) -> Self {
-        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(paint.principled), true, Some(&paint.base_colors))
+    /// The scattering of a two-sided `principled` surface at `hit`, seen from `wo`, once for each of `base_colors`.
+    pub(crate) fn of_principled(
+        principled: Principled<'w>,
+        base_colors: &[Vec3; K],
+        hit: &SurfaceHit,
+        wo: Vec3,
+    ) -> Self {
+        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(principled), true, Some(base_colors))
     }
 
     fn at(

@@ -9,8 +9,7 @@ use mateval_scene::material::{
 };
 use mateval_scene::reference::ReferenceScene;
 
-use super::fresnel;
-use super::principled::eta_from_specular;
+use super::fresnel::{self, eta_from_specular};
 use super::principled_tables::BlenderTables;
 use super::rough_boundary::{RoughCoat, Widths};
 use crate::error::TracerError;

@@ -10,8 +10,9 @@ use mateval_scene::material::{
 };
 use mateval_scene::reference::ReferenceScene;
 
-use super::lobe::LocalSample;
+use super::sample::LocalSample;
 use super::*;
+use crate::world::World;
 
 const WHITE: ColorInput = ColorInput::Constant([1.0; 3]);
 
@@ -364,9 +365,9 @@ fn sides() {
     let (wo, wi) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.6, 0.0, -0.8));
     let mirrored = |w: Vec3| Vec3::new(w.x, w.y, -w.z);
     let (one, two) = (world(false), world(true));
-    assert!(Bsdf::new(&one, &hit, wo).is_black());
-    assert_eq!(Bsdf::new(&one, &hit, mirrored(wo)).evaluate(wi), (Vec3::ZERO, 0.0));
-    let front = Bsdf::new(&two, &hit, mirrored(wo)).evaluate(mirrored(wi)).0;
-    let back = Bsdf::new(&two, &hit, wo).evaluate(wi).0;
+    assert!(one.bsdf(&hit, wo).is_black());
+    assert_eq!(one.bsdf(&hit, mirrored(wo)).evaluate(wi), (Vec3::ZERO, 0.0));
+    let front = two.bsdf(&hit, mirrored(wo)).evaluate(mirrored(wi)).0;
+    let back = two.bsdf(&hit, wo).evaluate(wi).0;
     assert!(front.x > 0.1 && (front - back).length() < 1e-6, "{front} {back}");
 }

@@ -7,7 +7,7 @@ use mateval_scene::{Camera, Intrinsics};
 
 /// The first camera's image plane, as far as any view sees it, in cells of that camera's pixels.
 #[derive(Clone, Debug)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     camera: Camera,
     views: Vec<PlaneView>,
     samples: u32,

@@ -8,13 +8,15 @@ use mateval_scene::reference::LightIndex;
 use rayon::prelude::*;
 
 use super::cell_points::{Numbering, cell_points};
+use super::lighting::Lighting;
 use super::plane::{Plane, Window};
-use super::{HalfLight, Lighting};
+use super::view_light::HalfLight;
 use crate::light_basis::LightBasis;
-use crate::path::{Painted, PathCounts, PathTracer};
+use crate::material_source::MaterialSource;
+use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
-use crate::render::RenderSettings;
 use crate::sampler::Sampler;
+use crate::settings::RenderSettings;
 use crate::world::World;
 
 /// What happened in one tile.
@@ -27,24 +29,26 @@ pub(super) struct TileCounts {
 /// Tiles in the making, for each thread: more leave threads less idle at the end of a batch and take more memory.
 const TILES_A_THREAD: usize = 4;
 
-/// What is exposed: a world, with `K` predictions in place of its materials or with none.
+/// What is exposed: a world of some materials in some light.
 #[derive(Clone, Copy)]
-pub(super) struct Subject<'a> {
-    pub(super) world: &'a World,
-    pub(super) painted: Option<Painted<'a>>,
-    pub(super) lighting: Lighting<'a>,
+pub(crate) struct Subject<'a, M> {
+    pub(crate) world: &'a World,
+    pub(crate) materials: M,
+    /// The first of the variants that are followed.
+    pub(crate) first: usize,
+    pub(crate) lighting: Lighting<'a>,
 }
 
-/// All views of `plane` with the seed of `settings`, by prediction. What happened in each tile is added to `counts`.
-pub(super) fn expose<const K: usize>(
-    subject: Subject<'_>,
+/// All views of `plane` with the seed of `settings`, by variant. What happened in each tile is added to `counts`.
+pub(super) fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
+    subject: Subject<'w, M>,
     plane: &Plane,
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
     done: &(impl Fn() + Sync),
 ) -> Vec<[HalfLight; K]> {
     let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
-    let mut films = exposure.blank_films::<K>();
+    let mut films = exposure.blank_films();
     // Tiles are merged in their order whichever is done first; batches bound how many wait.
     for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
         let exposed: Vec<ExposedTile<K>> = batch
@@ -65,8 +69,8 @@ pub(super) fn expose<const K: usize>(
     films
 }
 
-struct Exposure<'a> {
-    subject: Subject<'a>,
+struct Exposure<'w, 'a, M> {
+    subject: Subject<'w, M>,
     plane: &'a Plane,
     settings: &'a RenderSettings,
     numbering: Numbering,
@@ -78,7 +82,7 @@ struct ExposedTile<const K: usize> {
     counts: TileCounts,
 }
 
-/// A piece of one view: sums of all its pictures, pixel by pixel, by prediction.
+/// A piece of one view: sums of all its pictures, pixel by pixel, by variant.
 struct Part<const K: usize> {
     window: Window,
     sums: Vec<[[f64; 3]; K]>,
@@ -98,7 +102,7 @@ struct PlanePath {
     count: usize,
 }
 
-/// What a path has got from one light, by prediction.
+/// What a path has got from one light, by variant.
 struct Share<const K: usize> {
     path: usize,
     light: LightIndex,
@@ -106,22 +110,22 @@ struct Share<const K: usize> {
 }
 
 /// Where a tile's paths wait, are followed and put into views.
-struct Darkroom<'a, const K: usize> {
-    exposure: &'a Exposure<'a>,
-    tracer: PathTracer<'a, K>,
+struct Darkroom<'w, 'a, M, const K: usize> {
+    exposure: &'a Exposure<'w, 'a, M>,
+    tracer: PathTracer<'w, M, K>,
     paths: Vec<PlanePath>,
     shares: Vec<Share<K>>,
     found: Found<K>,
 }
 
-/// What one path found, by picture and prediction.
+/// What one path found, by picture and variant.
 struct Found<const K: usize> {
     sums: Vec<[[f64; 3]; K]>,
     /// The pictures that have got something, in the order of their first.
     touched: Vec<usize>,
 }
 
-impl Exposure<'_> {
+impl<'w, M: Copy> Exposure<'w, '_, M> {
     fn pictures(&self) -> usize {
         self.subject.lighting.pictures()
     }
@@ -135,7 +139,10 @@ impl Exposure<'_> {
         self.plane.views().iter().map(size).map(|size| from_fn(|_| blank(size))).collect()
     }
 
-    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K> {
+    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
+    where
+        M: MaterialSource<'w, K>,
+    {
         let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
         let parts = (0..self.plane.views().len()).map(part).collect();
         let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
@@ -175,12 +182,12 @@ impl Exposure<'_> {
     }
 }
 
-impl<'a, const K: usize> Darkroom<'a, K> {
-    fn new(exposure: &'a Exposure<'a>) -> Self {
-        let Subject { world, painted, .. } = exposure.subject;
+impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> Darkroom<'w, 'a, M, K> {
+    fn new(exposure: &'a Exposure<'w, 'a, M>) -> Self {
+        let Subject { world, materials, .. } = exposure.subject;
         Self {
             exposure,
-            tracer: PathTracer::new(world, painted, exposure.settings),
+            tracer: PathTracer::new(world, materials, *exposure.settings),
             paths: Vec::new(),
             shares: Vec::new(),
             found: Found { sums: vec![[[0.0; 3]; K]; exposure.pictures()], touched: Vec::new() },
@@ -193,7 +200,7 @@ impl<'a, const K: usize> Darkroom<'a, K> {
         let starts = paths.iter().map(|path| exposure.start(path));
         tracer.trace(starts, |path, light, values| shares.push(Share { path, light, values }));
         let lighting = &exposure.subject.lighting;
-        let first = exposure.subject.painted.map_or(0, |painted| painted.first);
+        let first = exposure.subject.first;
         // Paths were followed side by side; each one's own shares stay in their order.
         shares.sort_by_key(|share| share.path);
         let mut rest = shares.as_slice();
@@ -223,7 +230,7 @@ impl<const K: usize> Found<K> {
                 for picture in 0..self.sums.len() {
                     self.touch(picture);
                     for (k, (sum, value)) in self.sums[picture].iter_mut().zip(values).enumerate() {
-                        // Beyond the last prediction: see `Repaint::at`.
+                        // Variants beyond the last repeat it.
                         let weight = mixes[(first + k).min(mixes.len() - 1)][picture][share.light.0];
                         add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
                     }

@@ -9,11 +9,11 @@ use crate::accel::wide::{Block, Node, WIDTH};
 
 /// The proof that this processor has them all: there is no other way to get one than [`Self::detect`].
 #[derive(Clone, Copy, Debug)]
-pub(in crate::accel) struct Avx2(());
+pub(crate) struct Avx2(());
 
 impl Avx2 {
     /// Some where the processor has what it takes.
-    pub(in crate::accel) fn detect() -> Option<Self> {
+    pub(crate) fn detect() -> Option<Self> {
         let vectors = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         let bits = is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2");
         let counts = is_x86_feature_detected!("lzcnt") && is_x86_feature_detected!("popcnt");
@@ -22,7 +22,7 @@ impl Avx2 {
 
     /// Runs `work` compiled for AVX2, as far as it is inlined.
     #[inline]
-    pub(in crate::accel) fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
+    pub(crate) fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
         // SAFETY: `self` proves that the processor has them.
         unsafe { compiled_for_avx2(self, work) }
     }

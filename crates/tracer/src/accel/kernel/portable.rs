@@ -5,7 +5,7 @@ use crate::accel::wide::{Block, Node, WIDTH};
 
 /// Works everywhere.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::accel) struct Portable;
+pub(crate) struct Portable;
 
 /// One triangle's hit: distance, and the corners' weights, not yet divided by their sum.
 struct LaneHit {

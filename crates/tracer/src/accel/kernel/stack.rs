@@ -8,7 +8,7 @@ use crate::accel::wide::{Child, WIDTH};
 
 /// Children still to be visited and the bits of the distance where the ray enters them: fixed arrays, and a vector for
 /// what they cannot hold.
-pub(in crate::accel) struct Stack {
+pub(crate) struct Stack {
     /// The first `len` entries of both arrays have been written.
     enters: [MaybeUninit<u32>; FIXED],
     children: [MaybeUninit<Child>; FIXED],
@@ -21,7 +21,7 @@ const FIXED: usize = if cfg!(test) { 12 } else { 128 };
 
 impl Stack {
     #[inline(always)]
-    pub(in crate::accel) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             enters: [const { MaybeUninit::uninit() }; FIXED],
             children: [const { MaybeUninit::uninit() }; FIXED],
@@ -31,13 +31,13 @@ impl Stack {
     }
 
     #[inline(always)]
-    pub(in crate::accel) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
         self.spilled.clear();
     }
 
     #[inline(always)]
-    pub(in crate::accel) fn push(&mut self, enter_bits: u32, child: Child) {
+    pub(crate) fn push(&mut self, enter_bits: u32, child: Child) {
         if self.len < FIXED {
             self.enters[self.len].write(enter_bits);
             self.children[self.len].write(child);
@@ -79,7 +79,7 @@ impl Stack {
 
     /// The child pushed last of those in the arrays: for asking for its memory alone.
     #[inline(always)]
-    pub(in crate::accel) fn top(&self) -> Option<Child> {
+    pub(crate) fn top(&self) -> Option<Child> {
         let last = self.len.checked_sub(1)?;
         // SAFETY: as in `pop`.
         Some(unsafe { self.children[last].assume_init() })
@@ -87,7 +87,7 @@ impl Stack {
 
     /// The child pushed last of those that the ray enters before `limit`.
     #[inline(always)]
-    pub(in crate::accel) fn pop(&mut self, limit: f32) -> Option<Child> {
+    pub(crate) fn pop(&mut self, limit: f32) -> Option<Child> {
         loop {
             let (enter_bits, child) = if self.len == FIXED && !self.spilled.is_empty() {
                 self.unspill()?

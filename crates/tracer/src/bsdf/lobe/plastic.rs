@@ -9,10 +9,10 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 
 use super::conductor::{reflection, reflection_density};
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
-use super::rough_boundary::RoughCoat;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::rough_boundary::RoughCoat;
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
 /// The coat and its base, at one place.

@@ -1,39 +1,24 @@
 //! What light does at one place, in the frame of the shading normal: every parameter looked up, two directions to go.
 
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod plastic;
+mod principled;
+
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::material::{ColorInput, Material, MaterialModel, Microfacets};
 
-use super::conductor::{Conductor, reflection_density};
-use super::dielectric::Dielectric;
-use super::diffuse;
 use super::facets::Facets;
-use super::plastic::{Coat, Plastic};
-use super::principled::{Principled, eta_from_specular};
+use super::fresnel::eta_from_specular;
+use super::sample::LocalSample;
 use super::tables::Table;
 use crate::warp;
-
-/// A sampled direction in the local frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LocalSample {
-    pub(crate) wi: Vec3,
-    /// Value with cosine over density.
-    pub(crate) weight: Vec3,
-    /// Per solid angle; for a single direction, its probability.
-    pub(crate) density: f32,
-    /// Whether it is a single direction, which no other way of sampling can find.
-    pub(crate) delta: bool,
-}
-
-impl LocalSample {
-    pub(crate) fn spread(wi: Vec3, value: Vec3, density: f32) -> Self {
-        Self { wi, weight: value / density, density, delta: false }
-    }
-
-    pub(crate) fn delta(wi: Vec3, weight: Vec3, probability: f32) -> Self {
-        Self { wi, weight, density: probability, delta: true }
-    }
-}
+use conductor::{Conductor, reflection_density};
+use dielectric::Dielectric;
+use plastic::{Coat, Plastic};
+pub(crate) use principled::{Principled, PrincipledView, Tint};
 
 /// A material at one place. Reflecting ones expect `wo.z > 0`; dielectrics take either side.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,9 @@
 
 use glam::Vec3;
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::sample::LocalSample;
 
 /// A boundary and the tints of what it reflects and lets through.
 #[derive(Clone, Copy, Debug)]

@@ -16,10 +16,10 @@ use std::f32::consts::FRAC_1_PI;
 use glam::Vec3;
 use mateval_scene::material::{Distribution, PrincipledFlavour};
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
-use super::principled_tables::{BlenderTables, Kept};
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::principled_tables::{BlenderTables, Kept};
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
 /// The material at one place.
@@ -104,11 +104,6 @@ const SMALLEST_ALPHA: [f32; 2] = [1e-3, 1e-4];
 /// What a base of any colour counts when a lobe is chosen, and the least share of the facets there.
 const TYPICAL_BASE: f32 = 0.5;
 const LEAST_FACET_SHARE: f32 = 0.25;
-
-/// The index of refraction that Disney's `specular` stands for: F0 = 0.08 * specular. Blender's IOR level says the same.
-pub(crate) fn eta_from_specular(specular: f32) -> f32 {
-    2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
-}
 
 impl<'w> Principled<'w> {
     pub(crate) fn style(flavour: PrincipledFlavour, tables: Option<&'w BlenderTables>) -> Style<'w> {

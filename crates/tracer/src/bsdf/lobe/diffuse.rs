@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::Vec3;
 
-use super::lobe::LocalSample;
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
 /// Lambert's diffuse reflection.

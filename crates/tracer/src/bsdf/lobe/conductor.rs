@@ -3,9 +3,9 @@
 use glam::Vec3;
 use mateval_scene::material::ConductorIor;
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::sample::LocalSample;
 
 /// A metal: what it is made of, and a tint of what it reflects.
 #[derive(Clone, Copy, Debug)]
