@@ -4,7 +4,10 @@
 
 use std::arch::x86_64::*;
 
-use super::{BoxRay, Boxes, Kernel, Portable, Stack, TriangleRay, Triangles, WIDENED};
+use super::lanes::{Boxes, Kernel, Triangles};
+use super::portable::Portable;
+use super::stack::Stack;
+use super::test_ray::{BoxRay, TriangleRay, WIDENED};
 use crate::accel::wide::{Block, Node, WIDTH};
 
 /// The proof that this processor has them all: there is no other way to get one than [`Self::detect`].

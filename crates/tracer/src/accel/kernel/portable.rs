@@ -1,6 +1,8 @@
 //! The kernel for every processor: the formulas, one lane after the other.
 
-use super::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, WIDENED, key};
+use super::lanes::{Boxes, Kernel, Triangles, key};
+use super::stack::Stack;
+use super::test_ray::{BoxRay, TriangleRay, WIDENED};
 use crate::accel::wide::{Block, Node, WIDTH};
 
 /// Works everywhere.

@@ -3,7 +3,7 @@
 
 use std::mem::MaybeUninit;
 
-use super::WIDENED;
+use super::test_ray::WIDENED;
 use crate::accel::wide::{Child, WIDTH};
 
 /// Children still to be visited and the bits of the distance where the ray enters them: fixed arrays, and a vector for
