@@ -34,7 +34,7 @@ pub mod world;
 pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use emitter::StageLight;
-pub use error::TracerError;
+pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
 pub use light_basis::{LightBasis, LightGroups};
 pub use ray::Ray;
 pub use render::{Render, RenderStats, render};

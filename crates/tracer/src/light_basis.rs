@@ -7,7 +7,7 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
 use mateval_scene::reference::LightIndex;
 
-use crate::error::TracerError;
+use crate::error::{ExceededLimit, RequestFault, TracerError};
 
 /// Which lights share a picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,11 +45,7 @@ impl LightGroups {
         let group_bytes = PIXEL_BYTES * halves as u64 * cameras.iter().map(pixels).sum::<u64>();
         let room = bytes.checked_div(group_bytes).map_or(lights, |room| room.min(lights as u64) as usize);
         if room == 0 && lights > 0 {
-            return Err(TracerError::Unsupported(format!(
-                "{halves} halves of {} views take {group_bytes} bytes a group of lights, and {bytes} are allowed; \
-                 allow more, or make fewer views at a time",
-                cameras.len()
-            )));
+            return Err(ExceededLimit::BasisBytes { halves, views: cameras.len(), group_bytes, allowed: bytes }.into());
         }
         Ok(Self::runs(lights, room))
     }
@@ -108,8 +104,8 @@ impl LightBasis {
     /// Takes pictures of one size. Fails if a size differs.
     pub fn new(width: usize, height: usize, pictures: Vec<Picture<LinearRgb>>) -> Result<Self, TracerError> {
         if let Some(other) = pictures.iter().find(|picture| (picture.width(), picture.height()) != (width, height)) {
-            let (w, h) = (other.width(), other.height());
-            return Err(TracerError::Invalid(format!("a picture of {w}x{h} in a light basis of {width}x{height}")));
+            let found = [other.width(), other.height()];
+            return Err(RequestFault::PictureSize { found, expected: [width, height] }.into());
         }
         Ok(Self { width, height, pictures })
     }
@@ -132,7 +128,7 @@ impl LightBasis {
     pub fn weighted(&self, weights: &[[f64; 3]]) -> Result<Picture<LinearRgb>, TracerError> {
         if weights.len() != self.pictures.len() {
             let (found, expected) = (weights.len(), self.pictures.len());
-            return Err(TracerError::Invalid(format!("{found} weights for {expected} groups of lights")));
+            return Err(RequestFault::WeightCount { found, expected }.into());
         }
         Ok(self.mix(|group| weights[group]))
     }

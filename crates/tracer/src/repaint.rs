@@ -9,11 +9,12 @@ use std::ops::Range;
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::material::PrincipledFlavour;
+use mateval_scene::reference::{Surface, SurfaceIndex};
 use mateval_scene::{Camera, TriangleMesh};
 
 use crate::accel::{Hit, prefetch, prefetch_line};
 use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
-use crate::error::TracerError;
+use crate::error::{RequestFault, TracerError};
 use crate::material_source::MaterialSource;
 use crate::path::MOST_VARIANTS;
 use crate::settings::RenderSettings;
@@ -67,26 +68,7 @@ impl Repaint {
         coats: Vec<Option<Coat>>,
         flavour: PrincipledFlavour,
     ) -> Result<Self, TracerError> {
-        let surfaces = &world.scene().surfaces;
-        let fits = atlases.len() == surfaces.len()
-            && coats.len() == surfaces.len()
-            && atlases.iter().zip(surfaces).all(|(mesh, s)| mesh.triangles.len() == s.mesh.triangles.len());
-        if !fits {
-            return Err(TracerError::Invalid("the atlases are not of the world's triangles".into()));
-        }
-        let predictions = coats.iter().flatten().map(|coat| coat.base_colors.len()).max().unwrap_or(1);
-        if let Some(coat) = coats.iter().flatten().find(|coat| coat.base_colors.len() != predictions) {
-            let found = coat.base_colors.len();
-            return Err(TracerError::Invalid(format!("{found} base colours on one surface, {predictions} on another")));
-        }
-        if predictions == 0 {
-            return Err(TracerError::Invalid("no base colours to paint with".into()));
-        }
-        let unmapped = coats.iter().zip(atlases).position(|(coat, mesh)| coat.is_some() && !has_uvs(mesh));
-        if let Some(index) = unmapped {
-            let name = &surfaces[index].name;
-            return Err(TracerError::Invalid(format!("surface {index} '{name}': a coat for a mesh without sound uv")));
-        }
+        let predictions = check_coats(&world.scene().surfaces, atlases, &coats)?;
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
         let eta = eta_from_specular(SPECULAR);
         Ok(Self { coats, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
@@ -180,15 +162,41 @@ fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
     which.step_by(MOST_VARIANTS).map(|start| start..end.min(start + MOST_VARIANTS)).collect()
 }
 
-fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), TracerError> {
-    let predictions = repaint.predictions;
-    if repaint.coats.len() != world.scene().surfaces.len() {
-        return Err(TracerError::Invalid("the predictions were made for another world".into()));
+fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), RequestFault> {
+    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
+    if found != expected {
+        return Err(RequestFault::OtherWorld { found, expected });
     }
-    if which.end > predictions {
-        return Err(TracerError::Invalid(format!("predictions {which:?} of {predictions}")));
+    if which.end > repaint.predictions {
+        return Err(RequestFault::Predictions { found: which.clone(), count: repaint.predictions });
     }
     Ok(())
+}
+
+/// The number of predictions that the coats hold.
+fn check_coats(surfaces: &[Surface], atlases: &[TriangleMesh], coats: &[Option<Coat>]) -> Result<usize, RequestFault> {
+    if atlases.len() != surfaces.len() || coats.len() != surfaces.len() {
+        let (atlases, coats) = (atlases.len(), coats.len());
+        return Err(RequestFault::SurfaceCount { atlases, coats, surfaces: surfaces.len() });
+    }
+    let colors = coats.iter().flatten().map(|coat| coat.base_colors.len());
+    let predictions = colors.max().unwrap_or(1).max(1);
+    for (index, ((surface, atlas), coat)) in surfaces.iter().zip(atlases).zip(coats).enumerate() {
+        let (index, name) = (SurfaceIndex(index), || surface.name.clone());
+        let (found, expected) = (atlas.triangles.len(), surface.mesh.triangles.len());
+        if found != expected {
+            return Err(RequestFault::AtlasTriangles { surface: index, name: name(), found, expected });
+        }
+        let Some(coat) = coat else { continue };
+        let (found, expected) = (coat.base_colors.len(), predictions);
+        if found != expected {
+            return Err(RequestFault::BaseColorCount { surface: index, name: name(), found, expected });
+        }
+        if !has_uvs(atlas) {
+            return Err(RequestFault::AtlasUv { surface: index, name: name() });
+        }
+    }
+    Ok(predictions)
 }
 
 fn has_uvs(mesh: &TriangleMesh) -> bool {

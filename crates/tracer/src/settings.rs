@@ -1,6 +1,6 @@
 //! How a picture is made.
 
-use crate::error::TracerError;
+use crate::error::RequestFault;
 
 /// How light is looked for. All three have the same mean; they differ in noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,12 +47,13 @@ impl Default for RenderSettings {
 
 impl RenderSettings {
     /// Fails for settings that make no sense.
-    pub(crate) fn check(&self) -> Result<(), TracerError> {
+    pub(crate) fn check(&self) -> Result<(), RequestFault> {
         let Self { samples, roulette_survival, .. } = *self;
-        if samples == 0 || !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
-            return Err(TracerError::Invalid(format!(
-                "{samples} samples, roulette survival {roulette_survival}; expected at least 1, and above 0 up to 1"
-            )));
+        if samples == 0 {
+            return Err(RequestFault::Samples(samples));
+        }
+        if !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
+            return Err(RequestFault::RouletteSurvival(roulette_survival));
         }
         Ok(())
     }

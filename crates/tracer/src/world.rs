@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight};
-use crate::error::TracerError;
+use crate::error::{SceneFault, SurfaceFault, TracerError};
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
 use crate::surface_hit::SurfaceHit;
@@ -53,15 +53,15 @@ impl World {
     ///
     /// Fails as [`Self::new`], and where the triangles are not those that `accel` was built from.
     pub fn sharing(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
-        if !accel.holds(&meshes(&scene))? {
-            return Err(TracerError::Invalid("the hierarchy was built from other triangles".into()));
-        }
+        accel.check_triangles(&meshes(&scene))?;
         Self::assemble(scene, accel)
     }
 
     fn assemble(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
         for (index, surface) in scene.surfaces.iter().enumerate() {
-            check_surface(index, surface, scene.materials.len())?;
+            let located =
+                |fault| SceneFault::Surface { surface: SurfaceIndex(index), name: Some(surface.name.clone()), fault };
+            check_surface(surface, scene.materials.len()).map_err(located)?;
         }
         let textures = scene.texture_list();
         let texels = textures.iter().map(Texture::bytes);
@@ -220,22 +220,32 @@ fn opacity_draw(salt: u32, hit: &Hit) -> f32 {
     1.0 - unit_hash(salt, hit.global)
 }
 
-fn check_surface(index: usize, surface: &Surface, materials: usize) -> Result<(), TracerError> {
-    let invalid = |what: String| Err(TracerError::Invalid(format!("surface {index} '{}': {what}", surface.name)));
-    let mesh = &surface.mesh;
-    let count = mesh.positions.len();
-    if surface.material.0 >= materials {
-        return invalid(format!("material {} of {materials}", surface.material.0));
+fn check_surface(surface: &Surface, materials: usize) -> Result<(), SurfaceFault> {
+    let (mesh, material) = (&surface.mesh, surface.material.0);
+    if material >= materials {
+        return Err(SurfaceFault::MissingMaterial { material, count: materials });
     }
-    if let Some(normals) = &mesh.normals
-        && (normals.len() != count || !normals.iter().all(|normal| normal.is_finite()))
-    {
-        return invalid(format!("{} normals for {count} vertices, expected as many, all finite", normals.len()));
+    let vertices = mesh.positions.len();
+    if let Some(normals) = &mesh.normals {
+        check_attribute("normals", normals, vertices, |normal| normal.is_finite())?;
     }
-    if let Some(uvs) = &mesh.uvs
-        && (uvs.len() != count || !uvs.iter().all(|uv| uv.is_finite()))
-    {
-        return invalid(format!("{} uvs for {count} vertices, expected as many, all finite", uvs.len()));
+    match &mesh.uvs {
+        Some(uvs) => check_attribute("uvs", uvs, vertices, |uv| uv.is_finite()),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+fn check_attribute<T>(
+    attribute: &'static str,
+    values: &[T],
+    expected: usize,
+    is_finite: impl Fn(&T) -> bool,
+) -> Result<(), SurfaceFault> {
+    if values.len() != expected {
+        return Err(SurfaceFault::AttributeCount { attribute, found: values.len(), expected });
+    }
+    match values.iter().position(|value| !is_finite(value)) {
+        Some(vertex) => Err(SurfaceFault::AttributeNotFinite { attribute, vertex }),
+        None => Ok(()),
+    }
 }

@@ -13,7 +13,7 @@ use glam::Vec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::SurfaceIndex;
 
-use crate::error::TracerError;
+use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
 use crate::ray::Ray;
 use build::BinaryTree;
 use kernel::{BoxRay, Kernel, Portable, TriangleRay};
@@ -95,6 +95,8 @@ pub struct Accel {
 
 /// Coordinates beyond this are refused, in metres: f32 cannot tell one metre from the next there.
 const LARGEST_COORDINATE: f32 = 1e7;
+/// A node's children are numbered with 31 bits.
+const MOST_TRIANGLES: usize = 1 << 31;
 
 impl Accel {
     /// Builds over the meshes, one a surface, in this order.
@@ -208,16 +210,18 @@ impl Accel {
         self.wide.as_ref().map_or(0, Wide::memory_bytes) + self.starts.len() * size_of::<u32>()
     }
 
-    /// Whether it was built from these very triangles.
-    pub(crate) fn holds(&self, meshes: &[&TriangleMesh]) -> Result<bool, TracerError> {
+    /// Fails unless it was built from these very triangles.
+    pub(crate) fn check_triangles(&self, meshes: &[&TriangleMesh]) -> Result<(), TracerError> {
         let (corners, starts) = flatten(meshes)?;
         let blocks = || self.wide.iter().flat_map(|wide| &wide.blocks);
         let mut held = blocks().flat_map(|block| (0..WIDTH).map(move |lane| (block, lane)));
-        Ok(starts == self.starts
+        let same = starts == self.starts
             && held.all(|(block, lane)| {
                 let triangle = block.triangles[lane];
                 triangle == u32::MAX || block.corners_of(lane) == corners[triangle as usize]
-            }))
+            });
+        let (hierarchy, scene) = (self.triangle_count(), corners.len());
+        if same { Ok(()) } else { Err(RequestFault::OtherTriangles { hierarchy, scene }.into()) }
     }
 
     /// Walks the hierarchy with the instructions and the test chosen.
@@ -314,13 +318,14 @@ impl Accel {
 /// All corners, surface by surface, and where each surface starts.
 fn flatten(meshes: &[&TriangleMesh]) -> Result<(Vec<[Vec3; 3]>, Vec<u32>), TracerError> {
     let total: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    if total > 1 << 31 {
-        return Err(TracerError::Unsupported(format!("{total} triangles, the limit is 2^31")));
+    if total > MOST_TRIANGLES {
+        return Err(ExceededLimit::Triangles { found: total, limit: MOST_TRIANGLES }.into());
     }
     let mut corners = Vec::with_capacity(total);
     let mut starts = vec![0];
     for (surface, mesh) in meshes.iter().enumerate() {
-        check_positions(surface, mesh)?;
+        let fault = |fault| SceneFault::Surface { surface: SurfaceIndex(surface), name: None, fault };
+        check_positions(mesh).map_err(fault)?;
         corners.extend((0..mesh.triangles.len()).map(|index| mesh.corners(index)));
         starts.push(corners.len() as u32);
     }
@@ -332,14 +337,13 @@ fn is_within_reach(position: Vec3) -> bool {
     position.to_array().iter().all(|v| v.abs() <= LARGEST_COORDINATE)
 }
 
-fn check_positions(surface: usize, mesh: &TriangleMesh) -> Result<(), TracerError> {
-    let invalid = |what: String| Err(TracerError::Invalid(format!("surface {surface}: {what}")));
+fn check_positions(mesh: &TriangleMesh) -> Result<(), SurfaceFault> {
     if let Some(vertex) = mesh.positions.iter().position(|p| !is_within_reach(*p)) {
-        return invalid(format!("vertex {vertex} is at {}, expected within 1e7 m", mesh.positions[vertex]));
+        return Err(SurfaceFault::Position { vertex, position: mesh.positions[vertex], limit: LARGEST_COORDINATE });
     }
     let count = mesh.positions.len();
     match mesh.triangles.iter().position(|t| t.iter().any(|&vertex| vertex as usize >= count)) {
-        Some(t) => invalid(format!("triangle {t} names vertices {:?} of {count}", mesh.triangles[t])),
+        Some(triangle) => Err(SurfaceFault::MissingVertex { triangle, vertices: mesh.triangles[triangle], count }),
         None => Ok(()),
     }
 }

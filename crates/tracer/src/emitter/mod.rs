@@ -15,7 +15,7 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 
 use crate::accel::Accel;
-use crate::error::TracerError;
+use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
 use crate::ray::Ray;
 use crate::surface_hit::SurfaceHit;
 use area::{AreaEmitter, Glow, Outlines, TOGETHER};
@@ -113,7 +113,7 @@ impl Emitters {
         for (index, group) in scene.lights.iter().enumerate() {
             emitters
                 .add(scene, textures, LightIndex(index), &group.emission, count <= SEPARATE_SURFACES)
-                .map_err(|what| TracerError::Invalid(format!("light {index} '{}': {what}", group.name)))?;
+                .map_err(|fault| SceneFault::Light { light: LightIndex(index), name: group.name.clone(), fault })?;
         }
         emitters.outlines = Outlines::new(&emitters.areas);
         Ok(emitters)
@@ -121,29 +121,32 @@ impl Emitters {
 
     /// The lights of a stage, a group each, and none else, in a scene of `surfaces` surfaces.
     pub(crate) fn on_stage(stage: &[StageLight], surfaces: usize, scene_size: f32) -> Result<Self, TracerError> {
-        let mut emitters = Self {
-            areas: Vec::new(),
-            outlines: Outlines::default(),
+        let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
+        let accel = Accel::build(&meshes).map_err(|error| match error {
+            TracerError::InvalidScene(SceneFault::Surface { surface, fault, .. }) => {
+                RequestFault::StageMesh { light: LightIndex(surface.0), fault }.into()
+            }
+            other => other,
+        })?;
+        let mut areas = Vec::with_capacity(stage.len());
+        for (index, light) in stage.iter().enumerate() {
+            let located = |fault| RequestFault::StageLight { light: LightIndex(index), fault };
+            check_radiance(&light.radiance).map_err(located)?;
+            if light.mesh.triangles.is_empty() {
+                return Err(located(LightFault::NoTriangles).into());
+            }
+            let glow = Glow { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
+            areas.push(AreaEmitter::on_stage(LightIndex(index), glow, &light.mesh, scene_size));
+        }
+        Ok(Self {
+            outlines: Outlines::new(&areas),
+            areas,
             area_of: vec![None; surfaces],
-            stage: None,
+            stage: Some(accel),
             distant: Vec::new(),
             camera_visible: vec![false; stage.len()],
             scene_size,
-        };
-        for (index, light) in stage.iter().enumerate() {
-            let fault = |what: String| TracerError::Invalid(format!("stage light {index}: {what}"));
-            check_radiance(&light.radiance).map_err(fault)?;
-            let finite = light.mesh.positions.iter().all(|place| place.is_finite());
-            if light.mesh.triangles.is_empty() || !finite {
-                return Err(fault("no triangles, or corners that are not finite".to_owned()));
-            }
-            let glow = Glow { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
-            emitters.areas.push(AreaEmitter::on_stage(LightIndex(index), glow, &light.mesh, scene_size));
-        }
-        let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
-        emitters.stage = Some(Accel::build(&meshes)?);
-        emitters.outlines = Outlines::new(&emitters.areas);
-        Ok(emitters)
+        })
     }
 
     /// How many light groups there are.
@@ -158,7 +161,7 @@ impl Emitters {
         light: LightIndex,
         emission: &Emission,
         separate: bool,
-    ) -> Result<(), String> {
+    ) -> Result<(), LightFault> {
         match emission {
             Emission::Area { surfaces, radiance, map, two_sided } => {
                 check_radiance(radiance)?;
@@ -177,10 +180,13 @@ impl Emitters {
                 }
             }
             Emission::Environment { texture, scale, world_from_environment } => {
-                let map = textures.get(texture.0).ok_or(format!("texture {} of {}", texture.0, textures.len()))?;
-                let numbers = world_from_environment.iter().flatten().chain([scale]);
-                if !numbers.into_iter().all(|v| v.is_finite()) || *scale < 0.0 {
-                    return Err("scale or rotation is not finite, or the scale negative".into());
+                let missing = LightFault::MissingTexture { texture: texture.0, count: textures.len() };
+                let map = textures.get(texture.0).ok_or(missing)?;
+                if !scale.is_finite() || *scale < 0.0 {
+                    return Err(LightFault::EnvironmentScale(*scale));
+                }
+                if !world_from_environment.as_flattened().iter().all(|v| v.is_finite()) {
+                    return Err(LightFault::EnvironmentRotation(*world_from_environment));
                 }
                 let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
                 self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map) });
@@ -195,11 +201,12 @@ impl Emitters {
     }
 
     /// Notes that `surfaces` belong to the area emitter that comes next.
-    fn claim(&mut self, surfaces: &[SurfaceIndex]) -> Result<(), String> {
-        for surface in surfaces {
-            let slot = self.area_of.get_mut(surface.0).ok_or(format!("surface {} does not exist", surface.0))?;
+    fn claim(&mut self, surfaces: &[SurfaceIndex]) -> Result<(), LightFault> {
+        let count = self.area_of.len();
+        for &SurfaceIndex(surface) in surfaces {
+            let slot = self.area_of.get_mut(surface).ok_or(LightFault::MissingSurface { surface, count })?;
             if slot.replace(self.areas.len()).is_some() {
-                return Err(format!("surface {} glows twice", surface.0));
+                return Err(LightFault::SharedSurface(surface));
             }
         }
         Ok(())
@@ -395,9 +402,9 @@ impl DistantEmitter {
     }
 }
 
-fn check_radiance(radiance: &[f32; 3]) -> Result<(), String> {
+fn check_radiance(radiance: &[f32; 3]) -> Result<(), LightFault> {
     let sound = radiance.iter().all(|&v| v.is_finite() && v >= 0.0);
-    if sound { Ok(()) } else { Err(format!("radiance {radiance:?}, expected finite and not negative")) }
+    if sound { Ok(()) } else { Err(LightFault::Radiance(*radiance)) }
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use mateval_image::{Texels, Texture};
 use mateval_scene::material::UvTransform;
 use mateval_scene::reference::EmissionMap;
 
+use crate::error::LightFault;
+
 /// A factor of radiance, looked up at the surface's uv.
 #[derive(Clone, Debug)]
 pub(crate) struct RadianceMap {
@@ -14,14 +16,15 @@ pub(crate) struct RadianceMap {
 
 impl RadianceMap {
     /// Fails where the texture is not there, or a number is not finite or a texel below 0.
-    pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, String> {
+    pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, LightFault> {
         let index = map.texture.0;
-        let texture = textures.get(index).ok_or(format!("texture {index} of {}", textures.len()))?;
+        let missing = LightFault::MissingTexture { texture: index, count: textures.len() };
+        let texture = textures.get(index).ok_or(missing)?;
         if !map.uv.0.as_flattened().iter().all(|v| v.is_finite()) {
-            return Err("the uv of its map is not finite".into());
+            return Err(LightFault::MapTransform(map.uv.0));
         }
-        if !is_light(texture) {
-            return Err(format!("texture {index} has texels that are negative or not finite; no light is that"));
+        if let Some(value) = first_unsound(texture) {
+            return Err(LightFault::MapValue { texture: index, value });
         }
         Ok(Self { texture: texture.clone(), uv: map.uv })
     }
@@ -33,12 +36,12 @@ impl RadianceMap {
     }
 }
 
-/// Whether every texel can be a share of light; whole numbers always can.
-fn is_light(texture: &Texture) -> bool {
-    let sound = |values: &[f32]| values.iter().all(|v| v.is_finite() && *v >= 0.0);
+/// The first value that is negative or not finite, so that it cannot be a share of light; integer texels never are.
+fn first_unsound(texture: &Texture) -> Option<f32> {
+    let unsound = |values: &[f32]| values.iter().copied().find(|v| !(v.is_finite() && *v >= 0.0));
     match texture.texels() {
-        Texels::Linear(v) => sound(v.as_flattened()),
-        Texels::Grey(v) => sound(v),
-        Texels::Srgb8(_) | Texels::Srgb16(_) | Texels::Linear8(_) | Texels::Grey8(_) => true,
+        Texels::Linear(v) => unsound(v.as_flattened()),
+        Texels::Grey(v) => unsound(v),
+        Texels::Srgb8(_) | Texels::Srgb16(_) | Texels::Linear8(_) | Texels::Grey8(_) => None,
     }
 }

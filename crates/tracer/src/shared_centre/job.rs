@@ -7,7 +7,7 @@ use mateval_scene::Camera;
 use super::plane::Plane;
 use super::splat::{self, Subject, TileCounts};
 use super::view_light::{ViewLight, ViewsRender};
-use crate::error::TracerError;
+use crate::error::{RequestFault, TracerError};
 use crate::material_source::MaterialSource;
 use crate::path::PathCounts;
 use crate::render::{self, RenderStats};
@@ -89,10 +89,10 @@ fn planes(cameras: &[Camera], samples: u32) -> Vec<Plane> {
     }
 }
 
-fn check_seeds(seeds: &[u64]) -> Result<(), TracerError> {
+fn check_seeds(seeds: &[u64]) -> Result<(), RequestFault> {
     let twice = seeds.iter().enumerate().find(|(place, seed)| seeds[..*place].contains(seed));
     match twice {
-        Some((_, seed)) => Err(TracerError::Invalid(format!("seed {seed} occurs twice, expected one a half"))),
+        Some((_, seed)) => Err(RequestFault::RepeatedSeed(*seed)),
         None => Ok(()),
     }
 }

@@ -1,6 +1,8 @@
 //! Which pictures are made of a view's light.
 
-use crate::error::TracerError;
+use mateval_scene::reference::LightIndex;
+
+use crate::error::RequestFault;
 use crate::light_basis::LightGroups;
 
 /// Which pictures are made of a view's light.
@@ -25,22 +27,33 @@ impl Lighting<'_> {
     }
 
     /// Fails where the lights are not `lights`, variants not `variants`, or weights make no sense.
-    pub(super) fn check(&self, lights: usize, variants: usize) -> Result<(), TracerError> {
+    pub(super) fn check(&self, lights: usize, variants: usize) -> Result<(), RequestFault> {
         let mixes = match self {
             Self::Apart(groups) if groups.lights() == lights => return Ok(()),
             Self::Apart(groups) => {
-                let found = groups.lights();
-                return Err(TracerError::Invalid(format!("groups of {found} lights for a scene of {lights}")));
+                return Err(RequestFault::GroupedLights { found: groups.lights(), expected: lights });
             }
             Self::Mixed(mixes) => *mixes,
         };
-        let fit = mixes.len() == variants
-            && mixes.iter().all(|of| of.len() == self.pictures() && of.iter().all(|mix| mix.len() == lights));
-        let weights = mixes.iter().flatten().flatten().flatten();
-        if fit && { weights }.all(|weight| weight.is_finite() && *weight >= 0.0) {
-            return Ok(());
+        if mixes.len() != variants {
+            return Err(RequestFault::MixedPredictions { found: mixes.len(), expected: variants });
         }
-        let what = format!("mixes that do not fit {variants} predictions and {lights} lights, or are negative");
-        Err(TracerError::Invalid(what))
+        let expected = self.pictures();
+        if let Some(prediction) = mixes.iter().position(|mixes| mixes.len() != expected) {
+            return Err(RequestFault::MixCount { prediction, found: mixes[prediction].len(), expected });
+        }
+        mixes.iter().flatten().try_for_each(|mix| check_mix(mix, lights))
     }
+}
+
+fn check_mix(mix: &LightMix, lights: usize) -> Result<(), RequestFault> {
+    if mix.len() != lights {
+        return Err(RequestFault::WeightCount { found: mix.len(), expected: lights });
+    }
+    for (light, weights) in mix.iter().enumerate() {
+        if let Some(&found) = weights.iter().find(|weight| !(weight.is_finite() && **weight >= 0.0)) {
+            return Err(RequestFault::Weight { light: LightIndex(light), found });
+        }
+    }
+    Ok(())
 }

@@ -116,10 +116,10 @@ fn what_does_not_fit_is_refused() {
     };
     let atlases = atlases(&scene);
     let good = coats(&scene, &COLORS, 0.5, 0.0);
-    assert!(new(&atlases[1..], good.clone()).contains("not of the world's triangles"));
+    assert!(new(&atlases[1..], good.clone()).contains("7 atlases and 8 coats for a world of 8 surfaces"));
     let mut uneven = good.clone();
     uneven[0].as_mut().unwrap().base_colors.pop();
-    assert!(new(&atlases, uneven).contains("2 base colours on one surface, 3 on another"));
+    assert!(new(&atlases, uneven).contains("surface 0 '': 2 base colours, expected 3 on each surface"));
     let mut unmapped = atlases.clone();
     unmapped[0].uvs = None;
     assert!(new(&unmapped, good.clone()).contains("surface 0"));
