@@ -1,14 +1,22 @@
-//! Traces light through a scene.
+//! Path tracer for reference scenes.
 //!
-//! In: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and a
-//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render()`]), of several views
-//! and apart by lights ([`render_views`]), and first hits ([`World::first_hit`],
+//! Input: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and one or more
+//! [`mateval_scene::Camera`]s.
+//!
+//! Output: pictures of linear radiance ([`render()`]), the same per view and per group of lights ([`render_views`]),
+//! with predicted materials in place of the scene's own ([`render_repainted`]), and first hits ([`World::first_hit`],
 //! [`aov`]) for depth, normals, ids and material pictures.
 //!
-//! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
-//! [`SurfaceHit`]; the surface's material there becomes a [`Bsdf`]; [`emitter`] samples what shines on it; [`sampler`]
-//! gives every number from seed, pixel and sample index; [`film`] averages tiles in a fixed order. Trigonometry is the
-//! `libm` crate's, or sums and products of `warp`'s own, so every machine computes the same bits.
+//! Steps between:
+//!
+//! 1. [`World`] checks the scene, builds the bounding volume hierarchy ([`Accel`]) and prepares lights and materials.
+//! 2. [`Sampler`] derives every random number from seed, pixel and sample index.
+//! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
+//! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
+//! 5. [`film`] averages the samples of each tile in a fixed order.
+//!
+//! Every machine computes the same bits: trigonometric functions come from the `libm` crate, or are sums and products
+//! in `warp`.
 
 pub mod accel;
 pub mod aov;

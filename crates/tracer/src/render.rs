@@ -1,4 +1,4 @@
-//! Pictures of a world's light.
+//! Renders one view as a single picture.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -15,35 +15,37 @@ use crate::sampler::Sampler;
 use crate::settings::RenderSettings;
 use crate::world::World;
 
-/// What happened on the way.
+/// Counts of what happened along the paths of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RenderStats {
     /// Paths started.
     pub paths: u64,
-    /// Rays that looked for the nearest surface.
+    /// Rays that searched for the nearest surface.
     pub rays: u64,
-    /// Rays that asked whether an emitter is seen.
+    /// Shadow rays: those that tested whether an emitter is visible.
     pub shadow_rays: u64,
-    /// Share of paths that `max_bounces` cut.
+    /// Share of paths that `max_bounces` ended.
     pub capped_share: f64,
-    /// What those still carried, averaged over all paths: times the radiance around them, the most that is missing.
+    /// Throughput of the paths that `max_bounces` ended, averaged over all paths. Times the radiance around them, it
+    /// bounds the light that is missing.
     pub capped_throughput: f64,
-    /// Contributions left out because they were not finite: each is a bug.
+    /// Contributions left out because they were not finite. Each is a bug.
     pub not_finite: u64,
 }
 
-/// A picture and what happened on the way to it.
+/// A picture and the counts of its render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Render {
     /// Linear radiance.
     pub picture: Picture<LinearRgb>,
-    /// What happened.
+    /// Counts of the render.
     pub stats: RenderStats,
 }
 
-/// Renders what `camera` sees. `progress` is told, from any thread, how many tiles of how many are done.
+/// Renders what `camera` sees. `progress` is called from any thread with the number of finished tiles and their total.
 ///
-/// The same bytes for any number of threads of the current rayon pool. Fails for settings that make no sense.
+/// The bytes of the picture are the same for any number of threads in the current rayon pool. Fails if a setting is out
+/// of range.
 pub fn render(
     world: &World,
     camera: &Camera,
@@ -64,7 +66,7 @@ pub fn render(
     Ok(Render { picture, stats: stats(paths, &counts, 0) })
 }
 
-/// The means of the pixels' samples. Each batch of paths holds one a pixel.
+/// The mean of each pixel's samples. A batch of paths holds one path per pixel.
 fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile: &Tile) -> (Vec<[f64; 3]>, PathCounts) {
     let mut tracer = PathTracer::<_, 1>::new(world, OwnMaterials(world), *settings);
     let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
@@ -87,7 +89,7 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
     (sums, tracer.counts)
 }
 
-/// Of one of the variants that the paths were followed for.
+/// Sums the counts of all tiles, for one of the variants that share the paths.
 pub(crate) fn stats(paths: u64, tiles: &[PathCounts], variant: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
     let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[variant]).sum();

@@ -1,7 +1,8 @@
-//! Predictions on the surfaces of a world, in place of its own materials.
+//! Predicted materials on the surfaces of a world, in place of its own.
 //!
-//! Geometry, opacities, lights and what has no atlas (glass) stay the world's. What a path decides depends on roughness
-//! and metallic and on no base colour, so predictions that differ in base colour alone are followed by the same paths.
+//! Geometry, opacities, lights and surfaces without an atlas (glass) stay as they are in the world. The decisions along
+//! a path depend on roughness and metallic but never on base colour, so predictions that differ in base colour alone
+//! share their paths.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -22,23 +23,24 @@ use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
-/// One surface's atlas: several base colours over one roughness and metallic. Values are clipped to 0..1 when looked up.
+/// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
+/// looked up.
 #[derive(Clone, Debug)]
 pub struct Coat {
-    /// Linear at lookup, one a prediction.
+    /// One per prediction; lookups return linear values.
     pub base_colors: Vec<Texture>,
-    /// Perceptual; the first channel counts.
+    /// Perceptual roughness, in the first channel.
     pub roughness: Texture,
-    /// The first channel counts.
+    /// Metallic, in the first channel.
     pub metallic: Texture,
 }
 
-/// Predictions for all surfaces of a world.
+/// Predictions for the surfaces of a world.
 #[derive(Debug)]
 pub struct Repaint {
-    /// By surface; none keeps the world's own material.
+    /// One per surface; `None` keeps the world's own material.
     coats: Vec<Option<Coat>>,
-    /// Of all triangles of the world, surface by surface.
+    /// The atlas uvs of all triangles of the world, surface by surface.
     uvs: Vec<[Vec2; 3]>,
     predictions: usize,
     flavour: PrincipledFlavour,
@@ -46,7 +48,7 @@ pub struct Repaint {
     tables: BlenderTables,
 }
 
-/// A world's surfaces as painted: predictions from `first` on are the variants.
+/// A world's surfaces with predicted materials. The variants are the predictions from `first` on.
 #[derive(Clone, Copy)]
 struct Painted<'w> {
     world: &'w World,
@@ -54,14 +56,15 @@ struct Painted<'w> {
     first: usize,
 }
 
-/// Disney's `specular` of predictions: an index of refraction of 1.5.
+/// Disney's `specular` of predictions, an index of refraction of 1.5.
 const SPECULAR: f32 = 0.5;
 
 impl Repaint {
-    /// Paints `world` with `coats`, looked up by the uv of `atlases`; both one a surface.
+    /// Predictions for `world`. Both `atlases` and `coats` hold one entry per surface; coats are looked up at the uvs
+    /// of the atlases.
     ///
-    /// Fails where the atlases' triangles are not the world's, a painted mesh has no uv, coats hold different numbers of
-    /// base colours, or none.
+    /// Fails if the triangles of the atlases are not the world's, if the atlas of a coat has no uv, or if coats hold
+    /// different numbers of base colours, or none.
     pub fn new(
         world: &World,
         atlases: &[TriangleMesh],
@@ -74,13 +77,13 @@ impl Repaint {
         Ok(Self { coats, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
     }
 
-    /// How many predictions there are.
+    /// The number of predictions.
     pub fn predictions(&self) -> usize {
         self.predictions
     }
 
-    /// The principled material that a coat has at a place in its atlas, and the base colours of predictions
-    /// `first..first + K` there; those beyond the last say what the last does.
+    /// The principled material of a coat at `uv`, and the base colours of predictions `first..first + K` there.
+    /// Predictions beyond the last repeat it.
     fn look_up<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> (Principled<'_>, [Vec3; K]) {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
         let base_colors: [Vec3; K] = from_fn(|k| {
@@ -103,7 +106,7 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
         prefetch(&self.repaint.uvs[hit.global as usize]);
     }
 
-    /// The uv is the place in the atlas.
+    /// Returns the uv in the atlas.
     fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2 {
         let [a, b, c] = self.repaint.uvs[hit.global as usize];
         let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
@@ -123,10 +126,12 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
     }
 }
 
-/// [`crate::render_views`] with predictions in place of the world's own materials; one a prediction of the range `which`.
+/// [`crate::render_views`] with predictions in place of the world's own materials. Returns one render for each
+/// prediction of the range `which`.
 ///
-/// Up to eight predictions are followed by the same paths. Each gets the same bytes as it gets alone. Fails also where
-/// `which` names predictions that `repaint` does not hold, or mixes do not fit predictions and lights.
+/// Up to eight predictions share their paths. The bytes of each render are the same as if its prediction were rendered
+/// alone. Fails as [`crate::render_views`] does, and if `which` exceeds the predictions of `repaint`, or if mixes do
+/// not match predictions and lights.
 #[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
 pub fn render_repainted(
     world: &World,
@@ -173,7 +178,7 @@ fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> 
     Ok(())
 }
 
-/// The number of predictions that the coats hold.
+/// Checks the arguments of [`Repaint::new`] and returns the number of predictions.
 fn check_coats(surfaces: &[Surface], atlases: &[TriangleMesh], coats: &[Option<Coat>]) -> Result<usize, RequestFault> {
     if atlases.len() != surfaces.len() || coats.len() != surfaces.len() {
         let (atlases, coats) = (atlases.len(), coats.len());

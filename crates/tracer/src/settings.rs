@@ -1,34 +1,34 @@
-//! How a picture is made.
+//! Settings of a render.
 
 use crate::error::RequestFault;
 
-/// How light is looked for. All three have the same mean; they differ in noise.
+/// How paths find light. All strategies have the same mean and differ in noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightSampling {
-    /// Emitters are sampled and surfaces too, weighed by the power heuristic.
+    /// Samples emitters and the BSDF, weighted by the power heuristic.
     #[default]
     Both,
-    /// Emitters are sampled; what a scattered ray meets counts only after a mirror or clear glass.
+    /// Samples emitters. Light that a scattered ray meets counts only after a mirror or clear glass.
     Emitters,
-    /// Emitters are found by scattered rays alone.
+    /// Samples the BSDF alone.
     Bsdf,
 }
 
-/// How a picture is made.
+/// Settings of a render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderSettings {
-    /// Paths a pixel.
+    /// Paths per pixel.
     pub samples: u32,
-    /// Two seeds make two independent pictures.
+    /// Different seeds give independent pictures.
     pub seed: u64,
-    /// Scatterings beyond the first that a path may have before its last piece of direct light: Blender's "max bounces";
-    /// Mitsuba's `max_depth` is 2 more.
+    /// The largest number of scatterings after the first before the last direct light of a path: Blender's "max
+    /// bounces". Mitsuba's `max_depth` is larger by 2.
     pub max_bounces: u32,
-    /// From this bounce on, paths end by chance.
+    /// The bounce from which on Russian roulette ends paths.
     pub roulette_start: u32,
-    /// The probability to go on then, above 0 and up to 1.
+    /// The probability that a path survives Russian roulette, above 0 and at most 1.
     pub roulette_survival: f32,
-    /// How light is looked for.
+    /// How paths find light.
     pub light_sampling: LightSampling,
 }
 
@@ -46,7 +46,7 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
-    /// Fails for settings that make no sense.
+    /// Fails if a setting is out of range.
     pub(crate) fn check(&self) -> Result<(), RequestFault> {
         let Self { samples, roulette_survival, .. } = *self;
         if samples == 0 {

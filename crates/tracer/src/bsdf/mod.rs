@@ -1,8 +1,8 @@
-//! What light does where a ray meets a surface: a material's parameters at that place, with value, density and sampling.
+//! BSDFs: a material's parameters at one point, with evaluation, density and sampling.
 //!
-//! `wo` points to the viewer, `wi` to the light, both away from the surface and of unit length, in world space. `eval`
-//! includes the cosine. Which of several lobes is sampled never depends on a colour, so that paths made for one set of
-//! colours serve for another.
+//! `wo` points to the viewer, `wi` to the light, both away from the surface, of unit length and in world space.
+//! Evaluation includes the cosine. The choice of a lobe never depends on a colour, so the same paths serve any base
+//! colours.
 
 mod bump;
 mod facets;
@@ -28,61 +28,62 @@ use lobe::{Lobe, PrincipledView, Tint};
 pub(crate) use principled_tables::BlenderTables;
 pub(crate) use tables::{MaterialTables, Table};
 
-/// A surface's scattering at one place, for `K` base colours at once.
+/// The BSDF of a surface at one point, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<'w, const K: usize = 1> {
     frame: Frame,
-    /// The triangle's normal on the side of the frame's.
+    /// The geometric normal, on the side of the frame's z axis.
     geometric: Vec3,
     /// Towards the viewer, in the frame.
     wo: Vec3,
     lobe: Lobe<'w>,
-    /// For principled materials, which most are: what follows from `wo` already, and from the colours.
+    /// For principled materials, which most are: the terms that depend on `wo` and on the base colours alone.
     principled: Option<(PrincipledView, [Tint; K])>,
 }
 
 /// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample<const K: usize = 1> {
-    /// Where the light comes from.
+    /// Towards the light.
     pub wi: Vec3,
-    /// The value of [`Bsdf::evaluate`] over `density`, by base colour.
+    /// The value of [`Bsdf::evaluate`] over `density`, per base colour.
     pub weights: [Vec3; K],
-    /// Per solid angle; for a single direction (`delta`), its probability.
+    /// Per solid angle; for a delta sample, its probability.
     pub density: f32,
-    /// Whether this is a single direction, that of a mirror or of clear glass, which sampling lights cannot find.
+    /// Whether the direction comes from a delta distribution, such as a mirror, which light sampling cannot find.
     pub delta: bool,
 }
 
-/// The cosine to which a shading normal is turned back that points away from a viewer who sees the front.
+/// The smallest cosine between the viewer and a shading normal on the visible side; smaller ones are raised to it.
 const GRAZING: f32 = 1e-3;
 
-/// Facets smoother than this roughness do not show the lights of a stage ([`crate::StageLight`]).
+/// Facets smoother than this roughness do not reflect stage lights ([`crate::StageLight`]).
 pub const STAGE_ROUGHNESS: f32 = 0.2;
 
 impl Bsdf<'_> {
-    /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
-    /// single directions left out. See `Self::evaluate_all`.
+    /// The value times the cosine of `wi`, per channel, and the density with which [`Self::sample`] samples `wi`, per
+    /// solid angle. Delta lobes are left out. See `Self::evaluate_all`.
     pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
-        let ([value], density) = self.evaluate_all(wi, Shown::All);
+        let ([value], density) = self.evaluate_all(wi, BsdfPart::All);
         (value, density)
     }
 }
 
-/// What of a surface light is evaluated on.
+/// The part of a BSDF to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub(crate) enum BsdfPart {
     /// All of it.
     All,
-    /// What shows the lights of a stage: facets below [`STAGE_ROUGHNESS`] do not.
+    /// The part that reflects stage lights: facets below [`STAGE_ROUGHNESS`] are left out.
     Stage,
 }
 
 impl<'w, const K: usize> Bsdf<'w, K> {
-    /// The scattering of `material`, whose integrals are `table`, at `hit` on `mesh`, seen from `wo`; the same `K` times.
+    /// The BSDF of `material`, with its precomputed `table`, at `hit` on `mesh`, seen from `wo`. It is the same for all
+    /// `K` base colours.
     ///
-    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer who
-    /// sees that side of the triangle is turned until it does not.
+    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer
+    /// on its side of the triangle is turned towards the viewer.
     pub(crate) fn of_material(
         material: &Material,
         table: &'w Table,
@@ -99,7 +100,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         Self::at(hit, normal, wo, lobe, material.two_sided, None)
     }
 
-    /// The scattering of a two-sided `principled` surface at `hit`, seen from `wo`, once for each of `base_colors`.
+    /// The BSDF of a two-sided `principled` material at `hit`, seen from `wo`, for each of `base_colors`.
     pub(crate) fn of_principled(
         principled: Principled<'w>,
         base_colors: &[Vec3; K],
@@ -143,12 +144,12 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         Self { frame, geometric, wo, lobe, principled }
     }
 
-    /// Value times the cosine of `wi`, by base colour and channel, and the density with which [`Self::sample`] finds `wi`,
-    /// per solid angle; single directions left out.
+    /// The value times the cosine of `wi`, per base colour and channel, and the density with which [`Self::sample`]
+    /// samples `wi`, per solid angle. Delta lobes are left out.
     ///
-    /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's or the reverse: such light
-    /// would come through the surface.
-    pub(crate) fn evaluate_all(&self, wi: Vec3, shown: Shown) -> ([Vec3; K], f32) {
+    /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's, or the reverse: such
+    /// light would pass through the surface.
+    pub(crate) fn evaluate_all(&self, wi: Vec3, part: BsdfPart) -> ([Vec3; K], f32) {
         let local = self.frame.local_from_world(wi);
         if self.geometric.dot(wi) * local.z <= 0.0 {
             return ([Vec3::ZERO; K], 0.0);
@@ -157,7 +158,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
             Some(_) if local.z <= 0.0 => ([Vec3::ZERO; K], 0.0),
             Some((view, tints)) => {
                 let mut response = view.response(local);
-                if shown == Shown::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
+                if part == BsdfPart::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
                     response = response.of_base_alone();
                 }
                 (tints.map(|tint| tint.value(&response)), response.density)
@@ -166,8 +167,8 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         }
     }
 
-    /// A direction for `wo`, from three numbers in [0, 1); none where the draw sends light nowhere. Does not depend on the
-    /// base colours.
+    /// Samples a direction from three numbers in [0, 1), independently of the base colours. `None` if the sample is
+    /// absorbed.
     pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
         let (local, weights, density, delta) = match &self.principled {
             Some((view, tints)) => {
@@ -183,30 +184,31 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
-    /// The weights of `sample`, one of [`Self::sample`]'s, for the lights of a stage: what shows none of them left out.
+    /// The weights of `sample`, returned by [`Self::sample`], for stage lights: parts that do not reflect them are left
+    /// out.
     pub(crate) fn stage_weights(&self, sample: &BsdfSample<K>) -> [Vec3; K] {
         match &self.principled {
             _ if sample.delta => [Vec3::ZERO; K],
             Some((view, _)) if view.is_smoother_than(STAGE_ROUGHNESS) => {
-                let (values, _) = self.evaluate_all(sample.wi, Shown::Stage);
+                let (values, _) = self.evaluate_all(sample.wi, BsdfPart::Stage);
                 values.map(|value| value / sample.density)
             }
             _ => sample.weights,
         }
     }
 
-    /// Whether all light goes to single directions, so that sampling lights finds nothing.
+    /// Whether all lobes are delta distributions, so that light sampling finds nothing.
     pub fn is_delta(&self) -> bool {
         self.lobe.is_delta()
     }
 
-    /// Whether nothing is sent back at all.
+    /// Whether all light is absorbed.
     pub fn is_black(&self) -> bool {
         matches!(self.lobe, Lobe::Black)
     }
 }
 
-/// `normal`, or where that points away from `wo`, the nearest one that does not.
+/// `normal`, or if that points away from `wo`, the nearest normal that does not.
 fn turned_to(normal: Vec3, wo: Vec3) -> Vec3 {
     let cos = normal.dot(wo);
     if cos >= GRAZING { normal } else { (normal + wo * (GRAZING - cos)).normalize() }

@@ -1,4 +1,4 @@
-//! A direction that a lobe has sampled.
+//! A sampled direction in the local frame of a BSDF.
 
 use glam::Vec3;
 
@@ -6,11 +6,11 @@ use glam::Vec3;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalSample {
     pub(crate) wi: Vec3,
-    /// Value with cosine over density.
+    /// The value with the cosine, over the density.
     pub(crate) weight: Vec3,
-    /// Per solid angle; for a single direction, its probability.
+    /// Per solid angle; for a delta sample, its probability.
     pub(crate) density: f32,
-    /// Whether it is a single direction, which no other way of sampling can find.
+    /// Whether the direction comes from a delta distribution, which no other way of sampling can find.
     pub(crate) delta: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What materials need integrated beforehand.
+//! Checks materials and precomputes the tables that some of them need.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -14,32 +14,32 @@ use super::principled_tables::BlenderTables;
 use super::rough_boundary::{RoughCoat, Widths};
 use crate::error::{MaterialFault, SceneFault};
 
-/// One entry a material.
+/// One table per material.
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
 
-/// What one material needs.
+/// The precomputed values of one material.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     /// For Blender's principled.
     pub(crate) reflection: Option<Arc<BlenderTables>>,
     /// For rough plastic.
     pub(crate) coat: Option<Arc<RoughCoat>>,
-    /// For smooth plastic: the share of uniform light from inside that its coat reflects back.
+    /// For smooth plastic: the fraction of uniform light from inside that its coat reflects back.
     pub(crate) inside: f32,
 }
 
-/// Tables made so far, by what they depend on.
+/// The tables computed so far, by the parameters that they depend on.
 #[derive(Default)]
 struct Known {
-    /// By the bits of eta.
+    /// Keyed by the bits of eta.
     reflections: BTreeMap<u32, Arc<BlenderTables>>,
-    /// By whether it is GGX, the bits of eta, those of alpha where it is the same everywhere.
+    /// Keyed by whether the distribution is GGX, the bits of eta, and the bits of alpha if that is constant.
     coats: BTreeMap<(bool, u32, Option<u32>), Arc<RoughCoat>>,
 }
 
 impl MaterialTables {
-    /// Checks the materials' constants and integrates what they need, once for equal ones.
+    /// Checks the materials' parameters and computes their tables. Materials with equal parameters share a table.
     pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, SceneFault> {
         let mut known = Known::default();
         let mut tables = Vec::with_capacity(scene.materials.len());

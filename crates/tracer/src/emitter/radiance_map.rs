@@ -1,4 +1,4 @@
-//! How the radiance of a glowing surface differs from place to place.
+//! A map of the radiance over an emitting surface.
 
 use glam::{Vec2, Vec3};
 use mateval_image::{Texels, Texture};
@@ -7,7 +7,7 @@ use mateval_scene::reference::EmissionMap;
 
 use crate::error::LightFault;
 
-/// A factor of radiance, looked up at the surface's uv.
+/// A factor on the radiance, looked up at the surface's uv.
 #[derive(Clone, Debug)]
 pub(crate) struct RadianceMap {
     texture: Texture,
@@ -15,7 +15,7 @@ pub(crate) struct RadianceMap {
 }
 
 impl RadianceMap {
-    /// Fails where the texture is not there, or a number is not finite or a texel below 0.
+    /// Fails if the texture does not exist, if the uv transform is not finite, or if a texel is negative or not finite.
     pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, LightFault> {
         let index = map.texture.0;
         let missing = LightFault::MissingTexture { texture: index, count: textures.len() };
@@ -29,14 +29,14 @@ impl RadianceMap {
         Ok(Self { texture: texture.clone(), uv: map.uv })
     }
 
-    /// Out of line: most lamps have none.
+    /// Not inlined, since most lamps have no map.
     #[inline(never)]
     pub(crate) fn at(&self, uv: Vec2) -> Vec3 {
         Vec3::from_array(self.texture.sample(self.uv.apply(uv).to_array()))
     }
 }
 
-/// The first value that is negative or not finite, so that it cannot be a share of light; integer texels never are.
+/// The first value that is negative or not finite and so cannot scale light. Integer texels are always valid.
 fn first_unsound(texture: &Texture) -> Option<f32> {
     let unsound = |values: &[f32]| values.iter().copied().find(|v| !(v.is_finite() && *v >= 0.0));
     match texture.texels() {

@@ -1,4 +1,4 @@
-//! Views to be rendered, checked before the first path.
+//! A render of several views: checks of its arguments, then one exposure per plane and seed.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -29,7 +29,7 @@ pub(crate) struct Progress<'a> {
 }
 
 impl<'a> Progress<'a> {
-    /// `report` gets the number of finished tiles and `total`.
+    /// `report` is called with the number of finished tiles and `total`.
     pub(crate) fn new(total: usize, report: &'a (dyn Fn(usize, usize) + Sync)) -> Self {
         Self { finished: AtomicUsize::new(0), total, report }
     }
@@ -40,7 +40,7 @@ impl<'a> Progress<'a> {
 }
 
 impl<'a, M: Copy> ViewsJob<'a, M> {
-    /// The planes that the views are rendered over, for materials of `variants` variants.
+    /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
     pub(crate) fn planes(&self, variants: usize) -> Result<Vec<Plane>, TracerError> {
         self.settings.check()?;
         self.subject.lighting.check(self.subject.world.emitters().groups(), variants)?;
@@ -48,12 +48,12 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         Ok(planes(self.cameras, self.settings.samples))
     }
 
-    /// How many tiles [`Self::render`] makes.
+    /// The number of tiles that [`Self::render`] exposes.
     pub(crate) fn tiles(&self, planes: &[Plane]) -> usize {
         self.seeds.len() * planes.iter().map(|plane| plane.tiles().len()).sum::<usize>()
     }
 
-    /// The views by variant, for `K` variants that follow from the same paths.
+    /// Renders the views for `K` material variants that share their paths.
     pub(crate) fn render<const K: usize>(&self, planes: &[Plane], progress: &Progress<'_>) -> [ViewsRender; K]
     where
         M: MaterialSource<'a, K> + Sync,
@@ -81,7 +81,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     }
 }
 
-/// One plane for all cameras, or one for each.
+/// One plane for all cameras if they share a centre, otherwise one per camera.
 fn planes(cameras: &[Camera], samples: u32) -> Vec<Plane> {
     match Plane::new(cameras, samples) {
         Some(plane) => vec![plane],

@@ -1,24 +1,24 @@
-//! Which pictures are made of a view's light.
+//! The choice of pictures made from a view's light.
 
 use mateval_scene::reference::LightIndex;
 
 use crate::error::RequestFault;
 use crate::light_basis::LightGroups;
 
-/// Which pictures are made of a view's light.
+/// The pictures made from a view's light.
 #[derive(Clone, Copy, Debug)]
 pub enum Lighting<'a> {
-    /// One a group of lights, of the scene's own radiances.
+    /// One per group of lights, under the scene's own radiances.
     Apart(&'a LightGroups),
-    /// For each prediction the same number of mixes, a picture each.
+    /// For each prediction (or material variant) the same number of mixes, one picture each.
     Mixed(&'a [Vec<LightMix>]),
 }
 
-/// For each light what its radiance is multiplied by, a channel, not negative.
+/// For each light a factor on its radiance, per channel, at least 0.
 pub type LightMix = Vec<[f64; 3]>;
 
 impl Lighting<'_> {
-    /// How many pictures there are of a view.
+    /// The number of pictures per view.
     pub(super) fn pictures(&self) -> usize {
         match self {
             Self::Apart(groups) => groups.groups().len(),
@@ -26,7 +26,7 @@ impl Lighting<'_> {
         }
     }
 
-    /// Fails where the lights are not `lights`, variants not `variants`, or weights make no sense.
+    /// Fails unless the lights number `lights` and the mixes `variants`, with finite weights of at least 0.
     pub(super) fn check(&self, lights: usize, variants: usize) -> Result<(), RequestFault> {
         let mixes = match self {
             Self::Apart(groups) if groups.lights() == lights => return Ok(()),

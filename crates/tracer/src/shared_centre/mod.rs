@@ -1,10 +1,10 @@
-//! Several views of one centre from one set of paths.
+//! Several views with a common centre, rendered from one set of paths.
 //!
-//! Radiance along a direction is the same in every view from one place. So paths are drawn once over the union of the
-//! views' pictures, on the image plane of the first camera (`plane`), spread evenly (`cell_points`) and put into every
-//! view that holds their direction (`splat`). A path counts there by how much of that view's picture the path stands
-//! for: the Jacobian between the two planes over the known number of samples. Nothing is divided by sums of weights, so
-//! every pixel's expectation is its radiance under a box filter of one pixel.
+//! Radiance along a direction is the same in every view from one centre. So paths are distributed once over the union
+//! of the views' pictures, on the image plane of the first camera (`plane`), evenly (`cell_points`), and added to every
+//! view that contains their direction (`splat`). In each view a path has the weight of the picture area it represents:
+//! the Jacobian between the two planes over the known number of samples. Nothing is divided by sums of weights, so the
+//! expectation of every pixel is its radiance under a box filter of one pixel.
 
 mod cell_points;
 mod job;
@@ -26,13 +26,15 @@ use plane::Plane;
 pub(crate) use splat::Subject;
 pub use view_light::{HalfLight, ViewLight, ViewsRender};
 
-/// Renders what all `cameras` see, once a seed, one picture a group of lights.
+/// Renders what all `cameras` see, once per seed, one picture per group of lights.
 ///
-/// Where the cameras share a centre ([`share_centre`]) all views come from one set of paths a seed, else each view from
-/// its own. A pixel gets about `settings.samples` paths a seed; `settings.seed` itself is not used. `progress` is told,
-/// from any thread, how many tiles of how many are done. The same bytes for any number of threads of the current rayon
-/// pool. Fails for settings that make no sense, for seeds that occur twice (halves would be one) and for groups made for
-/// another number of lights.
+/// If the cameras share a centre ([`share_centre`]), all views come from one set of paths per seed, otherwise each view
+/// from its own. A pixel gets about `settings.samples` paths per seed; `settings.seed` is not used. `progress` is
+/// called from any thread with the number of finished tiles and their total. The bytes of the pictures are the same for
+/// any number of threads in the current rayon pool.
+///
+/// Fails if a setting is out of range, if a seed occurs twice (two halves would be the same), or if the groups were
+/// made for another number of lights.
 pub fn render_views(
     world: &World,
     cameras: &[Camera],
@@ -49,8 +51,8 @@ pub fn render_views(
     Ok(render)
 }
 
-/// Whether views from these cameras can come from one set of paths: all stand in one place, to the rounding of rays'
-/// origins, and no picture reaches further than 75 degrees from where the first one looks.
+/// Whether views from these cameras can come from one set of paths: the cameras stand at one point, up to the rounding
+/// of ray origins, and no picture extends more than 75 degrees from where the first camera looks.
 pub fn share_centre(cameras: &[Camera]) -> bool {
     Plane::new(cameras, 1).is_some()
 }

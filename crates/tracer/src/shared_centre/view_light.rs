@@ -1,22 +1,22 @@
-//! What is rendered of one or several views.
+//! The results of rendering several views.
 
 use mateval_image::Picture;
 
 use crate::light_basis::LightBasis;
 use crate::render::RenderStats;
 
-/// Views of one world.
+/// The views of one world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewsRender {
     /// In the order of the cameras.
     pub views: Vec<ViewLight>,
-    /// How many sets of paths were drawn a seed: 1 if the views share a centre, else one a view.
+    /// The number of path sets per seed: 1 if the views share a centre, otherwise one per view.
     pub passes: usize,
-    /// What happened, over all passes and seeds.
+    /// Counts over all passes and seeds.
     pub stats: RenderStats,
 }
 
-/// What one camera sees, in independent halves (or as many parts as there were seeds).
+/// The light that one camera sees, in independent halves (or as many parts as there were seeds).
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewLight {
     /// In the order of the seeds.
@@ -26,8 +26,8 @@ pub struct ViewLight {
 /// One of several independent estimates of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfLight {
-    /// Linear radiance, one picture a group of lights.
+    /// Linear radiance, one picture per group of lights.
     pub basis: LightBasis,
-    /// How many paths each pixel received.
+    /// The number of paths that each pixel received.
     pub counts: Picture<u32>,
 }

@@ -1,10 +1,10 @@
-//! A ray as the box test and the triangle tests need it, worked out once.
+//! A ray in the form that the box test and the triangle tests use, computed once per ray.
 
 use crate::ray::Ray;
 
-/// What of a ray the box test needs.
+/// The values of a ray for the box test.
 pub(crate) struct BoxRay {
-    /// Which of a box's corners is nearer along each axis: 0 the lower, 1 the upper.
+    /// For each axis, which corner of a box is nearer: 0 the lower, 1 the upper.
     pub(super) near: [usize; 3],
     pub(super) inverse: [f32; 3],
     /// The padded origins times the inverse directions.
@@ -13,13 +13,13 @@ pub(crate) struct BoxRay {
 }
 
 const PADDING: f32 = 1.0 / (1 << 20) as f32;
-/// How much farther a box may seem than what it holds.
+/// The factor by which the interval of a box test is widened.
 pub(crate) const WIDENED: f32 = 1.0 + 1.0 / (1 << 21) as f32;
-/// Directions smaller than this count as this in the slab test: over a kilometre it moves the ray by 1e-17 m.
+/// Smaller direction components are raised to this in the slab test: over a kilometre that moves the ray by 1e-17 m.
 const SMALLEST_DIRECTION: f32 = 1e-20;
 
 impl BoxRay {
-    /// `scene_size` is the scene's largest coordinate.
+    /// `scene_size` is the largest absolute coordinate of the scene.
     #[inline(always)]
     pub(crate) fn new(ray: &Ray, scene_size: f32) -> Self {
         let origin = ray.origin().to_array();
@@ -37,14 +37,14 @@ impl BoxRay {
     }
 }
 
-/// What of a ray the triangle tests need.
+/// The values of a ray for the triangle tests.
 pub(crate) struct TriangleRay {
     pub(super) origin: [f32; 3],
     pub(super) direction: [f32; 3],
-    /// The axes x, y, z of the sheared space; z is where the direction is largest.
+    /// The axes that become x, y, z of the sheared space; z is the axis along which the direction is largest.
     pub(super) axes: [usize; 3],
     pub(super) shear: [f32; 2],
-    /// One over the direction along z.
+    /// One over the direction's component along z.
     pub(super) distance_from_z: f32,
 }
 
@@ -55,7 +55,7 @@ impl TriangleRay {
         let [along_x, along_y, along_z] = d.map(f32::abs);
         let z = if along_x > along_y.max(along_z) { 0 } else { 2 - usize::from(along_y > along_z) };
         let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
-        // The largest direction of a unit vector is not one that was raised to the smallest.
+        // The largest component of a unit vector is never below `SMALLEST_DIRECTION`.
         let distance_from_z = boxes.inverse[z];
         Self {
             origin: ray.origin().to_array(),

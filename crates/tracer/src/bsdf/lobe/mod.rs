@@ -1,4 +1,4 @@
-//! What light does at one place, in the frame of the shading normal: every parameter looked up, two directions to go.
+//! The scattering models behind one enum: parameters looked up at a point, in the frame of the shading normal.
 
 mod conductor;
 mod dielectric;
@@ -20,7 +20,7 @@ use dielectric::Dielectric;
 use plastic::{Coat, Plastic};
 pub(crate) use principled::{Principled, PrincipledView, Tint};
 
-/// A material at one place. Reflecting ones expect `wo.z > 0`; dielectrics take either side.
+/// A material's parameters at one point. Opaque materials expect `wo.z > 0`, dielectrics accept either side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lobe<'w> {
     Black,
@@ -92,12 +92,12 @@ impl<'w> Lobe<'w> {
         matches!(self, Self::Dielectric(_) | Self::ThinDielectric(_) | Self::RoughDielectric(..))
     }
 
-    /// Whether every direction it sends light to is a single one, so that lights need not be sampled.
+    /// Whether all scattered directions are delta distributions, so that lights need not be sampled.
     pub(crate) fn is_delta(&self) -> bool {
         matches!(self, Self::Black | Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_))
     }
 
-    /// Value times the cosine of `wi`, single directions left out.
+    /// The value times the cosine of `wi`. Delta lobes are left out.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         match self {
             Self::RoughDielectric(dielectric, facets) => dielectric.eval_rough(facets, wo, wi),
@@ -111,7 +111,7 @@ impl<'w> Lobe<'w> {
         }
     }
 
-    /// The density with which [`Self::sample`] finds `wi`, per solid angle, single directions left out.
+    /// The density with which [`Self::sample`] samples `wi`, per solid angle. Delta lobes are left out.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
         match self {
             Self::RoughDielectric(dielectric, facets) => dielectric.density_rough(facets, wo, wi),
@@ -124,7 +124,7 @@ impl<'w> Lobe<'w> {
         }
     }
 
-    /// A direction for `wo`; none where the draw sends light nowhere. `u[0]` chooses among lobes.
+    /// Samples a direction for `wo`; `u[0]` selects the lobe. `None` if the sample is absorbed.
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
         if wo.z == 0.0 || (wo.z < 0.0 && !self.transmits()) {
             return None;
