@@ -1,4 +1,5 @@
-//! Reads the shared scenes `bench/room` (17,562 triangles) and `bench/dense` (864,036), made for this project.
+//! Reads the shared scenes `bench/room` (17,562 triangles) and `bench/dense` (864,036 triangles), made for this
+//! project.
 
 use std::path::{Path, PathBuf};
 
@@ -14,14 +15,14 @@ use mateval_scene::reference::{
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use serde_json::Value;
 
-/// The folder of `bench/<name>`, if the data is there: `MATEVAL_DATA`, or `../shared/data` from the project's root.
+/// The folder of `bench/<name>` in `MATEVAL_DATA` or in `../shared/data` from the project's root, if it exists.
 pub fn folder(name: &str) -> Option<PathBuf> {
     let data = std::env::var_os("MATEVAL_DATA").map_or_else(beside_the_project, PathBuf::from);
     let folder = data.join("bench").join(name);
     folder.join("scene.json").is_file().then_some(folder)
 }
 
-/// Tells of a test that is left out, even where the test runner keeps what tests print to itself.
+/// Reports a skipped test, even if the test runner captures the output of tests.
 #[allow(dead_code, reason = "benchmarks print")]
 pub fn say_skipped(why: &str) {
     use std::io::Write as _;
@@ -30,8 +31,8 @@ pub fn say_skipped(why: &str) {
     std::io::stderr().write_all(line.as_bytes()).unwrap();
 }
 
-/// Mitsuba's picture of a scene of 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`, max_depth 8,
-/// 64 samples.
+/// Mitsuba's picture of a scene with 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`,
+/// max_depth 8, 64 samples.
 #[allow(dead_code, reason = "some draw no comparison")]
 pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     const SIZE: usize = 512;
@@ -42,15 +43,15 @@ pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     Picture::new(SIZE, SIZE, pixels).unwrap()
 }
 
-/// The nearest folder above this crate or package that holds `Cargo.lock` is the project's root.
+/// The project's root: the nearest folder above this crate that holds `Cargo.lock`.
 fn beside_the_project() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     let root = package.ancestors().find(|folder| folder.join("Cargo.lock").is_file()).unwrap_or(package);
     root.join("../shared/data")
 }
 
-/// The scene, with Mitsuba's flavour of `principled`, two-sided surfaces and one-sided lamps, as its references were made;
-/// and its camera with `size` x `size` pixels.
+/// The scene with Mitsuba's flavour of `principled`, two-sided surfaces and one-sided lamps, as for its references, and
+/// its camera with `size` x `size` pixels.
 pub fn read(folder: &Path, size: u32) -> (ReferenceScene, Camera) {
     let json: Value = serde_json::from_slice(&std::fs::read(folder.join("scene.json")).unwrap()).unwrap();
     let mut scene = ReferenceScene::default();
@@ -111,7 +112,7 @@ fn rgb(value: &Value) -> [f32; 3] {
     serde_json::from_value(value.clone()).unwrap()
 }
 
-/// The first `count` triangles, with the vertices that they use alone; they are taken off `mesh`.
+/// Removes the first `count` triangles from `mesh` and returns them with the vertices that only they use.
 fn split_off(mesh: &mut TriangleMesh, count: usize) -> TriangleMesh {
     let triangles: Vec<[u32; 3]> = mesh.triangles.drain(..count).collect();
     let used = || triangles.iter().flatten().copied();
@@ -125,7 +126,7 @@ fn split_off(mesh: &mut TriangleMesh, count: usize) -> TriangleMesh {
     }
 }
 
-/// Binary PLY of x y z nx ny nz u v floats and triangles, as these files are.
+/// Reads a binary PLY file with floats x y z nx ny nz u v and triangles, as in these scenes.
 fn read_ply(path: &Path) -> TriangleMesh {
     let bytes = std::fs::read(path).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
