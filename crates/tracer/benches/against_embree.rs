@@ -46,12 +46,14 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
     let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     println!("\n{name}, {triangles} triangles");
     builds(&meshes);
+    // Build both hierarchies in both modes.
     let robust = Accel::build(&meshes).unwrap();
     let fast = Accel::build(&meshes).unwrap().with_test(TriangleTest::Fast);
     let embree = Embree::new(&meshes, Mode::Medium, 1, &mut |build| build());
     let embree_robust = Embree::new(&meshes, Mode::Robust, 1, &mut |build| build());
     println!("{:.1} bytes a triangle", robust.memory_bytes() as f64 / triangles as f64);
 
+    // Make the sets of rays.
     let coherent = rays::coherent(camera);
     let bounce = rays::bounced(&robust, &coherent);
     let second = rays::bounced(&robust, &bounce);
@@ -63,6 +65,7 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
         "{:22} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
         "times Embree's medium", "Embree's", "its robust", "fast", "watertight", "fast*", "watert.*", "differ"
     );
+    // Compare nearest hits.
     for (kind, set) in [("coherent", &coherent), ("bounce 1", &bounce), ("bounce 2", &second), ("random", &random)] {
         let differing =
             set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
@@ -85,6 +88,7 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
             ],
         );
     }
+    // Compare occlusion.
     for (kind, set) in [("shadow 1", &shadow), ("shadow 2", &shadow_2), ("occlusion to 1.5 m", &short)] {
         let differing = set.iter().filter(|ray| robust.occluded(ray) != embree.occluded(ray)).count();
         row(

@@ -61,6 +61,7 @@ fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
     let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
     let (mut ours, mut walls, mut rays) = (Vec::new(), [Vec::new(), Vec::new()], 0.0);
     let mut theirs = vec![Vec::new(); peers.len()];
+    // Run all contestants once per round.
     for round in 0..rounds {
         for (pool, walls) in pools.iter().zip(&mut walls) {
             let run = run(&world, camera, pool, round as u64);
@@ -74,6 +75,7 @@ fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
             seconds.push(mitsuba.render(samples) / f64::from(samples));
         }
     }
+    // Report medians.
     println!(
         "{name}, {triangles} triangles: {:.3} samples a pixel and CPU second, {:.2} us a sample, {rays:.1} rays a sample; \
          2 threads {:.2} times 1",

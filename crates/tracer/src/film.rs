@@ -44,6 +44,7 @@ pub(crate) fn develop<E: Send>(
     done: impl Fn() + Sync,
 ) -> (Picture<LinearRgb>, Vec<E>) {
     let tiles = tiles(width, height);
+    // Render all tiles in parallel.
     let developed: Vec<(Vec<LinearRgb>, E)> = tiles
         .par_iter()
         .map(|tile| {
@@ -53,6 +54,7 @@ pub(crate) fn develop<E: Send>(
             (pixels, extra)
         })
         .collect();
+    // Copy them into the picture, in order.
     let mut picture = Picture::filled(width, height, LinearRgb::default());
     let mut extras = Vec::with_capacity(tiles.len());
     for (tile, (pixels, extra)) in tiles.iter().zip(developed) {

@@ -143,10 +143,12 @@ pub fn render_repainted(
     seeds: &[u64],
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<ViewsRender>, TracerError> {
+    // Check everything before the first path.
     check_predictions(world, repaint, &which)?;
     let subject = |first| Subject { world, materials: Painted { world, repaint, first }, first, lighting };
     let job = |first| ViewsJob { subject: subject(first), cameras, settings, seeds };
     let planes = job(0).planes(repaint.predictions)?;
+    // Render the predictions in rounds that share their paths.
     let rounds = rounds(which);
     let progress = Progress::new(job(0).tiles(&planes) * rounds.len(), progress);
     let mut renders = Vec::new();

@@ -58,12 +58,14 @@ impl World {
     }
 
     fn assemble(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
+        // Check surfaces; materials and lights are checked when their tables are built.
         for (index, surface) in scene.surfaces.iter().enumerate() {
             let located =
                 |fault| SceneFault::Surface { surface: SurfaceIndex(index), name: Some(surface.name.clone()), fault };
             check_surface(surface, scene.materials.len()).map_err(located)?;
         }
         let textures = scene.texture_list();
+        // Rays read large textures and triangle records at random: keep them on huge pages.
         let texels = textures.iter().map(Texture::bytes);
         texels.filter(|bytes| bytes.len() >= SMALL_TEXTURE).for_each(move_to_huge_pages);
         let [low, high] = accel.bounds();

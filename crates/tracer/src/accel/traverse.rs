@@ -148,6 +148,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     accept: impl Fn(usize, &Candidate) -> bool,
     mut found: impl FnMut(usize, Option<Candidate>),
 ) {
+    // Start the first rays.
     let mut waiting = (0..rays.len()).filter(|&which| rays[which].is_usable());
     let mut walks: ArrayVec<Walk<WATERTIGHT, ANY, false>, AT_ONCE> = ArrayVec::new();
     let mut rays_of = [0; AT_ONCE];
@@ -159,6 +160,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
         let mut turn = 0;
         while turn < walks.len() {
             let (which, walk) = (rays_of[turn], &mut walks[turn]);
+            // Step a ray that has not finished, and prefetch what it visits in its next turn.
             if let Some(child) = walk.next {
                 walk.step(kernel, wide, child, |candidate| accept(which, candidate));
                 if let Some(next) = walk.next {
@@ -167,6 +169,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
                 turn += 1;
                 continue;
             }
+            // Report a finished ray, and give its place to the next one that waits, or to the last one in progress.
             found(which, walk.best);
             if let Some(another) = waiting.next() {
                 rays_of[turn] = another;

@@ -118,6 +118,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         two_sided: bool,
         colors: Option<&[Vec3; K]>,
     ) -> Self {
+        // Face the viewer, unless light passes to the other side.
         let mut geometric = hit.geometric_normal;
         let front = hit.is_front(wo);
         if !front && !lobe.transmits() {
@@ -126,10 +127,12 @@ impl<'w, const K: usize> Bsdf<'w, K> {
                 lobe = Lobe::Black;
             }
         }
+        // Build the frame of the shading normal on the side of the viewer.
         let seen_side = if front || !lobe.transmits() { 1.0 } else { -1.0 };
         let normal = turned_to(normal * seen_side, wo) * seen_side;
         let frame = Frame::around(normal);
         let wo = frame.local_from_world(wo);
+        // Compute what does not depend on the light.
         let principled = match &lobe {
             Lobe::Principled(principled) if wo.z > 0.0 => {
                 let view = principled.seen_from(wo);

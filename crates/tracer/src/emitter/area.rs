@@ -144,17 +144,20 @@ impl AreaEmitter {
         surfaces: Vec<SurfaceIndex>,
         scene_size: f32,
     ) -> Self {
+        // Number the triangles of all surfaces.
         let mut starts = vec![0];
         for mesh in meshes {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
+        // Distribute samples by area.
         let areas = meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| area(mesh, t)));
+        let triangles = Distribution::new(areas);
         let records: Vec<TriangleRecord> = meshes
             .iter()
             .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| TriangleRecord::new(mesh, TriangleIndex(t), scene_size)))
             .collect();
+        // Bound the emitter.
         let (centre, radius2) = bounding_sphere(meshes);
-        let triangles = Distribution::new(areas);
         let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !emission.two_sided));
         Self {
             light,

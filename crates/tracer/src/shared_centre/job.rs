@@ -62,6 +62,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
         let mut views: [Vec<ViewLight>; K] = std::array::from_fn(|_| vec![blank.clone(); self.cameras.len()]);
         let mut counts = Vec::new();
+        // Expose every plane once per seed.
         for &seed in self.seeds {
             let settings = RenderSettings { seed, ..*self.settings };
             let halves = planes
@@ -73,6 +74,7 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
                 }
             }
         }
+        // Attach the counts of each variant.
         let mut views = views.into_iter().enumerate();
         std::array::from_fn(|_| {
             let (variant, views) = views.next().expect("there are as many as variants");

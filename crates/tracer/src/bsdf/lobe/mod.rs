@@ -36,7 +36,7 @@ pub(crate) enum Lobe<'w> {
 }
 
 impl<'w> Lobe<'w> {
-    /// The material's parameters at `uv`.
+    /// The material's parameters at `uv`. Long because it has one arm for each model.
     pub(crate) fn at(material: &Material, table: &'w Table, textures: &[Texture], uv: Vec2) -> Self {
         let color = |input: &ColorInput| Vec3::from_array(input.at(textures, uv));
         let facets = |m: &Microfacets| Facets::new(m.distribution, m.alpha.at(textures, uv));
