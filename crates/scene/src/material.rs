@@ -306,6 +306,27 @@ impl Material {
         };
         Some(appearance)
     }
+
+    /// [`Self::appearance`] if none of its values comes from a texture.
+    pub fn constant_appearance(&self) -> Option<Appearance> {
+        let constant = |color: &ColorInput| color.lookup().is_none();
+        let number = |scalar: &ScalarInput| scalar.lookup().is_none();
+        let even = |microfacets: &Option<Microfacets>| microfacets.is_none_or(|m| number(&m.alpha));
+        let same_everywhere = match &self.model {
+            MaterialModel::Diffuse { reflectance, .. } => constant(reflectance),
+            MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
+                constant(specular_reflectance) && even(microfacets)
+            }
+            MaterialModel::Plastic { diffuse_reflectance, microfacets, .. } => {
+                constant(diffuse_reflectance) && even(microfacets)
+            }
+            MaterialModel::Principled { base_color, roughness, metallic, .. } => {
+                constant(base_color) && number(roughness) && number(metallic)
+            }
+            MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. } => false,
+        };
+        if same_everywhere { self.appearance(&[], Vec2::ZERO) } else { None }
+    }
 }
 
 impl ColorInput {
