@@ -4,7 +4,7 @@ use glam::{DVec2, Vec2};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
 use mateval_image::{Picture, Texture};
 use mateval_scene::TriangleMesh;
-use mateval_scene::material::{Appearance, ColorInput, Material, MaterialModel, ScalarInput};
+use mateval_scene::material::{Appearance, Material};
 use mateval_scene::uv_atlas::UvAtlas;
 
 use crate::atlas::Unwrapped;
@@ -50,7 +50,7 @@ pub fn bake(unwrapped: &Unwrapped, source: &TriangleMesh, material: &Material, t
     if !material.has_appearance() {
         return None;
     }
-    if let Some(appearance) = constant_appearance(material) {
+    if let Some(appearance) = material.constant_appearance() {
         return Some(bake_constant(&appearance));
     }
     let atlas = UvAtlas::new(&unwrapped.mesh, unwrapped.size as usize);
@@ -106,26 +106,6 @@ fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearanc
     Baked { material: BakedMaterial::Textured { base_color, roughness, metallic }, clipped }
 }
 
-/// The material's appearance where it looks up no texture for it.
-fn constant_appearance(material: &Material) -> Option<Appearance> {
-    let constant = |color: &ColorInput| matches!(color, ColorInput::Constant(_));
-    let number = |scalar: &ScalarInput| matches!(scalar, ScalarInput::Constant(_));
-    let same_everywhere = match &material.model {
-        MaterialModel::Diffuse { reflectance, .. } => constant(reflectance),
-        MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
-            constant(specular_reflectance) && microfacets.is_none_or(|m| number(&m.alpha))
-        }
-        MaterialModel::Plastic { diffuse_reflectance, microfacets, .. } => {
-            constant(diffuse_reflectance) && microfacets.is_none_or(|m| number(&m.alpha))
-        }
-        MaterialModel::Principled { base_color, roughness, metallic, .. } => {
-            constant(base_color) && number(roughness) && number(metallic)
-        }
-        MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. } => false,
-    };
-    if same_everywhere { material.appearance(&[], Vec2::ZERO) } else { None }
-}
-
 /// The most texels that any of the material's lookups has along one unit of the surface's uv.
 fn finest(material: &Material, textures: &[Texture]) -> f64 {
     material
@@ -174,7 +154,7 @@ fn mean_appearance(
 mod tests {
     use glam::Vec3;
     use mateval_image::{Texels, Wrap};
-    use mateval_scene::material::{TextureIndex, UvTransform};
+    use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex, UvTransform};
 
     use super::*;
     use crate::atlas::{SizeWish, unwrap};

@@ -247,10 +247,23 @@ pub struct Lookup {
     pub uv: UvTransform,
 }
 
+/// The parameters of a [`MaterialModel`] by type, for what holds for every model: checks and texture lookups.
+#[derive(Clone, Debug, Default)]
+pub struct ModelInputs<'a> {
+    /// Colours, constant or textured.
+    pub colors: Vec<&'a ColorInput>,
+    /// Numbers, constant or textured.
+    pub scalars: Vec<&'a ScalarInput>,
+    /// Real indices of refraction, inside over outside.
+    pub etas: Vec<f32>,
+    /// Other numbers.
+    pub numbers: Vec<f32>,
+}
+
 impl Material {
     /// Every texture that the material looks up.
     pub fn lookups(&self) -> Vec<Lookup> {
-        let (colors, scalars) = self.model.inputs();
+        let ModelInputs { colors, scalars, .. } = self.model.inputs();
         let around = self.opacity.iter().chain(self.bump.iter().map(|bump| &bump.height));
         let colors = colors.into_iter().filter_map(ColorInput::lookup);
         colors.chain(scalars.into_iter().chain(around).filter_map(ScalarInput::lookup)).collect()
@@ -296,6 +309,27 @@ impl Material {
         };
         Some(appearance)
     }
+
+    /// [`Self::appearance`] if none of its values comes from a texture.
+    pub fn constant_appearance(&self) -> Option<Appearance> {
+        let constant = |color: &ColorInput| color.lookup().is_none();
+        let number = |scalar: &ScalarInput| scalar.lookup().is_none();
+        let even = |microfacets: &Option<Microfacets>| microfacets.is_none_or(|m| number(&m.alpha));
+        let same_everywhere = match &self.model {
+            MaterialModel::Diffuse { reflectance, .. } => constant(reflectance),
+            MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
+                constant(specular_reflectance) && even(microfacets)
+            }
+            MaterialModel::Plastic { diffuse_reflectance, microfacets, .. } => {
+                constant(diffuse_reflectance) && even(microfacets)
+            }
+            MaterialModel::Principled { base_color, roughness, metallic, .. } => {
+                constant(base_color) && number(roughness) && number(metallic)
+            }
+            MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. } => false,
+        };
+        if same_everywhere { self.appearance(&[], Vec2::ZERO) } else { None }
+    }
 }
 
 impl ColorInput {
@@ -317,24 +351,39 @@ impl ScalarInput {
 }
 
 impl MaterialModel {
-    /// All its colours and all its numbers.
-    fn inputs(&self) -> (Vec<&ColorInput>, Vec<&ScalarInput>) {
+    /// All parameters of the model, by type.
+    pub fn inputs(&self) -> ModelInputs<'_> {
+        let mut inputs = ModelInputs::default();
         match self {
-            Self::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter().collect()),
+            Self::Diffuse { reflectance, alpha } => {
+                inputs.colors = vec![reflectance];
+                inputs.scalars = alpha.iter().collect();
+            }
             Self::Conductor { specular_reflectance, microfacets, .. } => {
-                (vec![specular_reflectance], rough_inputs(microfacets))
+                inputs.colors = vec![specular_reflectance];
+                inputs.scalars = rough_inputs(microfacets);
             }
-            Self::Plastic { diffuse_reflectance, specular_reflectance, microfacets, .. } => {
-                (vec![diffuse_reflectance, specular_reflectance], rough_inputs(microfacets))
+            Self::Plastic { eta, diffuse_reflectance, specular_reflectance, microfacets, .. } => {
+                inputs.etas = vec![*eta];
+                inputs.colors = vec![diffuse_reflectance, specular_reflectance];
+                inputs.scalars = rough_inputs(microfacets);
             }
-            Self::Dielectric { specular_reflectance, specular_transmittance, microfacets, .. } => {
-                (vec![specular_reflectance, specular_transmittance], rough_inputs(microfacets))
+            Self::Dielectric { eta, specular_reflectance, specular_transmittance, microfacets } => {
+                inputs.etas = vec![*eta];
+                inputs.colors = vec![specular_reflectance, specular_transmittance];
+                inputs.scalars = rough_inputs(microfacets);
             }
-            Self::ThinDielectric { specular_reflectance, specular_transmittance, .. } => {
-                (vec![specular_reflectance, specular_transmittance], Vec::new())
+            Self::ThinDielectric { eta, specular_reflectance, specular_transmittance } => {
+                inputs.etas = vec![*eta];
+                inputs.colors = vec![specular_reflectance, specular_transmittance];
             }
-            Self::Principled { base_color, roughness, metallic, .. } => (vec![base_color], vec![roughness, metallic]),
+            Self::Principled { base_color, roughness, metallic, specular, .. } => {
+                inputs.colors = vec![base_color];
+                inputs.scalars = vec![roughness, metallic];
+                inputs.numbers = vec![*specular];
+            }
         }
+        inputs
     }
 }
 

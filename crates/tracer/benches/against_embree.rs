@@ -1,9 +1,10 @@
-//! The hierarchy against Debian's Embree 3.13 (`apt-get install libembree-dev`), the same rays in the same process, run in
-//! turns: `cargo bench -p mateval-tracer --features bench-embree --bench against_embree [-- ROUNDS]`.
+//! Ray queries compared with Debian's Embree 3.13 (`apt-get install libembree-dev`): the same rays in the same process,
+//! in alternating runs. `cargo bench -p mateval-tracer --features bench-embree --bench against_embree [-- ROUNDS]`.
 //!
-//! Scenes: `bench/dense` where the shared data is, and the built-in room at 20 thousand, 1 million and 3 million triangles.
-//! CPU time of one thread. A number above 1 says that so many times the rays of Embree's medium mode are traced; with a
-//! star, by `closest_many` and `occluded_many`, as the path tracer does, else ray by ray.
+//! Scenes: `bench/dense` if the shared data is available, and the built-in room with 20 thousand, 1 million and 3
+//! million triangles. CPU time of one thread. Each number is our rays per second over those of Embree's medium mode. A
+//! star marks `closest_many` and `occluded_many`, as the path tracer uses them; the other numbers are for one ray at a
+//! time.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 #[path = "../tests/suite/bench_scene.rs"]
@@ -27,7 +28,7 @@ const SIDE: u32 = 724;
 
 fn main() {
     let rounds = std::env::args().skip(1).find_map(|word| word.parse().ok()).unwrap_or(9);
-    // One thread: what a ray costs, not how well threads share.
+    // A single thread measures the cost of a ray, not how well threads share the machine.
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().unwrap();
     if let Some(folder) = bench_scene::folder("dense") {
         let (scene, camera) = bench_scene::read(&folder, SIDE);
@@ -43,12 +44,14 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
     let triangles: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     println!("\n{name}, {triangles} triangles");
     builds(&meshes);
+    // Build both hierarchies in both modes.
     let robust = Accel::build(&meshes).unwrap();
     let fast = Accel::build(&meshes).unwrap().with_test(TriangleTest::Fast);
     let embree = Embree::new(&meshes, Mode::Medium, 1, &mut |build| build());
     let embree_robust = Embree::new(&meshes, Mode::Robust, 1, &mut |build| build());
     println!("{:.1} bytes a triangle", robust.memory_bytes() as f64 / triangles as f64);
 
+    // Make the sets of rays.
     let coherent = rays::coherent(camera);
     let bounce = rays::bounced(&robust, &coherent);
     let second = rays::bounced(&robust, &bounce);
@@ -60,6 +63,7 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
         "{:22} {:>10} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}",
         "times Embree's medium", "Embree's", "its robust", "fast", "watertight", "fast*", "watert.*", "differ"
     );
+    // Compare nearest hits.
     for (kind, set) in [("coherent", &coherent), ("bounce 1", &bounce), ("bounce 2", &second), ("random", &random)] {
         let differing =
             set.iter().filter(|ray| differs(robust.closest(ray).map(|h| h.distance), embree.closest(ray))).count();
@@ -82,6 +86,7 @@ fn compare(name: &str, meshes: Vec<TriangleMesh>, camera: &Camera, rounds: usize
             ],
         );
     }
+    // Compare occlusion.
     for (kind, set) in [("shadow 1", &shadow), ("shadow 2", &shadow_2), ("occlusion to 1.5 m", &short)] {
         let differing = set.iter().filter(|ray| robust.occluded(ray) != embree.occluded(ray)).count();
         row(
@@ -135,7 +140,7 @@ fn sum(rays: &[Ray], value: impl Fn(&Ray) -> Option<f32>) {
     std::hint::black_box(rays.iter().filter_map(value).map(f64::from).sum::<f64>());
 }
 
-/// The same for batches of as many rays as the path tracer asks for at once.
+/// The same for batches of the size that the path tracer uses.
 fn sum_many<V: Copy>(rays: &[Ray], trace: impl Fn(&[Ray], &mut Vec<V>), value: impl Fn(V) -> Option<f32>) {
     let mut values = Vec::new();
     let mut sum = 0.0;

@@ -1,8 +1,9 @@
-//! Peak memory against triangles, emitters and resolution: `cargo bench -p mateval-tracer --bench memory`.
+//! Peak memory by triangles, emitters and resolution: `cargo bench -p mateval-tracer --bench memory`.
 //!
-//! Each case is a process of its own, which makes a room, renders a light basis with one sample a pixel and tells the
-//! most that was resident (Linux alone). The pictures' share is known beforehand and bounded; a case fails if more is
-//! taken than that, the tiles in the making, and what the same triangles take with hardly any pictures.
+//! Each case is a separate process, which creates a room, renders a light basis with one sample per pixel and reports
+//! its peak resident memory (Linux only). The memory of the pictures is known beforehand and limited. A case fails if
+//! it takes more than the sum of that limit, the unfinished tiles, and the memory of the same triangles with almost no
+//! pictures.
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, reason = "a bench prints")]
 
@@ -15,17 +16,17 @@ use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceSce
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
-/// What one process renders.
+/// The render of one process.
 #[derive(Clone, Copy)]
 struct Case {
     triangles: u32,
     lights: u32,
     size: [u32; 2],
-    /// Bytes that the light basis may take.
+    /// The limit on the light basis, in bytes.
     bytes: u64,
 }
 
-/// What it took.
+/// The measurements of one process.
 struct Taken {
     peak: u64,
     groups: u64,
@@ -68,7 +69,7 @@ fn parent() {
         let pictures = pictures(case, taken.groups);
         assert!(pictures <= case.bytes);
         let threads = std::thread::available_parallelism().unwrap().get() as u64;
-        // Tiles in the making, and a tenth of the pictures for counts of paths and for what the allocator holds back.
+        // Unfinished tiles, and a tenth of the pictures for path counts and for memory that the allocator retains.
         let most =
             room + pictures + pictures / 10 + 64_000 * OFFSETS.len() as u64 * taken.groups * threads + (32 << 20);
         assert!(taken.peak <= most, "{} bytes taken, {most} expected at most", taken.peak);
@@ -141,7 +142,7 @@ fn room(triangles: u32, lights: u32) -> ReferenceScene {
     scene
 }
 
-/// With normals and uvs, as real meshes have.
+/// Adds normals and uvs, as real meshes have them.
 fn floor(triangles: u32) -> TriangleMesh {
     let side = (f64::from(triangles) / 2.0).sqrt().ceil() as u32;
     let vertex = |x: u32, z: u32| {
@@ -168,7 +169,7 @@ fn lamp(corner: Vec3, side: f32) -> TriangleMesh {
     TriangleMesh { positions, triangles: vec![[0, 1, 2], [0, 2, 3]], ..Default::default() }
 }
 
-/// The most that was resident, from Linux' `/proc`.
+/// Peak resident memory, from Linux' `/proc`.
 fn peak_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();

@@ -1,9 +1,9 @@
-//! Path tracing: CPU seconds a sample, of one thread; what two threads gain; and how Mitsuba 3 compares, in turns.
-//! `cargo bench -p mateval-tracer --bench paths [-- ROUNDS [SCENE]]`, SCENE `bench/room` or `bench/dense` of the shared
-//! data, or a number of triangles: that many in a room made here. All of them without it.
+//! Path tracing: CPU seconds per sample on one thread, the speed-up by two threads, and Mitsuba 3 for comparison, in
+//! alternating runs. `cargo bench -p mateval-tracer --bench paths [-- ROUNDS [SCENE]]`. SCENE is `bench/room` or
+//! `bench/dense` of the shared data, or the number of triangles of a generated room. Without it, all of them run.
 //!
-//! With `MATEVAL_PEERS_PYTHON` (set it to `target/peers/bin/python`, which `tools/test_peers.sh` installs) `bench/dense` is
-//! rendered by Mitsuba's `scalar_rgb` and `llvm_ad_rgb` too, by one thread each.
+//! With `MATEVAL_PEERS_PYTHON` (`target/peers/bin/python`, installed by `tools/test_peers.sh`), Mitsuba's `scalar_rgb`
+//! and `llvm_ad_rgb` also render `bench/dense`, on one thread each.
 //!
 //! 512x512 pixels, 6 bounces (Mitsuba's max_depth 8), no roulette.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
@@ -29,8 +29,8 @@ use rayon::ThreadPool;
 
 const SIZE: u32 = 512;
 const MAX_BOUNCES: u32 = 6;
-/// A pixel and measurement, of us and of Mitsuba's variants: the latter needs many to be at its best, the scalar one is
-/// the same for any number.
+/// Samples per pixel and measurement, for us and for Mitsuba's variants. The LLVM variant needs many samples for its
+/// best speed; the scalar one has the same speed for any number.
 const SAMPLES: u32 = 4;
 const VARIANTS: [(&str, u32); 2] = [("scalar_rgb", 1), ("llvm_ad_rgb", 16)];
 
@@ -58,6 +58,7 @@ fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
     let pools = [1, 2].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap());
     let (mut ours, mut walls, mut rays) = (Vec::new(), [Vec::new(), Vec::new()], 0.0);
     let mut theirs = vec![Vec::new(); peers.len()];
+    // Run all contestants once per round.
     for round in 0..rounds {
         for (pool, walls) in pools.iter().zip(&mut walls) {
             let run = run(&world, camera, pool, round as u64);
@@ -71,6 +72,7 @@ fn measure(name: &str, scene: ReferenceScene, camera: &Camera, rounds: usize) {
             seconds.push(mitsuba.render(samples) / f64::from(samples));
         }
     }
+    // Report medians.
     println!(
         "{name}, {triangles} triangles: {:.3} samples a pixel and CPU second, {:.2} us a sample, {rays:.1} rays a sample; \
          2 threads {:.2} times 1",
@@ -100,7 +102,7 @@ fn peers(scene: &str) -> Vec<Mitsuba> {
     VARIANTS.map(start).into()
 }
 
-/// What one picture took, a sample a pixel.
+/// The time that one picture took, per sample.
 struct Run {
     cpu: f64,
     wall: f64,

@@ -1,4 +1,4 @@
-//! First hits through places of a picture: what pictures without light are made of.
+//! First hits at points of a picture, for the pictures that show no light: depth, normals, ids, materials.
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 use mateval_scene::Camera;
@@ -7,12 +7,12 @@ use mateval_scene::reference::SurfaceIndex;
 use crate::ray::Ray;
 use crate::world::World;
 
-/// Sub-pixels along a pixel's side.
+/// Sub-pixels along each side of a pixel.
 const SUBPIXELS_A_SIDE: usize = 4;
-/// Sub-pixels of a pixel.
+/// Sub-pixels per pixel.
 pub const SUBPIXELS: usize = SUBPIXELS_A_SIDE * SUBPIXELS_A_SIDE;
 
-/// The places at which pixel (x, y) is looked at: the centres of a regular 4x4 grid, the same for truth and prediction.
+/// The points at which pixel (x, y) is sampled: the centres of a regular 4x4 grid, the same for truth and prediction.
 pub fn subpixels(x: usize, y: usize) -> [DVec2; SUBPIXELS] {
     std::array::from_fn(|index| {
         let step = |index: usize| (index as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
@@ -20,33 +20,34 @@ pub fn subpixels(x: usize, y: usize) -> [DVec2; SUBPIXELS] {
     })
 }
 
-/// What a picture shows at one place.
+/// The first hit behind one point of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelHit {
     /// The surface.
     pub surface: SurfaceIndex,
-    /// The triangle of that surface.
+    /// The triangle, within the surface's mesh.
     pub triangle: usize,
-    /// Weights of the triangle's corners, adding to one.
+    /// Barycentric weights of the triangle's corners; they add up to 1.
     pub barycentrics: Vec3,
-    /// Metres along the camera's axis.
+    /// Distance along the camera's axis, in metres.
     pub depth: f64,
     /// World-space shading normal, unit length, turned towards the camera.
     pub normal: Vec3,
-    /// Whether the front is seen: the side of the vertex normals, or else the one from which the triangle's corners run
-    /// counter-clockwise. That is the side that a one-sided emitter glows on.
+    /// Whether the front is visible: the side of the vertex normals, or without them the side from which the triangle's
+    /// corners run counter-clockwise. A one-sided emitter emits on that side.
     pub front: bool,
 }
 
 impl PixelHit {
-    /// A value that is given at the vertices, at the hit.
+    /// Interpolates values given at the vertices.
     pub fn interpolate(&self, triangles: &[[u32; 3]], values: &[Vec2]) -> Vec2 {
         let [a, b, c] = triangles[self.triangle].map(|vertex| values[vertex as usize]);
         a * self.barycentrics.x + b * self.barycentrics.y + c * self.barycentrics.z
     }
 }
 
-/// What the camera sees at `pixel`; masked-out texels (opacity under one half) are looked through, glass is not.
+/// The first hit behind `pixel`, or `None`. Masked-out texels (opacity below one half) do not count as hits, glass
+/// does.
 pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<PixelHit> {
     let direction = camera.direction(pixel);
     let hit = world.first_hit(&Ray::endless(camera.position().as_vec3(), direction.as_vec3()))?;
@@ -55,7 +56,7 @@ pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Pixel
     let corners = mesh.corners(triangle).map(|corner| corner.as_dvec3());
     let geometric = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
     let front = world.surface_hit(&hit).is_front(-direction.as_vec3());
-    // From the corners, not from the distance along the ray: as exact as the mesh is.
+    // The point comes from the corners, not from the distance along the ray, so it is as exact as the mesh.
     let weights = hit.barycentrics.as_dvec3();
     let point = corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z;
     let (_, depth) = camera.project(point)?;
@@ -67,7 +68,8 @@ pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Pixel
     Some(PixelHit { surface: hit.surface, triangle, barycentrics: hit.barycentrics, depth, normal, front })
 }
 
-/// The shading normal, on the side of the surface that the camera sees; the geometric one where that has no length.
+/// The shading normal on the side of the surface that the camera sees; the geometric normal where the shading normal
+/// has no length.
 fn towards_camera(shading: DVec3, geometric: DVec3, direction: DVec3) -> Vec3 {
     let geometric = if geometric.dot(direction) > 0.0 { -geometric } else { geometric }.normalize_or_zero();
     let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
@@ -96,7 +98,7 @@ mod tests {
         Surface { name: String::new(), mesh, material: MaterialIndex(material) }
     }
 
-    /// A sheet whose left half is cut out at z = -2 before a wall at z = -4.
+    /// A sheet at z = -2 whose left half is cut out, in front of a wall at z = -4.
     fn world() -> World {
         let plain = Material {
             name: String::new(),

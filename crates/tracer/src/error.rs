@@ -1,12 +1,353 @@
-//! What can go wrong.
+//! The error of this crate, split by what a caller can do about it.
 
-/// Why a scene cannot be traced.
-#[derive(Debug, thiserror::Error, PartialEq)]
+use std::ops::Range;
+
+use glam::Vec3;
+use mateval_scene::reference::{LightIndex, MaterialIndex, SurfaceIndex};
+
+/// Why something cannot be traced.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TracerError {
-    /// The scene contradicts itself; the message says where and what was expected.
+    /// The scene contradicts itself: fix the scene.
     #[error("invalid scene: {0}")]
-    Invalid(String),
-    /// The scene or the settings are beyond what the tracer can do; the message says what and the limit.
+    InvalidScene(#[from] SceneFault),
+    /// The arguments of a call contradict each other or the world: fix the call.
+    #[error("invalid request: {0}")]
+    InvalidRequest(#[from] RequestFault),
+    /// Everything is sound, but exceeds a limit: ask for less, or raise the limit where the caller sets it.
     #[error("unsupported: {0}")]
-    Unsupported(String),
+    Unsupported(#[from] ExceededLimit),
+}
+
+/// A part of a scene that contradicts itself or the rest of the scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SceneFault {
+    /// A surface.
+    #[error("surface {}{}: {fault}", surface.0, quoted(name))]
+    Surface {
+        /// Its place in the scene.
+        surface: SurfaceIndex,
+        /// Its name, where the meshes come with names.
+        name: Option<String>,
+        /// The fault.
+        fault: SurfaceFault,
+    },
+    /// A material.
+    #[error("material {} '{name}': {fault}", material.0)]
+    Material {
+        /// Its place in the scene.
+        material: MaterialIndex,
+        /// Its name.
+        name: String,
+        /// The fault.
+        fault: MaterialFault,
+    },
+    /// A group of lights.
+    #[error("light {} '{name}': {fault}", light.0)]
+    Light {
+        /// Its place in the scene.
+        light: LightIndex,
+        /// Its name.
+        name: String,
+        /// The fault.
+        fault: LightFault,
+    },
+}
+
+/// What is wrong with a surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceFault {
+    /// It names a material that does not exist.
+    #[error("material {material}, expected one of {count}")]
+    MissingMaterial {
+        /// The material named.
+        material: usize,
+        /// How many materials the scene has.
+        count: usize,
+    },
+    /// A coordinate is not finite or too large for `f32` to resolve a metre.
+    #[error("vertex {vertex} is at {position}, expected within {limit:e} m of the origin along each axis")]
+    Position {
+        /// The vertex.
+        vertex: usize,
+        /// Its position, in metres.
+        position: Vec3,
+        /// The largest coordinate, in metres.
+        limit: f32,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertices {vertices:?}, expected below {count}")]
+    MissingVertex {
+        /// The triangle.
+        triangle: usize,
+        /// The vertices named.
+        vertices: [u32; 3],
+        /// How many vertices the mesh has.
+        count: usize,
+    },
+    /// Normals or uvs are not one a vertex.
+    #[error("{found} {attribute}, expected one for each of {expected} vertices")]
+    AttributeCount {
+        /// Which array: "normals" or "uvs".
+        attribute: &'static str,
+        /// Its length.
+        found: usize,
+        /// The number of vertices.
+        expected: usize,
+    },
+    /// A normal or a uv is not finite.
+    #[error("the {attribute} hold a value at vertex {vertex} that is not finite")]
+    AttributeNotFinite {
+        /// Which array: "normals" or "uvs".
+        attribute: &'static str,
+        /// The first vertex concerned.
+        vertex: usize,
+    },
+}
+
+/// What is wrong with a material.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MaterialFault {
+    /// A constant is not finite.
+    #[error("value {0}, expected a finite one")]
+    NotFinite(f32),
+    /// An index of refraction is not a finite number above 0.
+    #[error("index of refraction {0}, expected a finite one above 0")]
+    IndexOfRefraction(f32),
+    /// It names a texture that does not exist.
+    #[error("texture {texture}, expected one of {count}")]
+    MissingTexture {
+        /// The texture named.
+        texture: usize,
+        /// How many textures the scene has.
+        count: usize,
+    },
+    /// It names a channel that textures do not have.
+    #[error("texture channel {0}, expected 0, 1 or 2")]
+    MissingChannel(usize),
+}
+
+/// What is wrong with a light, of the scene or of a stage.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LightFault {
+    /// Its radiance is negative or not finite.
+    #[error("radiance {0:?}, expected finite values of at least 0")]
+    Radiance([f32; 3]),
+    /// It names a texture that does not exist.
+    #[error("texture {texture}, expected one of {count}")]
+    MissingTexture {
+        /// The texture named.
+        texture: usize,
+        /// How many textures the scene has.
+        count: usize,
+    },
+    /// It names a surface that does not exist.
+    #[error("surface {surface}, expected one of {count}")]
+    MissingSurface {
+        /// The surface named.
+        surface: usize,
+        /// How many surfaces the scene has.
+        count: usize,
+    },
+    /// One of its surfaces emits for another light already.
+    #[error("surface {0} emits twice, expected one light a surface")]
+    SharedSurface(usize),
+    /// The transform of its map's uv is not finite.
+    #[error("the uv transform of its map is {0:?}, expected finite values")]
+    MapTransform([[f32; 3]; 2]),
+    /// A texel of its map is negative or not finite.
+    #[error("texture {texture} holds the value {value}, expected finite values of at least 0")]
+    MapValue {
+        /// The texture.
+        texture: usize,
+        /// The first such value.
+        value: f32,
+    },
+    /// The scale of its environment map is negative or not finite.
+    #[error("scale {0} of its environment map, expected a finite one of at least 0")]
+    EnvironmentScale(f32),
+    /// The rotation of its environment map is not finite.
+    #[error("rotation {0:?} of its environment map, expected finite values")]
+    EnvironmentRotation([[f32; 3]; 3]),
+    /// A light of a stage has no triangles.
+    #[error("a mesh without triangles, expected at least one")]
+    NoTriangles,
+}
+
+/// An argument that contradicts another, or the world it is used with.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RequestFault {
+    /// A light of a stage.
+    #[error("stage light {}: {fault}", light.0)]
+    StageLight {
+        /// Its place on the stage.
+        light: LightIndex,
+        /// The fault.
+        fault: LightFault,
+    },
+    /// The mesh of a light of a stage.
+    #[error("stage light {}: {fault}", light.0)]
+    StageMesh {
+        /// Its place on the stage.
+        light: LightIndex,
+        /// The fault.
+        fault: SurfaceFault,
+    },
+    /// Too few paths a pixel.
+    #[error("{0} samples a pixel, expected at least 1")]
+    Samples(u32),
+    /// The probability of surviving Russian roulette is out of range.
+    #[error("roulette survival {0}, expected above 0 and at most 1")]
+    RouletteSurvival(f32),
+    /// Two halves would be the same picture.
+    #[error("seed {0} occurs twice, expected another seed for each half")]
+    RepeatedSeed(u64),
+    /// A hierarchy is shared with a scene of other triangles.
+    #[error("the hierarchy was built from {hierarchy} triangles other than the scene's {scene}")]
+    OtherTriangles {
+        /// How many triangles the hierarchy holds.
+        hierarchy: usize,
+        /// How many triangles the scene has.
+        scene: usize,
+    },
+    /// Groups of lights were made for another scene.
+    #[error("groups of {found} lights for a scene of {expected} lights")]
+    GroupedLights {
+        /// How many lights the groups hold.
+        found: usize,
+        /// How many lights the scene has.
+        expected: usize,
+    },
+    /// Mixes of lights are not given once for each prediction.
+    #[error("light mixes for {found} predictions, expected {expected}")]
+    MixedPredictions {
+        /// For how many predictions there are mixes.
+        found: usize,
+        /// How many predictions there are.
+        expected: usize,
+    },
+    /// Predictions have different numbers of mixes.
+    #[error("{found} light mixes for prediction {prediction}, expected {expected} as for the first")]
+    MixCount {
+        /// The prediction.
+        prediction: usize,
+        /// How many mixes it has.
+        found: usize,
+        /// How many the first one has.
+        expected: usize,
+    },
+    /// A mix or a weighted sum does not have one weight a light or group of lights.
+    #[error("{found} weights, expected {expected}: one for each light or group of lights")]
+    WeightCount {
+        /// How many weights there are.
+        found: usize,
+        /// How many lights or groups there are.
+        expected: usize,
+    },
+    /// A weight is negative or not finite.
+    #[error("weight {found} of light {}, expected a finite one of at least 0", light.0)]
+    Weight {
+        /// The light.
+        light: LightIndex,
+        /// Its weight.
+        found: f64,
+    },
+    /// Predictions were made for a world with another number of surfaces.
+    #[error("{atlases} atlases and {coats} coats for a world of {surfaces} surfaces")]
+    SurfaceCount {
+        /// How many atlases there are.
+        atlases: usize,
+        /// How many coats there are, missing ones included.
+        coats: usize,
+        /// How many surfaces the world has.
+        surfaces: usize,
+    },
+    /// An atlas has other triangles than its surface.
+    #[error("surface {} '{name}': an atlas of {found} triangles for a mesh of {expected}", surface.0)]
+    AtlasTriangles {
+        /// The surface.
+        surface: SurfaceIndex,
+        /// Its name.
+        name: String,
+        /// How many triangles the atlas has.
+        found: usize,
+        /// How many triangles the surface has.
+        expected: usize,
+    },
+    /// An atlas with a coat has no uv, or one that is not finite or not one a vertex.
+    #[error("surface {} '{name}': a coat for an atlas without one finite uv a vertex", surface.0)]
+    AtlasUv {
+        /// The surface.
+        surface: SurfaceIndex,
+        /// Its name.
+        name: String,
+    },
+    /// Coats hold different numbers of base colours, or none.
+    #[error("surface {} '{name}': {found} base colours, expected {expected} on each surface", surface.0)]
+    BaseColorCount {
+        /// The surface.
+        surface: SurfaceIndex,
+        /// Its name.
+        name: String,
+        /// How many base colours its coat holds.
+        found: usize,
+        /// The largest number on any surface; at least 1.
+        expected: usize,
+    },
+    /// Predictions are used with another world than they were made for.
+    #[error("predictions for {found} surfaces in a world of {expected}")]
+    OtherWorld {
+        /// How many surfaces the predictions were made for.
+        found: usize,
+        /// How many surfaces the world has.
+        expected: usize,
+    },
+    /// Predictions are asked for that do not exist.
+    #[error("predictions {found:?}, expected within 0..{count}")]
+    Predictions {
+        /// Those asked for.
+        found: Range<usize>,
+        /// How many there are.
+        count: usize,
+    },
+    /// Pictures of one light basis differ in size.
+    #[error("a picture of {}x{} in a light basis of {}x{}", found[0], found[1], expected[0], expected[1])]
+    PictureSize {
+        /// Width and height of the first picture that differs.
+        found: [usize; 2],
+        /// Width and height of the basis.
+        expected: [usize; 2],
+    },
+}
+
+/// A limit that a sound request exceeds.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ExceededLimit {
+    /// More triangles than the hierarchy can number.
+    #[error("{found} triangles, the limit is {limit}")]
+    Triangles {
+        /// How many there are.
+        found: usize,
+        /// The most that are supported.
+        limit: usize,
+    },
+    /// The pictures of a single group of lights take more memory than is allowed.
+    #[error(
+        "{halves} halves of {views} views take {group_bytes} bytes a group of lights, and {allowed} are allowed; \
+         allow more, or make fewer views at a time"
+    )]
+    BasisBytes {
+        /// Independent halves of each view.
+        halves: usize,
+        /// Views rendered together.
+        views: usize,
+        /// Bytes that one group of lights takes.
+        group_bytes: u64,
+        /// Bytes allowed.
+        allowed: u64,
+    },
+}
+
+fn quoted(name: &Option<String>) -> String {
+    name.as_ref().map_or_else(String::new, |name| format!(" '{name}'"))
 }

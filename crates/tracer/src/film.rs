@@ -1,12 +1,12 @@
-//! Collects samples into a picture: box filter of one pixel, tile by tile.
+//! Averages samples into a picture, tile by tile, with a box filter of one pixel.
 
 use mateval_image::{LinearRgb, Picture};
 use rayon::prelude::*;
 
-/// Pixels along a tile's side.
+/// Pixels along each side of a tile.
 const TILE: usize = 16;
 
-/// A part of the picture.
+/// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Tile {
     x: usize,
@@ -25,17 +25,18 @@ pub(crate) fn tiles(width: usize, height: usize) -> Vec<Tile> {
 }
 
 impl Tile {
-    /// Its pixels (x, y), row by row.
+    /// The tile's pixels (x, y), row by row.
     pub(crate) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> + Clone + use<> {
         let Self { x, y, width, height } = *self;
         (y..y + height).flat_map(move |row| (x..x + width).map(move |column| [column, row]))
     }
 }
 
-/// A picture whose tiles' pixels, row by row, are what `develop_tile` gives, and what it says of each tile beside that.
+/// Renders a picture tile by tile. `develop_tile` returns a tile's pixels, row by row, and extra data, which is
+/// returned in the order of the tiles.
 ///
-/// Tiles are spread over the threads of the current pool; each pixel is made by one of them, so the result does not depend
-/// on their number. `done` is called after each tile with its place in no particular order.
+/// Tiles are distributed over the threads of the current pool. Each pixel is rendered by one thread, so the result does
+/// not depend on their number. `done` is called after each tile, in no particular order.
 pub(crate) fn develop<E: Send>(
     width: usize,
     height: usize,
@@ -43,6 +44,7 @@ pub(crate) fn develop<E: Send>(
     done: impl Fn() + Sync,
 ) -> (Picture<LinearRgb>, Vec<E>) {
     let tiles = tiles(width, height);
+    // Render all tiles in parallel.
     let developed: Vec<(Vec<LinearRgb>, E)> = tiles
         .par_iter()
         .map(|tile| {
@@ -52,6 +54,7 @@ pub(crate) fn develop<E: Send>(
             (pixels, extra)
         })
         .collect();
+    // Copy them into the picture, in order.
     let mut picture = Picture::filled(width, height, LinearRgb::default());
     let mut extras = Vec::with_capacity(tiles.len());
     for (tile, (pixels, extra)) in tiles.iter().zip(developed) {

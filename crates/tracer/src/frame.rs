@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// Three unit vectors at right angles; z is the normal.
+/// Three orthonormal vectors; z is the normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame {
     x: Vec3,
@@ -11,7 +11,8 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// A frame whose z is `normal` (unit length). Duff et al., "Building an Orthonormal Basis, Revisited" (JCGT 2017).
+    /// A frame whose z axis is `normal` (unit length). Duff et al., "Building an Orthonormal Basis, Revisited" (JCGT
+    /// 2017).
     pub(crate) fn around(normal: Vec3) -> Self {
         let sign = 1.0_f32.copysign(normal.z);
         let a = -1.0 / (sign + normal.z);
@@ -21,12 +22,12 @@ impl Frame {
         Self { x, y, z: normal }
     }
 
-    /// A world vector in this frame.
+    /// Converts a vector from world space to this frame.
     pub(crate) fn local_from_world(&self, v: Vec3) -> Vec3 {
         Vec3::new(v.dot(self.x), v.dot(self.y), v.dot(self.z))
     }
 
-    /// A vector of this frame in the world.
+    /// Converts a vector from this frame to world space.
     pub(crate) fn world_from_local(&self, v: Vec3) -> Vec3 {
         self.x * v.x + self.y * v.y + self.z * v.z
     }

@@ -1,14 +1,22 @@
-//! Traces light through a scene.
+//! Path tracer for reference scenes.
 //!
-//! In: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and a
-//! [`mateval_scene::Camera`]. Out: pictures of linear radiance ([`render()`]), of several views
-//! and apart by lights ([`render_views`]), and first hits ([`World::first_hit`],
+//! Input: a [`mateval_scene::reference::ReferenceScene`] (surfaces, materials, textures, lights) and one or more
+//! [`mateval_scene::Camera`]s.
+//!
+//! Output: pictures of linear radiance ([`render()`]), the same per view and per group of lights ([`render_views`]),
+//! with predicted materials in place of the scene's own ([`render_repainted`]), and first hits ([`World::first_hit`],
 //! [`aov`]) for depth, normals, ids and material pictures.
 //!
-//! Between: [`World`] checks the scene and builds [`Accel`] over its triangles; a [`Ray`]'s [`Hit`] becomes a
-//! [`SurfaceHit`]; the surface's material there becomes a [`Bsdf`]; [`emitter`] samples what shines on it; [`sampler`]
-//! gives every number from seed, pixel and sample index; [`film`] averages tiles in a fixed order. Trigonometry is the
-//! `libm` crate's, or sums and products of `warp`'s own, so every machine computes the same bits.
+//! Steps between:
+//!
+//! 1. [`World`] checks the scene, builds the bounding volume hierarchy ([`Accel`]) and prepares lights and materials.
+//! 2. [`Sampler`] derives every random number from seed, pixel and sample index.
+//! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
+//! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
+//! 5. [`film`] averages the samples of each tile in a fixed order.
+//!
+//! Every machine computes the same bits: trigonometric functions come from the `libm` crate, or are sums and products
+//! in `warp`.
 
 pub mod accel;
 pub mod aov;
@@ -18,11 +26,13 @@ pub mod error;
 pub mod film;
 mod frame;
 pub mod light_basis;
+mod material_source;
 mod path;
 pub mod ray;
 pub mod render;
 pub mod repaint;
 pub mod sampler;
+pub mod settings;
 pub mod shared_centre;
 pub mod surface_hit;
 mod triangle_record;
@@ -32,12 +42,13 @@ pub mod world;
 pub use accel::{Accel, Hit, InstructionSet, TriangleIndex, TriangleTest};
 pub use bsdf::{Bsdf, BsdfSample};
 pub use emitter::StageLight;
-pub use error::TracerError;
+pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFault, SurfaceFault, TracerError};
 pub use light_basis::{LightBasis, LightGroups};
 pub use ray::Ray;
-pub use render::{LightSampling, Render, RenderSettings, RenderStats, render};
-pub use repaint::{Coat, Repaint};
+pub use render::{Render, RenderStats, render};
+pub use repaint::{Coat, Repaint, render_repainted};
 pub use sampler::Sampler;
-pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_repainted, render_views};
+pub use settings::{LightSampling, RenderSettings};
+pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_views};
 pub use surface_hit::SurfaceHit;
 pub use world::World;

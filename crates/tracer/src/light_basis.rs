@@ -1,60 +1,58 @@
-//! A view's light, apart by where it comes from: one picture a group of lights, of radiance as in the scene.
+//! The light of a view, split by its source: one picture of radiance per group of lights.
 //!
-//! Light is linear in emission, so any other lighting of the same emitters is a weighted sum of these pictures. All of
-//! them come from the same paths, since nothing that a path decides depends on radiance ([`crate::emitter`]).
+//! Light is linear in emission, so any other lighting by the same emitters is a weighted sum of these pictures. All of
+//! them come from the same paths, since no decision along a path depends on radiance ([`crate::emitter`]).
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
 use mateval_scene::reference::LightIndex;
 
-use crate::error::TracerError;
+use crate::error::{ExceededLimit, RequestFault, TracerError};
 
-/// Which lights share a picture.
+/// An assignment of lights to pictures.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LightGroups {
     groups: Vec<Vec<LightIndex>>,
-    /// For each light the place in `groups`.
+    /// For each light, its index in `groups`.
     group_of: Vec<usize>,
 }
 
-/// What a light basis may take unless told otherwise: 2 GiB, which holds two halves of five views of 480 x 270 pixels
+/// The default limit on the memory of a light basis: 2 GiB, which holds two halves of five views of 480 x 270 pixels
 /// with 138 lights.
 pub const DEFAULT_BASIS_BYTES: u64 = 2 << 30;
 
-/// Of one pixel of one picture.
+/// Bytes of one pixel of one picture.
 const PIXEL_BYTES: u64 = size_of::<LinearRgb>() as u64;
 
 impl LightGroups {
-    /// All of `lights` lights in one picture: what a plain render shows.
+    /// All of `lights` lights in one picture, as in a plain render.
     pub fn together(lights: usize) -> Self {
         Self::runs(lights, 1)
     }
 
-    /// Each of `lights` lights in a picture of its own.
+    /// Each of `lights` lights in its own picture.
     pub fn apart(lights: usize) -> Self {
         Self::runs(lights, lights)
     }
 
-    /// Each light in a picture of its own if all pictures of `halves` halves of the cameras' views fit in `bytes`; if
-    /// not, as many runs of neighbours in the scene's list as fit, of nearly equal lengths: [`Self::is_merged`].
+    /// Each light in its own picture, if all pictures for `halves` halves of the cameras' views fit in `bytes`. If not,
+    /// lights that are neighbours in the scene's list share pictures, in as many groups of nearly equal size as fit
+    /// ([`Self::is_merged`]).
     ///
-    /// The bound counts finished pictures, 12 bytes a pixel; tiles in the making come on top, about 60 kB a view, group and
-    /// thread where the views' pixels are of the first one's size, more where they are finer. Fails if one group alone is too large.
+    /// The limit counts finished pictures, 12 bytes a pixel. Unfinished tiles add about 60 kB per view, group and
+    /// thread, or more in views whose pixels are finer than those of the first view. Fails if a single group is too
+    /// large.
     pub fn within(bytes: u64, lights: usize, cameras: &[Camera], halves: usize) -> Result<Self, TracerError> {
         let pixels = |camera: &Camera| u64::from(camera.intrinsics.width) * u64::from(camera.intrinsics.height);
         let group_bytes = PIXEL_BYTES * halves as u64 * cameras.iter().map(pixels).sum::<u64>();
         let room = bytes.checked_div(group_bytes).map_or(lights, |room| room.min(lights as u64) as usize);
         if room == 0 && lights > 0 {
-            return Err(TracerError::Unsupported(format!(
-                "{halves} halves of {} views take {group_bytes} bytes a group of lights, and {bytes} are allowed; \
-                 allow more, or make fewer views at a time",
-                cameras.len()
-            )));
+            return Err(ExceededLimit::BasisBytes { halves, views: cameras.len(), group_bytes, allowed: bytes }.into());
         }
         Ok(Self::runs(lights, room))
     }
 
-    /// `lights` in `count` runs whose lengths differ by one at most, the longer ones first.
+    /// `lights` in `count` runs whose lengths differ by at most one, the longer ones first.
     fn runs(lights: usize, count: usize) -> Self {
         let count = count.min(lights);
         let mut groups = vec![Vec::new(); count];
@@ -70,12 +68,12 @@ impl LightGroups {
         &self.groups
     }
 
-    /// Whether any group holds more than one light, so that their radiances can only rise and fall together.
+    /// Whether any group holds more than one light, so that their radiances can only be scaled together.
     pub fn is_merged(&self) -> bool {
         self.groups.len() < self.group_of.len()
     }
 
-    /// How many lights there are in all.
+    /// The number of lights in all groups.
     pub fn lights(&self) -> usize {
         self.group_of.len()
     }
@@ -91,7 +89,7 @@ fn run_of(light: usize, lights: usize, count: usize) -> usize {
     if light < in_longer { light / (short + 1) } else { longer + (light - in_longer) / short }
 }
 
-/// One view's pictures, one a group of lights, of one size.
+/// The pictures of one view, one per group of lights, all of the same size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightBasis {
     width: usize,
@@ -105,16 +103,16 @@ impl LightBasis {
         Self { width, height, pictures: vec![Picture::filled(width, height, LinearRgb::default()); count] }
     }
 
-    /// Takes pictures of one size. Fails if a size differs.
+    /// Takes pictures of one size. Fails if the size of one differs.
     pub fn new(width: usize, height: usize, pictures: Vec<Picture<LinearRgb>>) -> Result<Self, TracerError> {
         if let Some(other) = pictures.iter().find(|picture| (picture.width(), picture.height()) != (width, height)) {
-            let (w, h) = (other.width(), other.height());
-            return Err(TracerError::Invalid(format!("a picture of {w}x{h} in a light basis of {width}x{height}")));
+            let found = [other.width(), other.height()];
+            return Err(RequestFault::PictureSize { found, expected: [width, height] }.into());
         }
         Ok(Self { width, height, pictures })
     }
 
-    /// Linear radiance of each group.
+    /// Linear radiance, one picture per group.
     pub fn pictures(&self) -> &[Picture<LinearRgb>] {
         &self.pictures
     }
@@ -128,11 +126,12 @@ impl LightBasis {
         self.mix(|_| [1.0; 3])
     }
 
-    /// The view with each group's radiance multiplied by `weights`, a channel. Fails unless there is one a group.
+    /// The view with each group's radiance scaled by its entry of `weights`, per channel. Fails unless `weights` holds
+    /// one entry per group.
     pub fn weighted(&self, weights: &[[f64; 3]]) -> Result<Picture<LinearRgb>, TracerError> {
         if weights.len() != self.pictures.len() {
             let (found, expected) = (weights.len(), self.pictures.len());
-            return Err(TracerError::Invalid(format!("{found} weights for {expected} groups of lights")));
+            return Err(RequestFault::WeightCount { found, expected }.into());
         }
         Ok(self.mix(|group| weights[group]))
     }
@@ -180,7 +179,8 @@ mod tests {
         assert_eq!(lengths(&LightGroups::together(0)), [0; 0]);
     }
 
-    /// 5 views of 100 x 50 pixels in 2 halves are 600,000 bytes a group: 2.4 MB hold four groups, a byte less three.
+    /// 5 views of 100 x 50 pixels in 2 halves take 600,000 bytes a group: 2.4 MB hold four groups, one byte less holds
+    /// three.
     #[test]
     fn the_bound_merges_lights_and_says_so() {
         let within = |bytes| LightGroups::within(bytes, 10, &cameras(), 2);

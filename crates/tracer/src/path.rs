@@ -1,36 +1,36 @@
-//! Paths of light, followed backwards from the camera.
+//! Path tracing from the camera.
 //!
-//! At every surface one emitter is sampled (next-event estimation) and one direction of the surface's own; the two ways of
-//! finding light are weighed against each other by the power heuristic (Veach 1997, section 9.2). Nothing is clamped.
+//! At every surface the tracer samples one emitter (next-event estimation) and one direction of the BSDF, and combines
+//! both by multiple importance sampling with the power heuristic (Veach 1997, section 9.2). Nothing is clamped.
 
 use glam::{Vec2, Vec3};
 use mateval_scene::reference::LightIndex;
 
 use crate::accel::Hit;
-use crate::bsdf::{Bsdf, Shown};
+use crate::bsdf::{Bsdf, BsdfPart};
 use crate::emitter::Emitted;
+use crate::material_source::MaterialSource;
 use crate::ray::Ray;
-use crate::render::{LightSampling, RenderSettings};
-use crate::repaint::Repaint;
 use crate::sampler::Sampler;
+use crate::settings::{LightSampling, RenderSettings};
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
-/// The most predictions that the same paths are followed for.
-pub(crate) const TOGETHER: usize = 8;
+/// The largest number of material variants that one path can serve.
+pub(crate) const MOST_VARIANTS: usize = 8;
 
-/// What paths had to leave out or would have to explain.
+/// Events counted along paths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathCounts {
     pub(crate) rays: u64,
     pub(crate) shadow_rays: u64,
     pub(crate) capped: u64,
-    /// By prediction, as all that follows.
-    pub(crate) capped_throughput: [f64; TOGETHER],
-    pub(crate) not_finite: [u64; TOGETHER],
+    /// Per variant, like `not_finite`.
+    pub(crate) capped_throughput: [f64; MOST_VARIANTS],
+    pub(crate) not_finite: [u64; MOST_VARIANTS],
 }
 
-/// The last scattering: where the ray started and how likely its direction was.
+/// The last scattering event: its position, and the density of the direction sampled there.
 #[derive(Clone, Copy)]
 struct Scattered {
     from: Vec3,
@@ -38,84 +38,77 @@ struct Scattered {
     delta: bool,
 }
 
-/// Predictions that paths look at in place of the world's own materials.
-#[derive(Clone, Copy)]
-pub(crate) struct Painted<'w> {
-    pub(crate) repaint: &'w Repaint,
-    /// Of the `K` predictions that are followed.
-    pub(crate) first: usize,
-}
-
-/// A path under way, for `K` base colours.
+/// A path in progress, for `K` material variants.
 #[derive(Clone, Copy)]
 struct Path<const K: usize> {
-    /// Its place among the starts.
+    /// Index of the path's start.
     which: usize,
     sampler: Sampler,
     throughputs: [Vec3; K],
-    /// As `throughputs`, for the lights of a stage that the ray meets.
+    /// Like `throughputs`, for stage lights that the ray meets.
     stage_throughputs: [Vec3; K],
-    /// None on the camera's ray.
+    /// `None` on the camera ray.
     scattered: Option<Scattered>,
 }
 
-/// A path that has met a surface, which is not a lamp alone, and may scatter there.
+/// A path that has met a surface at which it may scatter. A lamp hidden from the camera is no such surface.
 struct Arrival<const K: usize> {
     path: Path<K>,
     place: SurfaceHit,
-    /// In the atlas; of no meaning without predictions.
+    /// The uv that the material source returned when it prefetched texels.
     uv: Vec2,
-    /// Towards where the path came from.
+    /// Towards the previous vertex of the path.
     wo: Vec3,
 }
 
-/// Light of a path that counts unless its shadow ray is stopped.
-struct Offer<const K: usize> {
+/// Sampled light that counts unless its shadow ray is blocked.
+struct LightSample<const K: usize> {
     which: usize,
     sampler: Sampler,
     light: LightIndex,
     values: [Vec3; K],
 }
 
-/// Follows paths, all those of a batch by one scattering at a time: each step asks early for the memory of the next, which
-/// a path alone would have to wait for. Keeps its room from one batch to the next.
+/// Traces batches of paths, one scattering of all paths at a time. Each step prefetches the memory of the next one, for
+/// which a single path would have to wait. Buffers are reused between batches.
 ///
-/// With predictions `K` of them are followed by the same paths, each with the numbers that it would have alone.
-pub(crate) struct PathTracer<'w, const K: usize = 1> {
+/// The same paths serve `K` variants of the `materials`, with the same random numbers for each variant as if it were
+/// traced alone.
+pub(crate) struct PathTracer<'w, M, const K: usize> {
     world: &'w World,
-    painted: Option<Painted<'w>>,
-    settings: &'w RenderSettings,
+    materials: M,
+    settings: RenderSettings,
     pub(crate) counts: PathCounts,
     paths: Vec<Path<K>>,
-    /// Of `paths`, one each.
+    /// One for each of `paths`.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     arrivals: Vec<Arrival<K>>,
-    offers: Vec<Offer<K>>,
-    /// Of `offers`, one each.
+    light_samples: Vec<LightSample<K>>,
+    /// One for each of `light_samples`.
     shadow_rays: Vec<Ray>,
-    stopped: Vec<bool>,
+    blocked: Vec<bool>,
 }
 
-impl<'w, const K: usize> PathTracer<'w, K> {
-    pub(crate) fn new(world: &'w World, painted: Option<Painted<'w>>, settings: &'w RenderSettings) -> Self {
+impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
+    pub(crate) fn new(world: &'w World, materials: M, settings: RenderSettings) -> Self {
         Self {
             world,
-            painted,
+            materials,
             settings,
             counts: PathCounts::default(),
             paths: Vec::new(),
             rays: Vec::new(),
             hits: Vec::new(),
             arrivals: Vec::new(),
-            offers: Vec::new(),
+            light_samples: Vec::new(),
             shadow_rays: Vec::new(),
-            stopped: Vec::new(),
+            blocked: Vec::new(),
         }
     }
 
-    /// Follows the paths that begin with `starts` and calls `add` for every light that one of them finds: with its place
-    /// among the starts, the light, and what that contributes. For each path the order of calls is that along the path.
+    /// Traces the paths that begin with `starts` and calls `add` for every contribution, with the index of the start,
+    /// the light and its value for each variant. Calls for one path come in order along the path.
     pub(crate) fn trace(
         &mut self,
         starts: impl IntoIterator<Item = (Sampler, Ray)>,
@@ -132,114 +125,108 @@ impl<'w, const K: usize> PathTracer<'w, K> {
         while !self.paths.is_empty() {
             self.arrive(scatterings, &mut add);
             self.scatter(scatterings);
-            self.take_offers(scatterings, &mut add);
+            self.add_unblocked(scatterings, &mut add);
             scatterings += 1;
         }
     }
 
-    /// Follows all rays to their ends and adds what they find there.
+    /// Traces all rays, adds the light that they meet and records where they arrive.
     fn arrive(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, [Vec3; K])) {
         self.counts.rays += self.rays.len() as u64;
         let paths = &self.paths;
+        // Find the nearest hits, and prefetch what shading reads of their triangles.
         self.world.closest_many(&self.rays, |which| paths[which].sampler.salt(2 * scatterings), &mut self.hits);
-        if let Some(Painted { repaint, .. }) = self.painted {
-            self.hits.iter().flatten().for_each(|hit| repaint.prefetch(hit));
-        }
+        self.hits.iter().flatten().for_each(|hit| self.materials.prefetch(hit));
         self.arrivals.clear();
-        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
+        let mut contributions =
+            Contributions { world: self.world, settings: &self.settings, counts: &mut self.counts, add };
         let on_stage = self.world.emitters().are_on_stage();
         for ((path, ray), hit) in self.paths.drain(..).zip(&self.rays).zip(&self.hits) {
+            // Add the light that the ray meets: of a stage, from outside the scene, or of the surface.
             if on_stage {
-                found.add_stage(&path, ray, hit.map_or(f32::INFINITY, |hit| hit.distance));
+                contributions.add_stage(&path, ray, hit.map_or(f32::INFINITY, |hit| hit.distance));
             }
             let Some(hit) = hit else {
-                found.add_outside(&path, ray.direction());
+                contributions.add_outside(&path, ray.direction());
                 continue;
             };
             let place = self.world.surface_hit(hit);
-            let is_lamp_alone = found.add_emitted(&path, &place, ray);
+            let is_lamp_alone = contributions.add_emitted(&path, &place, ray);
             if is_lamp_alone {
                 continue;
             }
+            // Stop paths that have scattered often enough.
             if scatterings > self.settings.max_bounces {
-                found.counts.capped += 1;
-                for (sum, throughput) in found.counts.capped_throughput.iter_mut().zip(path.throughputs) {
+                contributions.counts.capped += 1;
+                for (sum, throughput) in contributions.counts.capped_throughput.iter_mut().zip(path.throughputs) {
                     *sum += f64::from(throughput.element_sum() / 3.0);
                 }
                 continue;
             }
-            let uv = match self.painted {
-                Some(Painted { repaint, first }) => {
-                    let uv = repaint.uv(hit);
-                    repaint.prefetch_texels::<K>(first, place.surface.0, uv);
-                    uv
-                }
-                None => {
-                    self.world.prefetch_texels(&place);
-                    Vec2::ZERO
-                }
-            };
+            // Prefetch texels; they are read in `scatter`.
+            let uv = self.materials.prefetch_texels(hit, &place);
             self.arrivals.push(Arrival { path, place, uv, wo: -ray.direction() });
         }
     }
 
-    /// Looks for light from where paths have arrived, and sends them on.
+    /// Samples an emitter and the next ray at every arrival.
     fn scatter(&mut self, scatterings: u32) {
         self.rays.clear();
-        self.offers.clear();
+        self.light_samples.clear();
         self.shadow_rays.clear();
         for Arrival { path, place, uv, wo } in self.arrivals.drain(..) {
-            let painted = self.painted;
-            let paint = painted.and_then(|painted| painted.repaint.at::<K>(painted.first, place.surface.0, uv));
-            let bsdf = match &paint {
-                Some(paint) => Bsdf::repainted(paint, &place, wo),
-                None => Bsdf::own(self.world, &place, wo),
-            };
+            let bsdf = self.materials.bsdf(&place, uv, wo);
             if bsdf.is_black() {
                 continue;
             }
+            // Sample an emitter; the shadow ray waits until all paths have got here.
             if self.settings.light_sampling != LightSampling::Bsdf
-                && let Some((ray, offer)) = offered(self.world, self.settings, &path, &bsdf, &place, scatterings)
+                && let Some((ray, light_sample)) =
+                    sample_light(self.world, &self.settings, &path, &bsdf, &place, scatterings)
             {
                 self.counts.shadow_rays += 1;
-                self.offers.push(offer);
+                self.light_samples.push(light_sample);
                 self.shadow_rays.push(ray);
             }
-            if let Some((path, ray)) = scattered(self.world, self.settings, path, &bsdf, &place, scatterings) {
+            // Sample the direction in which the path continues.
+            if let Some((path, ray)) = sample_continuation(self.world, &self.settings, path, &bsdf, &place, scatterings)
+            {
                 self.paths.push(path);
                 self.rays.push(ray);
             }
         }
     }
 
-    /// Adds the light on offer that nothing is in the way of.
-    fn take_offers(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, [Vec3; K])) {
-        let offers = &self.offers;
-        let salt = |which: usize| offers[which].sampler.salt(2 * scatterings + 1);
-        self.world.occluded_many(&self.shadow_rays, salt, &mut self.stopped);
-        let mut found = Found { world: self.world, settings: self.settings, counts: &mut self.counts, add };
-        for (offer, _) in self.offers.iter().zip(&self.stopped).filter(|(_, stopped)| !**stopped) {
-            found.contribute(offer.which, offer.light, offer.values);
+    /// Adds sampled light whose shadow ray is not blocked.
+    fn add_unblocked(&mut self, scatterings: u32, add: &mut impl FnMut(usize, LightIndex, [Vec3; K])) {
+        let light_samples = &self.light_samples;
+        let salt = |which: usize| light_samples[which].sampler.salt(2 * scatterings + 1);
+        self.world.occluded_many(&self.shadow_rays, salt, &mut self.blocked);
+        let mut contributions =
+            Contributions { world: self.world, settings: &self.settings, counts: &mut self.counts, add };
+        for (light_sample, _) in self.light_samples.iter().zip(&self.blocked).filter(|(_, blocked)| !**blocked) {
+            contributions.contribute(light_sample.which, light_sample.light, light_sample.values);
         }
     }
 }
 
-/// Samples an emitter: the ray that asks whether anything is in between, and what its light would add.
-fn offered<const K: usize>(
+/// Samples an emitter: returns the shadow ray and the light that arrives unless that ray is blocked.
+fn sample_light<const K: usize>(
     world: &World,
     settings: &RenderSettings,
     path: &Path<K>,
     bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
     scatterings: u32,
-) -> Option<(Ray, Offer<K>)> {
+) -> Option<(Ray, LightSample<K>)> {
     if bsdf.is_delta() {
         return None;
     }
+    // Sample a light and evaluate the BSDF towards it.
     let [a, b, c, _] = path.sampler.set(1 + 2 * scatterings);
     let light = world.emitters().sample(place.position, [a, b, c], |place| world.opacity_at(place))?;
-    let shown = if light.on_stage { Shown::Stage } else { Shown::All };
-    let (values, density) = bsdf.evaluate_all(light.direction, shown);
+    let part = if light.on_stage { BsdfPart::Stage } else { BsdfPart::All };
+    let (values, density) = bsdf.evaluate_all(light.direction, part);
     if values == [Vec3::ZERO; K] {
         return None;
     }
@@ -247,18 +234,19 @@ fn offered<const K: usize>(
         Some(there) => place.spawn_to(there)?,
         None => place.spawn(light.direction),
     };
+    // Weigh the sample against finding the same light by a BSDF sample.
     let weight = match settings.light_sampling {
         LightSampling::Emitters => 1.0,
         _ => power_heuristic(light.density, density),
     };
-    let brought = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
-    let values = std::array::from_fn(brought);
-    Some((shadow, Offer { which: path.which, sampler: path.sampler, light: light.light, values }))
+    let contribution = |k: usize| path.throughputs[k] * values[k] * light.radiance * (weight / light.density);
+    let values = std::array::from_fn(contribution);
+    Some((shadow, LightSample { which: path.which, sampler: path.sampler, light: light.light, values }))
 }
 
-/// The path and the ray that it goes on with. Roulette stops paths with a fixed probability, whatever they carry: so the
-/// length of paths follows from geometry alone.
-fn scattered<const K: usize>(
+/// Samples the ray on which the path continues. Russian roulette has a fixed survival probability that does not depend
+/// on the throughput, so path lengths follow from geometry alone.
+fn sample_continuation<const K: usize>(
     world: &World,
     settings: &RenderSettings,
     mut path: Path<K>,
@@ -266,6 +254,7 @@ fn scattered<const K: usize>(
     place: &SurfaceHit,
     scatterings: u32,
 ) -> Option<(Path<K>, Ray)> {
+    // Play Russian roulette.
     let [a, b, c, roulette] = path.sampler.set(2 + 2 * scatterings);
     if scatterings >= settings.roulette_start {
         if roulette >= settings.roulette_survival {
@@ -273,6 +262,7 @@ fn scattered<const K: usize>(
         }
         path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
+    // Sample a direction; the weights of stage lights leave out smooth facets.
     let sample = bsdf.sample([a, b, c])?;
     if world.emitters().are_on_stage() {
         let weights = bsdf.stage_weights(&sample);
@@ -286,17 +276,17 @@ fn scattered<const K: usize>(
     Some((path, place.spawn(sample.wi)))
 }
 
-/// Where what paths find goes.
-struct Found<'a, const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> {
+/// Collects the contributions of paths.
+struct Contributions<'a, const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> {
     world: &'a World,
     settings: &'a RenderSettings,
     counts: &'a mut PathCounts,
     add: &'a mut F,
 }
 
-impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
-    /// Adds what the surface itself sends back along `ray`. True if the surface is nothing but a lamp to this ray: an
-    /// emitter hidden from the camera shows the camera its material and every other ray its light alone.
+impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Contributions<'_, K, F> {
+    /// Adds the light that the surface emits back along `ray`. Returns true if the surface is only a lamp to this ray:
+    /// an emitter hidden from the camera shows the camera its material and every other ray its light alone.
     fn add_emitted(&mut self, path: &Path<K>, place: &SurfaceHit, ray: &Ray) -> bool {
         let emitters = self.world.emitters();
         let Some(light) = emitters.light_of(place.surface) else { return false };
@@ -311,7 +301,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
         hidden
     }
 
-    /// Adds the lights of a stage that the ray passes before it meets a surface, which is `end` metres away.
+    /// Adds the stage lights that the ray passes before it meets a surface `end` metres away.
     fn add_stage(&mut self, path: &Path<K>, ray: &Ray, end: f32) {
         let Some(Scattered { from, .. }) = path.scattered else { return };
         for emitted in self.world.emitters().stage_along(&Ray::new(ray.origin(), ray.direction(), end), from) {
@@ -328,7 +318,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
         }
     }
 
-    /// Adds light that the surface's own sampling found.
+    /// Adds light that a BSDF sample (or the camera ray) has met.
     fn add_met(&mut self, path: &Path<K>, throughputs: [Vec3; K], emitted: &Emitted) {
         let weight = match (path.scattered, self.settings.light_sampling) {
             (None | Some(Scattered { delta: true, .. }), _) | (_, LightSampling::Bsdf) => 1.0,
@@ -340,7 +330,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     }
 
     fn contribute(&mut self, which: usize, light: LightIndex, values: [Vec3; K]) {
-        // One prediction's accident is not the others'.
+        // A value that is not finite in one variant does not spoil the others.
         let finite = values.map(|value| if value.is_finite() { value } else { Vec3::ZERO });
         let counts = self.counts.not_finite.iter_mut().zip(values);
         counts.for_each(|(count, value)| *count += u64::from(!value.is_finite()));
@@ -348,7 +338,7 @@ impl<const K: usize, F: FnMut(usize, LightIndex, [Vec3; K])> Found<'_, K, F> {
     }
 }
 
-/// Veach's power heuristic with exponent 2, for one sample each; safe where a density is infinite.
+/// Veach's power heuristic with exponent 2, for one sample of each strategy. An infinite density is allowed.
 fn power_heuristic(own: f32, other: f32) -> f32 {
     if own == f32::INFINITY {
         return 1.0;

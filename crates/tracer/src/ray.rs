@@ -1,13 +1,13 @@
-//! A ray, made by one constructor.
+//! A ray, and the only way to construct one.
 
 use glam::Vec3;
 
-/// Unit vectors stay below it with room to spare.
+/// Unit vectors stay well below this.
 const LARGEST_DIRECTION: f32 = 1e3;
-/// Farther out, f32 could not tell the corners of any scene that is accepted apart; and products stay finite.
+/// Beyond this, f32 could not distinguish the corners of any accepted scene; below it, products stay finite.
 const FARTHEST_ORIGIN: f32 = 1e15;
 
-/// A half-line or a piece of one, in world space.
+/// A half-line or line segment in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     origin: Vec3,
@@ -17,39 +17,39 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// From `origin` along `direction` (unit length) for `max_distance` metres, which may be infinite.
+    /// A ray from `origin` along `direction` (unit length) for `max_distance` metres, which may be infinite.
     ///
-    /// The only way to make a ray. It turns negative zeros into zeros. A ray whose direction is zero or not finite, or
-    /// whose origin is not finite or beyond 1e15 m, hits nothing.
+    /// This is the only constructor. It turns negative zeros into zeros. A ray whose direction is zero or not finite,
+    /// or whose origin is not finite or beyond 1e15 m, hits nothing.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3, max_distance: f32) -> Self {
-        // Infinities and NaN are not below either bound.
+        // Infinities and NaN fail both comparisons.
         let usable = origin.abs().cmple(Vec3::splat(FARTHEST_ORIGIN)).all()
             && direction.abs().cmple(Vec3::splat(LARGEST_DIRECTION)).all()
             && direction != Vec3::ZERO;
-        // -0.0 + 0.0 is +0.0; every other number stays as it is.
+        // -0.0 + 0.0 is +0.0; every other number is unchanged.
         Self { origin: origin + Vec3::ZERO, direction: direction + Vec3::ZERO, max_distance, usable }
     }
 
-    /// From `origin` along `direction`, without end.
+    /// A ray from `origin` along `direction` without end.
     #[inline]
     pub fn endless(origin: Vec3, direction: Vec3) -> Self {
         Self::new(origin, direction, f32::INFINITY)
     }
 
-    /// Where it starts.
+    /// The origin.
     #[inline]
     pub fn origin(&self) -> Vec3 {
         self.origin
     }
 
-    /// Where it goes.
+    /// The direction.
     #[inline]
     pub fn direction(&self) -> Vec3 {
         self.direction
     }
 
-    /// Hits beyond this distance do not count, in metres.
+    /// The distance beyond which hits do not count, in metres.
     #[inline]
     pub fn max_distance(&self) -> f32 {
         self.max_distance

@@ -1,4 +1,4 @@
-//! Pictures of a world's light.
+//! Renders one view as a single picture.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -8,90 +8,89 @@ use mateval_scene::Camera;
 
 use crate::error::TracerError;
 use crate::film::{self, Tile};
+use crate::material_source::OwnMaterials;
 use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
 use crate::sampler::Sampler;
+use crate::settings::RenderSettings;
 use crate::world::World;
 
-/// How light is looked for. All three have the same mean; they differ in noise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum LightSampling {
-    /// Emitters are sampled and surfaces too, weighed by the power heuristic.
-    #[default]
-    Both,
-    /// Emitters are sampled; what a scattered ray meets counts only after a mirror or clear glass.
-    Emitters,
-    /// Emitters are found by scattered rays alone.
-    Bsdf,
-}
-
-/// How a picture is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RenderSettings {
-    /// Paths a pixel.
-    pub samples: u32,
-    /// Two seeds make two independent pictures.
-    pub seed: u64,
-    /// Scatterings beyond the first that a path may have before its last piece of direct light: Blender's "max bounces";
-    /// Mitsuba's `max_depth` is 2 more.
-    pub max_bounces: u32,
-    /// From this bounce on, paths end by chance.
-    pub roulette_start: u32,
-    /// The probability to go on then, above 0 and up to 1.
-    pub roulette_survival: f32,
-    /// How light is looked for.
-    pub light_sampling: LightSampling,
-}
-
-impl Default for RenderSettings {
-    fn default() -> Self {
-        Self {
-            samples: 64,
-            seed: 0,
-            max_bounces: 16,
-            roulette_start: 4,
-            roulette_survival: 0.8,
-            light_sampling: LightSampling::Both,
-        }
-    }
-}
-
-/// What happened on the way.
+/// Counts of what happened along the paths of a render.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RenderStats {
     /// Paths started.
     pub paths: u64,
-    /// Rays that looked for the nearest surface.
+    /// Rays that searched for the nearest surface.
     pub rays: u64,
-    /// Rays that asked whether an emitter is seen.
+    /// Shadow rays: those that tested whether an emitter is visible.
     pub shadow_rays: u64,
-    /// Share of paths that `max_bounces` cut.
+    /// Share of paths that `max_bounces` ended.
     pub capped_share: f64,
-    /// What those still carried, averaged over all paths: times the radiance around them, the most that is missing.
+    /// Throughput of the paths that `max_bounces` ended, averaged over all paths. Times the radiance around them, it
+    /// bounds the light that is missing.
     pub capped_throughput: f64,
-    /// Contributions left out because they were not finite: each is a bug.
+    /// Contributions left out because they were not finite. Each is a bug.
     pub not_finite: u64,
 }
 
-/// A picture and what happened on the way to it.
+/// A picture and the counts of its render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Render {
     /// Linear radiance.
     pub picture: Picture<LinearRgb>,
-    /// What happened.
+    /// Counts of the render.
     pub stats: RenderStats,
 }
 
-/// Renders what `camera` sees. `progress` is told, from any thread, how many tiles of how many are done.
+/// Renders what `camera` sees. `progress` is called from any thread with the number of finished tiles and their total.
 ///
-/// The same bytes for any number of threads of the current rayon pool. Fails for settings that make no sense.
+/// The bytes of the picture are the same for any number of threads in the current rayon pool. Fails if a setting is out
+/// of range.
+///
+/// # Examples
+///
+/// A grey wall in uniform light of radiance 1 reflects half of it:
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use glam::{DVec3, Vec3};
+/// use mateval_scene::material::{ColorInput, Material, MaterialModel};
+/// use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface};
+/// use mateval_scene::{Camera, Intrinsics, TriangleMesh};
+/// use mateval_tracer::{RenderSettings, World, render};
+///
+/// let mesh = TriangleMesh {
+///     positions: vec![Vec3::new(-9.0, -9.0, -2.0), Vec3::new(9.0, -9.0, -2.0), Vec3::new(0.0, 9.0, -2.0)],
+///     triangles: vec![[0, 1, 2]],
+///     ..Default::default()
+/// };
+/// let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
+/// let grey = Material { name: "grey".into(), model, two_sided: true, opacity: None, bump: None };
+/// let sky = Emission::Constant { radiance: [1.0; 3] };
+/// let world = World::new(Arc::new(ReferenceScene {
+///     surfaces: vec![Surface { name: "wall".into(), mesh, material: MaterialIndex(0) }],
+///     materials: vec![grey],
+///     lights: vec![LightGroup { name: "sky".into(), emission: sky, camera_visible: true }],
+///     ..Default::default()
+/// }))?;
+///
+/// let intrinsics = Intrinsics::from_fov_x(8, 8, 0.5);
+/// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
+/// let settings = RenderSettings { samples: 16, ..Default::default() };
+/// let picture = render(&world, &camera, &settings, &|_finished, _total| ())?.picture;
+///
+/// let mean = picture.pixels().iter().map(|pixel| pixel.0[0]).sum::<f32>() / 64.0;
+/// assert!((mean - 0.5).abs() < 0.02, "{mean}");
+/// # Ok::<(), mateval_tracer::TracerError>(())
+/// ```
 pub fn render(
     world: &World,
     camera: &Camera,
     settings: &RenderSettings,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Render, TracerError> {
-    check(settings)?;
+    settings.check()?;
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
     let total = film::tiles(width, height).len();
     let finished = AtomicUsize::new(0);
@@ -105,19 +104,9 @@ pub fn render(
     Ok(Render { picture, stats: stats(paths, &counts, 0) })
 }
 
-pub(crate) fn check(settings: &RenderSettings) -> Result<(), TracerError> {
-    let RenderSettings { samples, roulette_survival, .. } = *settings;
-    if samples == 0 || !(roulette_survival > 0.0 && roulette_survival <= 1.0) {
-        return Err(TracerError::Invalid(format!(
-            "{samples} samples, roulette survival {roulette_survival}; expected at least 1, and above 0 up to 1"
-        )));
-    }
-    Ok(())
-}
-
-/// The means of the pixels' samples. Each batch of paths holds one a pixel.
+/// The mean of each pixel's samples. A batch of paths holds one path per pixel.
 fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile: &Tile) -> (Vec<[f64; 3]>, PathCounts) {
-    let mut tracer = PathTracer::<1>::new(world, None, settings);
+    let mut tracer = PathTracer::<_, 1>::new(world, OwnMaterials(world), *settings);
     let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
     for index in 0..settings.samples {
         let starts = tile.pixels().map(|[x, y]| {
@@ -138,10 +127,10 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
     (sums, tracer.counts)
 }
 
-/// Of one of the predictions that the paths were followed for.
-pub(crate) fn stats(paths: u64, tiles: &[PathCounts], prediction: usize) -> RenderStats {
+/// Sums the counts of all tiles, for one of the variants that share the paths.
+pub(crate) fn stats(paths: u64, tiles: &[PathCounts], variant: usize) -> RenderStats {
     let sum = |count: fn(&PathCounts) -> u64| tiles.iter().map(count).sum::<u64>();
-    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[prediction]).sum();
+    let capped_throughput: f64 = tiles.iter().map(|tile| tile.capped_throughput[variant]).sum();
     let all = paths.max(1) as f64;
     RenderStats {
         paths,
@@ -149,6 +138,6 @@ pub(crate) fn stats(paths: u64, tiles: &[PathCounts], prediction: usize) -> Rend
         shadow_rays: sum(|tile| tile.shadow_rays),
         capped_share: sum(|tile| tile.capped) as f64 / all,
         capped_throughput: capped_throughput / all,
-        not_finite: tiles.iter().map(|tile| tile.not_finite[prediction]).sum(),
+        not_finite: tiles.iter().map(|tile| tile.not_finite[variant]).sum(),
     }
 }

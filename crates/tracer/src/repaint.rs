@@ -1,37 +1,46 @@
-//! Predictions on the surfaces of a world, in place of its own materials.
+//! Predicted materials on the surfaces of a world, in place of its own.
 //!
-//! Geometry, opacities, lights and what has no atlas (glass) stay the world's. What a path decides depends on roughness
-//! and metallic and on no base colour, so predictions that differ in base colour alone are followed by the same paths.
+//! Geometry, opacities, lights and surfaces without an atlas (glass) stay as they are in the world. The decisions along
+//! a path depend on roughness and metallic but never on base colour, so predictions that differ in base colour alone
+//! share their paths.
 
 use std::array::from_fn;
+use std::ops::Range;
 
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
-use mateval_scene::TriangleMesh;
 use mateval_scene::material::PrincipledFlavour;
+use mateval_scene::reference::{Surface, SurfaceIndex};
+use mateval_scene::{Camera, TriangleMesh};
 
 use crate::accel::{Hit, prefetch, prefetch_line};
-use crate::bsdf::{BlenderTables, Principled, eta_from_specular};
-use crate::error::TracerError;
+use crate::bsdf::{BlenderTables, Bsdf, Principled, eta_from_specular};
+use crate::error::{RequestFault, TracerError};
+use crate::material_source::MaterialSource;
+use crate::path::MOST_VARIANTS;
+use crate::settings::RenderSettings;
+use crate::shared_centre::{Lighting, Progress, Subject, ViewsJob, ViewsRender};
+use crate::surface_hit::SurfaceHit;
 use crate::world::World;
 
-/// One surface's atlas: several base colours over one roughness and metallic. Values are clipped to 0..1 when looked up.
+/// The maps of one surface: several base colours over one roughness and metallic. Values are clamped to 0..1 when
+/// looked up.
 #[derive(Clone, Debug)]
 pub struct Coat {
-    /// Linear at lookup, one a prediction.
+    /// One per prediction; lookups return linear values.
     pub base_colors: Vec<Texture>,
-    /// Perceptual; the first channel counts.
+    /// Perceptual roughness, in the first channel.
     pub roughness: Texture,
-    /// The first channel counts.
+    /// Metallic, in the first channel.
     pub metallic: Texture,
 }
 
-/// Predictions for all surfaces of a world.
+/// Predictions for the surfaces of a world.
 #[derive(Debug)]
 pub struct Repaint {
-    /// By surface; none keeps the world's own material.
+    /// One per surface; `None` keeps the world's own material.
     coats: Vec<Option<Coat>>,
-    /// Of all triangles of the world, surface by surface.
+    /// The atlas uvs of all triangles of the world, surface by surface.
     uvs: Vec<[Vec2; 3]>,
     predictions: usize,
     flavour: PrincipledFlavour,
@@ -39,87 +48,45 @@ pub struct Repaint {
     tables: BlenderTables,
 }
 
-/// What is painted at one place, for `K` base colours.
-pub(crate) struct PaintAt<'a, const K: usize> {
-    pub(crate) principled: Principled<'a>,
-    pub(crate) base_colors: [Vec3; K],
+/// A world's surfaces with predicted materials. The variants are the predictions from `first` on.
+#[derive(Clone, Copy)]
+struct Painted<'w> {
+    world: &'w World,
+    repaint: &'w Repaint,
+    first: usize,
 }
 
-/// Disney's `specular` of predictions: an index of refraction of 1.5.
+/// Disney's `specular` of predictions, an index of refraction of 1.5.
 const SPECULAR: f32 = 0.5;
 
 impl Repaint {
-    /// Paints `world` with `coats`, looked up by the uv of `atlases`; both one a surface.
+    /// Predictions for `world`. Both `atlases` and `coats` hold one entry per surface; coats are looked up at the uvs
+    /// of the atlases.
     ///
-    /// Fails where the atlases' triangles are not the world's, a painted mesh has no uv, coats hold different numbers of
-    /// base colours, or none.
+    /// Fails if the triangles of the atlases are not the world's, if the atlas of a coat has no uv, or if coats hold
+    /// different numbers of base colours, or none.
     pub fn new(
         world: &World,
         atlases: &[TriangleMesh],
         coats: Vec<Option<Coat>>,
         flavour: PrincipledFlavour,
     ) -> Result<Self, TracerError> {
-        let surfaces = &world.scene().surfaces;
-        let fits = atlases.len() == surfaces.len()
-            && coats.len() == surfaces.len()
-            && atlases.iter().zip(surfaces).all(|(mesh, s)| mesh.triangles.len() == s.mesh.triangles.len());
-        if !fits {
-            return Err(TracerError::Invalid("the atlases are not of the world's triangles".into()));
-        }
-        let predictions = coats.iter().flatten().map(|coat| coat.base_colors.len()).max().unwrap_or(1);
-        if let Some(coat) = coats.iter().flatten().find(|coat| coat.base_colors.len() != predictions) {
-            let found = coat.base_colors.len();
-            return Err(TracerError::Invalid(format!("{found} base colours on one surface, {predictions} on another")));
-        }
-        if predictions == 0 {
-            return Err(TracerError::Invalid("no base colours to paint with".into()));
-        }
-        let unmapped = coats.iter().zip(atlases).position(|(coat, mesh)| coat.is_some() && !has_uvs(mesh));
-        if let Some(index) = unmapped {
-            let name = &surfaces[index].name;
-            return Err(TracerError::Invalid(format!("surface {index} '{name}': a coat for a mesh without sound uv")));
-        }
+        let predictions = check_coats(&world.scene().surfaces, atlases, &coats)?;
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
         let eta = eta_from_specular(SPECULAR);
         Ok(Self { coats, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
     }
 
-    /// How many predictions there are.
+    /// The number of predictions.
     pub fn predictions(&self) -> usize {
         self.predictions
     }
 
-    /// How many surfaces there are, painted or not.
-    pub(crate) fn surfaces(&self) -> usize {
-        self.coats.len()
-    }
-
-    /// Asks for the memory that [`Self::at`] reads first.
-    pub(crate) fn prefetch(&self, hit: &Hit) {
-        prefetch(&self.uvs[hit.global as usize]);
-    }
-
-    /// The place in the atlas of a hit.
-    pub(crate) fn uv(&self, hit: &Hit) -> Vec2 {
-        let [a, b, c] = self.uvs[hit.global as usize];
-        a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
-    }
-
-    /// Asks for the texels that [`Self::at`] reads.
-    pub(crate) fn prefetch_texels<const K: usize>(&self, first: usize, surface: usize, uv: Vec2) {
-        let Some(coat) = &self.coats[surface] else { return };
-        let colors = coat.base_colors[first..].iter().take(K);
-        for texture in colors.chain([&coat.roughness, &coat.metallic]) {
-            texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
-        }
-    }
-
-    /// What predictions `first..first + K` say of a place; those beyond the last say what the last does. None where the
-    /// world's own material stays.
-    pub(crate) fn at<const K: usize>(&self, first: usize, surface: usize, uv: Vec2) -> Option<PaintAt<'_, K>> {
-        let coat = self.coats[surface].as_ref()?;
+    /// The principled material of a coat at `uv`, and the base colours of predictions `first..first + K` there.
+    /// Predictions beyond the last repeat it.
+    fn look_up<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> (Principled<'_>, [Vec3; K]) {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
-        let base_colors = from_fn(|k| {
+        let base_colors: [Vec3; K] = from_fn(|k| {
             let texture = &coat.base_colors[(first + k).min(self.predictions - 1)];
             Vec3::from_array(texture.sample(uv.to_array())).clamp(Vec3::ZERO, Vec3::ONE)
         });
@@ -130,8 +97,113 @@ impl Repaint {
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
         };
-        Some(PaintAt { principled, base_colors })
+        (principled, base_colors)
     }
+}
+
+impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
+    fn prefetch(self, hit: &Hit) {
+        prefetch(&self.repaint.uvs[hit.global as usize]);
+    }
+
+    /// Returns the uv in the atlas.
+    fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2 {
+        let [a, b, c] = self.repaint.uvs[hit.global as usize];
+        let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
+        if let Some(coat) = &self.repaint.coats[place.surface.0] {
+            let colors = coat.base_colors[self.first..].iter().take(K);
+            for texture in colors.chain([&coat.roughness, &coat.metallic]) {
+                texture.addresses(uv.to_array()).into_iter().for_each(prefetch_line);
+            }
+        }
+        uv
+    }
+
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3) -> Bsdf<'w, K> {
+        let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
+        let (principled, base_colors) = self.repaint.look_up(coat, self.first, uv);
+        Bsdf::of_principled(principled, &base_colors, place, wo)
+    }
+}
+
+/// [`crate::render_views`] with predictions in place of the world's own materials. Returns one render for each
+/// prediction of the range `which`.
+///
+/// Up to eight predictions share their paths. The bytes of each render are the same as if its prediction were rendered
+/// alone. Fails as [`crate::render_views`] does, and if `which` exceeds the predictions of `repaint`, or if mixes do
+/// not match predictions and lights.
+#[allow(clippy::too_many_arguments)] // what, from where, by what light, how: none belongs to another
+pub fn render_repainted(
+    world: &World,
+    repaint: &Repaint,
+    which: Range<usize>,
+    cameras: &[Camera],
+    lighting: Lighting<'_>,
+    settings: &RenderSettings,
+    seeds: &[u64],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<ViewsRender>, TracerError> {
+    // Check everything before the first path.
+    check_predictions(world, repaint, &which)?;
+    let subject = |first| Subject { world, materials: Painted { world, repaint, first }, first, lighting };
+    let job = |first| ViewsJob { subject: subject(first), cameras, settings, seeds };
+    let planes = job(0).planes(repaint.predictions)?;
+    // Render the predictions in rounds that share their paths.
+    let rounds = rounds(which);
+    let progress = Progress::new(job(0).tiles(&planes) * rounds.len(), progress);
+    let mut renders = Vec::new();
+    for round in rounds {
+        let job = job(round.start);
+        match round.len() {
+            1 => renders.extend(job.render::<1>(&planes, &progress)),
+            2 => renders.extend(job.render::<2>(&planes, &progress)),
+            3 | 4 => renders.extend(job.render::<4>(&planes, &progress).into_iter().take(round.len())),
+            _ => renders.extend(job.render::<8>(&planes, &progress).into_iter().take(round.len())),
+        }
+    }
+    Ok(renders)
+}
+
+fn rounds(which: Range<usize>) -> Vec<Range<usize>> {
+    let end = which.end;
+    which.step_by(MOST_VARIANTS).map(|start| start..end.min(start + MOST_VARIANTS)).collect()
+}
+
+fn check_predictions(world: &World, repaint: &Repaint, which: &Range<usize>) -> Result<(), RequestFault> {
+    let (found, expected) = (repaint.coats.len(), world.scene().surfaces.len());
+    if found != expected {
+        return Err(RequestFault::OtherWorld { found, expected });
+    }
+    if which.end > repaint.predictions {
+        return Err(RequestFault::Predictions { found: which.clone(), count: repaint.predictions });
+    }
+    Ok(())
+}
+
+/// Checks the arguments of [`Repaint::new`] and returns the number of predictions.
+fn check_coats(surfaces: &[Surface], atlases: &[TriangleMesh], coats: &[Option<Coat>]) -> Result<usize, RequestFault> {
+    if atlases.len() != surfaces.len() || coats.len() != surfaces.len() {
+        let (atlases, coats) = (atlases.len(), coats.len());
+        return Err(RequestFault::SurfaceCount { atlases, coats, surfaces: surfaces.len() });
+    }
+    let colors = coats.iter().flatten().map(|coat| coat.base_colors.len());
+    let predictions = colors.max().unwrap_or(1).max(1);
+    for (index, ((surface, atlas), coat)) in surfaces.iter().zip(atlases).zip(coats).enumerate() {
+        let (index, name) = (SurfaceIndex(index), || surface.name.clone());
+        let (found, expected) = (atlas.triangles.len(), surface.mesh.triangles.len());
+        if found != expected {
+            return Err(RequestFault::AtlasTriangles { surface: index, name: name(), found, expected });
+        }
+        let Some(coat) = coat else { continue };
+        let (found, expected) = (coat.base_colors.len(), predictions);
+        if found != expected {
+            return Err(RequestFault::BaseColorCount { surface: index, name: name(), found, expected });
+        }
+        if !has_uvs(atlas) {
+            return Err(RequestFault::AtlasUv { surface: index, name: name() });
+        }
+    }
+    Ok(predictions)
 }
 
 fn has_uvs(mesh: &TriangleMesh) -> bool {

@@ -1,26 +1,26 @@
-//! Random numbers that follow from seed, pixel and sample index alone.
+//! Random numbers that depend on seed, pixel and sample index alone.
 //!
-//! Owen-scrambled Sobol points (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020) in sets of four dimensions,
-//! each set of each pixel with a seed of its own; after three scatterings plain hashed numbers. Two halves of one sequence are correlated: halves that are to be
-//! independent need two seeds.
+//! Owen-scrambled Sobol points (Burley, "Practical Hash-based Owen Scrambling", JCGT 2020) in sets of four dimensions;
+//! each set of each pixel has its own scrambling seed. After three scatterings, plain hashes follow. Two halves of one
+//! sequence are correlated, so independent halves need two seeds.
 
 use mateval_scene::splitmix64;
 
-/// The numbers of one sample of one pixel.
+/// The random numbers of one sample of one pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Sampler {
     key: u64,
     index: u32,
 }
 
-/// Those of the pixel and of three surfaces.
+/// The sets of the pixel position and of the first three surfaces.
 const LAST_SPREAD_SET: u32 = 6;
 
-/// One sequence holds this many samples; the next ones start another.
+/// log2 of the samples in one sequence; later samples start another sequence.
 const SEQUENCE_BITS: u32 = 16;
 
 impl Sampler {
-    /// For sample `index` of the pixel at column `pixel[0]`, row `pixel[1]`.
+    /// The numbers for sample `index` of the pixel in column `pixel[0]`, row `pixel[1]`.
     pub fn new(seed: u64, pixel: [u32; 2], index: u32) -> Self {
         let place = (u64::from(pixel[0]) << 32) | u64::from(pixel[1]);
         let sequence = u64::from(index >> SEQUENCE_BITS);
@@ -28,8 +28,8 @@ impl Sampler {
         Self { key, index: index & ((1 << SEQUENCE_BITS) - 1) }
     }
 
-    /// Four numbers in [0, 1), of the first sets well spread over the samples of the pixel. Sets are independent of each
-    /// other.
+    /// Four numbers in [0, 1). Those of the first sets are stratified over the samples of the pixel. Sets are
+    /// independent of each other.
     pub fn set(&self, set: u32) -> [f32; 4] {
         if set > LAST_SPREAD_SET {
             return self.unordered(set);
@@ -37,7 +37,8 @@ impl Sampler {
         sobol_burley::sample_4d(self.index, 0, mix(self.key ^ u64::from(set)) as u32)
     }
 
-    /// Four numbers in [0, 1) without order: where a path has scattered often, order no longer shows in a pixel.
+    /// Four unstratified numbers in [0, 1). Once a path has scattered several times, stratification no longer shows in
+    /// the pixel.
     fn unordered(&self, set: u32) -> [f32; 4] {
         let first = mix(mix(self.key ^ u64::from(set)) ^ u64::from(self.index));
         let second = mix(first);
@@ -45,13 +46,13 @@ impl Sampler {
         [unit(first), unit(first >> 32), unit(second), unit(second >> 32)]
     }
 
-    /// A number for `unit_hash`, another for each `stream`.
+    /// A salt for `unit_hash`, different for each `stream`.
     pub(crate) fn salt(&self, stream: u32) -> u32 {
         mix(mix(self.key ^ (1 << 63) ^ u64::from(stream)) ^ u64::from(self.index)) as u32
     }
 }
 
-/// A number in [0, 1) that follows from two.
+/// A number in [0, 1), a hash of two integers.
 pub(crate) fn unit_hash(a: u32, b: u32) -> f32 {
     (mix((u64::from(a) << 32) | u64::from(b)) >> 40) as f32 / (1 << 24) as f32
 }
@@ -64,7 +65,7 @@ fn mix(value: u64) -> u64 {
 mod tests {
     use super::*;
 
-    /// Sixteen samples in sixteen slices along each dimension: what Sobol points promise.
+    /// Sixteen samples fall into sixteen slices along each dimension: the property of Sobol points.
     #[test]
     fn samples_of_a_pixel_are_stratified() {
         for dimension in 0..4 {
@@ -76,8 +77,8 @@ mod tests {
         }
     }
 
-    /// Means of two seeds over many pixels are uncorrelated, as the halves of a render must be; the twin shows that two
-    /// halves of one sequence are not.
+    /// Means of two seeds over many pixels are uncorrelated, as the halves of a render must be. The twin shows that two
+    /// halves of one sequence are correlated.
     #[test]
     fn seeds_are_independent_and_halves_of_one_sequence_are_not() {
         let mean = |seed: u64, pixel: u32, range: std::ops::Range<u32>| -> f64 {

@@ -1,37 +1,35 @@
-//! What is known of a surface at the place where a ray met it.
+//! A point on a surface, with its normals, and the rays that start there.
 
 use glam::{Vec2, Vec3};
 use mateval_scene::reference::SurfaceIndex;
 
 use crate::accel::TriangleIndex;
 use crate::ray::Ray;
-use crate::triangle_record::TriangleRecord;
+use crate::triangle_record::{ROUNDING, TriangleRecord};
 
-/// A place on a surface.
+/// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceHit {
     /// The surface.
     pub surface: SurfaceIndex,
     /// The triangle of that surface.
     pub triangle: TriangleIndex,
-    /// World space, from the triangle's corners: as exact as the mesh.
+    /// World space, interpolated between the triangle's corners, so it is as exact as the mesh.
     pub position: Vec3,
-    /// The triangle's own normal on its front, unit length. The front is the side of the vertex normals; without them,
+    /// The triangle's normal on its front, unit length. The front is the side of the vertex normals, or without them
     /// the side from which the corners run counter-clockwise.
     pub geometric_normal: Vec3,
-    /// The interpolated normal, unit length, on the same side; the geometric one where there is no sound other.
+    /// The interpolated vertex normal, unit length, on the same side. The geometric normal if there are no vertex
+    /// normals, or if they interpolate to zero or to the other side.
     pub shading_normal: Vec3,
-    /// The surface's own uv; zero where it has none.
+    /// The uv of the surface; zero if it has none.
     pub uv: Vec2,
-    /// How far a ray must start from the surface so that it cannot meet it again, in metres.
+    /// The distance from the surface at which rays start so that they do not hit it again, in metres.
     offset: f32,
 }
 
-/// 2^-24, half the spacing of f32 at 1.
-pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
-
 impl SurfaceHit {
-    /// The place with weights `weights` in a triangle, of which `record` tells all.
+    /// The point with barycentric `weights` in the triangle of `record`.
     #[inline]
     pub(crate) fn new(surface: SurfaceIndex, triangle: TriangleIndex, record: &TriangleRecord, weights: Vec3) -> Self {
         let blend = |[a, b, c]: [Vec3; 3]| a * weights.x + b * weights.y + c * weights.z;
@@ -48,19 +46,19 @@ impl SurfaceHit {
         }
     }
 
-    /// Whether `direction`, away from the surface, leaves on its front.
+    /// Whether `direction`, away from the surface, leaves on the front.
     #[inline]
     pub fn is_front(&self, direction: Vec3) -> bool {
         self.geometric_normal.dot(direction) > 0.0
     }
 
-    /// A ray from here along `direction`, that does not meet this triangle again.
+    /// A ray from here along `direction` that does not hit this triangle again.
     #[inline]
     pub fn spawn(&self, direction: Vec3) -> Ray {
         Ray::endless(self.beside(direction), direction)
     }
 
-    /// A ray from here to just before `other`, for asking whether something lies between; none if they coincide.
+    /// A shadow ray from here to just before `other`, or `None` if both coincide.
     #[inline]
     pub fn spawn_to(&self, other: &SurfaceHit) -> Option<Ray> {
         let towards = other.position - self.position;
@@ -70,11 +68,12 @@ impl SurfaceHit {
         Some(Ray::new(from, direction, distance * (1.0 - 4.0 * ROUNDING)))
     }
 
-    /// The place where rays towards `direction` start: off the surface, on the side to which they go.
+    /// The point where rays along `direction` start: off the surface, on the side to which they go.
     ///
-    /// After Waechter and Binder, "A Fast and Robust Method for Avoiding Self-Intersection" (Ray Tracing Gems, 2019), the
-    /// offset is counted in roundings of the numbers at hand, so it fits a scene of a millimetre and one of a kilometre;
-    /// here of the triangle's corners and the scene's size, not of the hit alone, since both enter the triangle test.
+    /// The offset is a number of roundings, as in Waechter and Binder, "A Fast and Robust Method for Avoiding
+    /// Self-Intersection" (Ray Tracing Gems, 2019), so it suits scenes of a millimetre and of a kilometre. Unlike
+    /// there, it is relative to the triangle's corners and the size of the scene, since both enter the triangle test,
+    /// and not to the hit alone.
     fn beside(&self, direction: Vec3) -> Vec3 {
         let side = if self.is_front(direction) { self.offset } else { -self.offset };
         self.position + self.geometric_normal * side
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
     use crate::accel::Accel;
 
-    /// A square of side `size` near (1, 1, 1) * `size`, tilted.
+    /// A tilted square with side `size` near (1, 1, 1) * `size`.
     fn square(size: f32) -> TriangleMesh {
         let (u, v) = (Vec3::new(0.6, 0.0, 0.8) * size, Vec3::new(0.48, 0.8, -0.36) * size);
         let origin = Vec3::splat(size);
@@ -99,8 +98,8 @@ mod tests {
         }
     }
 
-    /// From a millimetre to ten kilometres: rays that leave a plane, however grazing, never meet it again, and the offset
-    /// stays under a hundred-thousandth of the square's side.
+    /// At scales from a millimetre to ten kilometres, rays that leave a plane at any angle never hit it again, and the
+    /// offset stays below a hundred-thousandth of the square's side.
     #[test]
     fn spawned_rays_do_not_meet_their_own_plane() {
         for size in [1e-3, 1.0, 1e3, 1e4] {
@@ -121,7 +120,7 @@ mod tests {
                 let (sin, cos) = libm::sincosf(w * std::f32::consts::TAU);
                 let flat = (1.0 - height * height).sqrt();
                 let direction = frame.world_from_local(Vec3::new(cos * flat, sin * flat, height)).normalize();
-                // Rounding may turn a grazing direction back into the plane; that one may meet it.
+                // Rounding may turn a grazing direction back into the plane; such a ray may hit it.
                 if hit.geometric_normal.as_dvec3().dot(direction.as_dvec3()) * f64::from(height) > 0.0 {
                     left += 1;
                     assert!(!accel.occluded(&hit.spawn(direction)), "{size} {hit:?} {direction}");

@@ -1,29 +1,31 @@
-//! All that shading needs of a triangle, in one place: a hit costs two cache lines, not twelve.
+//! The data of a triangle that shading reads, in one record: a hit touches two cache lines instead of twelve.
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
 
 use crate::accel::TriangleIndex;
-use crate::surface_hit::ROUNDING;
 
-/// A triangle's corners and what is the same all over it: 128 bytes.
+/// 2^-24, half the spacing of f32 at 1.
+pub(crate) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
+
+/// The corners of a triangle and what is constant over it: 128 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct TriangleRecord {
     pub(crate) positions: [Vec3; 3],
     /// [`crate::SurfaceHit::geometric_normal`].
     pub(crate) normal: Vec3,
-    /// How far a ray must start from the triangle so that it cannot meet it again, in metres.
+    /// The distance from the triangle at which rays start so that they do not hit it again, in metres.
     pub(crate) offset: f32,
-    /// Zero where the mesh has none.
+    /// Zero if the mesh has no uvs.
     pub(crate) uvs: [Vec2; 3],
-    /// Vertex normals; of no meaning unless `smooth`.
+    /// Vertex normals, if `smooth`.
     pub(crate) normals: [Vec3; 3],
     pub(crate) smooth: bool,
 }
 
 impl TriangleRecord {
-    /// Of a triangle of a mesh. `scene_size` is the scene's largest coordinate.
+    /// The record of a triangle of `mesh`. `scene_size` is the largest absolute coordinate of the scene.
     pub(crate) fn new(mesh: &TriangleMesh, triangle: TriangleIndex, scene_size: f32) -> Self {
         let vertices = mesh.triangles[triangle.0].map(|vertex| vertex as usize);
         let positions = mesh.corners(triangle.0);
@@ -42,9 +44,11 @@ impl TriangleRecord {
     }
 }
 
-/// A hit is off its triangle by 6 roundings of the corners' coordinates (3 of the weights, 3 of their sum), times the root
-/// of 3 where the triangle is oblique; the next ray's triangle test moves corners by 6 roundings of distances of up to
-/// twice them along two axes; the sum rounds once an axis. That makes 10.4 + 17 + 1.7; 40 leaves a margin. A neighbour in the same plane may be as large as the scene, which the second term is for.
+/// A hit is off its triangle by 6 roundings of the corners' coordinates (3 of the weights, 3 of their sum), times the
+/// square root of 3 where the triangle is oblique. The next ray's triangle test moves corners by 6 roundings of
+/// distances of up to twice the coordinates, along two axes. The sum rounds once per axis. Together that is 10.4 + 17 +
+/// 1.7 roundings; 40 leaves a margin. The second term is for a neighbour in the same plane, which may be as large as
+/// the scene.
 fn offset(corners: [Vec3; 3], scene_size: f32) -> f32 {
     let largest = corners.iter().fold(0.0_f32, |size, corner| size.max(corner.abs().max_element()));
     ROUNDING * (40.0 * largest + 4.0 * scene_size)

@@ -1,10 +1,10 @@
-//! From the unit square to directions.
+//! Maps random numbers to points on disk, sphere, hemisphere and triangle.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, TAU};
 
 use glam::{Vec2, Vec3};
 
-/// A point of the unit disk, uniform. Shirley and Chiu, "A Low Distortion Map Between Disk and Square" (1997).
+/// A uniform point of the unit disk. Shirley and Chiu, "A Low Distortion Map Between Disk and Square" (1997).
 pub(crate) fn disk(u: [f32; 2]) -> Vec2 {
     let (x, y) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
     if x == 0.0 && y == 0.0 {
@@ -19,10 +19,10 @@ pub(crate) fn disk(u: [f32; 2]) -> Vec2 {
     }
 }
 
-/// Sine and cosine of `turns` (0 to 1) times a whole turn. Sums and products alone, so every machine computes the same
-/// bits; a third of the time that the general functions take.
+/// Sine and cosine of `turns` (0 to 1) full turns. Computed from sums and products only, so every machine gets the same
+/// bits, in a third of the time of the general functions.
 pub(crate) fn circle(turns: f32) -> (f32, f32) {
-    // To the nearest quarter, and what is left, exactly.
+    // The nearest quarter turn; the remainder is exact.
     let quarter = (4.0 * turns + 0.5) as u32;
     let (sin, cos) = sin_cos_near_zero(TAU * (turns - 0.25 * quarter as f32));
     match quarter & 3 {
@@ -33,7 +33,7 @@ pub(crate) fn circle(turns: f32) -> (f32, f32) {
     }
 }
 
-/// Taylor's series, for up to an eighth of a turn on both sides, where what they leave out is below the rounding of f32.
+/// Taylor series for angles of up to an eighth of a turn, where the truncation error is below the rounding of f32.
 fn sin_cos_near_zero(angle: f32) -> (f32, f32) {
     let x2 = angle * angle;
     let sin = 1.0 + x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362_880.0)));
@@ -41,7 +41,7 @@ fn sin_cos_near_zero(angle: f32) -> (f32, f32) {
     (angle * sin, cos)
 }
 
-/// A direction of the upper half, density cos / pi.
+/// A direction of the upper hemisphere with density cos / pi.
 pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let p = disk(u);
     p.extend((1.0 - p.length_squared()).max(0.0).sqrt())
@@ -52,7 +52,7 @@ pub(crate) fn cosine_density(z: f32) -> f32 {
     z.max(0.0) * FRAC_1_PI
 }
 
-/// A direction, uniform over the sphere: density 1 / (4 pi).
+/// A uniform direction with density 1 / (4 pi).
 pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     let z = 1.0 - 2.0 * u[0];
     let radius = (1.0 - z * z).max(0.0).sqrt();
@@ -60,7 +60,7 @@ pub(crate) fn sphere(u: [f32; 2]) -> Vec3 {
     Vec3::new(radius * cos, radius * sin, z)
 }
 
-/// Weights of a triangle's corners, uniform over its area.
+/// Barycentric weights of a uniform point in a triangle.
 pub(crate) fn triangle(u: [f32; 2]) -> Vec3 {
     let root = u[0].sqrt();
     Vec3::new(1.0 - root, root * (1.0 - u[1]), root * u[1])

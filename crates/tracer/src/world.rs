@@ -1,8 +1,8 @@
-//! A scene made ready for rays.
+//! A scene prepared for tracing.
 
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
 use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, Lookup, Material};
@@ -10,15 +10,15 @@ use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
-use crate::bsdf::MaterialTables;
+use crate::bsdf::{Bsdf, MaterialTables};
 use crate::emitter::{Emitters, StageLight};
-use crate::error::TracerError;
+use crate::error::{SceneFault, SurfaceFault, TracerError};
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
 use crate::surface_hit::SurfaceHit;
 use crate::triangle_record::TriangleRecord;
 
-/// A scene, its triangles in a hierarchy, its lights in tables.
+/// A scene with its hierarchy, emitters and material tables.
 #[derive(Debug)]
 pub struct World {
     scene: Arc<ReferenceScene>,
@@ -28,39 +28,41 @@ pub struct World {
     tables: Arc<MaterialTables>,
     /// Whether any material has an opacity.
     masked: bool,
-    /// Of all triangles, surface by surface.
+    /// The records of all triangles, surface by surface.
     records: Arc<Vec<TriangleRecord>>,
-    /// For each material what it looks up in textures.
+    /// For each material, its texture lookups.
     lookups: Arc<Vec<Vec<Lookup>>>,
 }
 
-/// Bytes of texels below which huge pages would save little and cost more.
+/// Textures with fewer bytes stay on small pages: huge pages would save little and cost more.
 const SMALL_TEXTURE: usize = 1 << 16;
 
 impl World {
     /// Checks the scene and builds the hierarchy over all surfaces.
     ///
-    /// Fails where an index leads nowhere, a vertex array has the wrong length, or a number is not finite.
+    /// Fails if an index names nothing, if a vertex array has the wrong length, or if a number is not finite.
     pub fn new(scene: Arc<ReferenceScene>) -> Result<Self, TracerError> {
         let accel = Arc::new(Accel::build(&meshes(&scene))?);
         Self::assemble(scene, accel)
     }
 
-    /// A world of the same triangles with other materials, uvs, normals or lights, which shares `accel`.
+    /// A world of the same triangles with other materials, uvs, normals or lights. It shares `accel`.
     ///
-    /// Fails as [`Self::new`], and where the triangles are not those that `accel` was built from.
+    /// Fails as [`Self::new`] does, and if `accel` was built from other triangles.
     pub fn sharing(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
-        if !accel.holds(&meshes(&scene))? {
-            return Err(TracerError::Invalid("the hierarchy was built from other triangles".into()));
-        }
+        accel.check_triangles(&meshes(&scene))?;
         Self::assemble(scene, accel)
     }
 
     fn assemble(scene: Arc<ReferenceScene>, accel: Arc<Accel>) -> Result<Self, TracerError> {
+        // Check surfaces; materials and lights are checked when their tables are built.
         for (index, surface) in scene.surfaces.iter().enumerate() {
-            check_surface(index, surface, scene.materials.len())?;
+            let located =
+                |fault| SceneFault::Surface { surface: SurfaceIndex(index), name: Some(surface.name.clone()), fault };
+            check_surface(surface, scene.materials.len()).map_err(located)?;
         }
         let textures = scene.texture_list();
+        // Rays read large textures and triangle records at random: keep them on huge pages.
         let texels = textures.iter().map(Texture::bytes);
         texels.filter(|bytes| bytes.len() >= SMALL_TEXTURE).for_each(move_to_huge_pages);
         let [low, high] = accel.bounds();
@@ -83,8 +85,8 @@ impl World {
         })
     }
 
-    /// The same surfaces and materials, lit by a stage and by nothing else: the scene's own lamps are surfaces like any
-    /// other. Light group k is `stage[k]`. Fails where a light has no triangles or holds numbers that are not finite.
+    /// The same surfaces and materials, lit only by stage lights: the scene's own lamps no longer emit. Light group k
+    /// is `stage[k]`. Fails if a light has no triangles, or a number is not finite.
     pub fn on_stage(&self, stage: &[StageLight]) -> Result<Self, TracerError> {
         let [low, high] = self.accel.bounds();
         let size = low.abs().max(high.abs()).max_element();
@@ -105,7 +107,7 @@ impl World {
         &self.scene
     }
 
-    /// The hierarchy, to be shared with [`Self::sharing`].
+    /// The hierarchy, for [`Self::sharing`].
     pub fn accel(&self) -> &Arc<Accel> {
         &self.accel
     }
@@ -115,16 +117,12 @@ impl World {
         &self.textures
     }
 
-    /// What emits.
+    /// The emitters.
     pub fn emitters(&self) -> &Emitters {
         &self.emitters
     }
 
-    pub(crate) fn tables(&self) -> &MaterialTables {
-        &self.tables
-    }
-
-    /// The nearest hit on a surface that is not cut out there.
+    /// The nearest hit on a surface whose opacity there is at least one half.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
         if !self.masked {
             return self.accel.closest(ray);
@@ -132,8 +130,9 @@ impl World {
         self.accel.closest_where(ray, |hit| self.opacity(hit) >= CUT_OUT_BELOW_OPACITY)
     }
 
-    /// The nearest hits of many rays: `hits[k]` of `rays[k]`. A surface of opacity o is met with probability o, drawn from
-    /// `salt(k)`: the same ray, salt and scene give the same hit. Asks early for what shading reads of the triangles.
+    /// The nearest hits of many rays; `hits[k]` belongs to `rays[k]`. A surface of opacity o is hit with probability o,
+    /// drawn from `salt(k)`: the same ray, salt and scene give the same hit. Prefetches what shading reads of the
+    /// triangles.
     pub(crate) fn closest_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, hits: &mut Vec<Option<Hit>>) {
         if self.masked {
             let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
@@ -146,7 +145,7 @@ impl World {
         }
     }
 
-    /// Whether each of many rays meets anything, opacities drawn as in [`Self::closest_many`].
+    /// Whether each of many rays hits anything, with opacities drawn as in [`Self::closest_many`].
     pub(crate) fn occluded_many(&self, rays: &[Ray], salt: impl Fn(usize) -> u32, occluded: &mut Vec<bool>) {
         if self.masked {
             let met = |which, hit: &Hit| self.opacity(hit) >= opacity_draw(salt(which), hit);
@@ -156,7 +155,7 @@ impl World {
         }
     }
 
-    /// Asks for the texels that shading reads at `place`.
+    /// Prefetches the texels that shading reads at `place`.
     pub(crate) fn prefetch_texels(&self, place: &SurfaceHit) {
         for lookup in &self.lookups[self.scene.surfaces[place.surface.0].material.0] {
             let texture = &self.textures[lookup.texture.0];
@@ -164,7 +163,7 @@ impl World {
         }
     }
 
-    /// The opacity at a hit, 1 where the material has none.
+    /// The opacity at a hit; 1 if the material has none.
     pub fn opacity(&self, hit: &Hit) -> f32 {
         match &self.material_of(hit.surface).opacity {
             None => 1.0,
@@ -172,7 +171,7 @@ impl World {
         }
     }
 
-    /// The opacity at a place, 1 where the material has none.
+    /// The opacity at a place; 1 if the material has none.
     pub fn opacity_at(&self, place: &SurfaceHit) -> f32 {
         self.material_of(place.surface).opacity.map_or(1.0, |opacity| opacity.at(&self.textures, place.uv))
     }
@@ -187,19 +186,28 @@ impl World {
         &self.scene.materials[self.scene.surfaces[surface.0].material.0]
     }
 
-    /// The surface's own uv at a hit; zero where it has none.
+    /// The surface's own uv at a hit; zero if it has none.
     pub fn source_uv(&self, hit: &Hit) -> Vec2 {
         let [a, b, c] = self.records[hit.global as usize].uvs;
         a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z
     }
 
-    /// What is known of the surface at a hit.
+    /// The point on the surface at a hit.
     pub fn surface_hit(&self, hit: &Hit) -> SurfaceHit {
         SurfaceHit::new(hit.surface, hit.triangle, &self.records[hit.global as usize], hit.barycentrics)
     }
 
-    pub(crate) fn mesh(&self, surface: SurfaceIndex) -> &TriangleMesh {
-        &self.scene.surfaces[surface.0].mesh
+    /// The BSDF of the surface's own material at `hit`, seen from `wo`.
+    pub fn bsdf(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_> {
+        self.bsdf_of_colors(hit, wo)
+    }
+
+    /// [`Self::bsdf`] for `K` material variants, all the same.
+    pub(crate) fn bsdf_of_colors<const K: usize>(&self, hit: &SurfaceHit, wo: Vec3) -> Bsdf<'_, K> {
+        let surface = &self.scene.surfaces[hit.surface.0];
+        let index = surface.material.0;
+        let (material, table) = (&self.scene.materials[index], self.tables.of(index));
+        Bsdf::of_material(material, table, &self.textures, &surface.mesh, hit, wo)
     }
 }
 
@@ -207,27 +215,37 @@ fn meshes(scene: &ReferenceScene) -> Vec<&TriangleMesh> {
     scene.surfaces.iter().map(|surface| &surface.mesh).collect()
 }
 
-/// A number in (0, 1] from the salt and the triangle: the order in which triangles are met does not enter.
+/// A number in (0, 1], a hash of salt and triangle, so that it does not depend on the order in which triangles are met.
 fn opacity_draw(salt: u32, hit: &Hit) -> f32 {
     1.0 - unit_hash(salt, hit.global)
 }
 
-fn check_surface(index: usize, surface: &Surface, materials: usize) -> Result<(), TracerError> {
-    let invalid = |what: String| Err(TracerError::Invalid(format!("surface {index} '{}': {what}", surface.name)));
-    let mesh = &surface.mesh;
-    let count = mesh.positions.len();
-    if surface.material.0 >= materials {
-        return invalid(format!("material {} of {materials}", surface.material.0));
+fn check_surface(surface: &Surface, materials: usize) -> Result<(), SurfaceFault> {
+    let (mesh, material) = (&surface.mesh, surface.material.0);
+    if material >= materials {
+        return Err(SurfaceFault::MissingMaterial { material, count: materials });
     }
-    if let Some(normals) = &mesh.normals
-        && (normals.len() != count || !normals.iter().all(|normal| normal.is_finite()))
-    {
-        return invalid(format!("{} normals for {count} vertices, expected as many, all finite", normals.len()));
+    let vertices = mesh.positions.len();
+    if let Some(normals) = &mesh.normals {
+        check_attribute("normals", normals, vertices, |normal| normal.is_finite())?;
     }
-    if let Some(uvs) = &mesh.uvs
-        && (uvs.len() != count || !uvs.iter().all(|uv| uv.is_finite()))
-    {
-        return invalid(format!("{} uvs for {count} vertices, expected as many, all finite", uvs.len()));
+    match &mesh.uvs {
+        Some(uvs) => check_attribute("uvs", uvs, vertices, |uv| uv.is_finite()),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+fn check_attribute<T>(
+    attribute: &'static str,
+    values: &[T],
+    expected: usize,
+    is_finite: impl Fn(&T) -> bool,
+) -> Result<(), SurfaceFault> {
+    if values.len() != expected {
+        return Err(SurfaceFault::AttributeCount { attribute, found: values.len(), expected });
+    }
+    match values.iter().position(|value| !is_finite(value)) {
+        Some(vertex) => Err(SurfaceFault::AttributeNotFinite { attribute, vertex }),
+        None => Ok(()),
+    }
 }

@@ -1,4 +1,4 @@
-//! Whole pictures: closed forms, agreement among ways of sampling, sameness of bytes, agreement with Mitsuba.
+//! Tests of whole pictures: closed forms, agreement between estimators, identical bytes, agreement with Mitsuba.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 #[path = "suite/bench_room.rs"]

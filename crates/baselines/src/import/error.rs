@@ -2,7 +2,8 @@
 
 use mateval_image::ImageError;
 use mateval_scene::findings::shortened;
-use mateval_scene::obj::ObjFault;
+use mateval_scene::gltf_error::GltfError;
+use mateval_scene::obj::ObjError;
 use mateval_scene::source_folder::FileFault;
 
 use super::limits::MAX_DEPTH;
@@ -14,15 +15,15 @@ pub enum ImportError {
     #[error("{}", .0.message)]
     File(FileFault),
     /// The glTF or one of its accessors is unsound.
-    #[error("{0}")]
-    Gltf(Box<dyn std::error::Error + Send + Sync>),
+    #[error(transparent)]
+    Gltf(#[from] GltfError),
     /// The OBJ, or the MTL file of this name, is unsound.
-    #[error("{}{}{}", file_prefix(.file), line_prefix(.fault.line), .fault.what)]
+    #[error("{}{fault}", file_prefix(.file))]
     Obj {
         /// The MTL file; none for the OBJ itself.
         file: Option<String>,
         /// The line and what is wrong.
-        fault: ObjFault,
+        fault: ObjError,
     },
     /// A texture cannot be decoded.
     #[error(transparent)]
@@ -189,20 +190,8 @@ impl From<FileFault> for ImportError {
     }
 }
 
-impl ImportError {
-    /// An unsound glTF, as the reader describes it.
-    pub(super) fn gltf(fault: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
-        Self::Gltf(fault.into())
-    }
-}
-
 fn file_prefix(file: &Option<String>) -> String {
     file.as_ref().map_or_else(String::new, |file| format!("'{}': ", shortened(file)))
-}
-
-/// Lines count from 1; 0 stands for no line.
-fn line_prefix(line: usize) -> String {
-    if line > 0 { format!("line {line}: ") } else { String::new() }
 }
 
 fn listed(faults: &[MaterialFault]) -> String {

@@ -20,7 +20,7 @@ use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VE
 /// Reads the file `name` of the folder.
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
-    let file = parse(&bytes).map_err(ImportError::gltf)?;
+    let file = parse(&bytes)?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
     let mut bytes = 0;
@@ -42,10 +42,6 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError>
     donor.materials.push(default);
     reader.walk(&file, &mut donor)?;
     Ok(donor)
-}
-
-fn in_words(error: GltfError) -> String {
-    error.to_string()
 }
 
 struct Reader<'a> {
@@ -104,7 +100,7 @@ impl Reader<'_> {
             gltf::image::Source::Uri { uri, .. } => (uri.to_owned(), self.file(uri)?),
             gltf::image::Source::View { view, .. } => {
                 let buffer = &self.buffers[view.buffer().index()];
-                (format!("image {}", image.index()), view_bytes(&view, buffer).map_err(ImportError::gltf)?.to_vec())
+                (format!("image {}", image.index()), view_bytes(&view, buffer)?.to_vec())
             }
         };
         let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap)?;
@@ -171,8 +167,7 @@ impl Reader<'_> {
         if donor.vertices > MAX_VERTICES {
             return Err(ImportError::TooLarge { what: Limited::Vertices, limit: MAX_VERTICES as u64 });
         }
-        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)
-            .map_err(ImportError::gltf)?
+        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)?
             .into_iter()
             .map(|place| world_from_node.transform_point3(DVec3::from(place.map(f64::from))).as_vec3())
             .collect();
@@ -183,16 +178,16 @@ impl Reader<'_> {
             Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
                 return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
             }
-            Some(accessor) => indices(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?,
+            Some(accessor) => indices(&accessor, bytes(&accessor)?)?,
             None => (0..positions.len() as u32).collect(),
         };
-        let triangles = triangles(numbers, positions.len()).map_err(ImportError::gltf)?;
+        let triangles = triangles(numbers, positions.len())?;
         let same_count = |found: usize, attribute: String| match found == positions.len() {
             true => Ok(()),
             false => Err(ImportError::Count { attribute, found, expected: positions.len() }),
         };
         let colors = match primitive.get(&Semantic::Colors(0)) {
-            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?,
+            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?)?,
             None => vec![[1.0; 3]; positions.len()],
         };
         same_count(colors.len(), "COLOR_0".to_owned())?;
@@ -204,7 +199,7 @@ impl Reader<'_> {
             let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
             let accessor =
                 primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| missing(format!("TEXCOORD_{set}")))?;
-            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?).map_err(ImportError::gltf)?;
+            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?)?;
             same_count(found.len(), format!("TEXCOORD_{set}"))?;
             *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
         }

@@ -1,4 +1,4 @@
-//! Debian's Embree 3.13, as far as the benchmarks need it (libembree-dev; header rtcore.h).
+//! Bindings to the part of Debian's Embree 3.13 that the benchmarks use (libembree-dev; header rtcore.h).
 #![allow(unsafe_code, reason = "Embree is a C library")]
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
@@ -6,16 +6,16 @@ use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use mateval_scene::TriangleMesh;
 use mateval_tracer::Ray;
 
-/// How Embree builds and traces.
+/// Embree's build and traversal mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// RTC_BUILD_QUALITY_MEDIUM, its default.
+    /// RTC_BUILD_QUALITY_MEDIUM, the default.
     Medium,
-    /// The same, and RTC_SCENE_FLAG_ROBUST.
+    /// The same with RTC_SCENE_FLAG_ROBUST.
     Robust,
 }
 
-/// A committed scene.
+/// A committed Embree scene.
 pub struct Embree {
     device: *mut c_void,
     scene: *mut c_void,
@@ -87,10 +87,10 @@ unsafe extern "C" {
 }
 
 impl Embree {
-    /// Copies the meshes and builds, with `threads` threads; `built` is called around the build alone.
+    /// Copies the meshes and builds the scene with `threads` threads. `built` is called around the build alone.
     pub fn new(meshes: &[&TriangleMesh], mode: Mode, threads: usize, built: &mut dyn FnMut(&mut dyn FnMut())) -> Self {
         let config = CString::new(format!("threads={threads},start_threads=1")).unwrap();
-        // SAFETY: calls in the order that Embree's manual gives; buffers are as long as asked for.
+        // SAFETY: the calls follow the order in Embree's manual, and buffers have the lengths requested.
         unsafe {
             let device = rtcNewDevice(config.as_ptr());
             assert!(!device.is_null());
@@ -130,11 +130,11 @@ impl Embree {
         (hit.geometry != INVALID).then_some((hit.geometry as usize, hit.triangle as usize, hit.ray.tfar))
     }
 
-    /// Whether anything is hit.
+    /// Whether the ray hits anything.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         let mut ray = rtc_ray(ray);
-        // SAFETY: as above.
+        // SAFETY: as in `closest`.
         unsafe { rtcOccluded1(self.scene, &mut context(), &mut ray) };
         ray.tfar < 0.0
     }
@@ -142,7 +142,7 @@ impl Embree {
 
 impl Drop for Embree {
     fn drop(&mut self) {
-        // SAFETY: both were made by `new` and are not used again.
+        // SAFETY: `new` created both, and they are not used again.
         unsafe {
             rtcReleaseScene(self.scene);
             rtcReleaseDevice(self.device);

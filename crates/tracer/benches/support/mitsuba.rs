@@ -1,11 +1,11 @@
-//! Mitsuba 3 in a process of its own, which renders when it is told to (`tests/peers/path_speed_mitsuba.py`).
+//! A Mitsuba 3 process that renders on request (`tests/peers/path_speed_mitsuba.py`).
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// A process that has loaded the scene.
+/// A process that has loaded a scene.
 pub struct Mitsuba {
     process: Child,
     requests: ChildStdin,
@@ -13,7 +13,7 @@ pub struct Mitsuba {
 }
 
 impl Mitsuba {
-    /// Loads `scene` (a folder) for `variant` and renders once, so that everything is compiled.
+    /// Loads the folder `scene` for `variant` and renders once, so that everything is compiled.
     pub fn start(python: &OsStr, variant: &str, scene: &Path, size: u32, max_depth: u32, samples: u32) -> Self {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/peers/path_speed_mitsuba.py");
         let mut process = Command::new(python)
@@ -29,7 +29,7 @@ impl Mitsuba {
         mitsuba
     }
 
-    /// CPU seconds that `samples` a pixel took.
+    /// Renders with `samples` per pixel and returns the CPU seconds it took.
     pub fn render(&mut self, samples: u32) -> f64 {
         writeln!(self.requests, "{samples}").unwrap();
         let mut answer = String::new();

@@ -4,12 +4,12 @@ use glam::{DVec2, Vec3};
 use mateval_scene::Camera;
 use mateval_tracer::{Accel, Ray};
 
-/// Numbers in [0, 1) without any order, four a ray.
+/// Unstratified numbers in [0, 1), four per ray.
 fn random(index: u32, stream: u32) -> [f32; 4] {
     sobol_burley::sample_4d(index & 0xffff, 0, (index >> 16) ^ (stream << 20))
 }
 
-/// Through the pixel centres of `camera`, row by row.
+/// Camera rays through the pixel centres of `camera`, row by row.
 pub fn coherent(camera: &Camera) -> Vec<Ray> {
     let [width, height] = [camera.intrinsics.width, camera.intrinsics.height];
     let ray = |x: u32, y: u32| {
@@ -19,7 +19,7 @@ pub fn coherent(camera: &Camera) -> Vec<Ray> {
     (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| ray(x, y)).collect()
 }
 
-/// From places uniform in the scene's box, in all directions alike.
+/// Rays from uniform points in the scene's box, in uniform directions.
 pub fn uniform(accel: &Accel, count: u32) -> Vec<Ray> {
     let [low, high] = accel.bounds();
     let ray = |index: u32| {
@@ -29,7 +29,7 @@ pub fn uniform(accel: &Accel, count: u32) -> Vec<Ray> {
     (0..count).map(ray).collect()
 }
 
-/// From where `rays` end, into the half-space that they came from.
+/// Rays from the hits of `rays` into the half-space that each ray came from.
 pub fn bounced(accel: &Accel, rays: &[Ray]) -> Vec<Ray> {
     let bounce = |(index, ray): (usize, &Ray)| {
         let hit = accel.closest(ray)?;
@@ -39,7 +39,7 @@ pub fn bounced(accel: &Accel, rays: &[Ray]) -> Vec<Ray> {
     rays.iter().enumerate().filter_map(bounce).collect()
 }
 
-/// From where `rays` end to a place under the top of the scene's box, a tenth of it off.
+/// Rays from the hits of `rays` to a point below the top of the scene's box, by a tenth of its height.
 pub fn towards_ceiling(accel: &Accel, rays: &[Ray], up: Vec3) -> Vec<Ray> {
     let [low, high] = accel.bounds();
     let shadow = |(index, ray): (usize, &Ray)| {
@@ -53,7 +53,7 @@ pub fn towards_ceiling(accel: &Accel, rays: &[Ray], up: Vec3) -> Vec<Ray> {
     rays.iter().enumerate().filter_map(shadow).collect()
 }
 
-/// The same rays, each ending after `reach` metres.
+/// The same rays, each limited to `reach` metres.
 pub fn shortened(rays: &[Ray], reach: f32) -> Vec<Ray> {
     rays.iter().map(|ray| Ray::new(ray.origin(), ray.direction(), reach)).collect()
 }

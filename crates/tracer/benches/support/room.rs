@@ -1,11 +1,12 @@
-//! A furnished room of any number of triangles, made in code.
+//! A generated furnished room with any number of triangles.
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_scene::material::{ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput};
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, Surface, SurfaceIndex};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 
-/// A room of 6 x 5 x 3 m (z up), open to no side, with bumpy balls on its floor: about `triangles` in all, one mesh a ball.
+/// A closed room of 6 x 5 x 3 m (z up) with bumpy spheres on its floor: about `triangles` triangles, one mesh per
+/// sphere.
 pub fn room(triangles: usize) -> Vec<TriangleMesh> {
     const BALLS: usize = 24;
     let rings = ((triangles as f32 / (4 * BALLS) as f32).sqrt().round() as u32).max(3);
@@ -29,7 +30,7 @@ fn shell(size: Vec3) -> TriangleMesh {
     }
 }
 
-/// 4 * rings^2 triangles, its surface waved.
+/// A sphere of 4 * rings^2 triangles with a wavy surface.
 fn ball(centre: Vec3, radius: f32, rings: u32, phase: f32) -> TriangleMesh {
     let sectors = 2 * rings;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), ..Default::default() };
@@ -53,8 +54,8 @@ fn ball(centre: Vec3, radius: f32, rings: u32, phase: f32) -> TriangleMesh {
     mesh
 }
 
-/// The meshes of [`room`] as a scene that can be rendered: a lamp under the ceiling, grey walls, glossy balls; and a camera of
-/// `size` x `size` pixels.
+/// The meshes of [`room`] as a scene to render, with a lamp under the ceiling, grey walls and glossy spheres, and a
+/// camera of `size` x `size` pixels.
 #[allow(dead_code, reason = "one benchmark traces rays alone")]
 pub fn lit(meshes: Vec<TriangleMesh>, size: u32) -> (ReferenceScene, Camera) {
     let principled = |color: f32, roughness: f32| Material {
@@ -84,7 +85,7 @@ pub fn lit(meshes: Vec<TriangleMesh>, size: u32) -> (ReferenceScene, Camera) {
     (scene, camera(size))
 }
 
-/// From a corner across the room.
+/// Looks from a corner across the room.
 pub fn camera(size: u32) -> Camera {
     let intrinsics = Intrinsics::from_fov_x(size, size, 1.2);
     Camera::look_at(DVec3::new(0.2, 0.2, 1.7), DVec3::new(4.0, 3.5, 0.8), DVec3::Z, intrinsics).unwrap()

@@ -1,7 +1,8 @@
-//! Builds a binary tree of boxes: the one place that names obvhs.
+//! Builds the binary tree of boxes. Only this file names obvhs.
 //!
 //! PLOC (Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction", 2018),
-//! then parallel reinsertion (the same, 2017). One triangle a leaf: `wide` decides which become one block.
+//! then parallel reinsertion (the same authors, 2017). Each leaf holds one triangle; `wide` decides which triangles
+//! share a block.
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -14,17 +15,17 @@ use rayon::prelude::*;
 /// A binary tree over triangles. Node 0 is its root.
 pub(super) struct BinaryTree(Bvh2);
 
-/// What a node of the tree holds.
+/// The contents of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum BinaryNode {
-    /// The places of two nodes.
+    /// The indices of two child nodes.
     Inner([usize; 2]),
     /// The index of a triangle.
     Leaf(u32),
 }
 
 impl BinaryTree {
-    /// Over at least one triangle with finite corners.
+    /// Builds the tree over at least one triangle with finite corners.
     pub(super) fn build(triangles: &[[Vec3; 3]]) -> Self {
         let boxes: Vec<Aabb> =
             triangles.par_iter().map(|corners| Aabb::from_points(&corners.map(Vec3A::from))).collect();
@@ -54,12 +55,12 @@ impl BinaryTree {
         found
     }
 
-    /// How many nodes there are.
+    /// The number of nodes.
     pub(super) fn len(&self) -> usize {
         self.0.nodes.len()
     }
 
-    /// What `node` holds.
+    /// The contents of `node`.
     #[inline]
     pub(super) fn node(&self, node: usize) -> BinaryNode {
         let found = &self.0.nodes[node];
@@ -78,7 +79,7 @@ impl BinaryTree {
         [min.into(), max.into()]
     }
 
-    /// Half the surface of a node's box.
+    /// Half the surface area of a node's box.
     #[inline]
     pub(super) fn half_area(&self, node: usize) -> f32 {
         self.0.nodes[node].aabb.half_area()

@@ -1,8 +1,8 @@
-//! Which triangle a ray meets: a bounding volume hierarchy over all triangles of all surfaces.
+//! Ray queries against all triangles of all surfaces, by a bounding volume hierarchy.
 //!
-//! The answer is that of testing every triangle ([`Accel::closest_by_testing_all`] is that test): boxes are padded, ties
-//! go to the lowest triangle, so the shape of the tree never shows. It is the same with every instruction set. Memory:
-//! about 90 bytes a triangle, at most 450 (where no two triangles are near each other).
+//! Answers are the same as when every triangle is tested ([`Accel::closest_by_testing_all`] does so): boxes are padded,
+//! and ties go to the triangle of lowest index, so the shape of the tree never shows. Answers are also the same with
+//! every instruction set. Memory: about 90 bytes a triangle, at most 450 (where no two triangles are near each other).
 
 mod build;
 mod kernel;
@@ -13,7 +13,7 @@ use glam::Vec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::SurfaceIndex;
 
-use crate::error::TracerError;
+use crate::error::{ExceededLimit, RequestFault, SceneFault, SurfaceFault, TracerError};
 use crate::ray::Ray;
 use build::BinaryTree;
 use kernel::{BoxRay, Kernel, Portable, TriangleRay};
@@ -21,45 +21,45 @@ pub(crate) use kernel::{move_to_huge_pages, on_huge_pages, prefetch, prefetch_li
 use traverse::Candidate;
 use wide::{WIDTH, Wide};
 
-/// A triangle's place in its own surface's mesh.
+/// The index of a triangle within the mesh of its surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TriangleIndex(pub usize);
 
-/// Where a ray meets a triangle.
+/// An intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// The surface.
     pub surface: SurfaceIndex,
     /// The triangle, within that surface's mesh.
     pub triangle: TriangleIndex,
-    /// Weights of the triangle's corners, adding to one.
+    /// Barycentric weights of the triangle's corners; they add up to 1.
     pub barycentrics: Vec3,
-    /// Along the ray, in metres.
+    /// Distance along the ray, in metres.
     pub distance: f32,
-    /// The triangle among all triangles, in the order of the surfaces.
+    /// The index of the triangle among all triangles, in the order of the surfaces.
     pub(crate) global: u32,
 }
 
-/// How a ray is tested against a triangle.
+/// The intersection test between a ray and a triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum TriangleTest {
-    /// Nothing passes between triangles with a common edge or corner.
+    /// No ray passes between triangles that share an edge or a corner.
     #[default]
     Watertight,
-    /// As fast, within a few percent; of rays aimed straight at an edge or a corner up to a fifth slip through.
+    /// Saves a few percent of the time. Of rays aimed exactly at an edge or a corner, up to a fifth slip through.
     Fast,
 }
 
-/// Which instructions rays are traced with. The answers are the same.
+/// The processor instructions used for ray queries. Answers do not depend on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InstructionSet {
-    /// AVX2, FMA and what came with them, of processors since about 2015.
+    /// AVX2, FMA and the bit instructions of the same generation: processors since about 2015.
     Avx2,
-    /// Any processor's.
+    /// Instructions that every processor has.
     Portable,
 }
 
-/// An instruction set that this processor has.
+/// An instruction set that this processor supports.
 #[derive(Clone, Copy, Debug)]
 enum Chosen {
     #[cfg(target_arch = "x86_64")]
@@ -79,28 +79,30 @@ impl Chosen {
     }
 }
 
-/// The hierarchy. It holds its own copy of the corners, so worlds of the same triangles can share it.
+/// A bounding volume hierarchy. It holds a copy of the corners, so that worlds with the same triangles can share it.
 #[derive(Debug)]
 pub struct Accel {
-    /// None when there are no triangles.
+    /// `None` if there are no triangles.
     wide: Option<Wide>,
     bounds: [Vec3; 2],
-    /// The largest coordinate.
+    /// The largest absolute coordinate.
     size: f32,
-    /// For each surface the number of triangles before it; then their total.
+    /// For each surface the number of triangles before it, then the total.
     starts: Vec<u32>,
     test: TriangleTest,
     instructions: Chosen,
 }
 
-/// Coordinates beyond this are refused, in metres: f32 cannot tell one metre from the next there.
+/// The largest coordinate accepted, in metres: f32 cannot distinguish one metre from the next there.
 const LARGEST_COORDINATE: f32 = 1e7;
+/// The children of a node are numbered with 31 bits.
+const MOST_TRIANGLES: usize = 1 << 31;
 
 impl Accel {
-    /// Builds over the meshes, one a surface, in this order.
+    /// Builds the hierarchy over the meshes of all surfaces, in the order of the surfaces.
     ///
-    /// Fails where a triangle names a vertex that does not exist, where a coordinate is not finite or beyond 1e7 m, or
-    /// beyond 2^31 triangles.
+    /// Fails if a triangle names a vertex that does not exist, if a coordinate is not finite or beyond 1e7 m, or if
+    /// there are more than 2^31 triangles.
     pub fn build(meshes: &[&TriangleMesh]) -> Result<Self, TracerError> {
         let (corners, starts) = flatten(meshes)?;
         let points = || corners.iter().flatten().copied();
@@ -122,19 +124,19 @@ impl Accel {
         Self { test, ..self }
     }
 
-    /// The same hierarchy with other instructions; none where the processor does not have them.
+    /// The same hierarchy with other instructions, or `None` if the processor does not support them.
     pub fn with_instructions(self, wanted: InstructionSet) -> Option<Self> {
         Chosen::new(wanted).map(|instructions| Self { instructions, ..self })
     }
 
-    /// The nearest hit, at a distance above 0.
+    /// The nearest hit at a distance above 0.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         self.find::<false>(ray, |_| true).map(|found| self.hit(&found))
     }
 
-    /// The nearest hit that `accept` takes. It may be asked about other hits too, in any order, and must always give the
-    /// same answer for the same hit.
+    /// The nearest hit that `accept` returns true for. `accept` may also be called for other hits, in any order, and
+    /// must always return the same value for the same hit.
     #[inline]
     pub fn closest_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> Option<Hit> {
         self.find::<false>(ray, |found| accept(&self.hit(found))).map(|found| self.hit(&found))
@@ -146,33 +148,33 @@ impl Accel {
         self.find::<true>(ray, |_| true).is_some()
     }
 
-    /// Whether there is any hit that `accept` takes, asked as in [`Self::closest_where`].
+    /// Whether there is any hit that `accept` returns true for; see [`Self::closest_where`].
     #[inline]
     pub fn occluded_where(&self, ray: &Ray, accept: impl Fn(&Hit) -> bool) -> bool {
         self.find::<true>(ray, |found| accept(&self.hit(found))).is_some()
     }
 
-    /// [`Self::closest`] of many rays at once, which is faster than one by one: `hits[k]` is that of `rays[k]`.
+    /// [`Self::closest`] for many rays at once, which is faster than one by one: `hits[k]` belongs to `rays[k]`.
     pub fn closest_many(&self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
         self.closest_of_candidates(rays, |_, _| true, hits);
     }
 
-    /// [`Self::closest_where`] of many rays at once; `accept` is told the number of the ray too.
+    /// [`Self::closest_where`] for many rays at once. `accept` also gets the index of the ray.
     pub fn closest_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, hits: &mut Vec<Option<Hit>>) {
         self.closest_of_candidates(rays, |which, found| accept(which, &self.hit(found)), hits);
     }
 
-    /// [`Self::occluded`] of many rays at once.
+    /// [`Self::occluded`] for many rays at once.
     pub fn occluded_many(&self, rays: &[Ray], occluded: &mut Vec<bool>) {
         self.any_of_candidates(rays, |_, _| true, occluded);
     }
 
-    /// [`Self::occluded_where`] of many rays at once; `accept` is told the number of the ray too.
+    /// [`Self::occluded_where`] for many rays at once. `accept` also gets the index of the ray.
     pub fn occluded_many_where(&self, rays: &[Ray], accept: impl Fn(usize, &Hit) -> bool, occluded: &mut Vec<bool>) {
         self.any_of_candidates(rays, |which, found| accept(which, &self.hit(found)), occluded);
     }
 
-    /// What [`Self::closest`] answers, found without the hierarchy; for tests and doubts.
+    /// The same as [`Self::closest`], found by testing every triangle. Slow; for tests.
     pub fn closest_by_testing_all(&self, ray: &Ray) -> Option<Hit> {
         let wide = self.wide.as_ref().filter(|_| ray.is_usable())?;
         let triangle_ray = TriangleRay::new(ray, &BoxRay::new(ray, self.size));
@@ -188,39 +190,41 @@ impl Accel {
         nearest.map(|found| self.hit(&found))
     }
 
-    /// The lower and the upper corner of the box around everything; zeros when there is nothing.
+    /// The lower and upper corner of the box around all triangles; zeros if there are none.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds
     }
 
-    /// How many triangles there are.
+    /// The number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.starts[self.starts.len() - 1] as usize
     }
 
-    /// How many surfaces there are.
+    /// The number of surfaces.
     pub fn surface_count(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Bytes held.
+    /// The memory that the hierarchy takes, in bytes.
     pub fn memory_bytes(&self) -> usize {
         self.wide.as_ref().map_or(0, Wide::memory_bytes) + self.starts.len() * size_of::<u32>()
     }
 
-    /// Whether it was built from these very triangles.
-    pub(crate) fn holds(&self, meshes: &[&TriangleMesh]) -> Result<bool, TracerError> {
+    /// Fails unless the hierarchy was built from exactly these triangles.
+    pub(crate) fn check_triangles(&self, meshes: &[&TriangleMesh]) -> Result<(), TracerError> {
         let (corners, starts) = flatten(meshes)?;
         let blocks = || self.wide.iter().flat_map(|wide| &wide.blocks);
         let mut held = blocks().flat_map(|block| (0..WIDTH).map(move |lane| (block, lane)));
-        Ok(starts == self.starts
+        let same = starts == self.starts
             && held.all(|(block, lane)| {
                 let triangle = block.triangles[lane];
                 triangle == u32::MAX || block.corners_of(lane) == corners[triangle as usize]
-            }))
+            });
+        let (hierarchy, scene) = (self.triangle_count(), corners.len());
+        if same { Ok(()) } else { Err(RequestFault::OtherTriangles { hierarchy, scene }.into()) }
     }
 
-    /// Walks the hierarchy with the instructions and the test chosen.
+    /// Traverses the hierarchy with the chosen instructions and triangle test.
     #[inline]
     fn find<const ANY: bool>(&self, ray: &Ray, accept: impl Fn(&Candidate) -> bool) -> Option<Candidate> {
         let wide = self.wide.as_ref().filter(|_| ray.is_usable())?;
@@ -264,7 +268,7 @@ impl Accel {
         self.find_many::<true>(rays, accept, |which, found| occluded[which] = found.is_some());
     }
 
-    /// [`Self::find`] for many rays; `found` is told of those whose rays are usable.
+    /// [`Self::find`] for many rays; `found` is called for every usable ray.
     fn find_many<const ANY: bool>(
         &self,
         rays: &[Ray],
@@ -311,35 +315,35 @@ impl Accel {
     }
 }
 
-/// All corners, surface by surface, and where each surface starts.
+/// The corners of all triangles, surface by surface, and the number of triangles before each surface.
 fn flatten(meshes: &[&TriangleMesh]) -> Result<(Vec<[Vec3; 3]>, Vec<u32>), TracerError> {
     let total: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    if total > 1 << 31 {
-        return Err(TracerError::Unsupported(format!("{total} triangles, the limit is 2^31")));
+    if total > MOST_TRIANGLES {
+        return Err(ExceededLimit::Triangles { found: total, limit: MOST_TRIANGLES }.into());
     }
     let mut corners = Vec::with_capacity(total);
     let mut starts = vec![0];
     for (surface, mesh) in meshes.iter().enumerate() {
-        check_positions(surface, mesh)?;
+        let fault = |fault| SceneFault::Surface { surface: SurfaceIndex(surface), name: None, fault };
+        check_positions(mesh).map_err(fault)?;
         corners.extend((0..mesh.triangles.len()).map(|index| mesh.corners(index)));
         starts.push(corners.len() as u32);
     }
     Ok((corners, starts))
 }
 
-/// Each coordinate by itself: a maximum would pass over NaN.
+/// Tests each coordinate by itself, because a maximum would ignore NaN.
 fn is_within_reach(position: Vec3) -> bool {
     position.to_array().iter().all(|v| v.abs() <= LARGEST_COORDINATE)
 }
 
-fn check_positions(surface: usize, mesh: &TriangleMesh) -> Result<(), TracerError> {
-    let invalid = |what: String| Err(TracerError::Invalid(format!("surface {surface}: {what}")));
+fn check_positions(mesh: &TriangleMesh) -> Result<(), SurfaceFault> {
     if let Some(vertex) = mesh.positions.iter().position(|p| !is_within_reach(*p)) {
-        return invalid(format!("vertex {vertex} is at {}, expected within 1e7 m", mesh.positions[vertex]));
+        return Err(SurfaceFault::Position { vertex, position: mesh.positions[vertex], limit: LARGEST_COORDINATE });
     }
     let count = mesh.positions.len();
     match mesh.triangles.iter().position(|t| t.iter().any(|&vertex| vertex as usize >= count)) {
-        Some(t) => invalid(format!("triangle {t} names vertices {:?} of {count}", mesh.triangles[t])),
+        Some(triangle) => Err(SurfaceFault::MissingVertex { triangle, vertices: mesh.triangles[triangle], count }),
         None => Ok(()),
     }
 }

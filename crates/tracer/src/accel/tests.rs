@@ -1,10 +1,10 @@
-//! The hierarchy against testing every triangle, and closed meshes against leaks.
+//! Tests of the hierarchy: against testing every triangle, and for leaks in closed meshes.
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// Coordinates from a coarse grid, so that edges, corners and planes coincide often; now and then anything.
+/// Mostly coordinates from a coarse grid, so that edges, corners and planes often coincide.
 fn coordinate() -> impl Strategy<Value = f32> {
     prop_oneof![4 => (-4_i32..=4).prop_map(|k| k as f32 * 0.5), 1 => -2.0_f32..2.0, 1 => Just(-0.0_f32)]
 }
@@ -14,7 +14,7 @@ fn point() -> impl Strategy<Value = Vec3> {
 }
 
 fn mesh() -> impl Strategy<Value = TriangleMesh> {
-    // Indices drawn at random share vertices and edges, and repeat a vertex within a triangle at times.
+    // Indices drawn at random share vertices and edges, and sometimes repeat a vertex within a triangle.
     prop::collection::vec(point(), 3..40).prop_flat_map(|positions| {
         let count = positions.len() as u32;
         prop::collection::vec([0..count, 0..count, 0..count], 1..80).prop_map(move |triangles| TriangleMesh {
@@ -25,7 +25,7 @@ fn mesh() -> impl Strategy<Value = TriangleMesh> {
     })
 }
 
-/// Axis-aligned, towards a grid point (through vertices and edges), with negative zeros, or anything.
+/// Directions along axes, towards grid points (through vertices and edges), with negative zeros, or arbitrary.
 fn direction() -> impl Strategy<Value = Vec3> {
     prop_oneof![
         Just(Vec3::X),
@@ -61,17 +61,18 @@ proptest! {
         let expected = accel.closest_by_testing_all(&ray);
         prop_assert_eq!(accel.closest(&ray), expected);
         prop_assert_eq!(accel.occluded(&ray), expected.is_some());
-        // The lowest of equally near triangles, also when the nearest are refused.
+        // The same with `accept`: the lowest of equally near triangles among those accepted.
         let odd = |hit: &Hit| hit.triangle.0 % 2 == 1;
         let refused = accel.closest_where(&ray, odd);
         prop_assert_eq!(accel.occluded_where(&ray, odd), refused.is_some());
         prop_assert!(refused.is_none_or(|hit| expected.is_some_and(|nearest| nearest.distance <= hit.distance)));
-        // Whatever the processor.
+        // The answers do not depend on the instructions.
         let portable = accel.with_instructions(InstructionSet::Portable).unwrap();
         prop_assert_eq!(portable.closest(&ray), expected);
         prop_assert_eq!(portable.occluded(&ray), expected.is_some());
         prop_assert_eq!(portable.closest_where(&ray, odd), refused);
-        // The fast test's roundings have no bound that boxes could be padded by; but they are the same everywhere.
+        // The rounding of the fast test has no bound that boxes could be padded by, but it is the same for all
+        // instructions.
         let portable = portable.with_test(TriangleTest::Fast);
         let found = (portable.closest(&ray), portable.occluded(&ray));
         if let Some(avx2) = portable.with_instructions(InstructionSet::Avx2) {
@@ -84,7 +85,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, ..ProptestConfig::default() })]
 
-    /// Rays under way side by side find what each finds alone, unusable ones among them, and any of few or many.
+    /// Rays traversed together find the same hits as each alone, for any number of rays, with unusable rays among them.
     #[test]
     fn many_rays_find_what_each_finds_alone(
         mesh in mesh(),
@@ -93,7 +94,7 @@ proptest! {
         let rays: Vec<Ray> =
             rays.into_iter().map(|(origin, d, reach)| Ray::new(origin, d.normalize_or_zero(), reach)).collect();
         let odd = |hit: &Hit| hit.triangle.0 % 2 == 1;
-        // Every third ray takes odd triangles alone.
+        // Every third ray accepts odd triangles only.
         let taken = |which: usize, hit: &Hit| !which.is_multiple_of(3) || odd(hit);
         for instructions in [InstructionSet::Avx2, InstructionSet::Portable] {
             let Some(accel) = Accel::build(&[&mesh]).unwrap().with_instructions(instructions) else { continue };
@@ -112,7 +113,7 @@ proptest! {
     }
 }
 
-/// A closed ball of 2 n^2 triangles, its vertices shared.
+/// A closed sphere of 2 n^2 triangles with shared vertices.
 fn ball(n: u32) -> TriangleMesh {
     let mut mesh = TriangleMesh { positions: vec![Vec3::Y, Vec3::NEG_Y], ..Default::default() };
     for ring in 1..n {
@@ -133,13 +134,13 @@ fn ball(n: u32) -> TriangleMesh {
     mesh
 }
 
-/// Rays from inside a closed mesh, at its vertices and at points of its edges, all hit, from near and far and off centre.
+/// Rays from inside a closed mesh to its vertices and to points on its edges all hit, from several origins.
 #[test]
 fn a_closed_mesh_leaks_nowhere() {
     let mesh = ball(60);
     let accel = Accel::build(&[&mesh]).unwrap();
     let mut shot = 0;
-    // The twin, of which the documentation tells.
+    // The twin: the fast test leaks as often as its documentation states.
     let fast = Accel::build(&[&mesh]).unwrap().with_test(TriangleTest::Fast);
     let mut slipped = 0;
     for origin in [Vec3::ZERO, Vec3::new(0.3, -0.2, 0.7), Vec3::new(0.0, 0.9, 0.0), Vec3::new(1e-7, 0.5, -1e-7)] {
@@ -188,13 +189,13 @@ fn bad_meshes_are_refused() {
     let mut nan = sound.clone();
     nan.positions[3].y = f32::NAN;
     for mesh in [&dangling, &infinite, &nan] {
-        assert!(
-            matches!(Accel::build(&[&sound, mesh]), Err(TracerError::Invalid(what)) if what.starts_with("surface 1"))
-        );
+        let error = Accel::build(&[&sound, mesh]).unwrap_err();
+        assert!(error.to_string().starts_with("invalid scene: surface 1: "), "{error}");
     }
 }
 
-/// A tree as deep as triangles make it that are ever smaller towards one corner: the stack, short in tests, runs over.
+/// Triangles that shrink towards one corner make a deep tree, so that the stack (short in tests) overflows into its
+/// vector.
 #[test]
 fn deep_trees_are_walked() {
     let mut mesh = TriangleMesh::default();

@@ -1,4 +1,4 @@
-//! Walks rays through the hierarchy.
+//! Traversal of the hierarchy, for single rays and for many at once.
 
 use arrayvec::ArrayVec;
 
@@ -6,7 +6,7 @@ use super::kernel::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, prefet
 use super::wide::{Block, Child, Node, WIDTH, Wide};
 use crate::ray::Ray;
 
-/// A triangle that a ray hits.
+/// A triangle hit by a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
     pub(super) distance: f32,
@@ -27,23 +27,24 @@ impl Candidate {
         }
     }
 
-    /// Whether it is nearer, or as near and of a lower triangle: so the shape of the tree never shows.
+    /// Whether this hit is nearer, or equally near with a lower triangle index, so that the shape of the tree never
+    /// shows.
     #[inline(always)]
     pub(super) fn comes_before(&self, other: &Self) -> bool {
         self.distance < other.distance || (self.distance == other.distance && self.triangle < other.triangle)
     }
 }
 
-/// One ray on its way through the hierarchy. With `ANY` the first hit found will do, whichever it is. What costs least
-/// differs for a ray that is `ALONE`: it waits for memory, where many in turn wait for mispredicted branches.
+/// The state of one ray during traversal. With `ANY` the traversal ends at the first hit found. `ALONE` selects what is
+/// fastest for a single ray, which waits for memory; many rays in turn wait for mispredicted branches instead.
 struct Walk<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> {
     box_ray: BoxRay,
     triangle_ray: TriangleRay,
     best: Option<Candidate>,
-    /// No farther than this.
+    /// The largest distance of hits still sought.
     limit: f32,
     stack: Stack,
-    /// What is visited next; none at the end.
+    /// The node or block to visit next; `None` at the end.
     next: Option<Child>,
 }
 
@@ -61,7 +62,7 @@ impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT
         }
     }
 
-    /// The same as new, in its old place: a stack is long and not worth moving.
+    /// Starts with another ray in place, since moving the long stack would cost time.
     #[inline(always)]
     fn restart(&mut self, wide: &Wide, scene_size: f32, ray: &Ray) {
         self.box_ray = BoxRay::new(ray, scene_size);
@@ -72,7 +73,7 @@ impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT
         self.next = Some(wide.root);
     }
 
-    /// Visits `child`, which was next.
+    /// Visits `child`, the former `next`.
     #[inline(always)]
     fn step<K: Kernel>(&mut self, kernel: K, wide: &Wide, child: Child, accept: impl Fn(&Candidate) -> bool) {
         if child.is_block() {
@@ -113,8 +114,8 @@ impl<const WATERTIGHT: bool, const ANY: bool, const ALONE: bool> Walk<WATERTIGHT
     }
 }
 
-/// The nearest hit that `accept` takes; among equally near ones that of the lowest triangle. With `ANY` the first one
-/// found, whichever it is.
+/// The nearest hit that `accept` returns true for; among equally near hits, the one of lowest triangle index. With
+/// `ANY`, the first such hit found.
 #[inline(always)]
 pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     kernel: K,
@@ -133,11 +134,11 @@ pub(super) fn traverse<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     walk.best
 }
 
-/// How many rays are under way at once in [`traverse_many`].
+/// The number of rays in progress at once in [`traverse_many`].
 const AT_ONCE: usize = 12;
 
-/// [`traverse`] for many rays; `found` is told of each, in any order. A few rays are under way at once and step in turn:
-/// while one waits for memory, the others work.
+/// [`traverse`] for many rays. `found` is called once per ray, in any order. Several rays are in progress at once and
+/// step in turn: while one waits for memory, the others compute.
 #[inline(always)]
 pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     kernel: K,
@@ -147,6 +148,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     accept: impl Fn(usize, &Candidate) -> bool,
     mut found: impl FnMut(usize, Option<Candidate>),
 ) {
+    // Start the first rays.
     let mut waiting = (0..rays.len()).filter(|&which| rays[which].is_usable());
     let mut walks: ArrayVec<Walk<WATERTIGHT, ANY, false>, AT_ONCE> = ArrayVec::new();
     let mut rays_of = [0; AT_ONCE];
@@ -158,6 +160,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
         let mut turn = 0;
         while turn < walks.len() {
             let (which, walk) = (rays_of[turn], &mut walks[turn]);
+            // Step a ray that has not finished, and prefetch what it visits in its next turn.
             if let Some(child) = walk.next {
                 walk.step(kernel, wide, child, |candidate| accept(which, candidate));
                 if let Some(next) = walk.next {
@@ -166,6 +169,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
                 turn += 1;
                 continue;
             }
+            // Report a finished ray, and give its place to the next one that waits, or to the last one in progress.
             found(which, walk.best);
             if let Some(another) = waiting.next() {
                 rays_of[turn] = another;
@@ -178,7 +182,7 @@ pub(super) fn traverse_many<K: Kernel, const WATERTIGHT: bool, const ANY: bool>(
     }
 }
 
-/// The nearest child met, if any; the others are pushed, the farthest first.
+/// Returns the nearest child met, if any, and pushes the others, the farthest first.
 #[inline(always)]
 fn nearest_first<K: Kernel>(kernel: K, node: &Node, boxes: &Boxes<K::Lanes>, stack: &mut Stack) -> Option<Child> {
     match boxes.met.count_ones() {

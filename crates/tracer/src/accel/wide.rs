@@ -1,8 +1,8 @@
-//! The hierarchy as rays walk it: nodes of eight boxes, leaves of one block of up to eight triangles.
+//! The wide hierarchy that rays traverse: nodes of eight boxes, and blocks of up to eight triangles as leaves.
 //!
-//! Which nodes of the binary tree become children of one wide node, and which subtrees one block, minimises the surface
-//! area cost by dynamic programming (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
-//! Compressed Wide BVHs", HPG 2017, section 4.1). About 90 bytes a triangle.
+//! Dynamic programming over the surface area cost decides which nodes of the binary tree become children of one wide
+//! node and which subtrees become one block (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
+//! Through Compressed Wide BVHs", HPG 2017, section 4.1). About 90 bytes a triangle.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -10,17 +10,17 @@ use rayon::prelude::*;
 use super::build::{BinaryNode, BinaryTree};
 use super::kernel::on_huge_pages;
 
-/// Boxes of a node, triangles of a block.
+/// The number of boxes in a node and of triangles in a block.
 pub(super) const WIDTH: usize = 8;
 
-/// Eight boxes and what they hold: four cache lines.
+/// Eight boxes and their children: four cache lines.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Node {
-    /// `bounds[0]` are the lower corners, `[1]` the upper ones; then axis, then child.
+    /// Lower corners in `bounds[0]`, upper corners in `bounds[1]`; indexed by axis, then child.
     pub(super) bounds: [[[f32; WIDTH]; 3]; 2],
     pub(super) children: [Child; WIDTH],
-    /// Bit k is set where child k exists.
+    /// Bit k is set if child k exists.
     pub(super) filled: u32,
 }
 
@@ -28,15 +28,14 @@ pub(super) struct Node {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub(super) struct Block {
-    /// Corner, then axis, then triangle. Triangles ascend; places that are not filled hold one point thrice, which no ray
-    /// hits.
+    /// Indexed by corner, axis, triangle. Triangles ascend. Unused lanes hold one point three times, which no ray hits.
     pub(super) corners: [[[f32; WIDTH]; 3]; 3],
     pub(super) triangles: [u32; WIDTH],
-    /// The surface of each.
+    /// The surface of each triangle.
     pub(super) surfaces: [u32; WIDTH],
 }
 
-/// A node (its place) or a block (its place, and the highest bit).
+/// The index of a node, or the index of a block with the highest bit set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub(super) struct Child(pub(super) u32);
@@ -49,7 +48,7 @@ impl Child {
         self.0 & Self::BLOCK != 0
     }
 
-    /// Its place among the nodes or among the blocks.
+    /// The index among nodes or among blocks.
     #[inline(always)]
     pub(super) fn place(self) -> usize {
         (self.0 & !Self::BLOCK) as usize
@@ -89,12 +88,12 @@ impl Block {
     }
 }
 
-/// What visiting a node costs, against visiting a block.
+/// The cost of visiting a node, relative to that of visiting a block below.
 const NODE_COST: f32 = 1.0;
 const BLOCK_COST: f32 = 0.6;
 
-/// The least cost of a subtree as 1 to 7 children of a wide node above it: `[k]` with up to k + 1 of them. The last entry
-/// is the number of triangles.
+/// The least cost of a subtree as children of the wide node above: entry k is for at most k + 1 children, for 1 to 7
+/// children. The last entry is the number of triangles.
 type Costs = [f32; WIDTH];
 
 struct Collapse<'t> {
@@ -103,12 +102,12 @@ struct Collapse<'t> {
 }
 
 impl Wide {
-    /// From a binary tree over `triangles`; `starts` says how many lie before each surface.
+    /// Converts a binary tree over `triangles`. `starts` holds the number of triangles before each surface.
     pub(super) fn collapse(tree: &BinaryTree, triangles: &[[Vec3; 3]], starts: &[u32]) -> Self {
         let collapse = Collapse { tree, costs: costs(tree) };
         let (mut nodes, mut roots) = (Vec::new(), Vec::new());
         let root = collapse.child(0, &mut roots);
-        // Nodes whose boxes are not filled in yet, with their place in the binary tree.
+        // Wide nodes whose boxes are not filled in yet: the index in the binary tree and among `nodes`.
         let mut open = Vec::new();
         if !root.is_block() {
             nodes.push(EMPTY);
@@ -132,7 +131,7 @@ impl Wide {
         Self { nodes: on_huge_pages(nodes), blocks: on_huge_pages(blocks), root }
     }
 
-    /// Bytes held.
+    /// The memory that nodes and blocks take, in bytes.
     pub(super) fn memory_bytes(&self) -> usize {
         self.nodes.len() * size_of::<Node>() + self.blocks.len() * size_of::<Block>()
     }
@@ -152,7 +151,7 @@ impl Node {
     }
 }
 
-/// Nodes of the binary tree that become children of one wide node.
+/// The nodes of the binary tree that become children of one wide node.
 #[derive(Default)]
 struct Members {
     places: [usize; WIDTH],
@@ -160,7 +159,8 @@ struct Members {
 }
 
 impl Collapse<'_> {
-    /// The child that a node of the binary tree becomes: a block that is noted in `roots`, or a node without a place yet.
+    /// The child for a node of the binary tree: a block, whose root is added to `roots`, or a node whose index is not
+    /// set yet.
     fn child(&self, node: usize, roots: &mut Vec<usize>) -> Child {
         if self.costs[node][WIDTH - 1] > WIDTH as f32 {
             return Child(0);
@@ -169,7 +169,7 @@ impl Collapse<'_> {
         Child((roots.len() - 1) as u32 | Child::BLOCK)
     }
 
-    /// Splits `node` into up to `slots` children, as the costs say.
+    /// Splits `node` into up to `slots` children of least cost.
     fn expand(&self, node: usize, slots: usize, members: &mut Members) {
         let is_root = slots == WIDTH;
         match self.tree.node(node) {
@@ -190,7 +190,7 @@ impl Collapse<'_> {
     }
 }
 
-/// Of all nodes.
+/// The costs of all nodes of the binary tree.
 fn costs(tree: &BinaryTree) -> Vec<Costs> {
     let leaf = |node: usize| {
         let mut costs = [tree.half_area(node) * BLOCK_COST; WIDTH];
@@ -207,7 +207,7 @@ fn costs(tree: &BinaryTree) -> Vec<Costs> {
 }
 
 fn inner_costs(area: f32, children: &[Costs; 2]) -> Costs {
-    // Counts are exact as far as they matter, up to 8.
+    // Counts are exact up to 8, which is all that matters.
     let count = children[0][WIDTH - 1] + children[1][WIDTH - 1];
     let mut costs = [0.0; WIDTH];
     costs[0] =
@@ -219,7 +219,7 @@ fn inner_costs(area: f32, children: &[Costs; 2]) -> Costs {
     costs
 }
 
-/// The least cost of sharing `slots` slots between two subtrees, and how many the first then gets.
+/// The least cost of dividing `slots` slots between two subtrees, and the number of slots of the first.
 #[inline]
 fn cheapest_split(children: &[Costs; 2], slots: usize) -> (f32, usize) {
     let mut best = (f32::INFINITY, 1);
@@ -232,7 +232,7 @@ fn cheapest_split(children: &[Costs; 2], slots: usize) -> (f32, usize) {
     best
 }
 
-/// The triangles of a subtree, ascending.
+/// The triangles below a node, in ascending order.
 fn triangles_below(tree: &BinaryTree, root: usize) -> Vec<u32> {
     let (mut open, mut found) = (vec![root], Vec::with_capacity(WIDTH));
     while let Some(node) = open.pop() {

@@ -1,7 +1,7 @@
-//! Bends the shading normal by the slope of a height texture.
+//! Bump mapping: tilts the shading normal by the slope of a height texture.
 //!
-//! Blinn, "Simulation of Wrinkled Surfaces" (1978), the surface's own curvature neglected: the tangents dp/du and dp/dv
-//! are raised along the normal by the height's slope, their cross product is the new normal.
+//! Blinn, "Simulation of Wrinkled Surfaces" (1978), without the surface's own curvature: the tangents dp/du and dp/dv
+//! are raised along the normal by the slope of the height, and their cross product is the new normal.
 
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
@@ -10,7 +10,7 @@ use mateval_scene::material::{BumpMap, ScalarInput};
 
 use crate::surface_hit::SurfaceHit;
 
-/// The bent normal, on the side of `hit.shading_normal`; that normal itself where the mesh has no usable uv.
+/// The bumped normal, on the side of `hit.shading_normal`. The shading normal itself if the mesh has no usable uv.
 pub(crate) fn bumped_normal(bump: &BumpMap, textures: &[Texture], mesh: &TriangleMesh, hit: &SurfaceHit) -> Vec3 {
     let normal = hit.shading_normal;
     let Some([dp_du, dp_dv]) = tangents(mesh, hit.triangle.0) else { return normal };
@@ -21,7 +21,7 @@ pub(crate) fn bumped_normal(bump: &BumpMap, textures: &[Texture], mesh: &Triangl
     if bent.is_finite() { bent } else { normal }
 }
 
-/// How the position changes with u and with v over the triangle, in metres.
+/// The derivatives of the position by u and by v over the triangle, in metres.
 fn tangents(mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 2]> {
     let uvs = mesh.uvs.as_ref()?;
     let [a, b, c] = mesh.corners(triangle);
@@ -32,15 +32,15 @@ fn tangents(mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 2]> {
     tangents.iter().all(|t| t.is_finite()).then_some(tangents)
 }
 
-/// How the height changes with the surface's u and v: the slope of the bilinear lookup itself, which jumps from texel to
-/// texel, as Mitsuba has it.
+/// The derivatives of the height by the surface's u and v. As in Mitsuba, this is the slope of the bilinear lookup
+/// itself, which jumps from texel to texel.
 fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
     let ScalarInput::Texture { texture, channel, uv: transform } = height else { return Vec2::ZERO };
     let map = &textures[texture.0];
     let at = transform.apply(uv);
     let value = |uv: Vec2| map.sample(uv.to_array())[*channel];
     let (width, height) = (map.width() as f32, map.height() as f32);
-    // In the texture's own uv first, then by the chain rule.
+    // Derivatives by the texture's own uv, then by the chain rule.
     let [left, right] = centres_around(at.x, width);
     let du = (value(Vec2::new(right, at.y)) - value(Vec2::new(left, at.y))) * width;
     let [below, above] = centres_around(at.y, height);
@@ -49,7 +49,7 @@ fn slope(height: &ScalarInput, textures: &[Texture], uv: Vec2) -> Vec2 {
     Vec2::new(du * rows[0][0] + dv * rows[1][0], du * rows[0][1] + dv * rows[1][1])
 }
 
-/// The two texel centres between which a coordinate lies, for `count` texels from 0 to 1.
+/// The centres of the two texels around a coordinate, for `count` texels between 0 and 1.
 fn centres_around(at: f32, count: f32) -> [f32; 2] {
     let lower = (at * count - 0.5).floor();
     [(lower + 0.5) / count, (lower + 1.5) / count]
@@ -65,8 +65,8 @@ mod tests {
     use crate::accel::TriangleIndex;
     use crate::triangle_record::TriangleRecord;
 
-    /// Heights rise by 1 m over the texture, which covers 2 m of a square: a slope of one half. With the texture repeated
-    /// twice or turned a quarter, the slope is twice as steep or runs along v; on a mesh that is turned over, likewise.
+    /// Heights rise by 1 m over the texture, which covers 2 m of a square: a slope of one half. If the texture is
+    /// repeated twice, the slope doubles; if it is turned by a quarter, the slope runs along v.
     #[test]
     fn a_ramp_tilts_the_normal_by_its_slope() {
         let ramp = (0..16 * 16).map(|k| (k % 16) as f32 / 16.0).collect();
@@ -93,8 +93,8 @@ mod tests {
         is(bent(straight, 0.0), Vec3::Z);
     }
 
-    /// The slope is that of the interpolated heights at the very place: level between two equal texels, the whole step
-    /// between two that differ; a difference over a wider stretch would mix them.
+    /// The slope is that of the interpolated heights at the very point: zero between two equal texels, the whole step
+    /// between two that differ. A difference over a wider range would mix them.
     #[test]
     fn the_slope_jumps_at_texel_centres() {
         let textures = [Texture::new(4, 1, Texels::Grey(vec![0.0, 0.0, 1.0, 1.0]), Wrap::Clamp).unwrap()];

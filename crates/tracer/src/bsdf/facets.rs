@@ -1,7 +1,7 @@
-//! Microfacet distributions: how the normals of a rough surface are spread, and how they hide each other.
+//! Microfacet distributions: the density of facet normals on a rough surface, masking, and sampling.
 //!
-//! Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (EGSR 2007); shadowing and masking are
-//! separable (Smith), as in Mitsuba. All vectors are in the frame whose z is the surface normal.
+//! Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (EGSR 2007), with separable Smith shadowing
+//! and masking as in Mitsuba. All vectors are in the frame whose z is the surface normal.
 
 use std::f32::consts::PI;
 
@@ -10,23 +10,23 @@ use mateval_scene::material::Distribution;
 
 use crate::warp;
 
-/// A rough surface's facets.
+/// The microfacets of a rough surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Facets {
     distribution: Distribution,
     alpha: f32,
 }
 
-/// Below this width f32 cannot hold the peak's shape.
+/// Below this width f32 cannot represent the peak.
 const SMALLEST_ALPHA: f32 = 1e-4;
 
 impl Facets {
-    /// `alpha` is held at 1e-4 or above, as in Mitsuba.
+    /// An `alpha` below 1e-4 is raised to it, as in Mitsuba.
     pub(crate) fn new(distribution: Distribution, alpha: f32) -> Self {
         Self { distribution, alpha: alpha.max(SMALLEST_ALPHA) }
     }
 
-    /// The density of facets with normal `m`, per solid angle of m and area of the surface.
+    /// The density of facets with normal `m`, per solid angle of m and per surface area.
     pub(crate) fn density(&self, m: Vec3) -> f32 {
         if m.z <= 0.0 {
             return 0.0;
@@ -42,9 +42,9 @@ impl Facets {
         }
     }
 
-    /// The share of facets `m` that is visible from `w` (Smith's G1).
+    /// The fraction of facets `m` that is visible from `w` (Smith's G1).
     pub(crate) fn visible(&self, w: Vec3, m: Vec3) -> f32 {
-        // A facet seen from behind while the surface is seen from the front, or the reverse, is hidden.
+        // A facet seen from its back while the surface is seen from its front is hidden, and the reverse.
         if w.dot(m) * w.z <= 0.0 {
             return 0.0;
         }
@@ -55,19 +55,19 @@ impl Facets {
         match self.distribution {
             Distribution::Ggx => 2.0 / (1.0 + (1.0 + self.alpha * self.alpha * tan2).sqrt()),
             Distribution::Beckmann => {
-                // The rational approximation of Walter et al., relative error under 0.35 %.
+                // The rational approximation of Walter et al., with a relative error under 0.35 %.
                 let a = 1.0 / (self.alpha * tan2.sqrt());
                 if a >= 1.6 { 1.0 } else { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) }
             }
         }
     }
 
-    /// The share of facets `m` visible from both directions.
+    /// The fraction of facets `m` visible from both directions.
     pub(crate) fn visible_from_both(&self, wo: Vec3, wi: Vec3, m: Vec3) -> f32 {
         self.visible(wo, m) * self.visible(wi, m)
     }
 
-    /// A facet normal for `wo` with z > 0: of those visible from wo for GGX, of all for Beckmann.
+    /// Samples a facet normal for `wo` with z > 0: for GGX among those visible from `wo`, for Beckmann among all.
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 2]) -> Vec3 {
         match self.distribution {
             Distribution::Ggx => self.sample_visible_ggx(wo, u),
@@ -103,7 +103,7 @@ impl Facets {
     }
 }
 
-/// `w` mirrored at the facet normal `m`.
+/// Mirrors `w` at the facet normal `m`.
 pub(crate) fn reflect(w: Vec3, m: Vec3) -> Vec3 {
     m * (2.0 * w.dot(m)) - w
 }
@@ -114,8 +114,8 @@ mod tests {
 
     use super::*;
 
-    /// The facets' areas, projected on the surface, add up to the surface; those visible from w, projected on w, to its
-    /// cosine.
+    /// The areas of the facets, projected onto the surface, add up to its area. Those visible from w, projected along
+    /// w, add up to its cosine.
     #[test]
     fn facets_cover_the_surface() {
         for distribution in [Distribution::Ggx, Distribution::Beckmann] {
@@ -126,7 +126,7 @@ mod tests {
                 let n = 400;
                 for i in 0..n {
                     for j in 0..n {
-                        // Squaring the first coordinate puts most of the grid where the peak is.
+                        // Squaring the first coordinate concentrates the grid at the peak.
                         let s = (i as f32 + 0.5) / n as f32;
                         let z = 1.0 - s * s;
                         let (sin, cos) = libm::sincosf(TAU * (j as f32 + 0.5) / n as f32);

@@ -1,11 +1,11 @@
-//! How much of the light a smooth boundary reflects. Unpolarised; Born and Wolf, "Principles of Optics", chapter 1.5 and
-//! 14.2.
+//! Fresnel reflectance of smooth boundaries, for unpolarised light. Born and Wolf, "Principles of Optics", sections 1.5
+//! and 14.2.
 
 use glam::Vec3;
 use mateval_scene::material::ConductorIor;
 
-/// The reflected share at a dielectric boundary and the cosine of the refracted direction, 0 under total reflection.
-/// `cos` (0 to 1) is on the side from which the light comes, `eta` the other side's index over this side's.
+/// The reflectance of a dielectric boundary and the cosine of the refracted direction (0 under total reflection). `cos`
+/// (0 to 1) is on the side of the incident light, `eta` is the index of the other side over that of this side.
 pub(crate) fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
     let sin2_beyond = (1.0 - cos * cos).max(0.0) / (eta * eta);
     if sin2_beyond >= 1.0 {
@@ -14,13 +14,13 @@ pub(crate) fn dielectric(cos: f32, eta: f32) -> (f32, f32) {
     let beyond = (1.0 - sin2_beyond).sqrt();
     let parallel = (eta * cos - beyond) / (eta * cos + beyond);
     let perpendicular = (cos - eta * beyond) / (cos + eta * beyond);
-    // At grazing incidence into a boundary without contrast both quotients are 0 / 0; nothing is reflected there.
+    // At grazing incidence on a boundary without contrast both quotients are 0 / 0; nothing is reflected there.
     let reflected = 0.5 * (parallel * parallel + perpendicular * perpendicular);
     (if reflected.is_nan() { 0.0 } else { reflected }, beyond)
 }
 
-/// The first of [`dielectric`], from the side of the lower index (`eta` of at least 1), at a single division. `cos` is
-/// above 0. Cook and Torrance, "A Reflectance Model for Computer Graphics" (1982).
+/// The reflectance that [`dielectric`] returns, for light on the side of the lower index (`eta` of at least 1) and
+/// `cos` above 0, with a single division. Cook and Torrance, "A Reflectance Model for Computer Graphics" (1982).
 pub(crate) fn dielectric_from_thinner(cos: f32, eta: f32) -> f32 {
     let g = (eta * eta - 1.0 + cos * cos).sqrt();
     let (above, below) = (cos * (g + cos) - 1.0, cos * (g - cos) + 1.0);
@@ -28,7 +28,8 @@ pub(crate) fn dielectric_from_thinner(cos: f32, eta: f32) -> f32 {
     0.5 * quotient * quotient * (above * above + below * below)
 }
 
-/// The share of uniform light from one side that a smooth dielectric boundary reflects: 2 * integral of F(mu) mu dmu.
+/// The fraction of uniform light from one side that a smooth dielectric boundary reflects: 2 * integral of F(mu) mu
+/// dmu.
 pub(crate) fn diffuse_reflectance(eta: f32) -> f32 {
     const STEPS: u32 = 4096;
     let sum: f64 = (0..STEPS)
@@ -40,7 +41,7 @@ pub(crate) fn diffuse_reflectance(eta: f32) -> f32 {
     (2.0 * sum / f64::from(STEPS)) as f32
 }
 
-/// The reflected share at a conductor, a channel; `cos` from 0 to 1.
+/// The reflectance of a conductor, per channel, for `cos` from 0 to 1.
 pub(crate) fn conductor(cos: f32, ior: &ConductorIor) -> Vec3 {
     match ior {
         ConductorIor::PerfectMirror => Vec3::ONE,
@@ -67,13 +68,18 @@ pub(crate) fn schlick_weight(cos: f32) -> f32 {
     x * x * (x * x) * x
 }
 
+/// The index of refraction for Disney's `specular`, by F0 = 0.08 * specular. Blender's IOR level has the same meaning.
+pub(crate) fn eta_from_specular(specular: f32) -> f32 {
+    2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn known_values() {
-        // ((1.5 - 1) / (1.5 + 1))^2, and Brewster's angle, where only half of the light is reflected at all.
+        // ((1.5 - 1) / (1.5 + 1))^2; and Brewster's angle, where only one polarisation is reflected.
         assert!((dielectric(1.0, 1.5).0 - 0.04).abs() < 1e-7);
         let brewster = 1.0 / (1.0_f32 + 1.5 * 1.5).sqrt();
         let expected = 0.5 * ((1.5_f32 * 1.5 - 1.0) / (1.5 * 1.5 + 1.0)).powi(2);
@@ -94,7 +100,7 @@ mod tests {
         }
     }
 
-    /// What a boundary lets through is the same from both sides: (1 - R(1/eta)) * eta^2 = 1 - R(eta).
+    /// The transmitted fraction is the same from both sides: (1 - R(1/eta)) * eta^2 = 1 - R(eta).
     #[test]
     fn diffuse_reflectance_inside_follows_from_outside() {
         for eta in [1.2_f32, 1.5, 2.4] {

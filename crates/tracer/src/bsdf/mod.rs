@@ -1,111 +1,113 @@
-//! What light does where a ray meets a surface: a material's parameters at that place, with value, density and sampling.
+//! BSDFs: a material's parameters at one point, with evaluation, density and sampling.
 //!
-//! `wo` points to the viewer, `wi` to the light, both away from the surface and of unit length, in world space. `eval`
-//! includes the cosine. Which of several lobes is sampled never depends on a colour, so that paths made for one set of
-//! colours serve for another.
+//! `wo` points to the viewer, `wi` to the light, both away from the surface, of unit length and in world space.
+//! Evaluation includes the cosine. The choice of a lobe never depends on a colour, so the same paths serve any base
+//! colours.
 
 mod bump;
-mod conductor;
-mod dielectric;
-mod diffuse;
 mod facets;
 mod fresnel;
 mod lobe;
-mod plastic;
-mod principled;
 mod principled_tables;
 mod rough_boundary;
+mod sample;
 mod tables;
 #[cfg(test)]
 mod tests;
 
 use glam::Vec3;
+use mateval_image::Texture;
+use mateval_scene::TriangleMesh;
+use mateval_scene::material::Material;
 
 use crate::frame::Frame;
-use crate::repaint::PaintAt;
 use crate::surface_hit::SurfaceHit;
-use crate::world::World;
-use lobe::Lobe;
-pub(crate) use principled::{Principled, eta_from_specular};
-use principled::{PrincipledView, Tint};
+pub(crate) use fresnel::eta_from_specular;
+pub(crate) use lobe::Principled;
+use lobe::{Lobe, PrincipledView, Tint};
 pub(crate) use principled_tables::BlenderTables;
-pub(crate) use tables::MaterialTables;
+pub(crate) use tables::{MaterialTables, Table};
 
-/// A surface's scattering at one place, for `K` base colours at once: of the world's own material for one, of predictions
-/// for more ([`crate::Repaint`]).
+/// The BSDF of a surface at one point, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf<'w, const K: usize = 1> {
     frame: Frame,
-    /// The triangle's normal on the side of the frame's.
+    /// The geometric normal, on the side of the frame's z axis.
     geometric: Vec3,
     /// Towards the viewer, in the frame.
     wo: Vec3,
     lobe: Lobe<'w>,
-    /// For principled materials, which most are: what follows from `wo` already, and from the colours.
+    /// For principled materials, which most are: the terms that depend on `wo` and on the base colours alone.
     principled: Option<(PrincipledView, [Tint; K])>,
 }
 
 /// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample<const K: usize = 1> {
-    /// Where the light comes from.
+    /// Towards the light.
     pub wi: Vec3,
-    /// The value of [`Bsdf::evaluate`] over `density`, by base colour.
+    /// The value of [`Bsdf::evaluate`] over `density`, per base colour.
     pub weights: [Vec3; K],
-    /// Per solid angle; for a single direction (`delta`), its probability.
+    /// Per solid angle; for a delta sample, its probability.
     pub density: f32,
-    /// Whether this is a single direction, that of a mirror or of clear glass, which sampling lights cannot find.
+    /// Whether the direction comes from a delta distribution, such as a mirror, which light sampling cannot find.
     pub delta: bool,
 }
 
-/// The cosine to which a shading normal is turned back that points away from a viewer who sees the front.
+/// The smallest cosine between the viewer and a shading normal on the visible side; smaller ones are raised to it.
 const GRAZING: f32 = 1e-3;
 
-/// Facets smoother than this roughness do not show the lights of a stage ([`crate::StageLight`]).
+/// Facets smoother than this roughness do not reflect stage lights ([`crate::StageLight`]).
 pub const STAGE_ROUGHNESS: f32 = 0.2;
 
-impl<'w> Bsdf<'w> {
-    /// The scattering of the world's own material at `hit`, seen from `wo`.
-    ///
-    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer who
-    /// sees that side of the triangle is turned until it does not.
-    pub fn new(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
-        Self::own(world, hit, wo)
-    }
-
-    /// Value times the cosine of `wi`, a channel, and the density with which [`Self::sample`] finds `wi`, per solid angle;
-    /// single directions left out. See `Self::evaluate_all`.
+impl Bsdf<'_> {
+    /// The value times the cosine of `wi`, per channel, and the density with which [`Self::sample`] samples `wi`, per
+    /// solid angle. Delta lobes are left out. See `Self::evaluate_all`.
     pub fn evaluate(&self, wi: Vec3) -> (Vec3, f32) {
-        let ([value], density) = self.evaluate_all(wi, Shown::All);
+        let ([value], density) = self.evaluate_all(wi, BsdfPart::All);
         (value, density)
     }
 }
 
-/// What of a surface light is evaluated on.
+/// The part of a BSDF to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shown {
+pub(crate) enum BsdfPart {
     /// All of it.
     All,
-    /// What shows the lights of a stage: facets below [`STAGE_ROUGHNESS`] do not.
+    /// The part that reflects stage lights: facets below [`STAGE_ROUGHNESS`] are left out.
     Stage,
 }
 
 impl<'w, const K: usize> Bsdf<'w, K> {
-    /// As [`Bsdf::new`], the same for all colours.
-    pub(crate) fn own(world: &'w World, hit: &SurfaceHit, wo: Vec3) -> Self {
-        let material = world.material_of(hit.surface);
-        let table = world.tables().of(world.scene().surfaces[hit.surface.0].material.0);
-        let lobe = Lobe::at(material, table, world.textures(), hit.uv);
+    /// The BSDF of `material`, with its precomputed `table`, at `hit` on `mesh`, seen from `wo`. It is the same for all
+    /// `K` base colours.
+    ///
+    /// The back of an opaque material that is not two-sided is black. A shading normal that points away from a viewer
+    /// on its side of the triangle is turned towards the viewer.
+    pub(crate) fn of_material(
+        material: &Material,
+        table: &'w Table,
+        textures: &[Texture],
+        mesh: &TriangleMesh,
+        hit: &SurfaceHit,
+        wo: Vec3,
+    ) -> Self {
+        let lobe = Lobe::at(material, table, textures, hit.uv);
         let normal = match &material.bump {
-            Some(bump) => bump::bumped_normal(bump, world.textures(), world.mesh(hit.surface), hit),
+            Some(bump) => bump::bumped_normal(bump, textures, mesh, hit),
             None => hit.shading_normal,
         };
         Self::at(hit, normal, wo, lobe, material.two_sided, None)
     }
 
-    /// The scattering of predictions at `hit`: two-sided, without bumps.
-    pub(crate) fn repainted(paint: &PaintAt<'w, K>, hit: &SurfaceHit, wo: Vec3) -> Self {
-        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(paint.principled), true, Some(&paint.base_colors))
+    /// The BSDF of a two-sided `principled` material at `hit`, seen from `wo`, for each of `base_colors`.
+    pub(crate) fn of_principled(
+        principled: Principled<'w>,
+        base_colors: &[Vec3; K],
+        hit: &SurfaceHit,
+        wo: Vec3,
+    ) -> Self {
+        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(principled), true, Some(base_colors))
     }
 
     fn at(
@@ -116,6 +118,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         two_sided: bool,
         colors: Option<&[Vec3; K]>,
     ) -> Self {
+        // Face the viewer, unless light passes to the other side.
         let mut geometric = hit.geometric_normal;
         let front = hit.is_front(wo);
         if !front && !lobe.transmits() {
@@ -124,10 +127,12 @@ impl<'w, const K: usize> Bsdf<'w, K> {
                 lobe = Lobe::Black;
             }
         }
+        // Build the frame of the shading normal on the side of the viewer.
         let seen_side = if front || !lobe.transmits() { 1.0 } else { -1.0 };
         let normal = turned_to(normal * seen_side, wo) * seen_side;
         let frame = Frame::around(normal);
         let wo = frame.local_from_world(wo);
+        // Compute what does not depend on the light.
         let principled = match &lobe {
             Lobe::Principled(principled) if wo.z > 0.0 => {
                 let view = principled.seen_from(wo);
@@ -142,12 +147,12 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         Self { frame, geometric, wo, lobe, principled }
     }
 
-    /// Value times the cosine of `wi`, by base colour and channel, and the density with which [`Self::sample`] finds `wi`,
-    /// per solid angle; single directions left out.
+    /// The value times the cosine of `wi`, per base colour and channel, and the density with which [`Self::sample`]
+    /// samples `wi`, per solid angle. Delta lobes are left out.
     ///
-    /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's or the reverse: such light
-    /// would come through the surface.
-    pub(crate) fn evaluate_all(&self, wi: Vec3, shown: Shown) -> ([Vec3; K], f32) {
+    /// Both are zero where `wi` lies above the shading normal's plane and below the triangle's, or the reverse: such
+    /// light would pass through the surface.
+    pub(crate) fn evaluate_all(&self, wi: Vec3, part: BsdfPart) -> ([Vec3; K], f32) {
         let local = self.frame.local_from_world(wi);
         if self.geometric.dot(wi) * local.z <= 0.0 {
             return ([Vec3::ZERO; K], 0.0);
@@ -156,7 +161,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
             Some(_) if local.z <= 0.0 => ([Vec3::ZERO; K], 0.0),
             Some((view, tints)) => {
                 let mut response = view.response(local);
-                if shown == Shown::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
+                if part == BsdfPart::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
                     response = response.of_base_alone();
                 }
                 (tints.map(|tint| tint.value(&response)), response.density)
@@ -165,8 +170,8 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         }
     }
 
-    /// A direction for `wo`, from three numbers in [0, 1); none where the draw sends light nowhere. Does not depend on the
-    /// base colours.
+    /// Samples a direction from three numbers in [0, 1), independently of the base colours. `None` if the sample is
+    /// absorbed.
     pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
         let (local, weights, density, delta) = match &self.principled {
             Some((view, tints)) => {
@@ -182,30 +187,31 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         (self.geometric.dot(wi) * local.z > 0.0).then_some(BsdfSample { wi, weights, density, delta })
     }
 
-    /// The weights of `sample`, one of [`Self::sample`]'s, for the lights of a stage: what shows none of them left out.
+    /// The weights of `sample`, returned by [`Self::sample`], for stage lights: parts that do not reflect them are left
+    /// out.
     pub(crate) fn stage_weights(&self, sample: &BsdfSample<K>) -> [Vec3; K] {
         match &self.principled {
             _ if sample.delta => [Vec3::ZERO; K],
             Some((view, _)) if view.is_smoother_than(STAGE_ROUGHNESS) => {
-                let (values, _) = self.evaluate_all(sample.wi, Shown::Stage);
+                let (values, _) = self.evaluate_all(sample.wi, BsdfPart::Stage);
                 values.map(|value| value / sample.density)
             }
             _ => sample.weights,
         }
     }
 
-    /// Whether all light goes to single directions, so that sampling lights finds nothing.
+    /// Whether all lobes are delta distributions, so that light sampling finds nothing.
     pub fn is_delta(&self) -> bool {
         self.lobe.is_delta()
     }
 
-    /// Whether nothing is sent back at all.
+    /// Whether all light is absorbed.
     pub fn is_black(&self) -> bool {
         matches!(self.lobe, Lobe::Black)
     }
 }
 
-/// `normal`, or where that points away from `wo`, the nearest one that does not.
+/// `normal`, or if that points away from `wo`, the nearest normal that does not.
 fn turned_to(normal: Vec3, wo: Vec3) -> Vec3 {
     let cos = normal.dot(wo);
     if cos >= GRAZING { normal } else { (normal + wo * (GRAZING - cos)).normalize() }

@@ -1,7 +1,7 @@
-//! What a rough dielectric boundary reflects and lets through in all directions together, integrated by us.
+//! Directional albedos of a rough dielectric boundary, integrated at start-up.
 //!
-//! One bounce at the facets, Smith's masking on both sides: what hits a second facet is in neither sum, so both together
-//! are below one where the boundary is rough.
+//! One bounce at the facets with Smith masking on both sides. Light that hits a second facet is neither reflected nor
+//! transmitted here, so both together are below one for rough boundaries.
 
 use glam::Vec3;
 use mateval_scene::material::Distribution;
@@ -9,32 +9,32 @@ use mateval_scene::material::Distribution;
 use super::facets::{Facets, reflect};
 use super::fresnel;
 
-/// The coat of rough plastic: what passes into it, and what cannot leave.
+/// The coat of rough plastic: the light transmitted into it, and the light it reflects back inside.
 #[derive(Clone, Debug)]
 pub(crate) struct RoughCoat {
     widths: Widths,
     transmitted: Vec<Row>,
-    /// The share of uniform light from inside that is reflected back inside.
+    /// The fraction of uniform light from inside that is reflected back inside.
     inside: Vec<f32>,
 }
 
-/// Facet widths that a table holds: one, or many that are spaced evenly in perceptual roughness.
+/// The facet widths of a table: a single one, or many spaced evenly in perceptual roughness.
 #[derive(Clone, Debug)]
 pub(crate) struct Widths(Vec<f32>);
 
-/// Entry k is at the cosine of [`cosine`].
+/// Entry k belongs to the cosine [`cosine`] of k.
 type Row = [f32; COSINES];
 
 const COSINES: usize = 64;
-/// Facets integrated over are a grid of this side.
+/// Facets are integrated over a grid with this many points along each side.
 const GRID: u32 = 32;
-/// The same for the reflection from inside, which total reflection cuts sharply.
+/// The same for reflection from inside, where total reflection causes a sharp edge.
 const FINE_GRID: u32 = 64;
-/// For widths that vary over the surface.
+/// The number of widths in a table for varying width.
 const WIDTHS: usize = 24;
 
 impl Widths {
-    /// For facets that are the same everywhere.
+    /// For a width that is constant over the surface.
     pub(crate) fn uniform(alpha: f32) -> Self {
         Self(vec![alpha])
     }
@@ -51,7 +51,7 @@ impl Widths {
         )
     }
 
-    /// The value of `at` for the width `alpha`, interpolated between two.
+    /// Interpolates `at` between the two table entries around the width `alpha`.
     fn interpolate(&self, alpha: f32, at: impl Fn(usize) -> f32) -> f32 {
         if self.0.len() == 1 {
             return at(0);
@@ -77,18 +77,18 @@ impl RoughCoat {
         Self { transmitted, inside: inside.collect(), widths }
     }
 
-    /// The share of light from outside, from the cosine `cos`, that passes.
+    /// The transmitted fraction of light from outside that arrives from the cosine `cos`.
     pub(crate) fn transmitted(&self, cos: f32, alpha: f32) -> f32 {
         self.widths.interpolate(alpha, |row| lookup(&self.transmitted[row], cos))
     }
 
-    /// The share of uniform light from inside that is reflected back inside.
+    /// The fraction of uniform light from inside that is reflected back inside.
     pub(crate) fn reflected_inside(&self, alpha: f32) -> f32 {
         self.widths.interpolate(alpha, |row| self.inside[row])
     }
 }
 
-/// Closer together towards grazing, where reflection rises steeply.
+/// Entries are closer together towards grazing angles, where reflection rises steeply.
 fn cosine(k: usize) -> f32 {
     let root = k as f32 / (COSINES - 1) as f32;
     root * root
@@ -100,9 +100,9 @@ fn lookup(row: &Row, cos: f32) -> f32 {
     row[cell] + (position - cell as f32) * (row[cell + 1] - row[cell])
 }
 
-/// The reflected share of uniform light, 2 * integral of f(mu) mu dmu: as Mitsuba sums it, over 64 evenly spaced cosines
-/// with both ends in full. That lies 1.5 % below the integral for an index of 1 / 1.5, and is part of what `roughplastic`
-/// is: a white base is 1.3 % darker by it.
+/// The reflected fraction of uniform light, 2 * integral of f(mu) mu dmu, summed as Mitsuba does: over 64 evenly spaced
+/// cosines, with full weight at both ends. For an index of 1 / 1.5 the sum is 1.5 % below the integral. `roughplastic`
+/// includes that error, which makes a white base 1.3 % darker.
 fn uniform_reflected(facets: &Facets, eta: f32) -> f32 {
     let term = |k: usize| {
         let cos = k as f32 / (COSINES - 1) as f32;
@@ -111,7 +111,7 @@ fn uniform_reflected(facets: &Facets, eta: f32) -> f32 {
     2.0 * (0..COSINES).map(term).sum::<f32>() / COSINES as f32
 }
 
-/// The share of light from the cosine `cos` that facets reflect upwards.
+/// The fraction of light from the cosine `cos` that facets reflect upwards.
 fn reflected_share(facets: &Facets, eta: f32, cos: f32, grid: u32) -> f32 {
     over_facets(facets, cos, grid, |wo, m| {
         let wi = reflect(wo, m);
@@ -120,7 +120,7 @@ fn reflected_share(facets: &Facets, eta: f32, cos: f32, grid: u32) -> f32 {
     })
 }
 
-/// The share of light from the cosine `cos` that facets let through downwards.
+/// The fraction of light from the cosine `cos` that facets transmit downwards.
 fn transmitted_share(facets: &Facets, eta: f32, cos: f32) -> f32 {
     over_facets(facets, cos, GRID, |wo, m| {
         let (reflected, beyond) = fresnel::dielectric(wo.dot(m), eta);
@@ -129,7 +129,7 @@ fn transmitted_share(facets: &Facets, eta: f32, cos: f32) -> f32 {
     })
 }
 
-/// The mean of `value(wo, m)` over the facets m that are visible from wo at the cosine `cos`.
+/// The mean of `value(wo, m)` over the facets m visible from wo at the cosine `cos`.
 fn over_facets(facets: &Facets, cos: f32, grid: u32, value: impl Fn(Vec3, Vec3) -> f32) -> f32 {
     let wo = Vec3::new((1.0 - cos * cos).max(0.0).sqrt(), 0.0, cos);
     let mut sum = 0.0_f64;
@@ -157,7 +157,7 @@ mod tests {
             let expected = fresnel::dielectric(cos, 1.5).0;
             assert!((coat.transmitted(cos, 1e-3) - (1.0 - expected)).abs() < 2e-3, "{cos}");
         }
-        // The sum's own 1.5 %.
+        // The error of Mitsuba's sum, 1.5 %.
         assert!((coat.reflected_inside(1e-3) / fresnel::diffuse_reflectance(1.0 / 1.5) - 0.985).abs() < 3e-3);
     }
 
@@ -175,7 +175,7 @@ mod tests {
         }
     }
 
-    /// Worked out from values of Mitsuba 3.9.1's `roughplastic` (GGX, alpha 0.3, eta 1.5).
+    /// Computed from values of Mitsuba 3.9.1's `roughplastic` (GGX, alpha 0.3, eta 1.5).
     #[test]
     fn a_rough_coat_is_mitsubas() {
         let coat = RoughCoat::new(Distribution::Ggx, 1.5, Widths::uniform(0.3));

@@ -1,4 +1,4 @@
-//! What materials need integrated beforehand.
+//! Checks materials and precomputes the tables that some of them need.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -7,46 +7,46 @@ use mateval_image::Texture;
 use mateval_scene::material::{
     ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
-use mateval_scene::reference::ReferenceScene;
+use mateval_scene::reference::{MaterialIndex, ReferenceScene};
 
-use super::fresnel;
-use super::principled::eta_from_specular;
+use super::fresnel::{self, eta_from_specular};
 use super::principled_tables::BlenderTables;
 use super::rough_boundary::{RoughCoat, Widths};
-use crate::error::TracerError;
+use crate::error::{MaterialFault, SceneFault};
 
-/// One entry a material.
+/// One table per material.
 #[derive(Debug)]
 pub(crate) struct MaterialTables(Vec<Table>);
 
-/// What one material needs.
+/// The precomputed values of one material.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Table {
     /// For Blender's principled.
     pub(crate) reflection: Option<Arc<BlenderTables>>,
     /// For rough plastic.
     pub(crate) coat: Option<Arc<RoughCoat>>,
-    /// For smooth plastic: the share of uniform light from inside that its coat reflects back.
+    /// For smooth plastic: the fraction of uniform light from inside that its coat reflects back.
     pub(crate) inside: f32,
 }
 
-/// Tables made so far, by what they depend on.
+/// The tables computed so far, by the parameters that they depend on.
 #[derive(Default)]
 struct Known {
-    /// By the bits of eta.
+    /// Keyed by the bits of eta.
     reflections: BTreeMap<u32, Arc<BlenderTables>>,
-    /// By whether it is GGX, the bits of eta, those of alpha where it is the same everywhere.
+    /// Keyed by whether the distribution is GGX, the bits of eta, and the bits of alpha if that is constant.
     coats: BTreeMap<(bool, u32, Option<u32>), Arc<RoughCoat>>,
 }
 
 impl MaterialTables {
-    /// Checks the materials' constants and integrates what they need, once for equal ones.
-    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, TracerError> {
+    /// Checks the materials' parameters and computes their tables. Materials with equal parameters share a table.
+    pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture]) -> Result<Self, SceneFault> {
         let mut known = Known::default();
         let mut tables = Vec::with_capacity(scene.materials.len());
         for (index, material) in scene.materials.iter().enumerate() {
-            check(material, textures.len())
-                .map_err(|what| TracerError::Invalid(format!("material {index} '{}': {what}", material.name)))?;
+            let located =
+                |fault| SceneFault::Material { material: MaterialIndex(index), name: material.name.clone(), fault };
+            check(material, textures.len()).map_err(located)?;
             tables.push(table(material, &mut known));
         }
         Ok(Self(tables))
@@ -90,90 +90,45 @@ impl Known {
     }
 }
 
-/// Every constant finite, every index of refraction above 0, every texture there.
-fn check(material: &Material, textures: usize) -> Result<(), String> {
-    let mut inputs = Inputs { textures, fault: None };
-    match &material.model {
-        MaterialModel::Diffuse { reflectance, alpha } => {
-            inputs.color(reflectance);
-            alpha.iter().for_each(|alpha| inputs.scalar(alpha));
-        }
-        MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
-            inputs.color(specular_reflectance);
-            microfacets.iter().for_each(|m| inputs.scalar(&m.alpha));
-        }
-        MaterialModel::Plastic { eta, diffuse_reflectance, specular_reflectance, microfacets, .. } => {
-            inputs.eta(*eta);
-            inputs.color(diffuse_reflectance);
-            inputs.color(specular_reflectance);
-            microfacets.iter().for_each(|m| inputs.scalar(&m.alpha));
-        }
-        MaterialModel::Dielectric { eta, specular_reflectance, specular_transmittance, microfacets } => {
-            inputs.eta(*eta);
-            inputs.color(specular_reflectance);
-            inputs.color(specular_transmittance);
-            microfacets.iter().for_each(|m| inputs.scalar(&m.alpha));
-        }
-        MaterialModel::ThinDielectric { eta, specular_reflectance, specular_transmittance } => {
-            inputs.eta(*eta);
-            inputs.color(specular_reflectance);
-            inputs.color(specular_transmittance);
-        }
-        MaterialModel::Principled { base_color, roughness, metallic, specular, .. } => {
-            inputs.color(base_color);
-            inputs.scalar(roughness);
-            inputs.scalar(metallic);
-            inputs.value(*specular);
+/// Fails unless every constant is finite, every index of refraction above 0, and every texture and channel exist.
+fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
+    let inputs = material.model.inputs();
+    for eta in inputs.etas {
+        if !(eta.is_finite() && eta > 0.0) {
+            return Err(MaterialFault::IndexOfRefraction(eta));
         }
     }
-    material.opacity.iter().for_each(|opacity| inputs.scalar(opacity));
-    if let Some(bump) = &material.bump {
-        inputs.scalar(&bump.height);
-        inputs.value(bump.scale);
+    inputs.colors.into_iter().try_for_each(|color| check_color(color, textures))?;
+    inputs.scalars.into_iter().try_for_each(|scalar| check_scalar(scalar, textures))?;
+    inputs.numbers.into_iter().try_for_each(check_number)?;
+    material.opacity.iter().try_for_each(|opacity| check_scalar(opacity, textures))?;
+    match &material.bump {
+        Some(bump) => check_scalar(&bump.height, textures).and_then(|()| check_number(bump.scale)),
+        None => Ok(()),
     }
-    inputs.fault.map_or(Ok(()), Err)
 }
 
-/// Looks at a material's inputs and keeps the first fault.
-struct Inputs {
-    textures: usize,
-    fault: Option<String>,
+fn check_color(input: &ColorInput, textures: usize) -> Result<(), MaterialFault> {
+    match input {
+        ColorInput::Constant(rgb) => rgb.iter().try_for_each(|&value| check_number(value)),
+        ColorInput::Texture { texture, .. } => check_texture(texture.0, textures),
+    }
 }
 
-impl Inputs {
-    fn demand(&mut self, holds: bool, what: impl FnOnce() -> String) {
-        if !holds && self.fault.is_none() {
-            self.fault = Some(what());
+fn check_scalar(input: &ScalarInput, textures: usize) -> Result<(), MaterialFault> {
+    match *input {
+        ScalarInput::Constant(value) => check_number(value),
+        ScalarInput::Texture { texture, channel, .. } => {
+            check_texture(texture.0, textures)?;
+            if channel < 3 { Ok(()) } else { Err(MaterialFault::MissingChannel(channel)) }
         }
     }
+}
 
-    fn value(&mut self, value: f32) {
-        self.demand(value.is_finite(), || format!("value {value}, expected a finite one"));
-    }
+fn check_texture(texture: usize, count: usize) -> Result<(), MaterialFault> {
+    if texture < count { Ok(()) } else { Err(MaterialFault::MissingTexture { texture, count }) }
+}
 
-    fn eta(&mut self, eta: f32) {
-        self.demand(eta.is_finite() && eta > 0.0, || format!("index of refraction {eta}, expected above 0"));
-    }
-
-    fn texture(&mut self, index: usize) {
-        let count = self.textures;
-        self.demand(index < count, || format!("texture {index} of {count}"));
-    }
-
-    fn color(&mut self, input: &ColorInput) {
-        match input {
-            ColorInput::Constant(rgb) => rgb.iter().for_each(|&v| self.value(v)),
-            ColorInput::Texture { texture, .. } => self.texture(texture.0),
-        }
-    }
-
-    fn scalar(&mut self, input: &ScalarInput) {
-        match input {
-            ScalarInput::Constant(value) => self.value(*value),
-            ScalarInput::Texture { texture, channel, .. } => {
-                self.texture(texture.0);
-                self.demand(*channel < 3, || format!("texture channel {channel}, expected 0, 1 or 2"));
-            }
-        }
-    }
+fn check_number(value: f32) -> Result<(), MaterialFault> {
+    if value.is_finite() { Ok(()) } else { Err(MaterialFault::NotFinite(value)) }
 }

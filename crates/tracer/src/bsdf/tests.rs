@@ -1,4 +1,4 @@
-//! Every lobe: samples follow their density (chi-square), energy, reciprocity, known values.
+//! Tests of every lobe: samples follow their density (chi-square), energy, reciprocity, known values.
 
 mod values;
 
@@ -10,8 +10,9 @@ use mateval_scene::material::{
 };
 use mateval_scene::reference::ReferenceScene;
 
-use super::lobe::LocalSample;
+use super::sample::LocalSample;
 use super::*;
+use crate::world::World;
 
 const WHITE: ColorInput = ColorInput::Constant([1.0; 3]);
 
@@ -51,7 +52,7 @@ fn dielectric(eta: f32, microfacets: Option<Microfacets>) -> MaterialModel {
     MaterialModel::Dielectric { eta, specular_reflectance: WHITE, specular_transmittance: WHITE, microfacets }
 }
 
-/// All models at several widths, white throughout.
+/// All models at several widths, in white.
 fn models() -> Vec<MaterialModel> {
     let mut models = vec![
         diffuse(None),
@@ -75,7 +76,7 @@ fn models() -> Vec<MaterialModel> {
     models
 }
 
-/// Calls `look` with the local scattering of `model`.
+/// Calls `look` with the lobe of `model`.
 fn with_lobe<R>(model: &MaterialModel, look: impl FnOnce(&Lobe) -> R) -> R {
     let material = Material { name: String::new(), model: *model, two_sided: true, opacity: None, bump: None };
     let scene = ReferenceScene { materials: vec![material], ..Default::default() };
@@ -83,7 +84,7 @@ fn with_lobe<R>(model: &MaterialModel, look: impl FnOnce(&Lobe) -> R) -> R {
     look(&Lobe::at(&scene.materials[0], tables.of(0), &[], Vec2::ZERO))
 }
 
-/// Views from above at 4 angles, and from below for what transmits.
+/// Views from above at 4 angles, and from below for lobes that transmit.
 fn views(lobe: &Lobe) -> Vec<Vec3> {
     let from_above = [0.1_f32, 0.4, 0.8, 1.0];
     let mut views = from_above.map(|z| Vec3::new((1.0 - z * z).sqrt() * 0.6, (1.0 - z * z).sqrt() * 0.8, z)).to_vec();
@@ -94,22 +95,22 @@ fn views(lobe: &Lobe) -> Vec<Vec3> {
 }
 
 fn draws(count: u32) -> impl Iterator<Item = [f32; 3]> {
-    // Independent numbers: a chi-square test of stratified ones would be too kind.
+    // Independent numbers: stratified ones would make a chi-square test too lenient.
     (0..count).map(|k| [0, 1, 2].map(|stream| crate::sampler::unit_hash(k, 77 + stream)))
 }
 
 const ROWS: usize = 16;
 const COLUMNS: usize = 16;
 
-/// The cell of the sphere, cosine by angle, that `w` lies in.
+/// The cell of the sphere, by cosine and azimuth, that contains `w`.
 fn cell(w: Vec3) -> usize {
     let row = ((w.z + 1.0) * 0.5 * ROWS as f32).min(ROWS as f32 - 1.0) as usize;
     let phi = libm::atan2f(w.y, w.x) / TAU + 0.5;
     row * COLUMNS + ((phi * COLUMNS as f32) as usize).min(COLUMNS - 1)
 }
 
-/// The density integrated over each cell, in f64, by a grid that is fine enough for narrow peaks and finest where rows
-/// meet: at the poles and at the horizon peaks are narrowest.
+/// The density integrated over each cell, in f64. The grid is finest where rows of cells meet, since peaks are
+/// narrowest at the poles and at the horizon.
 fn expected(lobe: &Lobe, wo: Vec3) -> Vec<f64> {
     const FINE: usize = 96;
     let mut cells = vec![0.0_f64; ROWS * COLUMNS];
@@ -129,7 +130,7 @@ fn expected(lobe: &Lobe, wo: Vec3) -> Vec<f64> {
     cells
 }
 
-/// Pearson's statistic over cells of at least 10 expected draws, the rest pooled; and its degrees of freedom.
+/// Pearson's statistic over cells with at least 10 expected samples, with the rest pooled, and its degrees of freedom.
 fn chi_square(lobe: &Lobe, wo: Vec3, expected: &[f64], count: u32) -> (f64, f64) {
     let mut found = vec![0.0_f64; expected.len()];
     let mut spread = 0_u32;
@@ -142,7 +143,7 @@ fn chi_square(lobe: &Lobe, wo: Vec3, expected: &[f64], count: u32) -> (f64, f64)
     }
     let n = f64::from(count);
     let (mut statistic, mut freedom) = (0.0, 0.0);
-    // Draws that went nowhere or to single directions are a cell too.
+    // Absorbed samples and delta samples count as one cell too.
     let mut pooled = [n - f64::from(spread), n * (1.0 - expected.iter().sum::<f64>())];
     for (found, expected) in found.iter().zip(expected) {
         if n * expected >= 10.0 {
@@ -179,7 +180,7 @@ fn samples_follow_their_density() {
     assert!(tests > 180, "{tests}");
 }
 
-/// The twin: a density for another width, angle or share is found out.
+/// The twin: a density for another width, index or metallic is rejected.
 #[test]
 fn samples_of_another_density_are_found_out() {
     let wo = Vec3::new(0.6, 0.0, 0.8);
@@ -197,7 +198,7 @@ fn samples_of_another_density_are_found_out() {
     }
 }
 
-/// The mean weight of samples: the share of light that is sent on. Of its channels the largest.
+/// The mean weight of samples, which is the fraction of light scattered; the largest channel.
 fn albedo(lobe: &Lobe, wo: Vec3) -> f64 {
     f64::from(color_albedo(lobe, wo).max_element())
 }
@@ -211,7 +212,7 @@ fn color_albedo(lobe: &Lobe, wo: Vec3) -> Vec3 {
     ((0..count).map(weight).sum::<glam::DVec3>() / f64::from(count)).as_vec3()
 }
 
-/// Weights are value over density, and the value integrates to what the weights average to.
+/// Weights equal value over density.
 #[test]
 fn weights_are_value_over_density() {
     for model in models() {
@@ -229,9 +230,10 @@ fn weights_are_value_over_density() {
     }
 }
 
-/// White materials send on no more than they get. Four exceptions, each as its model has it: radiance grows inside glass
-/// by the square of the index; Mitsuba's principled adds a specular lobe to a full diffuse one; Blender's is interpolated
-/// between few cosines; Oren-Nayar's and rough plastic's formulas are fits and exceed one by little.
+/// White materials scatter no more light than they receive. Exceptions, as their models have them: radiance grows
+/// inside glass by the square of the index, Mitsuba's principled adds a specular lobe to a full diffuse one, Blender's
+/// is interpolated between few cosines, and the formulas of Oren-Nayar and of rough plastic are fits that exceed one
+/// slightly.
 #[test]
 fn no_more_light_leaves_than_came() {
     for model in models() {
@@ -253,7 +255,7 @@ fn no_more_light_leaves_than_came() {
     }
 }
 
-/// White and smooth or matt: nothing is lost, from any angle.
+/// White models that are smooth or matt lose nothing at any angle.
 #[test]
 fn lossless_models_lose_nothing() {
     let thin = MaterialModel::ThinDielectric { eta: 1.5, specular_reflectance: WHITE, specular_transmittance: WHITE };
@@ -274,13 +276,13 @@ fn lossless_models_lose_nothing() {
             }
         });
     }
-    // The twin: 2 % less is found out.
+    // The twin: a loss of 2 % is rejected.
     let darker = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.98; 3]), alpha: None };
     assert!(with_lobe(&darker, |lobe| albedo(lobe, Vec3::Z)) < 0.99);
 }
 
-/// Light and viewer may change places, but for glass (by the square of the index) and Blender's layering; the twin: glass
-/// without that square is found out.
+/// Light and viewer may be exchanged, except for Blender's layering, and for glass only up to the square of the index.
+/// The twin: glass without that square is rejected.
 #[test]
 fn reciprocity() {
     let mut pairs = 0;
@@ -300,8 +302,8 @@ fn reciprocity() {
     assert!(worst_exchange(&dielectric(1.5, facets(Distribution::Ggx, 0.3)), 1.0).1 > 0.3);
 }
 
-/// The number of sampled pairs of directions, and the largest part by which the value changes when they are exchanged;
-/// `gain` is what radiance gains on its way down through the surface.
+/// The number of sampled pairs of directions, and the largest relative change of the value when they are exchanged.
+/// `gain` is the factor by which radiance grows on its way down through the surface.
 fn worst_exchange(model: &MaterialModel, gain: f32) -> (u32, f32) {
     with_lobe(model, |lobe| {
         let (mut pairs, mut worst) = (0, 0.0_f32);
@@ -324,7 +326,7 @@ fn worst_exchange(model: &MaterialModel, gain: f32) -> (u32, f32) {
     })
 }
 
-/// Smooth glass from inside, beyond the critical angle, reflects everything; head on, it lets 96 % through.
+/// Smooth glass reflects everything from inside beyond the critical angle, and transmits 96 % at normal incidence.
 #[test]
 fn glass_reflects_as_fresnel_says() {
     with_lobe(&dielectric(1.5, None), |lobe| {
@@ -337,7 +339,7 @@ fn glass_reflects_as_fresnel_says() {
     });
 }
 
-/// Opaque and not two-sided: black from behind. Two-sided: the same from both sides.
+/// An opaque material that is not two-sided is black from behind; a two-sided one looks the same from both sides.
 #[test]
 fn sides() {
     use std::sync::Arc;
@@ -364,9 +366,9 @@ fn sides() {
     let (wo, wi) = (Vec3::new(0.0, 0.6, -0.8), Vec3::new(0.6, 0.0, -0.8));
     let mirrored = |w: Vec3| Vec3::new(w.x, w.y, -w.z);
     let (one, two) = (world(false), world(true));
-    assert!(Bsdf::new(&one, &hit, wo).is_black());
-    assert_eq!(Bsdf::new(&one, &hit, mirrored(wo)).evaluate(wi), (Vec3::ZERO, 0.0));
-    let front = Bsdf::new(&two, &hit, mirrored(wo)).evaluate(mirrored(wi)).0;
-    let back = Bsdf::new(&two, &hit, wo).evaluate(wi).0;
+    assert!(one.bsdf(&hit, wo).is_black());
+    assert_eq!(one.bsdf(&hit, mirrored(wo)).evaluate(wi), (Vec3::ZERO, 0.0));
+    let front = two.bsdf(&hit, mirrored(wo)).evaluate(mirrored(wi)).0;
+    let back = two.bsdf(&hit, wo).evaluate(wi).0;
     assert!(front.x > 0.1 && (front - back).length() < 1e-6, "{front} {back}");
 }

@@ -1,4 +1,4 @@
-//! Surfaces that glow.
+//! Emitting surfaces.
 
 use glam::Vec3;
 use mateval_scene::TriangleMesh;
@@ -11,73 +11,73 @@ use crate::surface_hit::SurfaceHit;
 use crate::triangle_record::TriangleRecord;
 use crate::warp;
 
-/// What surfaces glow with.
+/// What surfaces emit.
 #[derive(Clone, Debug)]
-pub(crate) struct Glow {
+pub(crate) struct SurfaceEmission {
     /// Linear Rec. 709.
     pub(crate) radiance: Vec3,
-    /// Multiplies it.
+    /// Multiplies the radiance.
     pub(crate) map: Option<RadianceMap>,
-    /// Whether backs glow too.
+    /// Whether backs emit too.
     pub(crate) two_sided: bool,
 }
 
-/// One or more surfaces of one light group, sampled together.
+/// One or several surfaces of one light group, sampled together.
 #[derive(Debug)]
 pub(crate) struct AreaEmitter {
     pub(crate) light: LightIndex,
-    glow: Glow,
-    /// None for a light of a stage.
+    emission: SurfaceEmission,
+    /// Empty for a stage light.
     surfaces: Vec<SurfaceIndex>,
-    /// For each of `surfaces` the number of triangles before it.
+    /// For each of `surfaces`, the number of triangles before it.
     starts: Vec<usize>,
     triangles: Distribution,
-    /// Of all triangles, surface by surface.
+    /// The records of all triangles, surface by surface.
     records: Vec<TriangleRecord>,
     outline: Outline,
 }
 
-/// The surface that places on lights of a stage name: none of the scene's.
+/// The surface index of points on stage lights; no surface of the scene has it.
 const STAGE: SurfaceIndex = SurfaceIndex(usize::MAX);
 
-/// Enough of an emitter to say roughly how much of the view it takes up.
+/// Bounds of an emitter, to estimate its solid angle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outline {
-    /// Of a sphere around it.
+    /// The centre of a bounding sphere.
     centre: Vec3,
-    /// Of that sphere, and squared; above 0.
+    /// The radius of that sphere, and its square, which is above 0.
     radius: f32,
     radius2: f32,
-    /// Square metres.
+    /// In square metres.
     area: f32,
-    /// The common front normal of all triangles, if they have one and only the front glows; else zero.
+    /// The normal that all triangles share, if they have one and only the front emits; else zero.
     facing: Vec3,
 }
 
-/// The outlines of all emitters, number by number, so that eight are looked at in one go.
+/// The outlines of all emitters as arrays of components, so that eight are evaluated at once.
 #[derive(Debug, Default)]
 pub(crate) struct Outlines(Vec<EightOutlines>);
 
-/// Emitters looked at together.
-pub(crate) const TOGETHER: usize = 8;
+/// The number of emitters evaluated at once.
+pub(crate) const LANES: usize = 8;
 
 #[derive(Clone, Copy, Debug)]
 struct EightOutlines {
-    centre: [[f32; TOGETHER]; 3],
-    facing: [[f32; TOGETHER]; 3],
-    radius: [f32; TOGETHER],
-    radius2: [f32; TOGETHER],
-    area: [f32; TOGETHER],
+    centre: [[f32; LANES]; 3],
+    facing: [[f32; LANES]; 3],
+    radius: [f32; LANES],
+    radius2: [f32; LANES],
+    area: [f32; LANES],
 }
 
 impl EightOutlines {
-    /// Takes up nothing of any view.
+    /// Has a solid angle of 0 from everywhere.
     const NONE: Self = Self {
-        centre: [[0.0; TOGETHER]; 3],
-        facing: [[0.0; TOGETHER]; 3],
-        radius: [0.0; TOGETHER],
-        radius2: [1.0; TOGETHER],
-        area: [0.0; TOGETHER],
+        centre: [[0.0; LANES]; 3],
+        facing: [[0.0; LANES]; 3],
+        radius: [0.0; LANES],
+        radius2: [1.0; LANES],
+        area: [0.0; LANES],
     };
 
     fn put(&mut self, lane: usize, outline: &Outline) {
@@ -91,7 +91,7 @@ impl EightOutlines {
     }
 
     #[inline(always)]
-    fn solid_angles(&self, from: Vec3) -> [f32; TOGETHER] {
+    fn solid_angles(&self, from: Vec3) -> [f32; LANES] {
         std::array::from_fn(|lane| {
             let away = [0, 1, 2].map(|axis| from[axis] - self.centre[axis][lane]);
             let dot = |other: [f32; 3]| away[0] * other[0] + away[1] * other[1] + away[2] * other[2];
@@ -109,12 +109,13 @@ impl Outlines {
             chunk.iter().enumerate().for_each(|(lane, area)| eight.put(lane, &area.outline));
             eight
         };
-        Self(areas.chunks(TOGETHER).map(eight).collect())
+        Self(areas.chunks(LANES).map(eight).collect())
     }
 
-    /// Roughly the solid angle of each emitter, seen from `from`; 0 from behind. Eight at a time; zeros follow the last.
+    /// An estimate of each emitter's solid angle seen from `from`; 0 from behind. Eight at a time; the last eight are
+    /// filled up with zeros.
     #[inline]
-    pub(crate) fn solid_angles(&self, from: Vec3) -> impl Iterator<Item = [f32; TOGETHER]> + '_ {
+    pub(crate) fn solid_angles(&self, from: Vec3) -> impl Iterator<Item = [f32; LANES]> + '_ {
         self.0.iter().map(move |eight| eight.solid_angles(from))
     }
 }
@@ -123,41 +124,44 @@ impl AreaEmitter {
     pub(crate) fn new(
         scene: &ReferenceScene,
         light: LightIndex,
-        glow: Glow,
+        emission: SurfaceEmission,
         surfaces: Vec<SurfaceIndex>,
         scene_size: f32,
     ) -> Self {
         let meshes: Vec<&TriangleMesh> = surfaces.iter().map(|surface| &scene.surfaces[surface.0].mesh).collect();
-        Self::of_meshes(&meshes, light, glow, surfaces, scene_size)
+        Self::of_meshes(&meshes, light, emission, surfaces, scene_size)
     }
 
-    /// A light of a stage, which is no surface of the scene.
-    pub(crate) fn on_stage(light: LightIndex, glow: Glow, mesh: &TriangleMesh, scene_size: f32) -> Self {
-        Self::of_meshes(&[mesh], light, glow, Vec::new(), scene_size)
+    /// A stage light, which is no surface of the scene.
+    pub(crate) fn on_stage(light: LightIndex, emission: SurfaceEmission, mesh: &TriangleMesh, scene_size: f32) -> Self {
+        Self::of_meshes(&[mesh], light, emission, Vec::new(), scene_size)
     }
 
     fn of_meshes(
         meshes: &[&TriangleMesh],
         light: LightIndex,
-        glow: Glow,
+        emission: SurfaceEmission,
         surfaces: Vec<SurfaceIndex>,
         scene_size: f32,
     ) -> Self {
+        // Number the triangles of all surfaces.
         let mut starts = vec![0];
         for mesh in meshes {
             starts.push(starts[starts.len() - 1] + mesh.triangles.len());
         }
+        // Distribute samples by area.
         let areas = meshes.iter().flat_map(|mesh| (0..mesh.triangles.len()).map(|t| area(mesh, t)));
+        let triangles = Distribution::new(areas);
         let records: Vec<TriangleRecord> = meshes
             .iter()
             .flat_map(|mesh| (0..mesh.triangles.len()).map(|t| TriangleRecord::new(mesh, TriangleIndex(t), scene_size)))
             .collect();
+        // Bound the emitter.
         let (centre, radius2) = bounding_sphere(meshes);
-        let triangles = Distribution::new(areas);
-        let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !glow.two_sided));
+        let (total, facing) = (triangles.total(), common_normal(&records).filter(|_| !emission.two_sided));
         Self {
             light,
-            glow,
+            emission,
             triangles,
             records,
             surfaces,
@@ -172,12 +176,12 @@ impl AreaEmitter {
         }
     }
 
-    /// Square metres.
+    /// In square metres.
     pub(crate) fn area(&self) -> f32 {
         self.outline.area
     }
 
-    /// A place, uniform over the area.
+    /// A point on the emitter, uniform over its area.
     pub(crate) fn sample(&self, choice: f32, u: [f32; 2]) -> SurfaceHit {
         let (triangle, _) = self.triangles.sample(choice);
         let which = self.starts.partition_point(|&start| start <= triangle) - 1;
@@ -186,27 +190,27 @@ impl AreaEmitter {
         SurfaceHit::new(surface, index, &self.records[triangle], warp::triangle(u))
     }
 
-    /// The place on the light of a stage that a ray has met.
+    /// The point on a stage light that a ray has hit.
     pub(crate) fn place_on_stage(&self, triangle: TriangleIndex, weights: Vec3) -> SurfaceHit {
         SurfaceHit::new(STAGE, triangle, &self.records[triangle.0], weights)
     }
 
-    /// Whether it is a light of a stage, which is no surface of the scene.
+    /// Whether this is a stage light, which is no surface of the scene.
     pub(crate) fn is_on_stage(&self) -> bool {
         self.surfaces.is_empty()
     }
 
-    /// Whether the side of `hit` towards `direction` glows.
-    pub(crate) fn glows(&self, hit: &SurfaceHit, direction: Vec3) -> bool {
-        self.glow.two_sided || hit.is_front(direction)
+    /// Whether the side of `hit` towards `direction` emits.
+    pub(crate) fn emits(&self, hit: &SurfaceHit, direction: Vec3) -> bool {
+        self.emission.two_sided || hit.is_front(direction)
     }
 
-    /// What it sends from `place`, on a side that glows. How it is sampled does not follow from this: see the module.
+    /// The radiance emitted at `place`, on a side that emits. Sampling does not depend on it; see the module.
     #[inline]
     pub(crate) fn radiance(&self, place: &SurfaceHit) -> Vec3 {
-        match &self.glow.map {
-            None => self.glow.radiance,
-            Some(map) => self.glow.radiance * map.at(place.uv),
+        match &self.emission.map {
+            None => self.emission.radiance,
+            Some(map) => self.emission.radiance * map.at(place.uv),
         }
     }
 }
@@ -216,7 +220,7 @@ fn area(mesh: &TriangleMesh, triangle: usize) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }
 
-/// The centre of the box around everything, and the square of the distance to the farthest vertex.
+/// The centre of the bounding box of all meshes, and the squared distance of the farthest vertex.
 fn bounding_sphere(meshes: &[&TriangleMesh]) -> (Vec3, f32) {
     let positions = || meshes.iter().flat_map(|mesh| mesh.positions.iter().copied());
     let low = positions().reduce(Vec3::min).unwrap_or_default();

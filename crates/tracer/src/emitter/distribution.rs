@@ -1,15 +1,15 @@
-//! Choosing one of many by weight.
+//! A discrete distribution, sampled by its cumulative weights.
 
 /// Cumulative weights, scaled to end at 1.
 #[derive(Clone, Debug)]
 pub(crate) struct Distribution {
-    /// `cumulative[k]` is the share of everything before k; one more entry than there are choices.
+    /// `cumulative[k]` is the probability of all choices before k; there is one more entry than choices.
     cumulative: Vec<f32>,
     total: f64,
 }
 
 impl Distribution {
-    /// Over weights that are finite and not negative. When all are zero, every choice is equally likely.
+    /// Builds the distribution from finite weights of at least 0. If all are zero, all choices are equally likely.
     pub(crate) fn new(weights: impl Iterator<Item = f64>) -> Self {
         let mut sums = vec![0.0_f64];
         let mut total = 0.0;
@@ -27,7 +27,8 @@ impl Distribution {
         self.total
     }
 
-    /// The choice for `u` in [0, 1), and the part of u within it, again in [0, 1). A choice of no weight is never made.
+    /// The choice for `u` in [0, 1), and the position of u within that choice, rescaled to [0, 1). A choice of weight
+    /// zero is never made.
     pub(crate) fn sample(&self, u: f32) -> (usize, f32) {
         let choice = self.cumulative.partition_point(|&before| before <= u) - 1;
         let choice = choice.min(self.cumulative.len() - 2);
@@ -35,7 +36,7 @@ impl Distribution {
         (choice, rest.clamp(0.0, 1.0 - f32::EPSILON))
     }
 
-    /// How likely `choice` is.
+    /// The probability of `choice`.
     pub(crate) fn probability(&self, choice: usize) -> f32 {
         self.cumulative[choice + 1] - self.cumulative[choice]
     }

@@ -1,4 +1,4 @@
-//! Light from far outside: a latitude-longitude map, or the same from everywhere.
+//! Light from infinity: a latitude-longitude map, or constant radiance.
 
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -8,11 +8,12 @@ use mateval_image::{LinearRgb, Texture};
 use super::distribution::Distribution;
 use crate::warp;
 
-/// A map around the scene, sampled by its brightness.
+/// An environment map, importance-sampled by its brightness.
 ///
-/// In the map's own frame, direction d is looked up at u = atan2(d.x, -d.z) / (2 pi), v = acos(d.y) / pi from the top, as
-/// in Mitsuba's `envmap`; bilinear between texel centres at half-integers, around in u, held at the poles in v. (Mitsuba
-/// stretches v so that the first and the last row lie on the poles: half a texel's difference.)
+/// In the map's own frame, direction d is looked up at u = atan2(d.x, -d.z) / (2 pi) and v = acos(d.y) / pi from the
+/// top, as in Mitsuba's `envmap`. Lookups are bilinear between texel centres at half-integers; u wraps around, v is
+/// clamped at the poles. (Mitsuba stretches v so that the first and last rows lie on the poles, a difference of half a
+/// texel.)
 #[derive(Debug)]
 pub(crate) struct EnvironmentMap {
     texture: Texture,
@@ -38,7 +39,7 @@ impl EnvironmentMap {
         }
     }
 
-    /// The radiance that comes from `direction`.
+    /// The radiance from `direction`.
     pub(crate) fn radiance(&self, direction: Vec3) -> Vec3 {
         let [u, v] = self.place(direction);
         let (width, height) = (self.texture.width(), self.texture.height());
@@ -52,7 +53,7 @@ impl EnvironmentMap {
         upper.lerp(lower, y - top) * self.scale
     }
 
-    /// A direction and its density per solid angle.
+    /// Samples a direction; returns it with its density per solid angle.
     pub(crate) fn sample(&self, u: [f32; 2]) -> (Vec3, f32) {
         let (row, v) = self.rows.sample(u[0]);
         let (column, u) = self.columns[row].sample(u[1]);
@@ -79,7 +80,7 @@ impl EnvironmentMap {
         probability * texels / (TAU * PI * sin_theta.max(f32::MIN_POSITIVE))
     }
 
-    /// u and v from the top, both in 0..1.
+    /// The coordinates u and v (from the top) of a direction, both in 0..1.
     fn place(&self, direction: Vec3) -> [f32; 2] {
         let d = self.world_from_map.transpose() * direction;
         let u = libm::atan2f(d.x, -d.z) / TAU;
@@ -104,12 +105,12 @@ fn neighbourhood(luminance: &[f64], texture: &Texture, x: usize, y: usize) -> f6
     sum / 9.0
 }
 
-/// The share of the sphere that a row covers, but for a constant factor.
+/// The solid angle of a row, up to a constant factor.
 fn row_area(texture: &Texture, y: usize) -> f32 {
     libm::sinf(PI * (y as f32 + 0.5) / texture.height() as f32)
 }
 
-/// A direction uniform over the sphere, and its density.
+/// A uniform direction and its density.
 pub(crate) fn sample_constant(u: [f32; 2]) -> (Vec3, f32) {
     (warp::sphere(u), CONSTANT_DENSITY)
 }
@@ -134,7 +135,8 @@ mod tests {
 
     #[test]
     fn the_convention_is_mitsubas() {
-        // The centre of column 4 of 16 is u = 4.5 / 16; towards +X u is 0.25, the border of columns 3 and 4.
+        // The centre of column 4 of 16 is at u = 4.5 / 16. The direction +X has u = 0.25, the border of columns 3 and
+        // 4.
         let map = map(3 * 16 + 4);
         let (phi, theta) = (TAU * 4.5 / 16.0, PI * 3.5 / 8.0);
         let direction = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
@@ -143,7 +145,8 @@ mod tests {
         assert!(map.place(Vec3::X)[0] == 0.25 && map.place(-Vec3::Z)[0] == 0.0 && map.place(Vec3::Y)[1] == 0.0);
     }
 
-    /// The density integrates to one, is what `sample` says, and is nowhere zero where the map is not.
+    /// The density integrates to one, matches the density that `sample` returns, and is zero nowhere where the map is
+    /// not.
     #[test]
     fn density_and_samples_agree() {
         let map = map(0);

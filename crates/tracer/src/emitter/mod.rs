@@ -1,8 +1,8 @@
-//! What emits light, and how it is found from a place that it may shine on.
+//! Emitters, and sampling of light that reaches a point.
 //!
-//! One emitter is chosen, then a place on it or a direction to it. The choice follows from geometry alone (solid angle,
-//! with a share of 0.2 for all alike), never from radiance: pictures of each light group alone, and of any weights of
-//! them, can come from the same paths.
+//! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone (on
+//! estimated solid angles, with a share of 0.2 spread evenly), never on radiance. So pictures of each light group
+//! alone, and of any weighting of the groups, can come from the same paths.
 
 mod area;
 mod distribution;
@@ -15,25 +15,25 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene, SurfaceIndex};
 
 use crate::accel::Accel;
-use crate::error::TracerError;
+use crate::error::{LightFault, RequestFault, SceneFault, TracerError};
 use crate::ray::Ray;
 use crate::surface_hit::SurfaceHit;
-use area::{AreaEmitter, Glow, Outlines, TOGETHER};
+use area::{AreaEmitter, LANES, Outlines, SurfaceEmission};
 use environment::EnvironmentMap;
 use radiance_map::RadianceMap;
 
-/// All light groups of a scene.
+/// The emitters of all light groups of a scene.
 #[derive(Debug)]
 pub struct Emitters {
     areas: Vec<AreaEmitter>,
     /// Of `areas`.
     outlines: Outlines,
-    /// For each surface the place in `areas`, if it glows.
+    /// For each surface its index in `areas`, if it emits.
     area_of: Vec<Option<usize>>,
-    /// The lights of a stage, one a surface: `areas`, in their order.
+    /// The stage lights as surfaces, in the order of `areas`.
     stage: Option<Accel>,
     distant: Vec<DistantEmitter>,
-    /// For each light group, whether the camera sees it.
+    /// For each light group, whether the camera sees its emitters.
     camera_visible: Vec<bool>,
     scene_size: f32,
 }
@@ -50,51 +50,51 @@ enum DistantKind {
     Constant(Vec3),
 }
 
-/// Light that arrives along a sampled direction, unless something is in between.
+/// Light that arrives along a sampled direction unless something blocks it.
 #[derive(Clone, Copy, Debug)]
 pub struct EmitterSample {
-    /// The group that it belongs to.
+    /// The light group.
     pub light: LightIndex,
-    /// Where it comes from, unit length.
+    /// Towards the emitter, unit length.
     pub direction: Vec3,
     /// Linear Rec. 709.
     pub radiance: Vec3,
-    /// Per solid angle, the choice of emitter included.
+    /// Per solid angle, including the choice of the emitter.
     pub density: f32,
-    /// The place on the emitter; none for one far outside.
+    /// The point on the emitter; `None` for an emitter at infinity.
     pub place: Option<SurfaceHit>,
-    /// Whether it is a light of a stage, which smooth facets do not show.
+    /// Whether the emitter is a stage light, which smooth facets do not reflect.
     pub on_stage: bool,
 }
 
-/// A light that is added to a scene to light it as a photo is lit: it never hides anything, and neither the camera nor
-/// facets below [`crate::bsdf::STAGE_ROUGHNESS`] see it.
+/// A light added to a scene so that it is lit as in a photo. It blocks no light, and it is invisible to the camera and
+/// in facets below [`crate::bsdf::STAGE_ROUGHNESS`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageLight {
-    /// World space, metres; glows on its front.
+    /// World space, in metres. The front emits.
     pub mesh: TriangleMesh,
     /// Linear Rec. 709.
     pub radiance: [f32; 3],
 }
 
-/// Radiance found without sampling, by a ray that happened to go there.
+/// Radiance that a ray has met by chance.
 #[derive(Clone, Copy, Debug)]
 pub struct Emitted {
-    /// The group that it belongs to.
+    /// The light group.
     pub light: LightIndex,
     /// Linear Rec. 709.
     pub radiance: Vec3,
-    /// The density with which [`Emitters::sample`] would have found it, per solid angle.
+    /// The density with which [`Emitters::sample`] would have sampled it, per solid angle.
     pub density: f32,
 }
 
-/// The share of choices that is spread over all area emitters alike.
+/// The probability mass that is spread evenly over all area emitters.
 const UNIFORM_SHARE: f32 = 0.2;
-/// Above this many glowing surfaces, those of a light group are sampled as one.
+/// Above this number of emitting surfaces, the surfaces of a light group are sampled as one emitter.
 const SEPARATE_SURFACES: usize = 64;
 
 impl Emitters {
-    /// `scene_size` is the scene's largest coordinate.
+    /// `scene_size` is the largest absolute coordinate of the scene.
     pub(crate) fn new(scene: &ReferenceScene, textures: &[Texture], scene_size: f32) -> Result<Self, TracerError> {
         let mut emitters = Self {
             areas: Vec::new(),
@@ -105,48 +105,51 @@ impl Emitters {
             camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
             scene_size,
         };
-        let glowing = |emission: &Emission| match emission {
+        let emitting_surfaces = |emission: &Emission| match emission {
             Emission::Area { surfaces, .. } => surfaces.len(),
             _ => 0,
         };
-        let count: usize = scene.lights.iter().map(|group| glowing(&group.emission)).sum();
+        let count: usize = scene.lights.iter().map(|group| emitting_surfaces(&group.emission)).sum();
         for (index, group) in scene.lights.iter().enumerate() {
             emitters
                 .add(scene, textures, LightIndex(index), &group.emission, count <= SEPARATE_SURFACES)
-                .map_err(|what| TracerError::Invalid(format!("light {index} '{}': {what}", group.name)))?;
+                .map_err(|fault| SceneFault::Light { light: LightIndex(index), name: group.name.clone(), fault })?;
         }
         emitters.outlines = Outlines::new(&emitters.areas);
         Ok(emitters)
     }
 
-    /// The lights of a stage, a group each, and none else, in a scene of `surfaces` surfaces.
+    /// Stage lights only, one group each, for a scene of `surfaces` surfaces.
     pub(crate) fn on_stage(stage: &[StageLight], surfaces: usize, scene_size: f32) -> Result<Self, TracerError> {
-        let mut emitters = Self {
-            areas: Vec::new(),
-            outlines: Outlines::default(),
+        let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
+        let accel = Accel::build(&meshes).map_err(|error| match error {
+            TracerError::InvalidScene(SceneFault::Surface { surface, fault, .. }) => {
+                RequestFault::StageMesh { light: LightIndex(surface.0), fault }.into()
+            }
+            other => other,
+        })?;
+        let mut areas = Vec::with_capacity(stage.len());
+        for (index, light) in stage.iter().enumerate() {
+            let located = |fault| RequestFault::StageLight { light: LightIndex(index), fault };
+            check_radiance(&light.radiance).map_err(located)?;
+            if light.mesh.triangles.is_empty() {
+                return Err(located(LightFault::NoTriangles).into());
+            }
+            let emission = SurfaceEmission { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
+            areas.push(AreaEmitter::on_stage(LightIndex(index), emission, &light.mesh, scene_size));
+        }
+        Ok(Self {
+            outlines: Outlines::new(&areas),
+            areas,
             area_of: vec![None; surfaces],
-            stage: None,
+            stage: Some(accel),
             distant: Vec::new(),
             camera_visible: vec![false; stage.len()],
             scene_size,
-        };
-        for (index, light) in stage.iter().enumerate() {
-            let fault = |what: String| TracerError::Invalid(format!("stage light {index}: {what}"));
-            check_radiance(&light.radiance).map_err(fault)?;
-            let finite = light.mesh.positions.iter().all(|place| place.is_finite());
-            if light.mesh.triangles.is_empty() || !finite {
-                return Err(fault("no triangles, or corners that are not finite".to_owned()));
-            }
-            let glow = Glow { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
-            emitters.areas.push(AreaEmitter::on_stage(LightIndex(index), glow, &light.mesh, scene_size));
-        }
-        let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
-        emitters.stage = Some(Accel::build(&meshes)?);
-        emitters.outlines = Outlines::new(&emitters.areas);
-        Ok(emitters)
+        })
     }
 
-    /// How many light groups there are.
+    /// The number of light groups.
     pub fn groups(&self) -> usize {
         self.camera_visible.len()
     }
@@ -158,29 +161,32 @@ impl Emitters {
         light: LightIndex,
         emission: &Emission,
         separate: bool,
-    ) -> Result<(), String> {
+    ) -> Result<(), LightFault> {
         match emission {
             Emission::Area { surfaces, radiance, map, two_sided } => {
                 check_radiance(radiance)?;
                 let map = map.as_ref().map(|map| RadianceMap::new(map, textures)).transpose()?;
-                let glow = Glow { radiance: Vec3::from_array(*radiance), map, two_sided: *two_sided };
+                let emission = SurfaceEmission { radiance: Vec3::from_array(*radiance), map, two_sided: *two_sided };
                 let parts: Vec<&[SurfaceIndex]> =
                     if separate { surfaces.chunks(1).collect() } else { vec![surfaces.as_slice()] };
                 for part in parts {
                     self.claim(part)?;
-                    // What has no triangles is never met, and there is no place on it to sample.
+                    // A surface without triangles is never hit, and no point on it can be sampled.
                     if part.iter().all(|surface| scene.surfaces[surface.0].mesh.triangles.is_empty()) {
                         part.iter().for_each(|surface| self.area_of[surface.0] = None);
                         continue;
                     }
-                    self.areas.push(AreaEmitter::new(scene, light, glow.clone(), part.to_vec(), self.scene_size));
+                    self.areas.push(AreaEmitter::new(scene, light, emission.clone(), part.to_vec(), self.scene_size));
                 }
             }
             Emission::Environment { texture, scale, world_from_environment } => {
-                let map = textures.get(texture.0).ok_or(format!("texture {} of {}", texture.0, textures.len()))?;
-                let numbers = world_from_environment.iter().flatten().chain([scale]);
-                if !numbers.into_iter().all(|v| v.is_finite()) || *scale < 0.0 {
-                    return Err("scale or rotation is not finite, or the scale negative".into());
+                let missing = LightFault::MissingTexture { texture: texture.0, count: textures.len() };
+                let map = textures.get(texture.0).ok_or(missing)?;
+                if !scale.is_finite() || *scale < 0.0 {
+                    return Err(LightFault::EnvironmentScale(*scale));
+                }
+                if !world_from_environment.as_flattened().iter().all(|v| v.is_finite()) {
+                    return Err(LightFault::EnvironmentRotation(*world_from_environment));
                 }
                 let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
                 self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map) });
@@ -194,29 +200,30 @@ impl Emitters {
         Ok(())
     }
 
-    /// Notes that `surfaces` belong to the area emitter that comes next.
-    fn claim(&mut self, surfaces: &[SurfaceIndex]) -> Result<(), String> {
-        for surface in surfaces {
-            let slot = self.area_of.get_mut(surface.0).ok_or(format!("surface {} does not exist", surface.0))?;
+    /// Records that `surfaces` belong to the next area emitter.
+    fn claim(&mut self, surfaces: &[SurfaceIndex]) -> Result<(), LightFault> {
+        let count = self.area_of.len();
+        for &SurfaceIndex(surface) in surfaces {
+            let slot = self.area_of.get_mut(surface).ok_or(LightFault::MissingSurface { surface, count })?;
             if slot.replace(self.areas.len()).is_some() {
-                return Err(format!("surface {} glows twice", surface.0));
+                return Err(LightFault::SharedSurface(surface));
             }
         }
         Ok(())
     }
 
-    /// Whether the camera sees the group glow.
+    /// Whether the camera sees the emitters of the group.
     pub fn is_camera_visible(&self, light: LightIndex) -> bool {
         self.camera_visible[light.0]
     }
 
-    /// The group that a surface glows for, whichever side is seen.
+    /// The light group that a surface emits for, whichever side is seen.
     pub fn light_of(&self, surface: SurfaceIndex) -> Option<LightIndex> {
         self.area_of[surface.0].map(|area| self.areas[area].light)
     }
 
-    /// Light for the place `from`, from three numbers in [0, 1); none when there is none to be had. `opacity` is asked
-    /// for the coverage of a glowing surface.
+    /// Samples light for the point `from`, from three numbers in [0, 1). `None` if the sample brings no light.
+    /// `opacity` returns the coverage of an emitting surface.
     pub fn sample(&self, from: Vec3, u: [f32; 3], opacity: impl Fn(&SurfaceHit) -> f32) -> Option<EmitterSample> {
         let distant_share = self.distant_share();
         if u[0] < distant_share {
@@ -241,7 +248,7 @@ impl Emitters {
         let cos = place.geometric_normal.dot(direction).abs();
         let probability = (1.0 - self.distant_share()) * probability;
         let density = probability * towards.length_squared() / (cos * area.area());
-        if !area.glows(&place, -direction) || !density.is_finite() || density <= 0.0 {
+        if !area.emits(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;
         }
         let on_stage = area.is_on_stage();
@@ -268,22 +275,22 @@ impl Emitters {
         })
     }
 
-    /// What the surface at `place` sends to `from`, if it glows there.
+    /// The radiance that the surface at `place` emits towards `from`, if it emits there.
     pub fn emitted(&self, place: &SurfaceHit, from: Vec3) -> Option<Emitted> {
         self.emitted_by(self.area_of[place.surface.0]?, place, from)
     }
 
-    /// Whether these are the lights of a stage.
+    /// Whether these are stage lights.
     pub(crate) fn are_on_stage(&self) -> bool {
         self.stage.is_some()
     }
 
-    /// What the lights of a stage that `ray` meets send back to the place `from`. They hide nothing, one another neither,
-    /// so all of them count; in the order of the lights.
+    /// The light that stage lights along `ray` emit back towards `from`. They block nothing, not even each other, so
+    /// all of them count, in the order of the lights.
     pub(crate) fn stage_along(&self, ray: &Ray, from: Vec3) -> impl Iterator<Item = Emitted> + '_ {
         let met = std::cell::RefCell::new(Vec::new());
         if let Some(stage) = &self.stage {
-            // Taking none, it is asked about all.
+            // Rejecting every hit makes the traversal visit all of them.
             stage.occluded_where(ray, |hit| {
                 met.borrow_mut().push(*hit);
                 false
@@ -300,7 +307,7 @@ impl Emitters {
     fn emitted_by(&self, which: usize, place: &SurfaceHit, from: Vec3) -> Option<Emitted> {
         let area = &self.areas[which];
         let towards = place.position - from;
-        if !area.glows(place, -towards) {
+        if !area.emits(place, -towards) {
             return None;
         }
         let probability = (1.0 - self.distant_share()) * self.area_probability(which, from);
@@ -310,7 +317,7 @@ impl Emitters {
         Some(Emitted { light: area.light, radiance: area.radiance(place), density })
     }
 
-    /// What arrives from far outside along a ray to `direction` that met nothing, one entry a group.
+    /// The radiance from emitters at infinity along a ray to `direction` that hit nothing, one entry per emitter.
     pub fn from_outside(&self, direction: Vec3) -> impl Iterator<Item = Emitted> + '_ {
         let share = self.distant_share() / self.distant.len().max(1) as f32;
         self.distant.iter().map(move |emitter| Emitted {
@@ -324,7 +331,7 @@ impl Emitters {
         })
     }
 
-    /// How often light from far outside is chosen.
+    /// The probability of sampling an emitter at infinity.
     fn distant_share(&self) -> f32 {
         match (self.areas.is_empty(), self.distant.is_empty()) {
             (_, true) => 0.0,
@@ -333,11 +340,12 @@ impl Emitters {
         }
     }
 
-    /// The area emitter for `choice` in [0, 1), the part of the choice within it, and its probability among them.
+    /// The area emitter for `choice` in [0, 1), the position of `choice` within its interval, and its probability among
+    /// area emitters.
     fn choose_area(&self, from: Vec3, choice: f32) -> Option<(usize, f32, f32)> {
         let last = self.areas.len().checked_sub(1)?;
-        // Most scenes have few emitters: what they weigh is kept for the second look.
-        let mut kept = [[0.0_f32; TOGETHER]; SEPARATE_SURFACES / TOGETHER];
+        // Most scenes have few emitters, whose weights are kept for the second pass.
+        let mut kept = [[0.0_f32; LANES]; SEPARATE_SURFACES / LANES];
         let mut total = 0.0_f32;
         for (place, weights) in self.outlines.solid_angles(from).enumerate() {
             if let Some(kept) = kept.get_mut(place) {
@@ -354,11 +362,11 @@ impl Emitters {
                 end += probability;
                 end
             });
-            // Without a branch for each: which one it is cannot be predicted.
+            // Counting avoids a branch per emitter, which could not be predicted.
             let passed = ends.iter().map(|end| usize::from(choice >= *end)).sum::<usize>();
-            let which = (eight * TOGETHER + passed).min(last);
-            let lane = which - eight * TOGETHER;
-            if lane < TOGETHER {
+            let which = (eight * LANES + passed).min(last);
+            let lane = which - eight * LANES;
+            if lane < LANES {
                 let start = if lane == 0 { before } else { ends[lane - 1] };
                 let rest = ((choice - start) / probabilities[lane]).clamp(0.0, 1.0 - f32::EPSILON);
                 return (probabilities[lane] > 0.0).then_some((which, rest, probabilities[lane]));
@@ -371,8 +379,8 @@ impl Emitters {
     fn area_probability(&self, which: usize, from: Vec3) -> f32 {
         let (mut total, mut own) = (0.0_f32, 0.0);
         for (place, weights) in self.outlines.solid_angles(from).enumerate() {
-            if place == which / TOGETHER {
-                own = weights[which % TOGETHER];
+            if place == which / LANES {
+                own = weights[which % LANES];
             }
             total += weights.iter().sum::<f32>();
         }
@@ -395,9 +403,9 @@ impl DistantEmitter {
     }
 }
 
-fn check_radiance(radiance: &[f32; 3]) -> Result<(), String> {
+fn check_radiance(radiance: &[f32; 3]) -> Result<(), LightFault> {
     let sound = radiance.iter().all(|&v| v.is_finite() && v >= 0.0);
-    if sound { Ok(()) } else { Err(format!("radiance {radiance:?}, expected finite and not negative")) }
+    if sound { Ok(()) } else { Err(LightFault::Radiance(*radiance)) }
 }
 
 #[cfg(test)]
@@ -432,8 +440,8 @@ mod tests {
         (scene, emitters)
     }
 
-    /// What a sample says of its density is what finding the same light by chance says, for all mixes of emitters and with
-    /// surfaces sampled each by itself or by group.
+    /// The density of a sample equals the density reported when the same light is met by chance, for all mixes of
+    /// emitters, whether surfaces are sampled one by one or by group.
     #[test]
     fn sampled_and_found_densities_agree() {
         for (surfaces, distant) in [(1, false), (5, false), (5, true), (70, true), (0, true)] {

@@ -1,11 +1,13 @@
-//! How the radiance of a glowing surface differs from place to place.
+//! A map of the radiance over an emitting surface.
 
 use glam::{Vec2, Vec3};
 use mateval_image::{Texels, Texture};
 use mateval_scene::material::UvTransform;
 use mateval_scene::reference::EmissionMap;
 
-/// A factor of radiance, looked up at the surface's uv.
+use crate::error::LightFault;
+
+/// A factor on the radiance, looked up at the surface's uv.
 #[derive(Clone, Debug)]
 pub(crate) struct RadianceMap {
     texture: Texture,
@@ -13,32 +15,33 @@ pub(crate) struct RadianceMap {
 }
 
 impl RadianceMap {
-    /// Fails where the texture is not there, or a number is not finite or a texel below 0.
-    pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, String> {
+    /// Fails if the texture does not exist, if the uv transform is not finite, or if a texel is negative or not finite.
+    pub(crate) fn new(map: &EmissionMap, textures: &[Texture]) -> Result<Self, LightFault> {
         let index = map.texture.0;
-        let texture = textures.get(index).ok_or(format!("texture {index} of {}", textures.len()))?;
+        let missing = LightFault::MissingTexture { texture: index, count: textures.len() };
+        let texture = textures.get(index).ok_or(missing)?;
         if !map.uv.0.as_flattened().iter().all(|v| v.is_finite()) {
-            return Err("the uv of its map is not finite".into());
+            return Err(LightFault::MapTransform(map.uv.0));
         }
-        if !is_light(texture) {
-            return Err(format!("texture {index} has texels that are negative or not finite; no light is that"));
+        if let Some(value) = first_unsound(texture) {
+            return Err(LightFault::MapValue { texture: index, value });
         }
         Ok(Self { texture: texture.clone(), uv: map.uv })
     }
 
-    /// Out of line: most lamps have none.
+    /// Not inlined, since most lamps have no map.
     #[inline(never)]
     pub(crate) fn at(&self, uv: Vec2) -> Vec3 {
         Vec3::from_array(self.texture.sample(self.uv.apply(uv).to_array()))
     }
 }
 
-/// Whether every texel can be a share of light; whole numbers always can.
-fn is_light(texture: &Texture) -> bool {
-    let sound = |values: &[f32]| values.iter().all(|v| v.is_finite() && *v >= 0.0);
+/// The first value that is negative or not finite and so cannot scale light. Integer texels are always valid.
+fn first_unsound(texture: &Texture) -> Option<f32> {
+    let unsound = |values: &[f32]| values.iter().copied().find(|v| !(v.is_finite() && *v >= 0.0));
     match texture.texels() {
-        Texels::Linear(v) => sound(v.as_flattened()),
-        Texels::Grey(v) => sound(v),
-        Texels::Srgb8(_) | Texels::Srgb16(_) | Texels::Linear8(_) | Texels::Grey8(_) => true,
+        Texels::Linear(v) => unsound(v.as_flattened()),
+        Texels::Grey(v) => unsound(v),
+        Texels::Srgb8(_) | Texels::Srgb16(_) | Texels::Linear8(_) | Texels::Grey8(_) => None,
     }
 }

@@ -1,32 +1,33 @@
-//! Where in a cell of the plane paths start, and which numbers they get.
+//! The points of a cell where paths start, and the random numbers of each path.
 //!
-//! A view's pixel holds parts of several cells, so what is even over a whole cell must be even over its parts. Within a
-//! cell the places are points of a Sobol sequence, taken in Morton order; paths are numbered in that order, cell after
-//! cell along a Morton curve over blocks of cells. A part of the plane then holds runs of consecutive numbers, and runs of
-//! a Sobol sequence are well spread themselves: the idea of Ahmed and Wonka, "Screen-space blue-noise diffusion of Monte
-//! Carlo sampling error via hierarchical ordering of pixels" (ACM TOG 39(6), 2020).
+//! A view's pixel covers parts of several cells, so points must be spread evenly not only over whole cells but also
+//! over parts of them. Within a cell, the points are those of a Sobol sequence, sorted in Morton order. Paths are
+//! numbered in that order, cell after cell along a Morton curve over blocks of cells. A part of the plane then holds
+//! runs of consecutive numbers, and runs of a Sobol sequence are well spread themselves: the idea of Ahmed and Wonka,
+//! "Screen-space blue-noise diffusion of Monte Carlo sampling error via hierarchical ordering of pixels" (ACM TOG
+//! 39(6), 2020).
 
 use crate::sampler::Sampler;
 
-/// Cells whose paths are numbered along one sequence: blocks of 2^`log_side` cells a side, `stride` numbers a cell.
+/// The numbering of paths along one sequence: blocks of 2^`log_side` cells per side, `stride` numbers per cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Numbering {
     log_side: u32,
     stride: u32,
 }
 
-/// A sampler's sequence has this many numbers.
+/// The length of a sampler's sequence.
 const SEQUENCE: u32 = 1 << 16;
 
 impl Numbering {
-    /// For up to `most` paths a cell.
+    /// For at most `most` paths per cell.
     pub(super) fn new(most: u32) -> Self {
         let stride = most.next_power_of_two();
         let cells = (SEQUENCE / stride).max(1);
         Self { log_side: cells.ilog2() / 2, stride }
     }
 
-    /// The numbers of path `rank` of the cell.
+    /// The sampler of path `rank` of a cell.
     pub(super) fn path_sampler(&self, seed: u64, [x, y]: [i32; 2], rank: u32) -> Sampler {
         let block = [x >> self.log_side, y >> self.log_side];
         let within = [x - (block[0] << self.log_side), y - (block[1] << self.log_side)];
@@ -35,18 +36,18 @@ impl Numbering {
     }
 }
 
-/// `count` places in the unit square, well spread, in Morton order; they replace what `points` held.
+/// Replaces `points` by `count` well-spread points of the unit square in Morton order.
 pub(super) fn cell_points(seed: u64, cell: [i32; 2], count: u32, points: &mut Vec<[f32; 2]>) {
     points.clear();
     points.extend((0..count).map(|index| {
-        // Set 0 is not used by paths: these numbers are independent of theirs.
+        // Paths do not use set 0, so these numbers are independent of theirs.
         let [x, y, ..] = Sampler::new(seed, cell.map(|v| v as u32), index).set(0);
         [x, y]
     }));
     points.sort_by_cached_key(|point| morton(point.map(|v| (v * 65536.0) as u32)));
 }
 
-/// The low 16 bits of x and y, interleaved: x in the even bits.
+/// Interleaves the low 16 bits of x and y; x takes the even bits.
 fn morton([x, y]: [u32; 2]) -> u32 {
     spread(x) | (spread(y) << 1)
 }
@@ -72,8 +73,7 @@ mod tests {
         assert_eq!(morton([0xffff, 0xffff]), u32::MAX);
     }
 
-    /// Sixteen points: one in each sixteenth of the cell, in the order of the curve, from the whole of which the quarters
-    /// are four each.
+    /// Sixteen points: one in each sixteenth of the cell, in the order of the curve, hence four in each quarter.
     #[test]
     fn points_fill_nested_quarters_in_turn() {
         let mut points = Vec::new();
@@ -84,7 +84,7 @@ mod tests {
         assert_eq!(sixteenths.len(), 16);
     }
 
-    /// No two paths of a seed share their numbers, whatever the number of paths a cell.
+    /// No two paths of a seed share their random numbers, whatever the number of paths per cell.
     #[test]
     fn every_path_has_numbers_of_its_own() {
         for most in [1, 5, 64, 4096] {

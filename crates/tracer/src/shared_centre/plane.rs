@@ -1,54 +1,55 @@
-//! The image plane over which paths for several views of one centre are drawn.
+//! The image plane over which the paths for several views with a common centre are distributed.
 
 use std::ops::Range;
 
 use glam::{DMat3, DVec2, DVec3};
 use mateval_scene::{Camera, Intrinsics};
 
-/// The first camera's image plane, as far as any view sees it, in cells of that camera's pixels.
+/// The part of the first camera's image plane that any view sees, divided into cells of that camera's pixels.
 #[derive(Clone, Debug)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     camera: Camera,
     views: Vec<PlaneView>,
     samples: u32,
-    /// Cells, in pixels of the camera: negative left of its picture or above it.
+    /// Columns of cells, in pixels of the camera; negative to the left of its picture.
     columns: Range<i32>,
     rows: Range<i32>,
 }
 
-/// A view as the plane sees it.
+/// A view, relative to the plane.
 #[derive(Clone, Debug)]
 pub(super) struct PlaneView {
     pub(super) intrinsics: Intrinsics,
-    /// None for the plane's own camera, whose pixels are the cells.
+    /// `None` for the plane's own camera, whose pixels are the cells.
     turn: Option<DMat3>,
-    /// Pixels of the view to a pixel of the plane's camera where both look the same way.
+    /// Pixels of the view per pixel of the plane's camera, where both look in the same direction.
     scale: f64,
 }
 
-/// Where a point of the plane lies in a view's picture, and how many of that view's pixels one cell covers there.
+/// The position of a point of the plane in a view's picture, and the number of that view's pixels that one cell covers
+/// there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Seen {
     pub(super) place: DVec2,
     pub(super) pixels: f64,
 }
 
-/// A rectangle of cells or pixels: columns and rows.
+/// A rectangle of cells or pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Window {
     pub(super) columns: Range<i32>,
     pub(super) rows: Range<i32>,
 }
 
-/// Cells along a tile's side.
+/// Cells along each side of a tile.
 const TILE: usize = 16;
-/// The cosine of 75 degrees: beyond, a plane stretches a picture too far to be of use.
+/// The cosine of 75 degrees, beyond which a plane stretches a picture too far.
 const WIDEST: f64 = 0.258_819_045_102_520_74;
-/// Half the spacing of f32 at 1: what a ray's origin is rounded by.
+/// Half the spacing of f32 at 1, the relative rounding of a ray's origin.
 const ORIGIN_ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 
 impl Plane {
-    /// None if the cameras have no centre in common, or one looks too far away from where the first does.
+    /// `None` if the cameras have no common centre, or if one looks too far away from where the first looks.
     pub(super) fn new(cameras: &[Camera], samples: u32) -> Option<Self> {
         let first = cameras.first()?;
         let mut plane = Self::alone(first, samples);
@@ -58,7 +59,7 @@ impl Plane {
         Some(plane)
     }
 
-    /// A plane for one view.
+    /// The plane of a single view.
     pub(super) fn alone(camera: &Camera, samples: u32) -> Self {
         let intrinsics = camera.intrinsics;
         let (columns, rows) = (0..intrinsics.width as i32, 0..intrinsics.height as i32);
@@ -84,7 +85,7 @@ impl Plane {
         Some(())
     }
 
-    /// Makes the plane hold `direction`, in the plane's camera's space.
+    /// Extends the plane to contain `direction`, given in the space of the plane's camera.
     fn grow(&mut self, direction: DVec3) -> Option<()> {
         if -direction.z < WIDEST {
             return None;
@@ -106,7 +107,7 @@ impl Plane {
         &self.camera
     }
 
-    /// All parts of the plane, row by row.
+    /// The tiles of the plane, row by row.
     pub(super) fn tiles(&self) -> Vec<Window> {
         let parts = |range: &Range<i32>| {
             let end = range.end;
@@ -117,32 +118,32 @@ impl Plane {
             .collect()
     }
 
-    /// Paths for the cell, as many as the view that needs most: so many that each of its pixels there gets the samples
-    /// asked for. 0 where no view sees the cell.
+    /// The number of paths in a cell. The view with the most pixels in the cell determines it, so that each of its
+    /// pixels gets the requested samples. 0 if no view sees the cell.
     pub(super) fn paths(&self, [x, y]: [i32; 2]) -> u32 {
         let cell = Window { columns: x..x + 1, rows: y..y + 1 };
         let middle = self.ray_place([x, y], [0.5, 0.5]);
         let needs = self.views.iter().enumerate().filter(|(index, _)| self.window(*index, &cell).is_some());
         let most = needs.filter_map(|(_, view)| self.seen(view, middle)).map(|seen| seen.pixels).fold(0.0, f64::max);
-        // A millionth less, so that rounding does not ask for one more.
+        // Reduced by a millionth, so that rounding does not add a path.
         (most * f64::from(self.samples) * (1.0 - 1e-6)).ceil() as u32
     }
 
-    /// The most paths that any cell may have.
+    /// The largest number of paths in any cell.
     pub(super) fn most_paths(&self) -> u32 {
         let cells = self.tiles().into_iter().flat_map(|tile| tile.cells().collect::<Vec<_>>());
         cells.map(|cell| self.paths(cell)).max().unwrap_or(0).max(1)
     }
 
-    /// The point `offset` of the cell, in pixels of the plane's camera.
+    /// The point at `offset` within a cell, in pixels of the plane's camera.
     pub(super) fn ray_place(&self, cell: [i32; 2], offset: [f32; 2]) -> DVec2 {
         DVec2::new(f64::from(cell[0]) + f64::from(offset[0]), f64::from(cell[1]) + f64::from(offset[1]))
     }
 
-    /// Where `view` sees the point `at` of the plane; none where that lies behind it.
+    /// The position in `view` of the point `at` of the plane, or `None` if the point lies behind the view.
     ///
-    /// Between image planes of one centre the area changes by the cube of the ratio of depths: dA/d(solid angle) is
-    /// focal^2 / cos^3 of the angle to the plane's axis.
+    /// Between image planes with a common centre, areas scale with the cube of the ratio of depths: dA/d(solid angle)
+    /// is focal^2 / cos^3 of the angle to the plane's axis.
     pub(super) fn seen(&self, view: &PlaneView, at: DVec2) -> Option<Seen> {
         let Some(turn) = view.turn else { return Some(Seen { place: at, pixels: 1.0 }) };
         let direction = turn * self.camera.camera_direction(at);
@@ -151,7 +152,7 @@ impl Plane {
             .then(|| Seen { place: place(&view.intrinsics, direction), pixels: view.scale / (depth * depth * depth) })
     }
 
-    /// The pixels of view `index` that may hold points of `part`; none if there are none.
+    /// The pixels of view `index` that may contain points of `part`, or `None`.
     pub(super) fn window(&self, index: usize, part: &Window) -> Option<Window> {
         let view = &self.views[index];
         let Window { columns, rows } = part;
@@ -164,10 +165,11 @@ impl Plane {
             [first, others @ ..] if others.len() == 3 => {
                 others.iter().fold((*first, *first), |(low, high), corner| (low.min(*corner), high.max(*corner)))
             }
-            // What lies partly behind the view may be anywhere in its picture.
+            // A part that lies partly behind the view may appear anywhere in its picture.
             _ => (DVec2::NEG_INFINITY, DVec2::INFINITY),
         };
-        // A pixel more on each side, for what rounding may do to a point at the edge; the plane's own are exact.
+        // One more pixel on each side, in case rounding moves a point at the edge; cells of the plane's own camera are
+        // exact.
         let margin = if view.turn.is_some() { 1.0 } else { 0.0 };
         let span = |low: f64, high: f64, size: u32| {
             let start = (low - margin).floor().max(0.0);
@@ -186,18 +188,18 @@ impl Window {
         self.rows.clone().flat_map(move |y| columns.clone().map(move |x| [x, y]))
     }
 
-    /// Places in a row.
+    /// The number of places in a row.
     pub(super) fn width(&self) -> usize {
         self.columns.len()
     }
 
-    /// How many places there are.
+    /// The number of places.
     pub(super) fn area(&self) -> usize {
         self.columns.len() * self.rows.len()
     }
 }
 
-/// Where a direction in camera space, in front of the camera, lies in the picture.
+/// The position in the picture of a direction in camera space, in front of the camera.
 fn place(k: &Intrinsics, direction: DVec3) -> DVec2 {
     let depth = -direction.z;
     DVec2::new(k.cx + k.fx * direction.x / depth, k.cy - k.fy * direction.y / depth)

@@ -1,4 +1,4 @@
-//! Paths of a plane, put into every view that sees their direction.
+//! Exposes the tiles of a plane: traces their paths and adds the light to every view that sees them.
 
 use std::array::from_fn;
 
@@ -8,44 +8,49 @@ use mateval_scene::reference::LightIndex;
 use rayon::prelude::*;
 
 use super::cell_points::{Numbering, cell_points};
+use super::lighting::Lighting;
 use super::plane::{Plane, Window};
-use super::{HalfLight, Lighting};
+use super::view_light::HalfLight;
 use crate::light_basis::LightBasis;
-use crate::path::{Painted, PathCounts, PathTracer};
+use crate::material_source::MaterialSource;
+use crate::path::{PathCounts, PathTracer};
 use crate::ray::Ray;
-use crate::render::RenderSettings;
 use crate::sampler::Sampler;
+use crate::settings::RenderSettings;
 use crate::world::World;
 
-/// What happened in one tile.
+/// Counts of what happened in one tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TileCounts {
     pub(super) paths: u64,
     pub(super) path: PathCounts,
 }
 
-/// Tiles in the making, for each thread: more leave threads less idle at the end of a batch and take more memory.
+/// Tiles exposed per thread before they are merged. More tiles keep threads busier at the end of a batch and take more
+/// memory.
 const TILES_A_THREAD: usize = 4;
 
-/// What is exposed: a world, with `K` predictions in place of its materials or with none.
+/// The scene to expose: a world with some materials and lighting.
 #[derive(Clone, Copy)]
-pub(super) struct Subject<'a> {
-    pub(super) world: &'a World,
-    pub(super) painted: Option<Painted<'a>>,
-    pub(super) lighting: Lighting<'a>,
+pub(crate) struct Subject<'a, M> {
+    pub(crate) world: &'a World,
+    pub(crate) materials: M,
+    /// The first of the material variants to trace.
+    pub(crate) first: usize,
+    pub(crate) lighting: Lighting<'a>,
 }
 
-/// All views of `plane` with the seed of `settings`, by prediction. What happened in each tile is added to `counts`.
-pub(super) fn expose<const K: usize>(
-    subject: Subject<'_>,
+/// Exposes all views of `plane` with the seed of `settings`, per variant. Appends the counts of each tile to `counts`.
+pub(super) fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
+    subject: Subject<'w, M>,
     plane: &Plane,
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
     done: &(impl Fn() + Sync),
 ) -> Vec<[HalfLight; K]> {
     let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
-    let mut films = exposure.blank_films::<K>();
-    // Tiles are merged in their order whichever is done first; batches bound how many wait.
+    let mut films = exposure.blank_films();
+    // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
     for batch in plane.tiles().chunks(TILES_A_THREAD * rayon::current_num_threads()) {
         let exposed: Vec<ExposedTile<K>> = batch
             .par_iter()
@@ -65,63 +70,63 @@ pub(super) fn expose<const K: usize>(
     films
 }
 
-struct Exposure<'a> {
-    subject: Subject<'a>,
+struct Exposure<'w, 'a, M> {
+    subject: Subject<'w, M>,
     plane: &'a Plane,
     settings: &'a RenderSettings,
     numbering: Numbering,
 }
 
-/// A tile's share of every view that sees any of it.
+/// The contribution of a tile to every view that sees some of it.
 struct ExposedTile<const K: usize> {
     parts: Vec<Option<Part<K>>>,
     counts: TileCounts,
 }
 
-/// A piece of one view: sums of all its pictures, pixel by pixel, by prediction.
+/// A rectangle of one view: sums for all its pictures, pixel by pixel and variant by variant.
 struct Part<const K: usize> {
     window: Window,
     sums: Vec<[[f64; 3]; K]>,
     counts: Vec<u32>,
 }
 
-/// Paths that are followed side by side; a few more where a cell has several.
+/// The number of paths traced together; slightly more if a cell has several.
 const BATCH: usize = 256;
 
 /// A path through one of the plane's cells.
 struct PlanePath {
     cell: [i32; 2],
-    /// Its number among those of the cell.
+    /// Its index among the paths of the cell.
     rank: u32,
     point: [f32; 2],
-    /// How many paths the cell has.
+    /// The number of paths in the cell.
     count: usize,
 }
 
-/// What a path has got from one light, by prediction.
-struct Share<const K: usize> {
+/// The light that a path has found from one light, per variant.
+struct Contribution<const K: usize> {
     path: usize,
     light: LightIndex,
     values: [Vec3; K],
 }
 
-/// Where a tile's paths wait, are followed and put into views.
-struct Darkroom<'a, const K: usize> {
-    exposure: &'a Exposure<'a>,
-    tracer: PathTracer<'a, K>,
+/// Buffers for exposing one tile.
+struct TileTracer<'w, 'a, M, const K: usize> {
+    exposure: &'a Exposure<'w, 'a, M>,
+    tracer: PathTracer<'w, M, K>,
     paths: Vec<PlanePath>,
-    shares: Vec<Share<K>>,
-    found: Found<K>,
+    contributions: Vec<Contribution<K>>,
+    found: PathLight<K>,
 }
 
-/// What one path found, by picture and prediction.
-struct Found<const K: usize> {
+/// The light found by one path, per picture and variant.
+struct PathLight<const K: usize> {
     sums: Vec<[[f64; 3]; K]>,
-    /// The pictures that have got something, in the order of their first.
+    /// The pictures that have received light, in order of their first contribution.
     touched: Vec<usize>,
 }
 
-impl Exposure<'_> {
+impl<'w, M: Copy> Exposure<'w, '_, M> {
     fn pictures(&self) -> usize {
         self.subject.lighting.pictures()
     }
@@ -135,23 +140,26 @@ impl Exposure<'_> {
         self.plane.views().iter().map(size).map(|size| from_fn(|_| blank(size))).collect()
     }
 
-    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K> {
+    fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
+    where
+        M: MaterialSource<'w, K>,
+    {
         let part = |view| self.plane.window(view, tile).map(|window| Part::new(window, self.pictures()));
         let parts = (0..self.plane.views().len()).map(part).collect();
         let mut exposed = ExposedTile { parts, counts: TileCounts::default() };
-        let mut darkroom = Darkroom::new(self);
+        let mut tile_tracer = TileTracer::new(self);
         let mut points = Vec::new();
         for cell in tile.cells() {
             cell_points(self.settings.seed, cell, self.plane.paths(cell), &mut points);
             for (rank, &point) in points.iter().enumerate() {
-                darkroom.paths.push(PlanePath { cell, rank: rank as u32, point, count: points.len() });
+                tile_tracer.paths.push(PlanePath { cell, rank: rank as u32, point, count: points.len() });
             }
-            if darkroom.paths.len() >= BATCH {
-                darkroom.develop(&mut exposed);
+            if tile_tracer.paths.len() >= BATCH {
+                tile_tracer.develop(&mut exposed);
             }
         }
-        darkroom.develop(&mut exposed);
-        exposed.counts.path = darkroom.tracer.counts;
+        tile_tracer.develop(&mut exposed);
+        exposed.counts.path = tile_tracer.tracer.counts;
         exposed
     }
 
@@ -162,8 +170,8 @@ impl Exposure<'_> {
         (self.numbering.path_sampler(self.settings.seed, path.cell, path.rank), ray)
     }
 
-    /// Adds what a path found to the views that see it.
-    fn splat<const K: usize>(&self, path: &PlanePath, found: &Found<K>, parts: &mut [Option<Part<K>>]) {
+    /// Adds the light of a path to the views that see it.
+    fn splat<const K: usize>(&self, path: &PlanePath, found: &PathLight<K>, parts: &mut [Option<Part<K>>]) {
         let at = self.plane.ray_place(path.cell, path.point);
         for (view, part) in self.plane.views().iter().zip(parts) {
             let Some(part) = part else { continue };
@@ -175,47 +183,47 @@ impl Exposure<'_> {
     }
 }
 
-impl<'a, const K: usize> Darkroom<'a, K> {
-    fn new(exposure: &'a Exposure<'a>) -> Self {
-        let Subject { world, painted, .. } = exposure.subject;
+impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> {
+    fn new(exposure: &'a Exposure<'w, 'a, M>) -> Self {
+        let Subject { world, materials, .. } = exposure.subject;
         Self {
             exposure,
-            tracer: PathTracer::new(world, painted, exposure.settings),
+            tracer: PathTracer::new(world, materials, *exposure.settings),
             paths: Vec::new(),
-            shares: Vec::new(),
-            found: Found { sums: vec![[[0.0; 3]; K]; exposure.pictures()], touched: Vec::new() },
+            contributions: Vec::new(),
+            found: PathLight { sums: vec![[[0.0; 3]; K]; exposure.pictures()], touched: Vec::new() },
         }
     }
 
-    /// Follows the paths that wait and puts what they find into the tile's views, path by path.
+    /// Traces the waiting paths and adds their light to the tile's views, path by path.
     fn develop(&mut self, exposed: &mut ExposedTile<K>) {
-        let Self { exposure, tracer, paths, shares, found } = self;
+        let Self { exposure, tracer, paths, contributions, found } = self;
         let starts = paths.iter().map(|path| exposure.start(path));
-        tracer.trace(starts, |path, light, values| shares.push(Share { path, light, values }));
+        tracer.trace(starts, |path, light, values| contributions.push(Contribution { path, light, values }));
         let lighting = &exposure.subject.lighting;
-        let first = exposure.subject.painted.map_or(0, |painted| painted.first);
-        // Paths were followed side by side; each one's own shares stay in their order.
-        shares.sort_by_key(|share| share.path);
-        let mut rest = shares.as_slice();
+        let first = exposure.subject.first;
+        // Paths were traced together; the stable sort keeps the contributions of each path in their order.
+        contributions.sort_by_key(|contribution| contribution.path);
+        let mut rest = contributions.as_slice();
         for (which, path) in paths.iter().enumerate() {
-            let (own, others) = rest.split_at(rest.partition_point(|share| share.path == which));
+            let (own, others) = rest.split_at(rest.partition_point(|contribution| contribution.path == which));
             rest = others;
-            own.iter().for_each(|share| found.add(lighting, first, share));
+            own.iter().for_each(|contribution| found.add(lighting, first, contribution));
             exposure.splat(path, found, &mut exposed.parts);
             found.clear();
         }
         exposed.counts.paths += paths.len() as u64;
         paths.clear();
-        shares.clear();
+        contributions.clear();
     }
 }
 
-impl<const K: usize> Found<K> {
-    fn add(&mut self, lighting: &Lighting<'_>, first: usize, share: &Share<K>) {
-        let values = share.values.map(|value| value.to_array().map(f64::from));
+impl<const K: usize> PathLight<K> {
+    fn add(&mut self, lighting: &Lighting<'_>, first: usize, contribution: &Contribution<K>) {
+        let values = contribution.values.map(|value| value.to_array().map(f64::from));
         match lighting {
             Lighting::Apart(groups) => {
-                let group = groups.of(share.light);
+                let group = groups.of(contribution.light);
                 self.touch(group);
                 self.sums[group].iter_mut().zip(values).for_each(|(sum, value)| add(sum, value, 1.0));
             }
@@ -223,8 +231,8 @@ impl<const K: usize> Found<K> {
                 for picture in 0..self.sums.len() {
                     self.touch(picture);
                     for (k, (sum, value)) in self.sums[picture].iter_mut().zip(values).enumerate() {
-                        // Beyond the last prediction: see `Repaint::at`.
-                        let weight = mixes[(first + k).min(mixes.len() - 1)][picture][share.light.0];
+                        // Variants beyond the last repeat it.
+                        let weight = mixes[(first + k).min(mixes.len() - 1)][picture][contribution.light.0];
                         add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
                     }
                 }
@@ -251,7 +259,7 @@ impl<const K: usize> Part<K> {
         Self { window, sums: vec![[[0.0; 3]; K]; area * groups], counts: vec![0; area] }
     }
 
-    /// The place in the piece of the pixel that holds (x, y); none outside.
+    /// The index within the rectangle of the pixel that contains (x, y), or `None` outside.
     fn pixel(&self, x: f64, y: f64) -> Option<usize> {
         let (x, y) = (x.floor(), y.floor());
         let holds = |range: &std::ops::Range<i32>, v: f64| v >= f64::from(range.start) && v < f64::from(range.end);
@@ -260,7 +268,7 @@ impl<const K: usize> Part<K> {
             .then(|| (y as i32 - rows.start) as usize * self.window.width() + (x as i32 - columns.start) as usize)
     }
 
-    fn add(&mut self, pixel: usize, found: &Found<K>, weight: f64) {
+    fn add(&mut self, pixel: usize, found: &PathLight<K>, weight: f64) {
         self.counts[pixel] += 1;
         let first = pixel * found.sums.len();
         for &group in &found.touched {
@@ -269,7 +277,7 @@ impl<const K: usize> Part<K> {
         }
     }
 
-    /// Adds the piece to its view. A pixel gets few pieces, always in the order of the tiles.
+    /// Adds the rectangle to its view. A pixel receives few rectangles, always in the order of the tiles.
     fn merge_into(&self, films: &mut [HalfLight; K]) {
         for (k, film) in films.iter_mut().enumerate() {
             let groups = film.basis.pictures().len();

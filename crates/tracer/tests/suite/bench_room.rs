@@ -1,4 +1,4 @@
-//! The shared test room against Mitsuba 3.9.1 (llvm, `path`, max_depth 8, 64 samples, `twosided` `principled`).
+//! The shared test room compared with Mitsuba 3.9.1 (llvm, `path`, max_depth 8, 64 samples, `twosided` `principled`).
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,15 +10,15 @@ use mateval_tracer::{RenderSettings, World};
 use super::bench_scene;
 use super::statistics::{Estimate, Renders};
 
-/// The reference has 4 x 4 pixels for each of ours: box filters nest.
+/// The reference has 4 x 4 pixels for each of ours; box filters nest.
 const SIZE: u32 = 128;
 const NEST: usize = 4;
 const RENDERS: u64 = 16;
 
-/// Both pictures' means agree to 1 % and within noise, all 16x16 tiles of the reference within noise; with lights 3 %
-/// brighter neither does.
+/// The means of both pictures agree to 1 % and within noise, and the 16x16-pixel tiles of the reference agree within
+/// noise. With lights 3 % brighter neither agrees.
 #[test]
-#[allow(clippy::print_stderr, reason = "what was measured is told")]
+#[allow(clippy::print_stderr, reason = "the test reports what it measured")]
 fn agrees_with_mitsuba() {
     let Some(folder) = bench_scene::folder("room") else { return };
     let reference = bench_scene::reference(&folder);
@@ -29,7 +29,7 @@ fn agrees_with_mitsuba() {
             *radiance = radiance.map(|v| v * brightness);
         }
         let world = World::new(Arc::new(scene)).unwrap();
-        // The reference's max_depth 8 is 6 bounces.
+        // Mitsuba's max_depth of 8 equals 6 bounces.
         let settings = RenderSettings { samples: 4, seed: 1, max_bounces: 6, ..Default::default() };
         Renders::new(&world, &camera, settings, RENDERS)
     };
@@ -41,14 +41,15 @@ fn agrees_with_mitsuba() {
     let (ratio, z, tiles) = compare(&renders, &reference);
     eprintln!("bench/room: ratio {ratio:.5}, z {z:.2}, mean squared z of tiles {tiles:.3}");
     assert!((ratio - 1.0).abs() < 0.01 && z.abs() < 4.0, "ratio {ratio}, z {z}");
-    // The squares of Student's t with 15 degrees of freedom average to 15 / 13; 1024 tiles leave a deviation of 0.06.
+    // The squares of Student's t with 15 degrees of freedom have the mean 15 / 13; over 1024 tiles it deviates by 0.06.
     assert!(tiles < 1.35, "{tiles}");
 
     let (ratio, z, tiles) = compare(&found(1.03), &reference);
     assert!((ratio - 1.0).abs() > 0.01 && z.abs() > 4.0 && tiles > 1.35, "the twin passes: {ratio} {z} {tiles}");
 }
 
-/// The ratio of the means, its distance from 1 in standard errors, and the mean square of that over tiles.
+/// The ratio of the means, its distance from 1 in standard errors, and the mean squared distance of tiles in standard
+/// errors.
 fn compare(renders: &Renders, reference: &Picture<LinearRgb>) -> (f64, f64, f64) {
     let mean = |x: std::ops::Range<usize>, y: std::ops::Range<usize>| {
         let pixels = y.clone().flat_map(|y| x.clone().map(move |x| (x, y)));
@@ -56,8 +57,8 @@ fn compare(renders: &Renders, reference: &Picture<LinearRgb>) -> (f64, f64, f64)
             pixels.map(|(x, y)| reference.get(x, y).0.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0).collect();
         values.iter().sum::<f64>() / values.len() as f64
     };
-    // Two renders of Mitsuba's, of 768 samples on such tiles (the reference has 1024), differ by 1.57 % rms, so one
-    // is off by 1.1 %; ours by 2.6 %. Its variance is 0.18 of ours.
+    // Two of Mitsuba's renders with 768 samples on such tiles (the reference has 1024) differ by 1.57 % rms, so one has
+    // an error of 1.1 %. Ours has an error of 2.6 %, so Mitsuba's variance is 0.18 of ours.
     let with_reference = |ours: Estimate| Estimate { error: ours.error * 1.18_f64.sqrt(), ..ours };
     let whole = with_reference(renders.whole());
     let expected = mean(0..512, 0..512);

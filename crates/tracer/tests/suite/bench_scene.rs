@@ -1,4 +1,5 @@
-//! Reads the shared scenes `bench/room` (17,562 triangles) and `bench/dense` (864,036), made for this project.
+//! Reads the shared scenes `bench/room` (17,562 triangles) and `bench/dense` (864,036 triangles), made for this
+//! project.
 
 use std::path::{Path, PathBuf};
 
@@ -21,8 +22,8 @@ pub fn folder(name: &str) -> Option<PathBuf> {
     scene.parent().map(Path::to_owned)
 }
 
-/// Mitsuba's picture of a scene of 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`, max_depth 8,
-/// 64 samples.
+/// Mitsuba's picture of a scene with 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`,
+/// max_depth 8, 64 samples.
 #[allow(dead_code, reason = "some draw no comparison")]
 pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     const SIZE: usize = 512;
@@ -95,7 +96,7 @@ fn rgb(value: &Value) -> [f32; 3] {
     serde_json::from_value(value.clone()).unwrap()
 }
 
-/// The first `count` triangles, with the vertices that they use alone; they are taken off `mesh`.
+/// Removes the first `count` triangles from `mesh` and returns them with the vertices that only they use.
 fn split_off(mesh: &mut TriangleMesh, count: usize) -> TriangleMesh {
     let triangles: Vec<[u32; 3]> = mesh.triangles.drain(..count).collect();
     let used = || triangles.iter().flatten().copied();
@@ -109,7 +110,7 @@ fn split_off(mesh: &mut TriangleMesh, count: usize) -> TriangleMesh {
     }
 }
 
-/// Binary PLY of x y z nx ny nz u v floats and triangles, as these files are.
+/// Reads a binary PLY file with floats x y z nx ny nz u v and triangles, as in these scenes.
 fn read_ply(path: &Path) -> TriangleMesh {
     let bytes = std::fs::read(path).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;

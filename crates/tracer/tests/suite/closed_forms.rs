@@ -35,16 +35,17 @@ fn constant(radiance: f32) -> Emission {
     Emission::Constant { radiance: [radiance; 3] }
 }
 
-/// The mean of 8 renders, for pictures with one value.
+/// The mean of 8 renders, for pictures of a constant value.
 fn mean(world: &World, camera: &Camera, samples: u32, max_bounces: u32) -> Estimate {
     let settings = RenderSettings { samples, max_bounces, ..Default::default() };
     Renders::new(world, camera, settings, 8).whole()
 }
 
-/// Within 4.5 standard errors, which are themselves at most 0.4 % of the value; and 2 % more is not.
+/// Asserts that the estimate is within 4.5 standard errors, which are at most 0.4 % of the value, and that a value 2 %
+/// larger is not.
 fn assert_is(found: Estimate, expected: f64) {
     assert!(found.error <= 0.004 * expected, "too noisy: {found:?}, expected {expected}");
-    // Where nothing is random, rounding to f32 is what remains.
+    // Where nothing is random, only rounding to f32 remains.
     let agrees = |expected: f64| found.z(expected).abs() < 4.5 || (found.mean / expected - 1.0).abs() < 1e-5;
     assert!(agrees(expected), "{found:?}, expected {expected}");
     assert!(!agrees(1.02 * expected), "the twin passes: {found:?}");
@@ -55,17 +56,17 @@ fn glowing_room(reflectance: f32, radiance: f32) -> World {
     room().into_iter().fold(Builder::default(), add).world()
 }
 
-/// Walls that glow and reflect: E / (1 - rho) everywhere.
+/// Walls that emit and reflect: radiance E / (1 - rho) everywhere.
 #[test]
 fn furnace_room() {
     let view = camera([0.3, -0.2, 0.1], [1.0, 0.5, -0.4], 16, 100.0);
     assert_is(mean(&glowing_room(0.5, 1.0), &view, 16, 60), 2.0);
     assert_is(mean(&glowing_room(0.0, 1.0), &view, 1, 60), 1.0);
-    // Cut after k + 1 scatterings, the sum of the geometric series that far.
+    // Paths that end after k + 1 scatterings give the partial sum of the geometric series.
     assert_is(mean(&glowing_room(0.5, 1.0), &view, 16, 1), 1.75);
 }
 
-/// A floor of reflectance 0.8 seen by a camera that looks down on the point under a lamp's centre.
+/// A floor of reflectance 0.8, with a camera that looks down on the point below the centre of a lamp.
 fn lamp_over_floor(lamp: TriangleMesh, scale: f32) -> Estimate {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0) * scale, Vec3::Z * 8.0 * scale, Vec3::X * 8.0 * scale);
     let world = Builder::default().surface(floor, grey(0.8)).surface(lamp, grey(0.0)).glowing([3.0; 3]).world();
@@ -73,8 +74,8 @@ fn lamp_over_floor(lamp: TriangleMesh, scale: f32) -> Estimate {
     mean(&world, &camera([1.5 * s, 0.5 * s, 0.0], [0.0, 0.0, 0.0], 8, 0.05), 64, 0)
 }
 
-/// The form factor of a rectangle seen from a parallel plane under its centre (Siegel and Howell, configuration 4), at a
-/// millimetre, a metre and a kilometre.
+/// The form factor of a rectangle from a parallel plane below its centre (Siegel and Howell, configuration 4), at
+/// scales of a millimetre, a metre and a kilometre.
 #[test]
 fn rectangle_over_floor() {
     let (a, b) = (0.7 / 1.2, 0.5 / 1.2);
@@ -86,14 +87,14 @@ fn rectangle_over_floor() {
     }
 }
 
-/// A sphere of radius r at height d: (r / d)^2, less what 96 rings of flat faces leave out.
+/// A sphere of radius r at height d: (r / d)^2, less the area that 96 rings of flat faces miss.
 #[test]
 fn sphere_over_floor() {
     let lamp = sphere(Vec3::new(0.0, 1.5, 0.0), 0.5, 96);
     assert_is(lamp_over_floor(lamp, 1.0), 0.8 * 3.0 / 9.0 * 0.9995);
 }
 
-/// A lamp of a square millimetre is a point: L A / d^2 falls straight on the floor below it, less by the cosines elsewhere.
+/// A lamp of a square millimetre acts as a point: L A / d^2 on the floor straight below, times cosines elsewhere.
 #[test]
 fn point_like_lamp() {
     let radiance = 3e6;
@@ -111,7 +112,7 @@ fn point_like_lamp() {
     }
 }
 
-/// One-sided lamps are dark behind; two-sided ones are not.
+/// One-sided lamps are dark from behind, two-sided ones are not.
 #[test]
 fn sides_of_a_lamp() {
     let scene = |two_sided: bool| {
@@ -130,7 +131,7 @@ fn sides_of_a_lamp() {
     }
 }
 
-/// A tinted mirror at 45 degrees shows a glowing wall.
+/// A tinted mirror at 45 degrees shows an emitting wall.
 #[test]
 fn mirror_shows_the_lamp() {
     let slanted = quad(Vec3::new(-1.0, -1.0, -3.0), Vec3::new(2.0, 0.0, 2.0), Vec3::Y * 2.0);
@@ -145,8 +146,8 @@ fn mirror_shows_the_lamp() {
     assert_is(mean(&world, &camera([0.0; 3], [0.0, 0.0, -2.0], 8, 5.0), 4, 4), 2.1);
 }
 
-/// A sheet of index 1.5, head on: 1 - 2 R / (1 + R) with R = 0.04 of the wall behind it; a closed ball of glass in uniform
-/// light does not show at all.
+/// A sheet of index 1.5 at normal incidence transmits 1 - 2 R / (1 + R) of the wall behind it, with R = 0.04. A closed
+/// sphere of glass in uniform light is invisible.
 #[test]
 fn clear_glass() {
     let sheet = quad(Vec3::new(-1.0, -1.0, -1.0), Vec3::X * 2.0, Vec3::Y * 2.0);
@@ -157,11 +158,11 @@ fn clear_glass() {
 
     let ball = sphere(Vec3::new(0.0, 0.0, -3.0), 1.0, 48);
     let world = Builder::default().surface(ball, glass()).light(constant(1.0)).world();
-    // Paths that total reflection holds inside longest are stopped by chance, so there is some noise.
+    // Roulette ends the paths that total reflection holds inside longest, so there is some noise.
     assert_is(mean(&world, &camera([0.0; 3], [0.0, 0.0, -3.0], 16, 30.0), 64, 400), 1.0);
 }
 
-/// Uniform light on a convex body: reflectance times radiance; and the background is the light itself.
+/// A convex body in uniform light has radiance times reflectance; the background shows the light itself.
 #[test]
 fn uniform_light() {
     let ball = || sphere(Vec3::new(0.0, 0.0, -3.0), 1.0, 32);
@@ -173,7 +174,7 @@ fn uniform_light() {
     assert_eq!(mean(&hidden, &camera([0.0; 3], [0.0, 0.0, 3.0], 4, 20.0), 1, 4).mean, 0.0);
 }
 
-/// One bright texel, turned into the world by a rotation: the floor's light is the integral of the map over its sky.
+/// One bright texel, rotated in the world: the light of the floor is the integral of the map over its sky.
 #[test]
 fn one_bright_texel() {
     let mut texels = vec![[0.0; 3]; 32 * 16];
@@ -208,8 +209,8 @@ fn one_bright_texel() {
     assert_is(mean(&world, &camera([0.3, 1.0, 0.2], [0.0; 3], 8, 10.0), 64, 2), 0.5 / PI * irradiance);
 }
 
-/// A lamp hidden from the camera: the camera sees its grey material, lit by the other lamp; a mirror shows its light; it
-/// lights the floor as if it were not hidden.
+/// A lamp hidden from the camera: the camera sees its grey material lit by another lamp, a mirror shows its light, and
+/// the floor is lit as if the lamp were visible.
 #[test]
 fn hidden_lamp() {
     let lamp = quad(Vec3::new(-1.0, -1.0, -3.0), Vec3::X * 2.0, Vec3::Y * 2.0);

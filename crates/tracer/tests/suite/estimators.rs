@@ -1,4 +1,4 @@
-//! Different ways to the same picture.
+//! Agreement between estimators of the same picture, and scenes that are refused.
 
 use std::sync::Arc;
 
@@ -24,7 +24,8 @@ fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> Mate
     }
 }
 
-/// A room open to a map on one side, with a lamp, a large metal ball, a rough plastic box side and a frosted pane.
+/// A room open to an environment map on one side, with a lamp, a large metal sphere, a rough plastic box and a frosted
+/// pane.
 pub fn scene(brightness: f32) -> ReferenceScene {
     let mut walls = room();
     walls.truncate(5);
@@ -81,14 +82,14 @@ pub fn view() -> Camera {
     camera([0.2, 0.1, 2.6], [0.0, -0.1, 0.0], 32, 50.0)
 }
 
-/// Whole and quarters within 4.5 standard errors.
+/// The largest distance between two sets of renders in standard errors, of whole pictures and of quarters.
 pub fn worst(a: &Renders, b: &Renders) -> f64 {
     let quarter = |k: usize| (16 * (k % 2)..16 * (k % 2) + 16, 16 * (k / 2)..16 * (k / 2) + 16);
     let regions = (0..4).map(quarter).chain([(0..32, 0..32)]);
     regions.map(|(x, y)| a.region(x.clone(), y.clone()).z_against(&b.region(x, y)).abs()).fold(0.0, f64::max)
 }
 
-/// Sampling emitters, surfaces or both, and ending paths by chance or not, have one mean; 3 % more light has not.
+/// Sampling emitters, the BSDF or both, with or without roulette, gives one mean. With 3 % more light the mean differs.
 #[test]
 fn ways_of_sampling_agree() {
     let world = World::new(Arc::new(scene(1.0))).unwrap();
@@ -118,13 +119,13 @@ fn ways_of_sampling_agree() {
     assert!(z > 4.5, "the twin passes: {z}");
 }
 
-/// Directions to lights follow the density that is told for them: the density of a direction is that of all a ray there
-/// meets, integrated over cells of the sphere, against 40,000 samples by Pearson's chi-square. The twin: the density of
-/// a place 10 cm away.
+/// Sampled directions to lights follow the density reported for them. The density of a direction is the sum over all
+/// emitters on a ray along it, integrated over cells of the sphere and compared with 40,000 samples by Pearson's
+/// chi-square. The twin: the density for a point 10 cm away.
 #[test]
 fn directions_to_lights_follow_their_density() {
     let mut scene = scene(1.0);
-    // Nothing else may be in between: lamps and the map alone.
+    // Only lamps and the map, so that nothing blocks light.
     let lamps = [
         quad(Vec3::new(-0.4, 0.95, -0.4), Vec3::X * 0.8, Vec3::Z * 0.8),
         quad(Vec3::new(-0.9, -0.2, -0.9), Vec3::Y * 0.5, Vec3::Z * 0.7),
@@ -142,7 +143,7 @@ fn directions_to_lights_follow_their_density() {
     let from = Vec3::new(0.1, 0.05, 0.2);
     let [expected, elsewhere] = [from, from + Vec3::X * 0.1].map(|place| light_density(&world, place));
     let z = |expected: &[f64]| chi_square_of_lights(&world, from, expected);
-    // The rest is spent on the backs of lamps.
+    // The remaining probability falls on the backs of lamps.
     let total: f64 = expected.iter().sum();
     assert!((0.7..1.0).contains(&total), "{total}");
     assert!(z(&expected) < 5.0, "{}", z(&expected));
@@ -152,8 +153,8 @@ fn directions_to_lights_follow_their_density() {
 const ROWS: usize = 12;
 const COLUMNS: usize = 24;
 
-/// The density of directions to lights from a place, over cells of equal solid angle; a sphere behind its own front half
-/// and two lights in one line add up.
+/// The density of directions to lights from a point, over cells of equal solid angle. A sphere's back, behind its own
+/// front, and lights behind one another add up.
 fn light_density(world: &World, from: Vec3) -> Vec<f64> {
     const FINE: usize = 48;
     let mut cells = vec![0.0; ROWS * COLUMNS];
@@ -177,13 +178,13 @@ fn light_density(world: &World, from: Vec3) -> Vec<f64> {
     cells
 }
 
-/// How far the samples of lights are from `expected`, as a standard normal (Wilson and Hilferty); draws that find nothing
-/// (the back of a lamp) and cells of fewer than 10 are pooled.
+/// The deviation of light samples from `expected`, as a standard normal (Wilson and Hilferty). Samples that find
+/// nothing (backs of lamps) and cells with fewer than 10 expected samples are pooled.
 fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
     const COUNT: u32 = 40_000;
     let mut found = vec![0.0_f64; ROWS * COLUMNS];
     for index in 0..COUNT {
-        // Another pixel each: independent numbers.
+        // Each sample uses another pixel, so that the numbers are independent.
         let [a, b, c, _] = Sampler::new(9, [index, 0], 0).set(0);
         let Some(sample) = world.emitters().sample(from, [a, b, c], |_| 1.0) else { continue };
         let d = sample.direction;
@@ -211,14 +212,14 @@ fn chi_square_of_lights(world: &World, from: Vec3, expected: &[f64]) -> f64 {
 fn progress_reaches_its_end() {
     let world = Builder::default().world();
     let seen = std::sync::Mutex::new(Vec::new());
-    let told = |done, total| seen.lock().unwrap().push((done, total));
-    render(&world, &view(), &RenderSettings { samples: 1, ..Default::default() }, &told).unwrap();
+    let report = |done, total| seen.lock().unwrap().push((done, total));
+    render(&world, &view(), &RenderSettings { samples: 1, ..Default::default() }, &report).unwrap();
     let mut seen = seen.into_inner().unwrap();
     seen.sort_unstable();
     assert_eq!(seen, [(1, 4), (2, 4), (3, 4), (4, 4)]);
 }
 
-/// A world of other materials and uvs over the same triangles takes the hierarchy as it is; other triangles are refused.
+/// A world of other materials and uvs over the same triangles shares the hierarchy; other triangles are refused.
 #[test]
 fn worlds_share_a_hierarchy() {
     let first = World::new(Arc::new(scene(1.0))).unwrap();
@@ -246,7 +247,7 @@ fn what_the_cap_cut_is_reported() {
     assert_eq!((long.paths, long.not_finite), (32 * 32 * 8, 0));
 }
 
-/// Every kind of scene that contradicts itself is refused, and the message says where.
+/// Every kind of contradictory scene is refused, with a message that names the place.
 #[test]
 fn bad_scenes_are_refused() {
     let refused = |change: fn(&mut ReferenceScene), place: &str| {
@@ -281,7 +282,7 @@ fn bad_scenes_are_refused() {
     assert!(World::new(Arc::new(bad)).unwrap_err().to_string().contains("material 1"));
 }
 
-/// A lamp of no triangles lights nothing and stands in nobody's way.
+/// A lamp without triangles emits nothing and blocks nothing.
 #[test]
 fn lamps_without_triangles_are_dark() {
     let mut with = scene(1.0);

@@ -1,4 +1,4 @@
-//! The light basis: its weighted sums are renders of the same scene under other lights.
+//! Tests of the light basis: its weighted sums equal renders of the same scene under other lights.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
 use super::statistics::Renders;
 
 /// A room open to a pale sky behind the camera, with three lamps, one of them hidden from the camera, and a rough metal
-/// ball. The weights multiply the radiances of the four lights.
+/// sphere. The weights multiply the radiances of the four lights.
 pub fn lit_room(weights: [[f32; 3]; 4]) -> ReferenceScene {
     let mut walls = room();
     walls.truncate(5);
@@ -43,7 +43,7 @@ pub fn lit_world(weights: [[f32; 3]; 4]) -> World {
     World::new(Arc::new(lit_room(weights))).unwrap()
 }
 
-/// Into the room, with some of the dark outside at the edges.
+/// Looks into the room, with some of the darkness outside at the edges.
 pub fn view(size: u32) -> Camera {
     camera([0.1, 0.1, 2.2], [0.0, -0.05, 0.0], size, 50.0)
 }
@@ -58,7 +58,7 @@ fn basis(world: &World, groups: &LightGroups, seed: u64, samples: u32) -> LightB
     done.views.remove(0).halves.remove(0).basis
 }
 
-/// The largest difference of two pictures, against the mean of the first.
+/// The largest difference between two pictures, relative to the mean of the first.
 fn difference(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> f64 {
     let channels = |p: &Picture<LinearRgb>| p.pixels().iter().flat_map(|v| v.0).map(f64::from).collect::<Vec<_>>();
     let (a, b) = (channels(a), channels(b));
@@ -70,8 +70,8 @@ fn as_f64(weights: [[f32; 3]; 4]) -> Vec<[f64; 3]> {
     weights.map(|weight| weight.map(f64::from)).to_vec()
 }
 
-/// With one seed the basis holds the very paths of the picture without groups, and those of the same room under other
-/// lights: sums agree to rounding. A weight off by 1 % does not.
+/// With one seed, the basis comes from the same paths as the picture without groups, and as that of the same room under
+/// other lights, so sums agree to rounding. With a weight off by 1 % they do not.
 #[test]
 fn one_pass_serves_all_lightings() {
     let (plain, mixed) = (lit_world(ONE), lit_world(MIXED));
@@ -84,8 +84,8 @@ fn one_pass_serves_all_lightings() {
     assert!(difference(&together(&mixed), &apart.weighted(&weights).unwrap()) > 1e-3, "the twin passes");
 }
 
-/// A plain render of the room under other lights and the weighted basis of the room as it is have one mean: by quarters
-/// and as a whole, with both variances. Other weights have not.
+/// A plain render of the room under other lights and the weighted basis of the original room have one mean, by quarters
+/// and as a whole, given both variances. With other weights they differ.
 #[test]
 fn a_weighted_basis_is_a_render() {
     let world = lit_world(ONE);
@@ -108,7 +108,7 @@ fn a_weighted_basis_is_a_render() {
     assert!(twin > 4.5, "the twin passes: {twin}");
 }
 
-/// Groups of several lights hold the sums of their lights' pictures.
+/// A group of several lights holds the sum of their pictures.
 #[test]
 fn merged_groups_are_sums() {
     let world = lit_world(ONE);
@@ -123,7 +123,7 @@ fn merged_groups_are_sums() {
     }
 }
 
-/// No lights: no pictures, and their sum is black.
+/// A scene without lights has a basis without pictures, whose sum is black.
 #[test]
 fn no_lights_are_no_pictures() {
     let world = Builder::default().surface(room().remove(0), grey(0.5)).world();

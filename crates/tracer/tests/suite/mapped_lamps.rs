@@ -26,7 +26,7 @@ fn texture(width: usize, texels: &[[f32; 3]]) -> Texture {
     Texture::new(width, texels.len() / width, Texels::Linear(texels.to_vec()), Wrap::Clamp).unwrap()
 }
 
-/// Two texels side by side that meet halfway, in a two-thousandth of the uv.
+/// Two texels side by side, with a transition half way over a two-thousandth of the uv.
 fn two_tone(left: [f32; 3], right: [f32; 3]) -> (Texture, UvTransform) {
     (texture(2, &[left, right]), UvTransform([[1000.0, 0.0, -499.5], [0.0, 1.0, 0.0]]))
 }
@@ -35,7 +35,7 @@ fn lamp() -> TriangleMesh {
     quad(Vec3::new(-0.6, 0.9, -0.4), Vec3::X * 1.2, Vec3::Z * 0.8)
 }
 
-/// A room with a ball in it, which the lamp under the ceiling is to be added to.
+/// A room with a sphere, without the lamp below its ceiling.
 fn furnished() -> Builder {
     let metal = MaterialModel::Conductor {
         ior: ConductorIor::EtaK { eta: [0.2, 0.9, 1.1], k: [3.9, 2.4, 2.1] },
@@ -48,7 +48,8 @@ fn furnished() -> Builder {
     builder.surface(sphere(Vec3::new(0.3, -0.5, -0.3), 0.4, 16), material(metal))
 }
 
-/// Its lamp is of many strongly differing texels, some of them black, shown more than once and askew; it reflects nothing.
+/// The lamp's map has many strongly differing texels, some of them black, and is repeated and skewed. The lamp reflects
+/// nothing.
 fn motley() -> Builder {
     let texels: Vec<[f32; 3]> =
         (0..20).map(|k| [k % 3, k % 5, k % 7].map(|v| if k % 4 == 0 { 0.0 } else { v as f32 })).collect();
@@ -57,7 +58,7 @@ fn motley() -> Builder {
     furnished().surface(lamp(), grey(0.0)).glowing([3.0, 2.5, 2.0]).mapped(texture, uv)
 }
 
-/// A map of one colour c times radiance r is radiance r c, to the last bit; a hundredth more is not.
+/// A map of a constant colour c times radiance r equals radiance r c exactly; one larger by a hundredth does not.
 #[test]
 fn a_map_of_one_colour_is_a_radiance() {
     let (radiance, colour) = ([4.0, 3.0, 2.5], [0.3, 0.7, 1.1]);
@@ -68,13 +69,13 @@ fn a_map_of_one_colour_is_a_radiance() {
     let mapped = |colour: [f32; 3]| lit(lamp(radiance).mapped(texture(2, &[colour; 4]), uv));
     assert!(plain == mapped(colour));
     assert!(plain != mapped(colour.map(|c| 1.01 * c)), "the twin passes");
-    // Bytes, which textures usually are, give what they mean.
+    // The same for textures of bytes, the usual kind.
     let bytes = Texture::new(1, 1, Texels::Linear8(vec![[51, 102, 255]]), Wrap::Repeat).unwrap();
     let half = lit(lamp([1.0; 3]).mapped(bytes, uv));
     assert!(half == lit(lamp([51.0 / 255.0, 102.0 / 255.0, 1.0])));
 }
 
-/// A surface without uv shows one place of the map.
+/// A surface without uv shows a single point of the map.
 #[test]
 fn without_uv_one_place_is_looked_up() {
     let bare = TriangleMesh { uvs: None, ..lamp() };
@@ -90,7 +91,7 @@ fn without_uv_one_place_is_looked_up() {
     assert!(lit(lamp(), mapped) != plain, "the twin passes");
 }
 
-/// A rectangle of two tones is two rectangles, each of one; they the other way round are not.
+/// A rectangle of two tones equals two rectangles of one tone each; swapping the tones makes a difference.
 #[test]
 fn two_tones_are_two_lamps() {
     let (left, right) = ([6.0, 1.0, 0.5], [0.5, 1.0, 4.0]);
@@ -108,7 +109,7 @@ fn two_tones_are_two_lamps() {
     assert!(z > 4.5, "the twin passes: {z}");
 }
 
-/// Sampling the lamp, the surfaces or both have one mean; a lamp of the same colour all over has not.
+/// Sampling the lamp, the BSDF or both gives one mean; a lamp of constant colour gives another.
 #[test]
 fn ways_of_sampling_a_mapped_lamp_agree() {
     let renders = |builder: Builder, samples, light_sampling, seed| {
@@ -127,7 +128,7 @@ fn ways_of_sampling_a_mapped_lamp_agree() {
     assert!(z > 4.5, "the twin passes: {z}");
 }
 
-/// Where light is looked for follows from no colour of the map: places and densities are those without it.
+/// Light sampling does not depend on the map: points and densities equal those without a map.
 #[test]
 fn a_map_steers_no_sample() {
     let [mapped, plain] =
@@ -145,7 +146,7 @@ fn a_map_steers_no_sample() {
     assert!(colours.len() > 100, "{}", colours.len());
 }
 
-/// The camera reads the map off the lamp, from behind the other way round where both sides glow, else nothing.
+/// The camera sees the map on the lamp; from behind it sees the map mirrored if both sides emit, otherwise nothing.
 #[test]
 fn both_sides_show_the_map() {
     let (left, right) = ([2.0, 0.5, 0.25], [0.5, 3.0, 1.0]);
@@ -165,7 +166,8 @@ fn both_sides_show_the_map() {
     assert_eq!(seen(false, &behind), [[0.0; 3]; 2]);
 }
 
-/// Hidden from the camera, the lamp shows it its material; a mirror still shows the map, and all else is lit the same.
+/// A lamp hidden from the camera shows it its material; a mirror still shows the map, and everything else is lit the
+/// same.
 #[test]
 fn hidden_from_the_camera() {
     let (left, right) = ([2.0, 0.5, 0.25], [0.5, 3.0, 1.0]);
@@ -190,7 +192,7 @@ fn hidden_from_the_camera() {
     };
     assert_eq!(seen(build().hidden(), &at_lamp), [[0.0; 3]; 2]);
     assert_eq!(seen(build(), &at_lamp), [left, right]);
-    // The mirror turns it round once more: the camera has turned as well.
+    // The mirror reverses the map again, since the camera has turned too.
     assert_eq!(seen(build().hidden(), &at_mirror), [right, left]);
 
     let lit = |builder: Builder| picture(builder.scene(), &camera([0.0, 0.2, 0.6], [0.0, -0.8, -0.2], 16, 30.0));
@@ -198,7 +200,7 @@ fn hidden_from_the_camera() {
     assert!(lit(motley()) != lit(furnished()), "the twin passes");
 }
 
-/// One pass over the lights apart, weighted, is the render of lamps of those radiances; a weight off by 1 % is not.
+/// The weighted basis from one pass equals the render of lamps with those radiances; a weight off by 1 % does not.
 #[test]
 fn a_weighted_basis_is_a_render() {
     let lit = |weights: [[f32; 3]; 2]| {
@@ -224,7 +226,7 @@ fn a_weighted_basis_is_a_render() {
     assert!(difference(&[[0.2, 0.505, 3.0], [0.7; 3]]) > 1e-3, "the twin passes");
 }
 
-/// Maps that lead nowhere or hold what is no light are refused; the light is named.
+/// Maps that do not exist or hold values that are no radiance are refused, with the name of the light.
 #[test]
 fn bad_maps_are_refused() {
     let error = |texels: [f32; 3], index: usize, scale: f32| {

@@ -1,4 +1,4 @@
-//! Predictions in place of a world's own materials, and the lights of a stage.
+//! Predictions in place of a world's own materials, and stage lights.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ fn flat(value: [f32; 3]) -> Texture {
     Texture::new(1, 1, Texels::Linear(vec![value]), Wrap::Clamp).unwrap()
 }
 
-/// One coat of these colours on all walls and lamps; the metal ball keeps its own material.
+/// One coat with these colours on all walls and lamps; the metal sphere keeps its own material.
 fn coats(scene: &ReferenceScene, colors: &[[f32; 3]], roughness: f32, metallic: f32) -> Vec<Option<Coat>> {
     let coat = |mesh: &TriangleMesh| {
         mesh.uvs.as_ref().map(|_| Coat {
@@ -37,7 +37,7 @@ fn atlases(scene: &ReferenceScene) -> Vec<TriangleMesh> {
     scene.surfaces.iter().map(|surface| surface.mesh.clone()).collect()
 }
 
-/// The room of the light basis; where its meshes have uv, of the prediction's own material.
+/// The room of the light basis, in which all meshes with uvs have the prediction's material.
 fn principled_room(color: [f32; 3], roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> ReferenceScene {
     let mut scene = lit_room([[1.0; 3]; 4]);
     for surface in scene.surfaces.iter().filter(|surface| surface.mesh.uvs.is_some()) {
@@ -59,7 +59,8 @@ fn repainted(world: &World, repaint: &Repaint, which: std::ops::Range<usize>) ->
     render_repainted(world, repaint, which, &[view(24)], lighting, &settings, &[3, 4], &|_, _| ()).unwrap()
 }
 
-/// Painting a room is the same as building it of that material, bit for bit; so is following a prediction beside others.
+/// A repainted room equals a room built with that material, bit for bit, and a prediction rendered beside others equals
+/// the same rendered alone.
 #[test]
 fn paint_is_the_material_itself_and_company_changes_nothing() {
     let scene = Arc::new(lit_room([[1.0; 3]; 4]));
@@ -116,10 +117,14 @@ fn what_does_not_fit_is_refused() {
     };
     let atlases = atlases(&scene);
     let good = coats(&scene, &COLORS, 0.5, 0.0);
-    assert!(new(&atlases[1..], good.clone()).contains("not of the world's triangles"));
+    assert!(new(&atlases[1..], good.clone()).contains(&format!(
+        "{} atlases and {} coats",
+        atlases.len() - 1,
+        atlases.len()
+    )));
     let mut uneven = good.clone();
     uneven[0].as_mut().unwrap().base_colors.pop();
-    assert!(new(&atlases, uneven).contains("2 base colours on one surface, 3 on another"));
+    assert!(new(&atlases, uneven).contains("surface 0 '': 2 base colours, expected 3 on each surface"));
     let mut unmapped = atlases.clone();
     unmapped[0].uvs = None;
     assert!(new(&unmapped, good.clone()).contains("surface 0"));
@@ -136,11 +141,11 @@ fn what_does_not_fit_is_refused() {
     assert!(!fails(0..1, Lighting::Mixed(&vec![vec![vec![[1.0; 3]; 4]]; 3])));
 }
 
-/// A square above a floor, seen from straight above through the square.
+/// A square stage light above a floor, with a camera that looks straight down through it.
 fn floor_and_stage() -> (World, Vec<StageLight>, Camera) {
     let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
     let lamp = quad(Vec3::new(3.0, 3.0, 3.0), Vec3::X * 0.5, Vec3::Z * 0.5);
-    // The scene's own lamp must be dark on the stage.
+    // The scene's own lamp, which must be dark on the stage.
     let world = Builder::default().surface(floor, grey(0.5)).surface(lamp, grey(0.5)).glowing([100.0; 3]).world();
     let mesh = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::X, Vec3::Z);
     let stage = vec![StageLight { mesh, radiance: [2.0, 1.0, 0.0] }];
@@ -154,9 +159,9 @@ fn seen(world: &World, camera: &Camera) -> [f64; 3] {
     [0, 1, 2].map(|c| picture.pixels().iter().map(|pixel| f64::from(pixel.0[c])).sum::<f64>() / count)
 }
 
-/// The floor under the middle of a square of side 1 at height 1 gets E = 4 L F, F the form factor of a corner: Siegel and
-/// Howell, "Thermal Radiation Heat Transfer", configuration 11 (parallel rectangle over a corner), with a = b = 1/2.
-/// Neither the square itself, which is in the way, nor the scene's own lamp is seen.
+/// The floor below the centre of a square of side 1 at height 1 receives E = 4 L F, with the form factor F of a corner:
+/// Siegel and Howell, "Thermal Radiation Heat Transfer", configuration 11 (parallel rectangle over a corner), a = b =
+/// 1/2. Neither the square in front of the camera nor the scene's own lamp is visible.
 #[test]
 fn a_stage_lights_the_floor_and_hides_nothing() {
     let (world, stage, camera) = floor_and_stage();
@@ -171,12 +176,12 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
     assert!(own > 0.0 && (own / expected - 1.0).abs() > 0.1, "the twin passes: {own}");
     let mut turned = stage;
     turned[0].mesh = quad(Vec3::new(-0.5, 1.0, -0.5), Vec3::Z, Vec3::X);
-    // It glows on its front alone; the lamp's underside sends a trace of that back.
+    // Only the front emits; a trace of its light returns from the lamp's underside.
     assert!(seen(&world.on_stage(&turned).unwrap(), &camera)[0] < 1e-5 * expected);
 }
 
-/// Smooth facets do not show a stage: a black floor of smooth plastic shows nothing of the square above it, a rough one
-/// does; and the same square as a surface of the scene is mirrored.
+/// Smooth facets do not reflect a stage: a black floor of smooth plastic shows nothing of the square above it, a rough
+/// one does. As a surface of the scene, the same square is mirrored.
 #[test]
 fn smooth_facets_do_not_show_a_stage() {
     let shine = |roughness: f32, staged: bool| {
@@ -204,7 +209,7 @@ fn smooth_facets_do_not_show_a_stage() {
     assert!(scene > 0.01 && (stage / scene - 1.0).abs() < 0.02, "{stage} {scene}");
 }
 
-/// A room of dull walls with a smooth floor and a stage of two lights, one of them 2 mm before the back wall.
+/// A room of matt walls with a smooth floor, and a stage of two lights, one of them 2 mm in front of the back wall.
 fn room_on_stage() -> World {
     let smooth = MaterialModel::Principled {
         base_color: ColorInput::Constant([0.7, 0.5, 0.3]),
@@ -222,8 +227,8 @@ fn room_on_stage() -> World {
     World::new(Arc::new(scene)).unwrap().on_stage(&stage.map(|(mesh, radiance)| StageLight { mesh, radiance })).unwrap()
 }
 
-/// Lights of a stage that are sampled, that rays meet, and both together give one picture; and what lies beside a light is
-/// far less noisy by both than by sampling alone.
+/// Sampling stage lights, the BSDF or both gives one picture. Beside a light, both together are far less noisy than
+/// light sampling alone.
 #[test]
 fn ways_of_finding_a_stage_agree() {
     let world = room_on_stage();
@@ -241,7 +246,7 @@ fn ways_of_finding_a_stage_agree() {
     assert!(both < 0.7 * emitters, "{both} {emitters}");
 }
 
-/// A stage needs lights that are there.
+/// Stage lights without triangles or with invalid radiances are refused.
 #[test]
 fn unsound_stages_are_refused() {
     let (world, stage, _) = floor_and_stage();

@@ -1,6 +1,7 @@
-//! The same bytes of a picture for any number of threads, for either set of instructions, in every build, on every machine.
+//! Pictures have the same bytes for any number of threads, with either instruction set, in every build and on every
+//! machine.
 //!
-//! That the optimised build renders these bytes too is what `tools/test_builds.sh` tests, by hand.
+//! `tools/test_builds.sh`, run by hand, tests that the optimised build renders these bytes too.
 
 use std::sync::Arc;
 
@@ -13,8 +14,9 @@ use sha2::{Digest, Sha256};
 
 use super::estimators;
 
-/// Of a picture with every kind of material and light, and of two views of it from one set of paths, light by light.
-/// They change with whatever a picture depends on: then a release's pictures change too, which a change has to say.
+/// Hashes of a picture with every kind of material and light, and of two views of it from one set of paths, per light.
+/// They change with anything that pictures depend on. The pictures of a release then change too, and the change must be
+/// announced.
 const RENDER: &str = "4d9eba39ca6d6ff6356794ac9e8e7cb61aafc12f4a0591bf651005478902fdba";
 const VIEWS: &str = "ae0b07f9a4225879baed48d891df15a549f14c1c90764de85c6d0505cce9d013";
 
@@ -26,7 +28,7 @@ fn hash<'a>(pictures: impl IntoIterator<Item = &'a Picture<LinearRgb>>) -> Strin
     hasher.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Both hashes of a world, by `threads`.
+/// Both hashes of a world, rendered by `threads` threads.
 fn hashes(world: &World, threads: usize) -> [String; 2] {
     let settings = RenderSettings { samples: 4, seed: 3, ..Default::default() };
     let views = [estimators::view(), estimators::view().turned(5.0, -5.0)];
@@ -40,7 +42,7 @@ fn hashes(world: &World, threads: usize) -> [String; 2] {
     [hash([&picture]), hash(halves.flat_map(|half| half.basis.pictures()))]
 }
 
-/// The scene in a hierarchy that is walked with the instructions told, none where the machine has not got them.
+/// The scene with a hierarchy that uses the given instructions, or `None` if the machine lacks them.
 fn world(scene: &Arc<ReferenceScene>, instructions: InstructionSet) -> Option<World> {
     let meshes: Vec<&TriangleMesh> = scene.surfaces.iter().map(|surface| &surface.mesh).collect();
     let accel = Accel::build(&meshes).unwrap().with_instructions(instructions)?;
@@ -61,7 +63,7 @@ fn pictures_are_those_stored() {
     }
 }
 
-/// Another seed or a light a millionth brighter is another picture.
+/// Another seed, or a light brighter by a millionth, gives another picture.
 #[test]
 fn what_changes_a_picture_changes_its_hash() {
     let picture = |brightness, seed| {

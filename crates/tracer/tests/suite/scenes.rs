@@ -11,7 +11,7 @@ use mateval_scene::reference::{
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use mateval_tracer::World;
 
-/// A parallelogram from `corner` along `u` and `v`; its front is where u x v points.
+/// A parallelogram from `corner` along `u` and `v`; u x v points to its front.
 pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
     TriangleMesh {
         positions: vec![corner, corner + u, corner + u + v, corner + v],
@@ -21,14 +21,14 @@ pub fn quad(corner: Vec3, u: Vec3, v: Vec3) -> TriangleMesh {
     }
 }
 
-/// The six sides of the cube from -1 to 1, their fronts inside.
+/// The six sides of the cube from -1 to 1, with their fronts inside.
 pub fn room() -> Vec<TriangleMesh> {
     let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
     let (low, high) = (Vec3::splat(-1.0), Vec3::splat(1.0));
     vec![quad(low, z, x), quad(high, -x, -z), quad(low, y, z), quad(high, -z, -y), quad(low, x, y), quad(high, -y, -x)]
 }
 
-/// A sphere of `rings` x 2 `rings` quads with smooth normals, its front outside.
+/// A sphere of `rings` x 2 `rings` quads with smooth normals and its front outside.
 pub fn sphere(centre: Vec3, radius: f32, rings: u32) -> TriangleMesh {
     let sectors = 2 * rings;
     let mut normals = Vec::new();
@@ -48,17 +48,17 @@ pub fn sphere(centre: Vec3, radius: f32, rings: u32) -> TriangleMesh {
     TriangleMesh { positions, triangles: triangles.collect(), normals: Some(normals), uvs: None }
 }
 
-/// A material of `model`, the same on both sides.
+/// A two-sided material of `model`.
 pub fn material(model: MaterialModel) -> Material {
     Material { name: String::new(), model, two_sided: true, opacity: None, bump: None }
 }
 
-/// Lambert's, grey.
+/// A grey Lambertian material.
 pub fn grey(reflectance: f32) -> Material {
     material(MaterialModel::Diffuse { reflectance: ColorInput::Constant([reflectance; 3]), alpha: None })
 }
 
-/// A scene that grows piece by piece.
+/// Builds a scene step by step.
 #[derive(Default)]
 pub struct Builder(ReferenceScene);
 
@@ -77,13 +77,13 @@ impl Builder {
         self
     }
 
-    /// Makes the surface that was added last glow on its front.
+    /// Makes the front of the last surface emit.
     pub fn glowing(self, radiance: [f32; 3]) -> Self {
         let last = SurfaceIndex(self.0.surfaces.len() - 1);
         self.light(Emission::Area { surfaces: vec![last], radiance, map: None, two_sided: false })
     }
 
-    /// Multiplies the radiance of the light that was added last by `texture`, looked up by `uv`.
+    /// Multiplies the radiance of the last light by `texture`, looked up by `uv`.
     pub fn mapped(mut self, texture: Texture, uv: UvTransform) -> Self {
         let index = TextureIndex(self.0.textures.len());
         self.0.textures.push(SourceTexture { name: String::new(), sha256: None, texture });
@@ -94,7 +94,7 @@ impl Builder {
         self
     }
 
-    /// Makes the light that was added last glow on both sides.
+    /// Makes the last light emit on both sides.
     pub fn on_both_sides(mut self) -> Self {
         let Some(Emission::Area { two_sided, .. }) = self.0.lights.last_mut().map(|group| &mut group.emission) else {
             unreachable!("no surface has been made to glow")
@@ -103,24 +103,24 @@ impl Builder {
         self
     }
 
-    /// Adds light.
+    /// Adds a light.
     pub fn light(mut self, emission: Emission) -> Self {
         self.0.lights.push(LightGroup { name: String::new(), emission, camera_visible: true });
         self
     }
 
-    /// Hides the light that was added last from the camera.
+    /// Hides the last light from the camera.
     pub fn hidden(mut self) -> Self {
         self.0.lights.last_mut().unwrap().camera_visible = false;
         self
     }
 
-    /// The scene so far, to be changed at will.
+    /// Returns the scene, for further changes.
     pub fn scene(self) -> ReferenceScene {
         self.0
     }
 
-    /// The scene, ready for rays.
+    /// Returns the scene as a world.
     pub fn world(self) -> World {
         World::new(Arc::new(self.0)).unwrap()
     }

@@ -1,4 +1,4 @@
-//! Five views from one set of paths against five renders, and what such views promise.
+//! Five views from one set of paths compared with five renders, and the properties of such views.
 
 use std::sync::Arc;
 
@@ -32,13 +32,14 @@ fn rendered(world: &World, cameras: &[Camera], samples: u32, seeds: std::ops::Ra
     done
 }
 
-/// Each view's estimates, one a seed.
+/// The estimates of each view, one per seed.
 fn estimates(done: &ViewsRender) -> Vec<Renders> {
     let of = |view: &mateval_tracer::ViewLight| Renders::from_pictures(view.halves.iter().map(|half| half.basis.sum()));
     done.views.iter().map(of).collect()
 }
 
-/// The largest distance between whole pictures in standard errors, and mean squared distances of 8x8 tiles and of pixels.
+/// The largest distance between whole pictures in standard errors, and the mean squared distances of 8x8 tiles and of
+/// pixels.
 fn compare(a: &Renders, b: &Renders) -> [f64; 3] {
     let mean_square = |side: usize| {
         let places = (0..SIZE / side).flat_map(|y| (0..SIZE / side).map(move |x| (x * side, y * side)));
@@ -52,8 +53,8 @@ fn compare(a: &Renders, b: &Renders) -> [f64; 3] {
     [a.whole().z_against(&b.whole()).abs(), mean_square(8), mean_square(1)]
 }
 
-/// Splatted views and separate renders have one mean, as wholes, in 8x8 tiles and pixel by pixel, by both variances; a
-/// view turned by half a pixel more has not, nor has one 3 % brighter.
+/// Splatted views and separate renders have one mean, for whole pictures, 8x8 tiles and pixels, given both variances. A
+/// view turned by half a pixel differs, and so does one 3 % brighter.
 #[test]
 #[allow(clippy::print_stderr, reason = "how near it came")]
 fn splatted_views_are_renders() {
@@ -62,8 +63,8 @@ fn splatted_views_are_renders() {
     let separate = |world: &World, camera: &Camera, seed: u64| {
         Renders::new(world, camera, RenderSettings { seed, ..settings(16) }, 16)
     };
-    // The squares of Student's t with about 30 degrees of freedom average to 1.07; 16 tiles leave a deviation of 0.36,
-    // 1024 pixels of 0.045.
+    // The squares of Student's t with about 30 degrees of freedom have the mean 1.07. Over 16 tiles it deviates by
+    // 0.36, over 1024 pixels by 0.045.
     let agree = |[whole, tiles, pixels]: [f64; 3]| whole < 4.0 && tiles < 2.5 && pixels < 1.25;
     for (index, camera) in views().iter().enumerate() {
         let z = compare(&splatted[index], &separate(&world, camera, 50 + index as u64));
@@ -77,7 +78,7 @@ fn splatted_views_are_renders() {
     assert!(!agree(turned) && !agree(brighter), "a twin passes: {turned:?} {brighter:?}");
 }
 
-/// Of every pixel and channel, the variance of one estimate, from independent ones.
+/// The variance of one estimate for every pixel and channel, from independent estimates.
 fn variances(renders: &Renders) -> Vec<f64> {
     let n = renders.pictures().len() as f64;
     let of = |place: usize, channel: usize| {
@@ -88,7 +89,7 @@ fn variances(renders: &Renders) -> Vec<f64> {
     (0..SIZE * SIZE).flat_map(|place| (0..3).map(move |channel| of(place, channel))).collect()
 }
 
-/// The noise of `found` over that of `own`, where the room is seen and where a lamp or the sky is.
+/// The noise of `found` relative to that of `own`, where the room is visible and where a lamp or the sky is.
 fn noise_ratios(found: &Renders, own: &Renders) -> [f64; 2] {
     let mean = own.picture();
     let lamp = |place: usize| mean.pixels()[place / 3].0.iter().any(|&v| v > 1.0);
@@ -101,9 +102,10 @@ fn noise_ratios(found: &Renders, own: &Renders) -> [f64; 2] {
     })
 }
 
-/// How noisy a splatted view is against a render of its own with as many samples a pixel. In this smooth room, where even
-/// samples gain most, 1.4 times where a view's pixels do not match the plane's and 0.9 where they do; a lamp in view
-/// shows the number of paths a pixel, which a render keeps exact: 2.5 times. A quarter of the samples is beyond bounds.
+/// The noise of a splatted view relative to its own render with as many samples per pixel. In this smooth room, where
+/// stratified samples gain most, it is 1.4 times as large where a view's pixels do not match the plane's, and 0.9 where
+/// they do. A visible lamp shows the varying number of paths per pixel, which is exact in a render: 2.5 times. With a
+/// quarter of the samples the noise is out of bounds.
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn splatting_adds_little_noise() {
@@ -120,7 +122,7 @@ fn splatting_adds_little_noise() {
     }
 }
 
-/// The same in a furnished room with textures, where paths themselves are noisy: 1.15 times, lamps left out.
+/// The same in a furnished room with textures, where paths themselves are noisy: 1.15 times, without lamps.
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn splatting_adds_little_noise_to_a_furnished_room() {
@@ -138,8 +140,8 @@ fn splatting_adds_little_noise_to_a_furnished_room() {
     }
 }
 
-/// Under an even sky radiance is the same everywhere, and all noise is that of the number of paths a pixel: its variance
-/// is far under that of random places (the number itself) and grows as Sobol points' does.
+/// Under an even sky radiance is constant, and all noise comes from the number of paths per pixel. Its variance is far
+/// below that of random points (which equals the number) and grows as that of Sobol points.
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn the_number_of_paths_a_pixel_varies_little() {
@@ -154,7 +156,7 @@ fn the_number_of_paths_a_pixel_varies_little() {
     }
 }
 
-/// Errors of two seeds are uncorrelated in every view; those of one with itself are not.
+/// The errors of two seeds are uncorrelated in every view; those of one seed with itself are not.
 #[test]
 fn halves_are_independent() {
     let world = lit_world([[1.0; 3]; 4]);
@@ -166,7 +168,7 @@ fn halves_are_independent() {
             f64::from(value) / variances[3 * place + 1].sqrt()
         };
         let correlation = |second: &dyn Fn(usize) -> usize| {
-            // A pixel of even sky has rounding for noise.
+            // A pixel of even sky has only rounding as noise.
             let noisy = (0..SIZE * SIZE).filter(|place| variances[3 * place + 1] > 1e-9);
             let pairs = noisy.flat_map(|place| (0..20).map(move |pair| (place, pair)));
             let sums = pairs.fold([0.0; 3], |[ab, aa, bb], (place, pair)| {
@@ -175,14 +177,14 @@ fn halves_are_independent() {
             });
             sums[0] / (sums[1] * sums[2]).sqrt()
         };
-        // Against the mean of all n, errors of two of them have the correlation -1 / (n - 1).
+        // Relative to the mean of all n, the errors of two have the correlation -1 / (n - 1).
         let found = correlation(&|pair| 2 * pair + 1) + 1.0 / 39.0;
         assert!(found.abs() < 0.03, "{found}");
         assert!(correlation(&|pair| 2 * pair) > 0.99, "the twin passes");
     }
 }
 
-/// Every pixel gets about the samples asked for, none less than 8/10 of them, and the mean is above what was asked.
+/// Every pixel gets about the requested samples, none less than 8/10 of them, and the mean exceeds the request.
 #[test]
 fn every_pixel_gets_its_samples() {
     let world = lit_world([[1.0; 3]; 4]);
@@ -203,7 +205,8 @@ fn every_pixel_gets_its_samples() {
             png_io::write_srgb(&folder.join(format!("splatted_{index}.png")), &picture).unwrap();
         }
     }
-    // The union of the pictures, and the surplus where the plane is stretched: five views for 1.73 views' paths.
+    // The union of the pictures, plus the surplus where the plane is stretched: five views cost the paths of 1.73
+    // views.
     let share = done.stats.paths as f64 / (48.0 * 48.0 * 64.0);
     assert!(share > 1.2 && share < 1.8, "{share}");
 }
@@ -221,7 +224,8 @@ fn a_half_depends_on_its_own_seed() {
     assert_ne!(one[1], other[1]);
 }
 
-/// Cameras in different places, or looking different ways, get a pass each, with the pixels that they get alone.
+/// Cameras at different points, or looking in very different directions, get a pass each, with the same pixels as
+/// alone.
 #[test]
 fn other_view_sets_fall_back_to_one_pass_a_view() {
     let world = lit_world([[1.0; 3]; 4]);
@@ -241,7 +245,7 @@ fn other_view_sets_fall_back_to_one_pass_a_view() {
     }
 }
 
-/// Views of other sizes and focal lengths share the paths too, each pixel with the samples asked for.
+/// Views of other sizes and focal lengths share the paths too, and each pixel gets the requested samples.
 #[test]
 fn views_may_differ_in_size() {
     let world = lit_world([[1.0; 3]; 4]);
@@ -269,7 +273,8 @@ fn what_makes_no_sense_is_refused() {
     assert!(message(&LightGroups::apart(4), 0, &[3]).contains("0 samples"));
 }
 
-/// Few pixels and much between the views: tiles reach behind views. Under light of one all around every pixel is one.
+/// With few pixels and large angles between views, tiles extend behind views. Under uniform light from everywhere,
+/// every pixel is one.
 #[test]
 fn small_pictures_lose_nothing() {
     let world = Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();

@@ -1,4 +1,4 @@
-//! Deciding whether noisy pictures agree.
+//! Statistics for comparing noisy pictures.
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
@@ -7,7 +7,7 @@ use mateval_tracer::{RenderSettings, World, render};
 /// Independent renders of one view.
 pub struct Renders(Vec<Picture<LinearRgb>>);
 
-/// A mean and the standard error that goes with it.
+/// A mean with its standard error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
     pub mean: f64,
@@ -15,7 +15,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// From independent values of one expectation.
+    /// An estimate from independent values of one expectation.
     pub fn of(values: &[f64]) -> Self {
         let n = values.len() as f64;
         let mean = values.iter().sum::<f64>() / n;
@@ -23,12 +23,12 @@ impl Estimate {
         Self { mean, error: (variance / n).sqrt() }
     }
 
-    /// How many standard errors it lies above `expected`.
+    /// The distance above `expected`, in standard errors.
     pub fn z(&self, expected: f64) -> f64 {
         (self.mean - expected) / self.error.max(1e-12)
     }
 
-    /// How many standard errors lie between two estimates.
+    /// The distance between two estimates, in standard errors.
     pub fn z_against(&self, other: &Self) -> f64 {
         (self.mean - other.mean) / self.error.hypot(other.error).max(1e-12)
     }
@@ -40,7 +40,7 @@ pub fn chi_square_z(mean: f64, freedom: f64) -> f64 {
 }
 
 impl Renders {
-    /// `count` renders with seeds of their own.
+    /// `count` renders with different seeds.
     pub fn new(world: &World, camera: &Camera, settings: RenderSettings, count: u64) -> Self {
         let one = |seed: u64| {
             let settings = RenderSettings { seed: settings.seed * 1000 + seed, ..settings };
@@ -51,17 +51,17 @@ impl Renders {
         Self((0..count).map(one).collect())
     }
 
-    /// Pictures that are independent estimates of one.
+    /// Takes pictures that are independent estimates of the same view.
     pub fn from_pictures(pictures: impl Iterator<Item = Picture<LinearRgb>>) -> Self {
         Self(pictures.collect())
     }
 
-    /// The single renders.
+    /// The individual renders.
     pub fn pictures(&self) -> &[Picture<LinearRgb>] {
         &self.0
     }
 
-    /// Mean of all channels over the rectangle of pixels.
+    /// The mean of all channels over a rectangle of pixels.
     pub fn region(&self, x: std::ops::Range<usize>, y: std::ops::Range<usize>) -> Estimate {
         let mean = |picture: &Picture<LinearRgb>| {
             let pixels = y.clone().flat_map(|y| x.clone().map(move |x| (x, y)));
@@ -71,7 +71,7 @@ impl Renders {
         Estimate::of(&self.0.iter().map(mean).collect::<Vec<_>>())
     }
 
-    /// Mean of everything.
+    /// The mean of the whole picture.
     pub fn whole(&self) -> Estimate {
         self.region(0..self.0[0].width(), 0..self.0[0].height())
     }

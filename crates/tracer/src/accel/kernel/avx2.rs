@@ -1,29 +1,32 @@
-//! The kernel for processors with AVX2, FMA and the bit instructions that came with them; see `portable` for the formulas,
-//! lane by lane.
+//! The kernel for processors with AVX2, FMA and the bit instructions of the same generation. `portable` shows the
+//! formulas for a single lane.
 #![allow(unsafe_code, reason = "the one place where processor instructions are named")]
 
 use std::arch::x86_64::*;
 
-use super::{BoxRay, Boxes, Kernel, Portable, Stack, TriangleRay, Triangles, WIDENED};
+use super::lanes::{Boxes, Kernel, Triangles};
+use super::portable::Portable;
+use super::stack::Stack;
+use super::test_ray::{BoxRay, TriangleRay, WIDENED};
 use crate::accel::wide::{Block, Node, WIDTH};
 
-/// The proof that this processor has them all: there is no other way to get one than [`Self::detect`].
+/// A proof that this processor supports the instructions: only [`Self::detect`] creates it.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::accel) struct Avx2(());
+pub(crate) struct Avx2(());
 
 impl Avx2 {
-    /// Some where the processor has what it takes.
-    pub(in crate::accel) fn detect() -> Option<Self> {
+    /// `Some` if the processor supports the instructions.
+    pub(crate) fn detect() -> Option<Self> {
         let vectors = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
         let bits = is_x86_feature_detected!("bmi1") && is_x86_feature_detected!("bmi2");
         let counts = is_x86_feature_detected!("lzcnt") && is_x86_feature_detected!("popcnt");
         (vectors && bits && counts).then_some(Self(()))
     }
 
-    /// Runs `work` compiled for AVX2, as far as it is inlined.
+    /// Runs `work`; what is inlined into it is compiled for AVX2.
     #[inline]
-    pub(in crate::accel) fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
-        // SAFETY: `self` proves that the processor has them.
+    pub(crate) fn run<R>(self, work: impl FnOnce(Self) -> R) -> R {
+        // SAFETY: `self` proves that the processor supports the instructions.
         unsafe { compiled_for_avx2(self, work) }
     }
 }
@@ -38,19 +41,19 @@ impl Kernel for Avx2 {
 
     #[inline(always)]
     fn boxes(self, node: &Node, ray: &BoxRay, limit: f32) -> Boxes<Self::Lanes> {
-        // SAFETY: `self` proves that the processor has what the function asks for.
+        // SAFETY: `self` proves that the processor supports the instructions.
         unsafe { boxes(node, ray, limit) }
     }
 
     #[inline(always)]
     fn push_sorted(self, node: &Node, boxes: &Boxes<Self::Lanes>, stack: &mut Stack) {
-        // SAFETY: `self` proves that the processor has what the function asks for.
+        // SAFETY: `self` proves that the processor supports the instructions.
         unsafe { push_sorted(node, boxes, stack) }
     }
 
     #[inline(always)]
     fn triangles<const WATERTIGHT: bool>(self, block: &Block, ray: &TriangleRay, limit: f32) -> Triangles {
-        // SAFETY: `self` proves that the processor has what the functions ask for.
+        // SAFETY: `self` proves that the processor supports the instructions.
         if WATERTIGHT { unsafe { watertight(block, ray, limit) } } else { unsafe { fast(block, ray, limit) } }
     }
 }
@@ -58,7 +61,7 @@ impl Kernel for Avx2 {
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn load(values: &[f32; WIDTH]) -> __m256 {
-    // SAFETY: eight floats behind a reference.
+    // SAFETY: the reference is to eight floats.
     unsafe { _mm256_loadu_ps(values.as_ptr()) }
 }
 
@@ -66,7 +69,7 @@ fn load(values: &[f32; WIDTH]) -> __m256 {
 #[inline]
 fn store(lanes: __m256) -> [f32; WIDTH] {
     let mut values = [0.0; WIDTH];
-    // SAFETY: eight floats behind a reference.
+    // SAFETY: the reference is to eight floats.
     unsafe { _mm256_storeu_ps(values.as_mut_ptr(), lanes) };
     values
 }
@@ -76,7 +79,7 @@ fn store(lanes: __m256) -> [f32; WIDTH] {
 fn boxes(node: &Node, ray: &BoxRay, limit: f32) -> Boxes<__m256> {
     let (mut enter, mut leave) = (_mm256_setzero_ps(), _mm256_set1_ps(limit));
     for axis in 0..3 {
-        // `& 1` shows the compiler that both indices are in range.
+        // `& 1` lets the compiler see that both indices are in range.
         let (nearer, farther) = (ray.near[axis] & 1, 1 ^ (ray.near[axis] & 1));
         let inverse = _mm256_set1_ps(ray.inverse[axis]);
         let near_origin = _mm256_set1_ps(ray.near_origin[axis]);
@@ -91,24 +94,24 @@ fn boxes(node: &Node, ray: &BoxRay, limit: f32) -> Boxes<__m256> {
     Boxes { met: met & node.filled, enter }
 }
 
-/// Sorts all eight lanes, pushes all, and then takes those that were met as pushed: no branch depends on their number.
+/// Sorts all eight lanes, stores all of them, then commits those that were met: no branch depends on their number.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn push_sorted(node: &Node, boxes: &Boxes<__m256>, stack: &mut Stack) {
     let keys = sorted(boxes.met, boxes.enter);
-    let Some(room) = stack.room() else { return Portable.push_sorted(node, &boxes.numbers(), stack) };
-    // SAFETY: a child is a number of 32 bits; eight of them behind references.
+    let Some(slots) = stack.free_slots() else { return Portable.push_sorted(node, &boxes.to_array(), stack) };
+    // SAFETY: children and distances are 32-bit numbers, and each reference is to eight of them.
     unsafe {
         let children = _mm256_loadu_si256(node.children.as_ptr().cast());
-        _mm256_storeu_si256(room.children.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, keys));
-        _mm256_storeu_si256(room.enters.as_mut_ptr().cast(), _mm256_andnot_si256(_mm256_set1_epi32(7), keys));
+        _mm256_storeu_si256(slots.children.as_mut_ptr().cast(), _mm256_permutevar8x32_epi32(children, keys));
+        _mm256_storeu_si256(slots.enters.as_mut_ptr().cast(), _mm256_andnot_si256(_mm256_set1_epi32(7), keys));
     }
-    // SAFETY: there was room, and all eight entries are written.
-    unsafe { stack.fill(boxes.met.count_ones() as usize) };
+    // SAFETY: `free_slots` returned slots, and all eight have been written.
+    unsafe { stack.commit(boxes.met.count_ones() as usize) };
 }
 
-/// The keys of the boxes met, the farthest first, then those of the others. Batcher's bitonic network: six rounds of
-/// compare and exchange.
+/// The keys of the boxes met, the farthest first, followed by those of the others. A bitonic sorting network (Batcher)
+/// of six compare-and-exchange rounds.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn sorted(met: u32, enter: __m256) -> __m256i {
@@ -116,9 +119,9 @@ fn sorted(met: u32, enter: __m256) -> __m256i {
     let keys = _mm256_or_si256(_mm256_andnot_si256(_mm256_set1_epi32(7), _mm256_castps_si256(enter)), lanes);
     let one_bit = _mm256_sllv_epi32(_mm256_set1_epi32(1), lanes);
     let wanted = _mm256_and_si256(_mm256_set1_epi32(met as i32), one_bit);
-    // What was missed becomes -1: less than every distance.
+    // Boxes not met get the key -1, which is below every distance.
     let keys = _mm256_or_si256(keys, _mm256_cmpeq_epi32(wanted, _mm256_setzero_si256()));
-    // The bits say which lanes keep the lesser of a pair.
+    // The bits select the lanes that keep the smaller key of a pair.
     let keys = exchange::<0b0110_0110>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
     let keys = exchange::<0b0011_1100>(keys, _mm256_shuffle_epi32::<0b01_00_11_10>(keys));
     let keys = exchange::<0b0101_1010>(keys, _mm256_shuffle_epi32::<0b10_11_00_01>(keys));
@@ -128,13 +131,13 @@ fn sorted(met: u32, enter: __m256) -> __m256i {
 }
 
 impl Boxes<__m256> {
-    fn numbers(&self) -> Boxes<[f32; WIDTH]> {
-        // SAFETY: there are no `__m256` in these boxes but those that `Avx2` made.
+    fn to_array(&self) -> Boxes<[f32; WIDTH]> {
+        // SAFETY: only `Avx2`, the proof of support, creates boxes of this type.
         Boxes { met: self.met, enter: unsafe { store(self.enter) } }
     }
 }
 
-/// Lane by lane the larger of two keys, or the lesser where bit `LESSER` of the lane is set.
+/// In each lane the larger of two keys, or the smaller one if bit `LESSER` of the lane is set.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn exchange<const LESSER: i32>(keys: __m256i, partners: __m256i) -> __m256i {
@@ -142,7 +145,7 @@ fn exchange<const LESSER: i32>(keys: __m256i, partners: __m256i) -> __m256i {
     _mm256_blend_epi32::<LESSER>(most, least)
 }
 
-/// Three lanes of vectors.
+/// Three-dimensional vectors, one per lane.
 type Vectors = [__m256; 3];
 
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
@@ -230,7 +233,7 @@ fn dot(p: Vectors, q: Vectors) -> __m256 {
 
 const NONE: Triangles = Triangles { hit: 0, distance: [0.0; WIDTH], weights: [[0.0; WIDTH]; 3] };
 
-/// The lanes whose weights all have one sign, and whose `sum` is not zero.
+/// The lanes in which all weights have the same sign and `sum` is not zero.
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 #[inline]
 fn inside([u, v, w]: Vectors, sum: __m256) -> u32 {

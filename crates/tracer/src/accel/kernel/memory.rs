@@ -1,10 +1,10 @@
-//! Wishes about memory: that it be near soon, that it lie in large pages. What is computed does not depend on them.
+//! Hints about memory: prefetching and huge pages. Results do not depend on them.
 #![allow(unsafe_code, reason = "a processor's instruction and a call of the system")]
 
-/// Bytes that the processor fetches at once.
+/// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// Asks for the value at `place`.
+/// Prefetches the cache lines of the value at `place`.
 #[inline(always)]
 pub(crate) fn prefetch<T>(place: &T) {
     let start = std::ptr::from_ref(place).cast::<u8>();
@@ -13,21 +13,21 @@ pub(crate) fn prefetch<T>(place: &T) {
     }
 }
 
-/// Asks for the line that holds `address`, which may be any: nothing is read that a program could see.
+/// Prefetches the cache line that holds `address`, which may be any address: the program reads nothing from it.
 #[inline(always)]
 pub(crate) fn prefetch_line(address: *const u8) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: every x86-64 has the instruction, and it does not fault whatever the address.
+        // SAFETY: every x86-64 processor has the instruction, and it never faults, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast::<i8>()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = address;
 }
 
-/// The same values in memory for which the system has been asked for huge pages, where it knows such: rays jump about in
-/// more memory than a processor keeps the addresses of small pages for.
+/// Copies values to memory for which the system has been asked to use huge pages, where it has them. Rays access more
+/// memory at random than the processor can keep small-page addresses for.
 pub(crate) fn on_huge_pages<T: Copy>(values: Vec<T>) -> Vec<T> {
     let mut moved = Vec::with_capacity(values.len());
     ask_for_huge_pages(moved.spare_capacity_mut());
@@ -35,18 +35,18 @@ pub(crate) fn on_huge_pages<T: Copy>(values: Vec<T>) -> Vec<T> {
     moved
 }
 
-/// The system takes whole pages alone. On processors with larger ones it refuses.
+/// The system accepts whole pages only. On processors with larger pages it refuses.
 #[cfg(target_os = "linux")]
 const PAGE: usize = 4096;
 
-/// Changes nothing but how memory is mapped; a refusal costs only time.
+/// Only changes how memory is mapped; a refusal costs nothing but time.
 #[cfg(target_os = "linux")]
 fn ask_for_huge_pages<T>(memory: &mut [std::mem::MaybeUninit<T>]) {
     let start = memory.as_mut_ptr().cast::<libc::c_void>();
     let skipped = start.align_offset(PAGE);
     let length = size_of_val(memory).saturating_sub(skipped) / PAGE * PAGE;
     if length > 0 {
-        // SAFETY: whole pages within a piece of our own memory; the advice leaves what they hold as it is.
+        // SAFETY: the range is whole pages within our own memory, and the advice does not change their contents.
         unsafe { libc::madvise(start.wrapping_byte_add(skipped), length, libc::MADV_HUGEPAGE) };
     }
 }
@@ -54,8 +54,8 @@ fn ask_for_huge_pages<T>(memory: &mut [std::mem::MaybeUninit<T>]) {
 #[cfg(not(target_os = "linux"))]
 fn ask_for_huge_pages<T>(_: &mut [std::mem::MaybeUninit<T>]) {}
 
-/// Asks that what lies at `values` be moved to huge pages now, addresses unchanged. Many textures are smaller than such a
-/// page, so the pages asked for reach over the ends: their neighbours move too, which they do not notice.
+/// Asks the system to move `values` to huge pages now, at unchanged addresses. Many textures are smaller than a huge
+/// page, so the range extends beyond both ends and neighbouring memory moves too, unnoticed by its owners.
 #[cfg(target_os = "linux")]
 pub(crate) fn move_to_huge_pages(values: &[u8]) {
     const HUGE_PAGE: usize = 512 * PAGE;
@@ -65,8 +65,8 @@ pub(crate) fn move_to_huge_pages(values: &[u8]) {
     let start = range.start.addr() / HUGE_PAGE * HUGE_PAGE;
     let length = range.end.addr().next_multiple_of(HUGE_PAGE) - start;
     for advice in [libc::MADV_HUGEPAGE, MADV_COLLAPSE] {
-        // SAFETY: both advices leave what memory holds, and whether it may be read or written, as it is; of memory that is
-        // not there nothing comes but a refusal.
+        // SAFETY: neither advice changes the contents of memory or the permission to access it; for memory that is not
+        // mapped the system only refuses.
         unsafe { libc::madvise(std::ptr::without_provenance_mut(start), length, advice) };
     }
 }
@@ -78,7 +78,7 @@ pub(crate) fn move_to_huge_pages(_: &[u8]) {}
 mod tests {
     use super::*;
 
-    /// Pieces from one byte to more than a huge page keep what they hold, and so do their neighbours.
+    /// Buffers from one byte to more than a huge page keep their contents, and so do their neighbours.
     #[test]
     fn what_moves_stays_the_same() {
         let filled = |length: usize| (0..length).map(|k| (k % 251) as u8).collect::<Vec<u8>>();

@@ -1,13 +1,15 @@
-//! The kernel for every processor: the formulas, one lane after the other.
+//! The kernel for every processor: the formulas, lane by lane.
 
-use super::{BoxRay, Boxes, Kernel, Stack, TriangleRay, Triangles, WIDENED, key};
+use super::lanes::{Boxes, Kernel, Triangles, key};
+use super::stack::Stack;
+use super::test_ray::{BoxRay, TriangleRay, WIDENED};
 use crate::accel::wide::{Block, Node, WIDTH};
 
-/// Works everywhere.
+/// A kernel that every processor can run.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::accel) struct Portable;
+pub(crate) struct Portable;
 
-/// One triangle's hit: distance, and the corners' weights, not yet divided by their sum.
+/// A hit of one triangle: distance, and the weights of its corners, not yet divided by their sum.
 struct LaneHit {
     distance: f32,
     weights: [f32; 3],
@@ -78,7 +80,7 @@ fn watertight(corners: &[[f32; 3]; 3], ray: &TriangleRay) -> Option<LaneHit> {
     Some(LaneHit { distance: z * ray.distance_from_z / sum, weights: [u, v, w] })
 }
 
-/// p.x q.y - p.y q.x by Kahan's method: its sign is exact.
+/// p.x q.y - p.y q.x by Kahan's method; its sign is exact.
 fn difference(p: [f32; 3], q: [f32; 3]) -> f32 {
     let product = p[1] * q[0];
     let lost = (-p[1]).mul_add(q[0], product);

@@ -1,14 +1,14 @@
-//! What a ray has still to visit.
+//! The stack of nodes and blocks that a ray has yet to visit.
 #![allow(unsafe_code, reason = "clearing the array would cost a tenth of a short ray")]
 
 use std::mem::MaybeUninit;
 
-use super::WIDENED;
+use super::test_ray::WIDENED;
 use crate::accel::wide::{Child, WIDTH};
 
-/// Children still to be visited and the bits of the distance where the ray enters them: fixed arrays, and a vector for
-/// what they cannot hold.
-pub(in crate::accel) struct Stack {
+/// Children still to be visited, with the bits of the distance at which the ray enters them. Fixed arrays, and a vector
+/// for entries beyond them.
+pub(crate) struct Stack {
     /// The first `len` entries of both arrays have been written.
     enters: [MaybeUninit<u32>; FIXED],
     children: [MaybeUninit<Child>; FIXED],
@@ -16,12 +16,12 @@ pub(in crate::accel) struct Stack {
     spilled: Vec<(u32, Child)>,
 }
 
-/// Few in tests, so that they run over.
+/// Small in tests, so that tests reach the vector.
 const FIXED: usize = if cfg!(test) { 12 } else { 128 };
 
 impl Stack {
     #[inline(always)]
-    pub(in crate::accel) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             enters: [const { MaybeUninit::uninit() }; FIXED],
             children: [const { MaybeUninit::uninit() }; FIXED],
@@ -31,13 +31,13 @@ impl Stack {
     }
 
     #[inline(always)]
-    pub(in crate::accel) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         self.len = 0;
         self.spilled.clear();
     }
 
     #[inline(always)]
-    pub(in crate::accel) fn push(&mut self, enter_bits: u32, child: Child) {
+    pub(crate) fn push(&mut self, enter_bits: u32, child: Child) {
         if self.len < FIXED {
             self.enters[self.len].write(enter_bits);
             self.children[self.len].write(child);
@@ -47,21 +47,21 @@ impl Stack {
         }
     }
 
-    /// Room for eight more entries, for [`Self::fill`]; none where there is not so much left.
+    /// The next eight free entries of the arrays, to be written before [`Self::commit`]; `None` if fewer are free.
     #[inline(always)]
-    pub(super) fn room(&mut self) -> Option<Room<'_>> {
+    pub(super) fn free_slots(&mut self) -> Option<FreeSlots<'_>> {
         let enters = self.enters.get_mut(self.len..)?.first_chunk_mut()?;
         let children = self.children.get_mut(self.len..)?.first_chunk_mut()?;
-        Some(Room { enters, children })
+        Some(FreeSlots { enters, children })
     }
 
-    /// Takes the first `count` entries (at most eight) of the room as pushed.
+    /// Adds the first `count` entries (at most eight) of [`Self::free_slots`] to the stack.
     ///
     /// # Safety
     ///
-    /// [`Self::room`] has given room, and its first `count` entries have been written since the last push.
+    /// [`Self::free_slots`] has returned slots, and the first `count` of them have been written since the last push.
     #[inline(always)]
-    pub(super) unsafe fn fill(&mut self, count: usize) {
+    pub(super) unsafe fn commit(&mut self, count: usize) {
         self.len += count;
     }
 
@@ -77,24 +77,24 @@ impl Stack {
         self.spilled.pop()
     }
 
-    /// The child pushed last of those in the arrays: for asking for its memory alone.
+    /// The last child in the arrays, to prefetch its memory.
     #[inline(always)]
-    pub(in crate::accel) fn top(&self) -> Option<Child> {
+    pub(crate) fn top(&self) -> Option<Child> {
         let last = self.len.checked_sub(1)?;
-        // SAFETY: as in `pop`.
+        // SAFETY: every entry below `len` has been written, as shown in `pop`.
         Some(unsafe { self.children[last].assume_init() })
     }
 
-    /// The child pushed last of those that the ray enters before `limit`.
+    /// Pops children until one is found that the ray enters before `limit`.
     #[inline(always)]
-    pub(in crate::accel) fn pop(&mut self, limit: f32) -> Option<Child> {
+    pub(crate) fn pop(&mut self, limit: f32) -> Option<Child> {
         loop {
             let (enter_bits, child) = if self.len == FIXED && !self.spilled.is_empty() {
                 self.unspill()?
             } else {
                 self.len = self.len.checked_sub(1)?;
-                // SAFETY: `len` grows only where an entry is written at its old value (`push`), or when as many have been
-                // written there (`fill`); so every entry below the old `len` has been written.
+                // SAFETY: `len` grows only after the entries it then includes have been written: one in `push`, `count`
+                // before `commit`. So every entry below the old `len` has been written.
                 unsafe { (self.enters[self.len].assume_init(), self.children[self.len].assume_init()) }
             };
             if f32::from_bits(enter_bits) <= limit * WIDENED {
@@ -104,8 +104,8 @@ impl Stack {
     }
 }
 
-/// Where the next eight entries of a stack will be.
-pub(super) struct Room<'s> {
+/// The next eight free entries of a stack.
+pub(super) struct FreeSlots<'s> {
     pub(super) enters: &'s mut [MaybeUninit<u32>; WIDTH],
     pub(super) children: &'s mut [MaybeUninit<Child>; WIDTH],
 }

@@ -1,4 +1,5 @@
-//! Values of every lobe against Mitsuba's, and Oren and Nayar's against their paper; albedos against Blender's.
+//! Values of every lobe compared with Mitsuba's, those of Oren and Nayar with their paper; albedos compared with
+//! Blender's.
 
 use mateval_scene::material::ConductorIor;
 
@@ -25,8 +26,8 @@ fn brown_principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -
     }
 }
 
-/// `wo` and `wi` are (cosine, azimuth). Rough plastic rests on tables of their own on both sides, plastic on Mitsuba's fit
-/// of the diffuse reflectance (0.1 % off) against our integral; all else is formulas.
+/// `wo` and `wi` are (cosine, azimuth). The tolerance is larger for rough plastic, where both sides use tables of their
+/// own, and for plastic, where Mitsuba uses a fit of the diffuse reflectance (0.1 % off) and we an integral.
 fn is_close(model: &MaterialModel, wo: (f32, f32), wi: (f32, f32), expected: [f32; 3]) -> bool {
     let direction = |(z, phi): (f32, f32)| {
         let (sin, cos) = libm::sincosf(phi);
@@ -135,7 +136,7 @@ fn values_are_mitsubas() {
     }
 }
 
-/// The twin: roughness off by 0.02, an index off by 0.02, a colour off by 1 %.
+/// The twin: values are rejected if a parameter is off by 0.02, or if `nonlinear` differs.
 #[test]
 fn values_slightly_off_are_found_out() {
     let (wo, wi) = ((0.8, 0.0), (0.7, 2.9));
@@ -151,9 +152,9 @@ fn values_slightly_off_are_found_out() {
     }
 }
 
-/// Light and viewer at one place: there pbrt's form of the model, A + B sin tan (Pharr et al., "Physically Based
-/// Rendering", third edition, 8.4.1), is exact for direct light; what facets send each other is equation 31 of the paper.
-/// Smooth, it is Lambert's; rough, it is brighter than that towards the light.
+/// Retro-reflection. There pbrt's form of the model, A + B sin tan (Pharr et al., "Physically Based Rendering", third
+/// edition, 8.4.1), is exact for direct light, and equation 31 of the paper gives the interreflection. A smooth surface
+/// is Lambertian; a rough one is brighter towards a grazing light.
 #[test]
 fn oren_nayar_towards_the_light() {
     let value = |alpha: f32, cos: f32| {
@@ -174,8 +175,8 @@ fn oren_nayar_towards_the_light() {
     assert!(value(0.5, 0.2) > 1.3 && value(0.5, 1.0) < 1.0);
 }
 
-/// A plane under uniform light of radiance 1, seen at three cosines: rendered by Blender 4.5.15 (Cycles, 8192 samples in
-/// each of 64 pixels, standard error 4e-5 or less). The twins, another roughness and the other flavour, are off.
+/// A plane under uniform radiance 1, seen at three cosines, rendered by Blender 4.5.15 (Cycles, 8192 samples in each of
+/// 64 pixels, standard error at most 4e-5). The twins, with another roughness and with the other flavour, are off.
 #[test]
 fn albedos_are_blenders() {
     let truth = [

@@ -1,28 +1,31 @@
-//! base_color, roughness, metallic: Disney's model in two flavours, front side only, alpha = roughness^2 with GGX.
+//! The principled model: base_color, roughness and metallic, in two flavours. Front side only; GGX with alpha =
+//! roughness^2.
 //!
-//! Both are one bounce off GGX facets, whose Fresnel term is Schlick's with base_color (weight metallic) and the exact
-//! dielectric one (weight 1 - metallic), over a diffuse base (weight 1 - metallic).
+//! Both flavours have a diffuse base (weight 1 - metallic) and one bounce off GGX facets. The Fresnel term of the
+//! facets is Schlick's with base_color (weight metallic) plus the exact dielectric one (weight 1 - metallic).
 //!
 //! - Mitsuba: Burley, "Physically Based Shading at Disney" (2012) and "Extending the Disney BRDF to a BSDF" (2015), as
-//!   Mitsuba 3 documents `principled`, with everything but base_color, roughness, metallic and specular at its default:
-//!   separable masking, and Disney's base with retro-reflection, not reduced by what the facets reflect.
-//! - Blender: what Cycles of Blender 4.5 computes for Principled BSDF with base_color, roughness, metallic and specular
-//!   IOR level set and everything else at its default. Masking knows heights; both Fresnel terms are scaled up by what
-//!   further bounces bring (Kulla and Conty 2017); the base is Lambert's, reduced by what the dielectric facets reflect
-//!   towards the viewer. So it is not reciprocal, as Blender's is not. Held against Blender itself by `tests/peers`.
+//!   documented for `principled` of Mitsuba 3, with defaults for all parameters but base_color, roughness, metallic and
+//!   specular. Masking is separable. The base is Disney's with retro-reflection, not reduced by what the facets
+//!   reflect.
+//! - Blender: what Cycles of Blender 4.5 computes for its Principled BSDF, with defaults for all parameters but
+//!   base_color, roughness, metallic and specular IOR level. Masking is height-correlated. Both Fresnel terms are
+//!   scaled up by the light of further bounces (Kulla and Conty 2017). The base is Lambertian, reduced by what the
+//!   dielectric facets reflect towards the viewer, so the model is not reciprocal, as in Blender. `tests/peers`
+//!   compares it with Blender.
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 use mateval_scene::material::{Distribution, PrincipledFlavour};
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
-use super::principled_tables::{BlenderTables, Kept};
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::principled_tables::{BlenderTables, FacetAlbedo};
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
-/// The material at one place.
+/// The material at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Principled<'w> {
     pub(crate) base_color: Vec3,
@@ -32,83 +35,79 @@ pub(crate) struct Principled<'w> {
     pub(crate) style: Style<'w>,
 }
 
-/// The flavour, with what it needs.
+/// The flavour, with the tables it needs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Style<'w> {
     Mitsuba,
     Blender(&'w BlenderTables),
 }
 
-/// The material at one place but for its base colour, seen from one direction: all that does not depend on the light's is
-/// worked out.
+/// The material seen from one direction: all terms that depend neither on the base colour nor on the light's direction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PrincipledView {
     wo: Vec3,
     alpha: f32,
-    /// See [`slope`], for the viewer.
+    /// The value of [`slope`] for the viewer.
     slope: f32,
     eta: f32,
-    /// Weight of the dielectric Fresnel term.
+    /// The weight of the dielectric Fresnel term.
     dielectric: f32,
     metallic: f32,
-    /// Blender's: what facets do with light from the viewer.
-    kept: Option<Kept>,
+    /// For Blender's flavour: the light from the viewer that facets keep after one bounce.
+    albedo: Option<FacetAlbedo>,
     base: Base,
-    /// What the base colour is multiplied by for the diffuse part.
+    /// The factor between the base colour and the diffuse part.
     base_weight: f32,
-    /// The probability with which the facets are sampled.
+    /// The probability of sampling the facets.
     facet_share: f32,
-    /// The shares' densities: the first over half the facets' own, the second over the cosine.
+    /// Factors of the two densities: that of the facets over half the facets' own density, that of the base over the
+    /// cosine.
     facet_density: f32,
     base_density: f32,
 }
 
-/// What a base colour makes of a [`PrincipledView`]: the only part that depends on it.
+/// The terms that depend on the base colour alone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tint {
-    /// Of Schlick's term: the value head on, and how far it rises towards grazing.
+    /// Schlick's Fresnel term: its value at normal incidence, and its rise towards grazing angles.
     metal: Vec3,
     metal_rise: Vec3,
-    /// The diffuse part's value over the cosine, but for [`Response::base`].
+    /// The diffuse part over the cosine and over [`Response::base`].
     base: Vec3,
 }
 
-/// A [`PrincipledView`] towards one light: what tints are multiplied by.
+/// A [`PrincipledView`] for one light direction: the factors of a [`Tint`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Response {
-    /// What the facets send there, with the cosine, for a Fresnel term of 1.
+    /// What the facets reflect for a Fresnel term of 1, with the cosine.
     bounce: f32,
-    /// Schlick's weight between viewer and light.
+    /// Schlick's weight for the angle between viewer and light.
     schlick: f32,
     /// The dielectric Fresnel term.
     dielectric: f32,
     /// The diffuse part over its colour and the cosine.
     base: f32,
     cos: f32,
-    /// The density with which [`PrincipledView::sample`] finds it.
+    /// The density with which [`PrincipledView::sample`] samples the direction.
     pub(crate) density: f32,
 }
 
-/// The diffuse part's shape, and the masking of the facets above it.
+/// The shape of the diffuse part, and the masking of the facets above it.
 #[derive(Clone, Copy, Debug)]
 enum Base {
-    /// Blender's: Lambert's, masking with heights.
+    /// Blender's flavour: Lambertian, with height-correlated masking.
     Lambert,
-    /// Mitsuba's: Disney's, separable masking. `fresnel` is Schlick's weight for the viewer.
+    /// Mitsuba's flavour: Disney's, with separable masking. `fresnel` is Schlick's weight for the viewer.
     Disney { roughness: f32, fresnel: f32 },
 }
 
-/// Keeps the peak of a mirror finite: Mitsuba's and Disney's limit, and what f32 can hold.
+/// The smallest alpha, which keeps the peak of a mirror finite: for Mitsuba (and Disney), and for Blender what f32 can
+/// represent.
 const SMALLEST_ALPHA: [f32; 2] = [1e-3, 1e-4];
 
-/// What a base of any colour counts when a lobe is chosen, and the least share of the facets there.
+/// The weight of a base of any colour in the choice of a lobe, and the smallest probability of sampling the facets.
 const TYPICAL_BASE: f32 = 0.5;
 const LEAST_FACET_SHARE: f32 = 0.25;
-
-/// The index of refraction that Disney's `specular` stands for: F0 = 0.08 * specular. Blender's IOR level says the same.
-pub(crate) fn eta_from_specular(specular: f32) -> f32 {
-    2.0 / (1.0 - (0.08 * specular.clamp(0.0, 1.0)).sqrt()) - 1.0
-}
 
 impl<'w> Principled<'w> {
     pub(crate) fn style(flavour: PrincipledFlavour, tables: Option<&'w BlenderTables>) -> Style<'w> {
@@ -118,13 +117,13 @@ impl<'w> Principled<'w> {
         }
     }
 
-    /// The value with the cosine, a channel.
+    /// The value with the cosine, per channel.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let view = self.seen_from(wo);
         view.tint(self.base_color).value(&view.response(wi))
     }
 
-    /// The density with which [`Self::sample`] finds `wi`.
+    /// The density with which [`Self::sample`] samples `wi`.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
         self.seen_from(wo).response(wi).density
     }
@@ -135,7 +134,7 @@ impl<'w> Principled<'w> {
         Some(LocalSample::spread(wi, view.tint(self.base_color).value(&response), response.density))
     }
 
-    /// What can be said before the light's direction and the base colour are known.
+    /// Computes the terms that depend on the viewer.
     pub(crate) fn seen_from(&self, wo: Vec3) -> PrincipledView {
         match self.style {
             Style::Mitsuba => self.mitsuba(wo),
@@ -154,7 +153,7 @@ impl<'w> Principled<'w> {
             eta: self.eta,
             dielectric: matt,
             metallic: self.metallic,
-            kept: None,
+            albedo: None,
             base: Base::Disney { roughness: self.roughness, fresnel: fresnel::schlick_weight(wo.z) },
             base_weight: matt * FRAC_1_PI,
             facet_share,
@@ -165,14 +164,15 @@ impl<'w> Principled<'w> {
 
     fn blender(&self, tables: &BlenderTables, wo: Vec3) -> PrincipledView {
         let alpha = (self.roughness * self.roughness).max(SMALLEST_ALPHA[1]);
-        let kept = tables.kept(self.roughness, wo.z);
+        let albedo = tables.facet_albedo(self.roughness, wo.z);
         let matt = 1.0 - self.metallic;
-        // The dielectric facets, and what they leave for the base.
-        let gain = kept.gain(tables.mean_fresnel());
-        let reflected = kept.share * gain * (tables.f0() + (1.0 - tables.f0()) * tables.rise(self.roughness, wo.z));
+        // The light that the dielectric facets reflect, and the light that they leave to the base.
+        let gain = albedo.gain(tables.mean_fresnel());
+        let reflected =
+            albedo.directional * gain * (tables.f0() + (1.0 - tables.f0()) * tables.rise(self.roughness, wo.z));
         let passed = matt * (1.0 - reflected).max(0.0);
-        // Facets of metal count by what they keep, whatever their colour.
-        let facets = self.metallic * kept.share + matt * reflected;
+        // Metal facets count with the light they keep, whatever their colour.
+        let facets = self.metallic * albedo.directional + matt * reflected;
         let facet_share = (facets / (facets + TYPICAL_BASE * passed)).max(LEAST_FACET_SHARE);
         let slope = slope(wo.z, alpha * alpha);
         PrincipledView {
@@ -182,7 +182,7 @@ impl<'w> Principled<'w> {
             eta: self.eta,
             dielectric: matt * gain,
             metallic: self.metallic,
-            kept: Some(kept),
+            albedo: Some(albedo),
             base: Base::Lambert,
             base_weight: passed * FRAC_1_PI,
             facet_share,
@@ -194,23 +194,24 @@ impl<'w> Principled<'w> {
 
 impl PrincipledView {
     pub(crate) fn tint(&self, base_color: Vec3) -> Tint {
-        let (metal, metal_rise) = match &self.kept {
+        let (metal, metal_rise) = match &self.albedo {
             _ if self.metallic == 0.0 => (Vec3::ZERO, Vec3::ZERO),
-            Some(kept) => self.blender_metal(kept, base_color),
+            Some(albedo) => self.blender_metal(albedo, base_color),
             None => (base_color * self.metallic, (Vec3::ONE - base_color) * self.metallic),
         };
         Tint { metal, metal_rise, base: base_color * self.base_weight }
     }
 
-    /// Schlick's value head on and its rise, both with what further bounces bring. Its mean over all directions is
-    /// F0 + (1 - F0) / 21. Blender's tint at 82 degrees (Kutz et al. 2021) is white by default: this, exactly.
-    fn blender_metal(&self, kept: &Kept, base_color: Vec3) -> (Vec3, Vec3) {
+    /// Schlick's value at normal incidence and its rise, both with the light of further bounces. The mean of Schlick's
+    /// term over all directions is F0 + (1 - F0) / 21. Blender's tint at 82 degrees (Kutz et al. 2021) is white by
+    /// default, which gives exactly this.
+    fn blender_metal(&self, albedo: &FacetAlbedo, base_color: Vec3) -> (Vec3, Vec3) {
         let f0 = base_color.clamp(Vec3::ZERO, Vec3::ONE);
-        let gain = Vec3::from_array(f0.to_array().map(|f0| self.metallic * kept.gain(f0 + (1.0 - f0) / 21.0)));
+        let gain = Vec3::from_array(f0.to_array().map(|f0| self.metallic * albedo.gain(f0 + (1.0 - f0) / 21.0)));
         (gain * f0, gain * (Vec3::ONE - f0))
     }
 
-    /// What light from `wi` meets. Both directions lie above the surface.
+    /// The response to light from `wi`. Both directions lie above the surface.
     pub(crate) fn response(&self, wi: Vec3) -> Response {
         let half = self.wo + wi;
         let length2 = half.length_squared();
@@ -234,13 +235,13 @@ impl PrincipledView {
         }
     }
 
-    /// Whether the facets are as smooth as `roughness` or smoother.
+    /// Whether the facets are smoother than `roughness`.
     pub(crate) fn is_smoother_than(&self, roughness: f32) -> bool {
         self.alpha < roughness * roughness
     }
 
-    /// Smith's masking and shadowing over twice the product of the cosines, by [`slope`] instead of Lambda: with heights
-    /// (Heitz, JCGT 2014, equation 99) or as a product (Walter et al. 2007, equation 34).
+    /// Smith's masking and shadowing over twice the product of the cosines, expressed by [`slope`] instead of Lambda:
+    /// height-correlated (Heitz, JCGT 2014, equation 99) or separable (Walter et al. 2007, equation 34).
     fn unmasked(&self, cos_i: f32, alpha2: f32) -> f32 {
         let (cos_o, slope_o, slope_i) = (self.wo.z, self.slope, slope(cos_i, alpha2));
         match self.base {
@@ -249,7 +250,7 @@ impl PrincipledView {
         }
     }
 
-    /// The base's shape: Lambert's, or Burley 2015, equation 4, without subsurface.
+    /// The shape of the base: Lambert's, or Burley 2015, equation 4, without subsurface scattering.
     fn base(&self, cos_i: f32, cos_difference: f32) -> f32 {
         match self.base {
             Base::Lambert => 1.0,
@@ -261,7 +262,8 @@ impl PrincipledView {
         }
     }
 
-    /// A direction above the surface and what light from there meets; none where the facets send the draw below it.
+    /// Samples a direction above the surface, with its response. `None` if the facets send the sample below the
+    /// surface.
     pub(crate) fn sample(&self, u: [f32; 3]) -> Option<(Vec3, Response)> {
         let wi = if u[0] < self.facet_share {
             reflect(self.wo, Facets::new(Distribution::Ggx, self.alpha).sample(self.wo, [u[1], u[2]]))
@@ -277,14 +279,14 @@ impl PrincipledView {
 }
 
 impl Response {
-    /// Without the facets' part.
+    /// The response without the facets.
     pub(crate) fn of_base_alone(self) -> Self {
         Self { bounce: 0.0, ..self }
     }
 }
 
 impl Tint {
-    /// The value with the cosine, a channel.
+    /// The value with the cosine, per channel.
     #[inline]
     pub(crate) fn value(&self, response: &Response) -> Vec3 {
         let fresnel = self.metal + self.metal_rise * response.schlick + response.dielectric;
@@ -292,7 +294,7 @@ impl Tint {
     }
 }
 
-/// The cosine times 1 + 2 Lambda of GGX, Smith's function (Heitz 2014, equation 72).
+/// The cosine times 1 + 2 Lambda, for Smith's Lambda of GGX (Heitz 2014, equation 72).
 fn slope(cos: f32, alpha2: f32) -> f32 {
     let cos2 = cos * cos;
     (cos2 + alpha2 * (1.0 - cos2)).max(0.0).sqrt()

@@ -1,41 +1,26 @@
-//! What light does at one place, in the frame of the shading normal: every parameter looked up, two directions to go.
+//! The scattering models behind one enum: parameters looked up at a point, in the frame of the shading normal.
+
+mod conductor;
+mod dielectric;
+mod diffuse;
+mod plastic;
+mod principled;
 
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::material::{ColorInput, Material, MaterialModel, Microfacets};
 
-use super::conductor::{Conductor, reflection_density};
-use super::dielectric::Dielectric;
-use super::diffuse;
 use super::facets::Facets;
-use super::plastic::{Coat, Plastic};
-use super::principled::{Principled, eta_from_specular};
+use super::fresnel::eta_from_specular;
+use super::sample::LocalSample;
 use super::tables::Table;
 use crate::warp;
+use conductor::{Conductor, reflection_density};
+use dielectric::Dielectric;
+use plastic::{Coat, Plastic};
+pub(crate) use principled::{Principled, PrincipledView, Tint};
 
-/// A sampled direction in the local frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LocalSample {
-    pub(crate) wi: Vec3,
-    /// Value with cosine over density.
-    pub(crate) weight: Vec3,
-    /// Per solid angle; for a single direction, its probability.
-    pub(crate) density: f32,
-    /// Whether it is a single direction, which no other way of sampling can find.
-    pub(crate) delta: bool,
-}
-
-impl LocalSample {
-    pub(crate) fn spread(wi: Vec3, value: Vec3, density: f32) -> Self {
-        Self { wi, weight: value / density, density, delta: false }
-    }
-
-    pub(crate) fn delta(wi: Vec3, weight: Vec3, probability: f32) -> Self {
-        Self { wi, weight, density: probability, delta: true }
-    }
-}
-
-/// A material at one place. Reflecting ones expect `wo.z > 0`; dielectrics take either side.
+/// A material's parameters at one point. Opaque materials expect `wo.z > 0`, dielectrics accept either side.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lobe<'w> {
     Black,
@@ -51,7 +36,7 @@ pub(crate) enum Lobe<'w> {
 }
 
 impl<'w> Lobe<'w> {
-    /// The material's parameters at `uv`.
+    /// The material's parameters at `uv`. Long because it has one arm for each model.
     pub(crate) fn at(material: &Material, table: &'w Table, textures: &[Texture], uv: Vec2) -> Self {
         let color = |input: &ColorInput| Vec3::from_array(input.at(textures, uv));
         let facets = |m: &Microfacets| Facets::new(m.distribution, m.alpha.at(textures, uv));
@@ -107,12 +92,12 @@ impl<'w> Lobe<'w> {
         matches!(self, Self::Dielectric(_) | Self::ThinDielectric(_) | Self::RoughDielectric(..))
     }
 
-    /// Whether every direction it sends light to is a single one, so that lights need not be sampled.
+    /// Whether all scattered directions are delta distributions, so that lights need not be sampled.
     pub(crate) fn is_delta(&self) -> bool {
         matches!(self, Self::Black | Self::Mirror(_) | Self::Dielectric(_) | Self::ThinDielectric(_))
     }
 
-    /// Value times the cosine of `wi`, single directions left out.
+    /// The value times the cosine of `wi`. Delta lobes are left out.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         match self {
             Self::RoughDielectric(dielectric, facets) => dielectric.eval_rough(facets, wo, wi),
@@ -126,7 +111,7 @@ impl<'w> Lobe<'w> {
         }
     }
 
-    /// The density with which [`Self::sample`] finds `wi`, per solid angle, single directions left out.
+    /// The density with which [`Self::sample`] samples `wi`, per solid angle. Delta lobes are left out.
     pub(crate) fn density(&self, wo: Vec3, wi: Vec3) -> f32 {
         match self {
             Self::RoughDielectric(dielectric, facets) => dielectric.density_rough(facets, wo, wi),
@@ -139,7 +124,7 @@ impl<'w> Lobe<'w> {
         }
     }
 
-    /// A direction for `wo`; none where the draw sends light nowhere. `u[0]` chooses among lobes.
+    /// Samples a direction for `wo`; `u[0]` selects the lobe. `None` if the sample is absorbed.
     pub(crate) fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<LocalSample> {
         if wo.z == 0.0 || (wo.z < 0.0 && !self.transmits()) {
             return None;

@@ -1,21 +1,21 @@
-//! A diffuse base under a dielectric coat, rough or smooth: Mitsuba's `plastic` and `roughplastic`.
+//! A diffuse base under a dielectric coat, smooth or rough: Mitsuba's `plastic` and `roughplastic`.
 //!
-//! The light that enters through the coat, is scattered by the base, is reflected inside by the coat any number of times
-//! and leaves: T(wi) T(wo) / eta^2 * base / (1 - base * R_inside) / pi (Mitsuba 3's documentation of `plastic`). Without
-//! `nonlinear`, the base's own colour stays out of the denominator.
+//! Light enters through the coat, is scattered by the base, is reflected back by the coat any number of times and
+//! leaves: T(wi) T(wo) / eta^2 * base / (1 - base * R_inside) / pi (Mitsuba 3's documentation of `plastic`). Without
+//! `nonlinear`, the denominator does not contain the colour of the base.
 
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
 use super::conductor::{reflection, reflection_density};
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
-use super::rough_boundary::RoughCoat;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::rough_boundary::RoughCoat;
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
-/// The coat and its base, at one place.
+/// The coat and its base at one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plastic<'w> {
     pub(crate) eta: f32,
@@ -28,15 +28,15 @@ pub(crate) struct Plastic<'w> {
 /// The coat's boundary.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Coat<'w> {
-    /// With the share of uniform light from inside that it reflects back.
+    /// `inside` is the fraction of uniform light from inside that the coat reflects back.
     Smooth { inside: f32 },
-    /// With its facets, their width and what they do together.
+    /// `table` holds the directional albedos of the facets.
     Rough { facets: Facets, alpha: f32, table: &'w RoughCoat },
 }
 
 impl Plastic<'_> {
-    /// What the coat lets through of light from or to the cosine `cos`. It is also the share of samples for the base: so
-    /// the choice does not depend on colours.
+    /// The fraction of light that the coat transmits from or to the cosine `cos`. It is also the probability of
+    /// sampling the base, so that the choice does not depend on colours.
     fn transmitted(&self, cos: f32) -> f32 {
         match self.coat {
             Coat::Smooth { .. } => 1.0 - fresnel::dielectric(cos, self.eta).0,
@@ -54,7 +54,7 @@ impl Plastic<'_> {
         self.base / (Vec3::ONE - returned) * (through * FRAC_1_PI * wi.z)
     }
 
-    /// The base, and the coat where it is rough.
+    /// The base, and the coat if it is rough.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let base = self.base_value(wo, wi);
         let (Coat::Rough { facets, .. }, Some(m)) = (self.coat, (wo + wi).try_normalize()) else { return base };

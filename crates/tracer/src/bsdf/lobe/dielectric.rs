@@ -1,16 +1,16 @@
 //! Boundaries between clear media: smooth, thin and rough.
 //!
-//! `eta` is inside over outside; z is the outside. Radiance grows by the square of the index it enters, so what is let
-//! through is divided by the square of the index ratio on the way from light to viewer (Veach 1997, section 5.2), as in
-//! Mitsuba; a path in and out of a closed body cancels it.
+//! `eta` is the index inside over that outside; z points outside. Radiance scales with the square of the index it
+//! enters. As in Mitsuba, transmitted light is therefore divided by the square of the index ratio on the way from light
+//! to viewer (Veach 1997, section 5.2). A path into and out of a closed body cancels the factor.
 
 use glam::Vec3;
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::sample::LocalSample;
 
-/// A boundary and the tints of what it reflects and lets through.
+/// A boundary, with tints of the light it reflects and transmits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Dielectric {
     pub(crate) eta: f32,
@@ -24,7 +24,7 @@ impl Dielectric {
         if wo.z > 0.0 { self.eta } else { 1.0 / self.eta }
     }
 
-    /// A smooth boundary: the mirror direction or the refracted one, by Fresnel's share.
+    /// Samples a smooth boundary: the mirror direction or the refracted one, with probabilities by the Fresnel term.
     pub(crate) fn sample_smooth(&self, wo: Vec3, u: f32) -> LocalSample {
         let eta = self.relative(wo);
         let (reflected, beyond) = fresnel::dielectric(wo.z.abs(), eta);
@@ -35,7 +35,8 @@ impl Dielectric {
         LocalSample::delta(wi, self.transmittance / (eta * eta), 1.0 - reflected)
     }
 
-    /// A sheet with both boundaries: R + T^2 R / (1 - R^2) = 2 R / (1 + R) is reflected, the rest goes straight on.
+    /// Samples a sheet with two boundaries: R + T^2 R / (1 - R^2) = 2 R / (1 + R) is reflected, the rest passes
+    /// straight through.
     pub(crate) fn sample_thin(&self, wo: Vec3, u: f32) -> LocalSample {
         let once = fresnel::dielectric(wo.z.abs(), self.eta).0;
         let reflected = 2.0 * once / (1.0 + once);
@@ -92,7 +93,7 @@ impl Dielectric {
     }
 }
 
-/// Two directions and the facet between them, turned so that `wo` lies above.
+/// Two directions and the facet between them, flipped so that `wo` lies above.
 struct Event {
     wo: Vec3,
     wi: Vec3,
@@ -102,7 +103,7 @@ struct Event {
 }
 
 impl Event {
-    /// None where no facet sends one direction into the other.
+    /// `None` if no facet sends one direction into the other.
     fn new(eta: f32, wo: Vec3, wi: Vec3) -> Option<Self> {
         let side = 1.0_f32.copysign(wo.z);
         let (wo, wi) = (wo * side, wi * side);

@@ -1,10 +1,10 @@
-//! Matt surfaces: Lambert's and Oren and Nayar's.
+//! Matt surfaces: the models of Lambert and of Oren and Nayar.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::Vec3;
 
-use super::lobe::LocalSample;
+use crate::bsdf::sample::LocalSample;
 use crate::warp;
 
 /// Lambert's diffuse reflection.
@@ -12,8 +12,8 @@ pub(crate) fn lambert(reflectance: Vec3, wi: Vec3) -> Vec3 {
     reflectance * (FRAC_1_PI * wi.z)
 }
 
-/// Oren and Nayar, "Generalization of Lambert's Reflectance Model" (SIGGRAPH 1994), section 4.4, with interreflection;
-/// Mitsuba 0.6's `roughdiffuse`. Their slope deviation is `alpha` / sqrt(2), as there.
+/// Oren and Nayar, "Generalization of Lambert's Reflectance Model" (SIGGRAPH 1994), section 4.4, with interreflection.
+/// As in Mitsuba 0.6's `roughdiffuse`, the standard deviation of the slope is `alpha` / sqrt(2).
 pub(crate) fn oren_nayar(reflectance: Vec3, alpha: f32, wo: Vec3, wi: Vec3) -> Vec3 {
     let s2 = 0.5 * alpha * alpha;
     let (theta_o, theta_i) = (angle(wo), angle(wi));
@@ -22,7 +22,7 @@ pub(crate) fn oren_nayar(reflectance: Vec3, alpha: f32, wo: Vec3, wi: Vec3) -> V
     let cos_phi = (wo.truncate().dot(wi.truncate()) / flat).clamp(-1.0, 1.0);
     let slope = 2.0 * smaller * FRAC_1_PI;
 
-    // Light that comes straight from the source.
+    // Direct illumination.
     let c1 = 1.0 - 0.5 * s2 / (s2 + 0.33);
     let behind = if cos_phi >= 0.0 { 0.0 } else { slope * slope * slope };
     let c2 = 0.45 * s2 / (s2 + 0.09) * (libm::sinf(larger) - behind);
@@ -30,7 +30,7 @@ pub(crate) fn oren_nayar(reflectance: Vec3, alpha: f32, wo: Vec3, wi: Vec3) -> V
     let c3 = 0.125 * s2 / (s2 + 0.09) * product * product;
     let tan = |angle: f32| libm::tanf(angle.min(FRAC_PI_2 - 1e-4));
     let direct = c1 + cos_phi * c2 * tan(smaller) + (1.0 - cos_phi.abs()) * c3 * tan(0.5 * (larger + smaller));
-    // Light that comes from other facets.
+    // Interreflection between facets.
     let between = 0.17 * s2 / (s2 + 0.13) * (1.0 - cos_phi * slope * slope);
 
     (reflectance * direct + reflectance * reflectance * between) * (FRAC_1_PI * wi.z)
@@ -40,7 +40,7 @@ fn angle(w: Vec3) -> f32 {
     libm::acosf(w.z.clamp(0.0, 1.0))
 }
 
-/// A direction by the cosine, for `value_at` of it.
+/// Samples a direction with a density proportional to the cosine; `value_at` evaluates it.
 pub(crate) fn sample(u: [f32; 2], value_at: impl Fn(Vec3) -> Vec3) -> Option<LocalSample> {
     let wi = warp::cosine_hemisphere(u);
     (wi.z > 0.0).then(|| LocalSample::spread(wi, value_at(wi), wi.z / PI))

@@ -1,13 +1,13 @@
-//! Metals, rough and smooth.
+//! Metals, smooth and rough.
 
 use glam::Vec3;
 use mateval_scene::material::ConductorIor;
 
-use super::facets::{Facets, reflect};
-use super::fresnel;
-use super::lobe::LocalSample;
+use crate::bsdf::facets::{Facets, reflect};
+use crate::bsdf::fresnel;
+use crate::bsdf::sample::LocalSample;
 
-/// A metal: what it is made of, and a tint of what it reflects.
+/// A metal: its index of refraction and a tint of the reflected light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Conductor {
     pub(crate) ior: ConductorIor,
@@ -15,7 +15,7 @@ pub(crate) struct Conductor {
 }
 
 impl Conductor {
-    /// The mirror direction.
+    /// The mirror direction as a delta sample.
     pub(crate) fn mirror(&self, wo: Vec3) -> LocalSample {
         let wi = Vec3::new(-wo.x, -wo.y, wo.z);
         LocalSample::delta(wi, self.tint * fresnel::conductor(wo.z, &self.ior), 1.0)
@@ -35,12 +35,12 @@ impl Conductor {
     }
 }
 
-/// D G / (4 cos_o): a facet reflection without its Fresnel term, with the cosine of wi.
+/// D G / (4 cos_o): a facet reflection without its Fresnel term, including the cosine of wi.
 pub(crate) fn reflection(facets: &Facets, wo: Vec3, wi: Vec3, m: Vec3) -> f32 {
     facets.density(m) * facets.visible_from_both(wo, wi, m) / (4.0 * wo.z)
 }
 
-/// The density per solid angle of wi, when a facet is sampled for `wo` and reflects it.
+/// The density per solid angle of wi if a facet visible from `wo` is sampled and reflects it.
 pub(crate) fn reflection_density(facets: &Facets, wo: Vec3, wi: Vec3) -> f32 {
     let Some(m) = (wo + wi).try_normalize() else { return 0.0 };
     let cos = wo.dot(m);
