@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
+use clap::builder::PossibleValue;
 use mateval_eval::light_rules::Track;
+use mateval_eval::result_key::PictureKind;
 use mateval_report::strips::{self, Shown, StripPlan};
 use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
@@ -38,16 +40,26 @@ pub struct PicturesArgs {
 }
 
 /// What they show.
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub enum StripPicture {
-    /// base_color.
     Albedo,
-    /// Under the scene's own lights.
-    #[value(name = "rgb_true")]
     RgbTrue,
-    /// Under lights fitted to the input view.
-    #[value(name = "rgb_fitted")]
     RgbFitted,
+}
+
+impl clap::ValueEnum for StripPicture {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Albedo, Self::RgbTrue, Self::RgbFitted]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (kind, help) = match self {
+            Self::Albedo => (PictureKind::Albedo, "base_color"),
+            Self::RgbTrue => (PictureKind::RgbTrue, "Under the scene's own lights"),
+            Self::RgbFitted => (PictureKind::RgbFitted, "Under lights fitted to the input view"),
+        };
+        Some(PossibleValue::new(kind.word()).help(help))
+    }
 }
 
 impl StripPicture {
