@@ -6,17 +6,18 @@ use mateval_image::{Mask, Picture};
 use mateval_scene::dataset::{Instance, SceneFile};
 
 use crate::result::InstancePixelErrors;
+use crate::result_key::{PictureKind, Views};
 
 /// Sums of squared errors of a scene's pixels by picture, views and instance.
 #[derive(Clone, Debug, Default)]
-pub struct InstanceErrors(BTreeMap<(String, &'static str, u16), (f64, usize)>);
+pub struct InstanceErrors(BTreeMap<(PictureKind, Views, u16), (f64, usize)>);
 
 impl InstanceErrors {
     /// Adds `error(k)`, a mean over channels, of every pixel k in the mask to the instance that it shows.
     pub fn add(
         &mut self,
-        picture: &str,
-        views: &'static str,
+        picture: PictureKind,
+        views: Views,
         instances: &Picture<u16>,
         mask: &Mask,
         error: impl Fn(usize) -> f64,
@@ -28,7 +29,7 @@ impl InstanceErrors {
             *count += 1;
         }
         for (instance, (sum, count)) in sums {
-            let all = self.0.entry((picture.to_owned(), views, instance)).or_default();
+            let all = self.0.entry((picture, views, instance)).or_default();
             all.0 += sum;
             all.1 += count;
         }
@@ -45,7 +46,7 @@ impl InstanceErrors {
                 category,
                 super_category,
                 picture,
-                views: views.to_owned(),
+                views,
                 pixels,
                 mse: sum / pixels as f64,
             })

@@ -5,6 +5,8 @@ use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::result_key::PictureKind;
+
 /// Under what light a prediction is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -18,12 +20,12 @@ pub enum Track {
 }
 
 impl Track {
-    /// The name of its pictures.
-    pub fn picture(self) -> &'static str {
+    /// The kind of its pictures.
+    pub fn picture(self) -> PictureKind {
         match self {
-            Self::Fitted => "rgb_fitted",
-            Self::True => "rgb_true",
-            Self::Relit => "rgb_relit",
+            Self::Fitted => PictureKind::RgbFitted,
+            Self::True => PictureKind::RgbTrue,
+            Self::Relit => PictureKind::RgbRelit,
         }
     }
 }

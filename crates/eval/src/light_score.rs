@@ -12,11 +12,13 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
 use crate::light_rules::{NoiseRules, Track};
+use crate::metric::Metric;
 use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, LitScene, Photo, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
-use crate::relit::{RelitLighting, lightings};
-use crate::result::{NoiseState, PsnrNoise, Region, views};
+use crate::relit::{LightingName, RelitLighting, lightings};
+use crate::result::{NoiseState, PsnrNoise};
+use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
 use crate::scene_score::{MaskedRegion, SceneOrder, Sheet, regions};
 use crate::truth::{RgbTruth, ViewTruth};
@@ -75,7 +77,7 @@ struct LightBench<'a> {
     /// Of each view.
     regions: Vec<Vec<MaskedRegion>>,
     /// What each light's pictures are compared with, by lighting (none is the scene's own) and view.
-    references: BTreeMap<Option<String>, Vec<LightReference>>,
+    references: BTreeMap<Option<LightingName>, Vec<LightReference>>,
     /// Of each view.
     blocks: Vec<Picture<u32>>,
 }
@@ -141,7 +143,7 @@ impl<'a> LightBench<'a> {
 
     fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut Sheet) -> Result<(), EvalError> {
         let order = self.order;
-        let name = picture.track.picture();
+        let kind = picture.track.picture();
         let lights: Vec<EncodedLight> =
             picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, order.scene.exposure)).collect();
         let references = &self.references[&picture.lighting];
@@ -158,12 +160,16 @@ impl<'a> LightBench<'a> {
                 rgb_metrics(self.protocol, order.lpips, light, reference, &region.mask, blocks)
             })
             .collect();
-        let mut errors: BTreeMap<String, Vec<NoiseFreeMse>> = BTreeMap::new();
+        let mut errors: BTreeMap<ResultKey, Vec<NoiseFreeMse>> = BTreeMap::new();
         for (&(view, region), measured) in jobs.iter().zip(measured) {
             let view = order.views[view];
             let RgbMeasured { values, mse } = order.or_named(view, measured)?;
-            sheet.score.pictures.extend(order.values(view, region, name, picture.lighting.as_ref(), values));
-            let key = format!("{name}{}.{}.psnr", region.suffix, views(&view.id, region.region));
+            sheet.score.pictures.extend(order.values(view, region, kind, picture.lighting, values));
+            let key = ResultKey {
+                picture: PictureName { kind, surfaces: region.surfaces },
+                views: Views::of(&view.id, region.region),
+                metric: Metric::Psnr,
+            };
             errors.entry(key).or_default().extend(mse);
         }
         if picture.track != Track::Relit {
@@ -172,14 +178,14 @@ impl<'a> LightBench<'a> {
                 .score
                 .noise
                 .extend(noise.map(|(key, views)| (key, psnr_noise(&self.protocol.light.noise, &views, samples))));
-            self.add_errors(name, &lights, references, &mut sheet.errors);
+            self.add_errors(kind, &lights, references, &mut sheet.errors);
         }
         Ok(())
     }
 
     fn add_errors(
         &self,
-        name: &str,
+        kind: PictureKind,
         lights: &[EncodedLight],
         references: &[LightReference],
         errors: &mut InstanceErrors,
@@ -187,9 +193,9 @@ impl<'a> LightBench<'a> {
         let pairs = lights.iter().zip(references);
         for ((view, truth), (light, reference)) in self.order.views.iter().zip(self.truths).zip(pairs) {
             let error = |k: usize| light.noise_free_square(reference, k);
-            errors.add(name, views(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
+            errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
-                errors.add(name, "unobserved", &truth.instances, unobserved, error);
+                errors.add(kind, Views::Unobserved, &truth.instances, unobserved, error);
             }
         }
     }
@@ -212,7 +218,7 @@ fn references(
     protocol: &Protocol,
     own: &[RgbTruth],
     lightings: &[RelitLighting],
-) -> Result<BTreeMap<Option<String>, Vec<LightReference>>, EvalError> {
+) -> Result<BTreeMap<Option<LightingName>, Vec<LightReference>>, EvalError> {
     let reference = |view: &View, truth: &RgbTruth| {
         order.or_named(view, LightReference::new(protocol, order.lpips, truth, order.scene.exposure))
     };
@@ -222,7 +228,7 @@ fn references(
     for view in &order.views {
         let relit = RgbTruth::relit(order.folder, renderer, view, lightings)?;
         for (lighting, truth) in lightings.iter().zip(&relit) {
-            references.entry(Some(lighting.name.clone())).or_default().push(reference(view, truth)?);
+            references.entry(Some(lighting.name)).or_default().push(reference(view, truth)?);
         }
     }
     Ok(references)

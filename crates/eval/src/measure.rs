@@ -5,13 +5,14 @@ use mateval_metrics::{Lpips, MetricError, Pixel, Psnr, mse, ssim_black_fill, ssi
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::metric::Metric;
 use crate::protocol::{AlbedoSpace, MaskRule, Protocol};
 
 /// One metric's value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// Its key.
-    pub metric: String,
+    /// By which metric.
+    pub metric: Metric,
     /// None where nothing counts.
     pub value: Option<f64>,
     /// For PSNR: there was no error at all.
@@ -98,8 +99,8 @@ pub fn scalar_metrics(
 fn error_metrics(error: Option<f64>, pixels: usize) -> Result<Vec<Measured>, MetricError> {
     let psnr = error.map(Psnr::from_mse).transpose()?;
     let exact = psnr.is_some_and(|psnr| psnr.exact);
-    let psnr = Measured { exact, ..Measured::plain("psnr", psnr.map(|psnr| psnr.db), pixels) };
-    Ok(vec![Measured::plain("mse", error, pixels), psnr])
+    let psnr = Measured { exact, ..Measured::plain(Metric::Psnr, psnr.map(|psnr| psnr.db), pixels) };
+    Ok(vec![Measured::plain(Metric::Mse, error, pixels), psnr])
 }
 
 fn ssim_metric<P: Pixel>(
@@ -110,10 +111,10 @@ fn ssim_metric<P: Pixel>(
     pixels: usize,
 ) -> Result<Measured, MetricError> {
     Ok(match rule {
-        MaskRule::BlackFill => Measured::plain("ssim", ssim_black_fill(prediction, reference, mask)?, pixels),
+        MaskRule::BlackFill => Measured::plain(Metric::Ssim, ssim_black_fill(prediction, reference, mask)?, pixels),
         MaskRule::Inside => {
             let inside = ssim_valid_windows(prediction, reference, mask)?;
-            Measured::plain("ssim", inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
+            Measured::plain(Metric::Ssim, inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
         }
     })
 }
@@ -122,13 +123,13 @@ fn ssim_metric<P: Pixel>(
 pub(crate) fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) -> Measured {
     let steps = 10_f64.powi(protocol.lpips_decimals as i32);
     let rounded = distance.map(|distance| (distance * steps).round() / steps);
-    Measured::plain(&format!("lpips_{}", protocol.lpips_net), rounded, pixels)
+    Measured::plain(Metric::LpipsAlex, rounded, pixels)
 }
 
 impl Measured {
     /// A value and no more.
-    pub(crate) fn plain(metric: &str, value: Option<f64>, count: usize) -> Self {
-        Self { metric: metric.to_owned(), value, exact: false, noise: None, count }
+    pub(crate) fn plain(metric: Metric, value: Option<f64>, count: usize) -> Self {
+        Self { metric, value, exact: false, noise: None, count }
     }
 }
 
@@ -142,7 +143,7 @@ mod tests {
         (prediction, reference, Picture::from_fn(40, 30, |x, _| x >= 20))
     }
 
-    fn value(measured: &[Measured], metric: &str) -> f64 {
+    fn value(measured: &[Measured], metric: Metric) -> f64 {
         measured.iter().find(|m| m.metric == metric).and_then(|m| m.value).unwrap()
     }
 
@@ -152,9 +153,9 @@ mod tests {
         let [ours, paper] = ["mateval-1", "paper"]
             .map(|name| albedo_metrics(&Protocol::named(name).unwrap(), None, &prediction, &reference, &mask).unwrap());
         // Half of the frame is black in both pictures: the paper's SSIM is nearer to one.
-        assert!(value(&paper, "ssim") > value(&ours, "ssim"));
-        assert!(value(&paper, "mse") != value(&ours, "mse"));
-        assert!(!ours.iter().any(|m| m.metric.starts_with("lpips")));
+        assert!(value(&paper, Metric::Ssim) > value(&ours, Metric::Ssim));
+        assert!(value(&paper, Metric::Mse) != value(&ours, Metric::Mse));
+        assert!(!ours.iter().any(|m| m.metric == Metric::LpipsAlex));
     }
 
     #[test]
@@ -162,7 +163,7 @@ mod tests {
         let (_, reference, mask) = pictures();
         let protocol = Protocol::named("mateval-1").unwrap();
         let same = albedo_metrics(&protocol, None, &reference, &reference, &mask).unwrap();
-        assert!(same.iter().any(|m| m.metric == "psnr" && m.exact && m.value == Some(100.0)));
+        assert!(same.iter().any(|m| m.metric == Metric::Psnr && m.exact && m.value == Some(100.0)));
         let nothing = Picture::filled(40, 30, false);
         for measured in albedo_metrics(&protocol, None, &reference, &reference, &nothing).unwrap() {
             assert_eq!(measured.value, None, "{}", measured.metric);
@@ -176,18 +177,21 @@ mod tests {
         let mask = Picture::from_fn(40, 30, |x, _| x >= 20);
         let [ours, paper] = ["mateval-1", "paper"].map(|name| {
             let measured = scalar_metrics(&Protocol::named(name).unwrap(), &prediction, &reference, &mask).unwrap();
-            let keys: Vec<&str> = measured.iter().map(|m| m.metric.as_str()).collect();
-            assert_eq!(keys, ["mse", "psnr", "ssim"]);
+            let metrics: Vec<Metric> = measured.iter().map(|m| m.metric).collect();
+            assert_eq!(metrics, [Metric::Mse, Metric::Psnr, Metric::Ssim]);
             measured
         });
         // 0.1 off everywhere, by hand; no curve lies between, whatever the protocol does to albedo.
         for measured in [&ours, &paper] {
-            assert!((value(measured, "mse") - 0.01).abs() < 1e-8 && (value(measured, "psnr") - 20.0).abs() < 1e-5);
+            assert!(
+                (value(measured, Metric::Mse) - 0.01).abs() < 1e-8
+                    && (value(measured, Metric::Psnr) - 20.0).abs() < 1e-5
+            );
         }
         // Twenty columns of thirty; whole windows have their centres 5 pixels inside of that.
         assert_eq!((ours[0].count, ours[2].count, paper[2].count), (600, 10 * 20, 600));
-        assert!(value(&paper, "ssim") != value(&ours, "ssim"));
+        assert!(value(&paper, Metric::Ssim) != value(&ours, Metric::Ssim));
         let same = scalar_metrics(&Protocol::named("paper").unwrap(), &reference, &reference, &mask).unwrap();
-        assert!(same[1].exact && value(&same, "ssim") == 1.0 && value(&same, "mse") == 0.0);
+        assert!(same[1].exact && value(&same, Metric::Ssim) == 1.0 && value(&same, Metric::Mse) == 0.0);
     }
 }

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::EvalError;
 use crate::light_rules::{LightRules, Track};
 use crate::pilot::enough_samples;
-use crate::relit::RelitLighting;
+use crate::relit::{LightingName, RelitLighting};
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
 use mateval_light::light_fit::{LightFit, fit_lights};
@@ -79,7 +79,7 @@ pub struct LitPicture {
     /// Which.
     pub track: Track,
     /// For track `relit` its name.
-    pub lighting: Option<String>,
+    pub lighting: Option<LightingName>,
     /// For each view two independent halves, linear, before exposure.
     pub views: Vec<[Picture<LinearRgb>; 2]>,
 }
@@ -119,7 +119,7 @@ struct Pass<'a> {
     lights: Vec<String>,
     on_stage: bool,
     /// What pictures are made, and whether the pilot watches them.
-    pictures: Vec<(Track, Option<String>)>,
+    pictures: Vec<(Track, Option<LightingName>)>,
 }
 
 /// How a prediction's pictures of one pass are mixed, and where that came from.
@@ -147,7 +147,7 @@ pub fn predicted_light(
         own.push((Track::Fitted, None));
     }
     if has(Track::Relit) {
-        own.extend(lit.lightings.iter().map(|lighting| (Track::Relit, Some(lighting.name.clone()))));
+        own.extend(lit.lightings.iter().map(|lighting| (Track::Relit, Some(lighting.name))));
     }
     if !own.is_empty() {
         let lights = lit.world.scene().lights.iter().map(|light| light.name.clone()).collect();
@@ -212,7 +212,7 @@ impl Renderer<'_> {
         named
             .map(|(at, (track, lighting))| LitPicture {
                 track: *track,
-                lighting: lighting.clone(),
+                lighting: *lighting,
                 views: bases.iter().map(|halves| [0, 1].map(|half| halves[half].pictures()[at].clone())).collect(),
             })
             .collect()
@@ -228,11 +228,11 @@ impl Renderer<'_> {
         let ones: LightMix = vec![[1.0; 3]; self.pass.lights.len()];
         let mixing = |fit: Option<FittedRadiances>| {
             let fitted = fit.as_ref().map(|fit| fit.lights.iter().map(|light| light.radiance).collect::<LightMix>());
-            let mix = |(track, lighting): &(Track, Option<String>)| match track {
+            let mix = |(track, lighting): &(Track, Option<LightingName>)| match track {
                 Track::True => ones.clone(),
                 Track::Fitted => fitted.clone().expect("a pass with this track was fitted"),
                 Track::Relit => {
-                    let relit = self.lit.lightings.iter().find(|relit| Some(&relit.name) == lighting.as_ref());
+                    let relit = self.lit.lightings.iter().find(|relit| Some(relit.name) == *lighting);
                     relit.expect("the pass was made of these lightings").weights.clone()
                 }
             };

@@ -1,15 +1,87 @@
 //! Lightings that no method saw: the reference's own emitters under other weights.
 
+use std::borrow::Cow;
+use std::fmt;
+use std::str::FromStr;
+
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_tracer::LightMix;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
 
 use crate::light_rules::RelitRules;
+use crate::word_enum::UnknownWord;
+
+/// The name of a lighting of track `relit`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum LightingName {
+    /// `dim`: all groups dimmed.
+    Dim,
+    /// `warm_cool`: warm and cool groups in turn.
+    WarmCool,
+    /// `alone_1`, `alone_2`, ...: the group of that place among the brightest, from 1, alone.
+    Alone(usize),
+}
+
+const DIM: &str = "dim";
+const WARM_COOL: &str = "warm_cool";
+const ALONE: &str = "alone_";
+
+impl fmt::Display for LightingName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Dim => f.write_str(DIM),
+            Self::WarmCool => f.write_str(WARM_COOL),
+            Self::Alone(place) => write!(f, "{ALONE}{place}"),
+        }
+    }
+}
+
+impl FromStr for LightingName {
+    type Err = UnknownWord;
+
+    fn from_str(word: &str) -> Result<Self, UnknownWord> {
+        let alone = || word.strip_prefix(ALONE)?.parse().ok().map(Self::Alone);
+        let known = [Some(Self::Dim), Some(Self::WarmCool), alone()];
+        // Only what is printed is parsed: `alone_01` is not.
+        known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {
+            what: "lighting",
+            word: word.to_owned(),
+            expected: format!("{DIM}, {WARM_COOL}, {ALONE}1, {ALONE}2, ..."),
+        })
+    }
+}
+
+impl TryFrom<String> for LightingName {
+    type Error = UnknownWord;
+
+    fn try_from(word: String) -> Result<Self, UnknownWord> {
+        word.parse()
+    }
+}
+
+impl From<LightingName> for String {
+    fn from(name: LightingName) -> Self {
+        name.to_string()
+    }
+}
+
+impl JsonSchema for LightingName {
+    fn schema_name() -> Cow<'static, str> {
+        "LightingName".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "pattern": "^(dim|warm_cool|alone_[1-9][0-9]*)$" })
+    }
+}
 
 /// One of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelitLighting {
-    /// `dim`, `warm_cool`, `alone_1` and so on.
-    pub name: String,
+    /// Its name.
+    pub name: LightingName,
     /// Of each light group.
     pub weights: LightMix,
 }
@@ -28,13 +100,13 @@ pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask
         warm_cool[group] = if place % 2 == 0 { rules.warm } else { rules.cool };
     }
     let mut lightings = vec![
-        RelitLighting { name: "dim".to_owned(), weights: vec![[rules.dim; 3]; groups.len()] },
-        RelitLighting { name: "warm_cool".to_owned(), weights: warm_cool },
+        RelitLighting { name: LightingName::Dim, weights: vec![[rules.dim; 3]; groups.len()] },
+        RelitLighting { name: LightingName::WarmCool, weights: warm_cool },
     ];
     if order.len() > 1 {
         lightings.extend(order.iter().take(rules.alone_at_most).enumerate().map(|(place, &alone)| {
             let weight = |group: usize| if group == alone { [1.0; 3] } else { [0.0; 3] };
-            RelitLighting { name: format!("alone_{}", place + 1), weights: (0..groups.len()).map(weight).collect() }
+            RelitLighting { name: LightingName::Alone(place + 1), weights: (0..groups.len()).map(weight).collect() }
         }));
     }
     lightings
@@ -65,7 +137,20 @@ mod tests {
     }
 
     fn names(groups: &[Picture<LinearRgb>]) -> Vec<String> {
-        lightings(&rules(), groups, &Mask::filled(2, 1, true)).into_iter().map(|lighting| lighting.name).collect()
+        lightings(&rules(), groups, &Mask::filled(2, 1, true))
+            .into_iter()
+            .map(|lighting| lighting.name.to_string())
+            .collect()
+    }
+
+    #[test]
+    fn names_are_parsed_from_what_they_print() {
+        for name in [LightingName::Dim, LightingName::WarmCool, LightingName::Alone(1), LightingName::Alone(12)] {
+            assert_eq!(name.to_string().parse(), Ok(name));
+        }
+        for word in ["", "dimmer", "alone", "alone_", "alone_01", "alone_+1", "Dim"] {
+            assert!(word.parse::<LightingName>().unwrap_err().to_string().contains("is no lighting"), "{word}");
+        }
     }
 
     #[test]

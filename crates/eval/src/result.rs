@@ -10,8 +10,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::measure::ValueNoise;
+use crate::metric::Metric;
 use crate::predicted_light::FittedRadiances;
 use crate::protocol::Protocol;
+use crate::relit::LightingName;
+use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
+use crate::word_enum::UnknownWord;
 
 /// The word for this version of a result.
 pub const RESULT_FORMAT: &str = "mateval-result/2";
@@ -67,14 +71,14 @@ pub struct ProtocolResult {
     pub protocol: Protocol,
     /// Numbers of different fingerprints are never to be compared.
     pub fingerprint: String,
-    /// Mean over scenes, by `<picture>.<views>.<metric>`.
-    pub summary: BTreeMap<String, f64>,
+    /// Mean over scenes.
+    pub summary: BTreeMap<ResultKey, f64>,
     /// Mean over pictures of each scene, by the same keys.
-    pub scenes: BTreeMap<SceneId, BTreeMap<String, f64>>,
+    pub scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
     /// Standard errors of the means of PSNR in `summary` that render noise makes, in dB.
-    pub summary_noise: BTreeMap<String, f64>,
+    pub summary_noise: BTreeMap<ResultKey, f64>,
     /// How sure the means of PSNR of each scene are that render noise touches, by the same keys.
-    pub noise: BTreeMap<SceneId, BTreeMap<String, PsnrNoise>>,
+    pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>,
     /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// Every single value.
@@ -155,10 +159,10 @@ pub struct InstancePixelErrors {
     pub category: Option<String>,
     /// The source's broader category; `Architecture` for architecture; else null.
     pub super_category: Option<String>,
-    /// `albedo`, `albedo_aligned`, `rgb_fitted`, `rgb_true`.
-    pub picture: String,
+    /// Albedo, aligned albedo, or light of track `true` or `fitted`.
+    pub picture: PictureKind,
     /// `input`, `novel`, `unobserved`.
-    pub views: String,
+    pub views: Views,
     /// Valid pixels that show it, in all of these views.
     pub pixels: usize,
     /// Mean over those pixels, in the space of the protocol's MSE of that picture; of light free of noise.
@@ -173,16 +177,15 @@ pub struct PictureValue {
     pub scene: SceneId,
     /// Its view.
     pub view: ViewId,
-    /// What was compared: `albedo`, `albedo_aligned`, `roughness`, `metallic`, `rgb_fitted`, `rgb_true`, `rgb_relit`; with
-    /// `_specular` behind it where only what is metal or smooth in truth counts.
-    pub picture: String,
-    /// For `rgb_relit` the lighting: `dim`, `warm_cool`, `alone_1` and so on.
+    /// What was compared, with `_specular` behind it where only what is metal or smooth in truth counts.
+    pub picture: PictureName,
+    /// The lighting of a picture of kind `rgb_relit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub lighting: Option<String>,
-    /// Which pixels: `valid` or `unobserved`.
+    pub lighting: Option<LightingName>,
+    /// Which pixels count.
     pub region: Region,
-    /// `mse`, `psnr`, `ssim`, `lpips_alex`.
-    pub metric: String,
+    /// By which metric.
+    pub metric: Metric,
     /// Null where no pixel or window counts.
     pub value: Option<f64>,
     /// For PSNR: the MSE was exactly zero, the value is the cap.
@@ -195,26 +198,59 @@ pub struct PictureValue {
     pub count: usize,
 }
 
-/// Which pixels of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Region {
-    /// All that `valid.png` holds.
-    Valid,
-    /// Those that the input view did not see.
-    Unobserved,
-}
-
-/// A metric that could not be taken.
+/// Numbers that could not be taken.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissingMetric {
-    /// Its key.
-    pub metric: String,
+    /// Which.
+    pub metric: MissingNumbers,
     /// Why.
     pub reason: String,
     /// The command that mends it.
     pub mend: String,
+}
+
+/// All numbers of a metric, or all of a kind of picture; one word in files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum MissingNumbers {
+    /// By that metric, of any picture.
+    Metric(Metric),
+    /// Of that kind of picture, by any metric.
+    Picture(PictureKind),
+}
+
+impl std::fmt::Display for MissingNumbers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Metric(metric) => metric.fmt(f),
+            Self::Picture(kind) => kind.fmt(f),
+        }
+    }
+}
+
+impl TryFrom<String> for MissingNumbers {
+    type Error = UnknownWord;
+
+    fn try_from(word: String) -> Result<Self, UnknownWord> {
+        word.parse().map(Self::Metric).or_else(|_| word.parse().map(Self::Picture))
+    }
+}
+
+impl From<MissingNumbers> for String {
+    fn from(numbers: MissingNumbers) -> Self {
+        numbers.to_string()
+    }
+}
+
+impl JsonSchema for MissingNumbers {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "MissingNumbers".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": "string", "pattern": "^[a-z0-9_]+$" })
+    }
 }
 
 /// Takes the means: of pictures to scenes (of texels by area), of scenes to the dataset. A value that is missing is left
@@ -222,86 +258,78 @@ pub struct MissingMetric {
 pub fn means(
     pictures: &[PictureValue],
     texels: &[InstanceTexelErrors],
-) -> (BTreeMap<SceneId, BTreeMap<String, f64>>, BTreeMap<String, f64>) {
-    let mut of_scene: BTreeMap<SceneId, BTreeMap<String, Mean>> = BTreeMap::new();
+) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
+    let mut of_scene: BTreeMap<SceneId, BTreeMap<ResultKey, Mean>> = BTreeMap::new();
     for picture in pictures {
         if let Some(value) = picture.value {
-            of_scene.entry(picture.scene.clone()).or_default().entry(key(picture)).or_default().add(value);
+            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key()).or_default().add(value);
         }
     }
-    let mut scenes: BTreeMap<SceneId, BTreeMap<String, f64>> = of_scene
+    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = of_scene
         .into_iter()
         .map(|(scene, keys)| (scene, keys.into_iter().map(|(key, mean)| (key, mean.value())).collect()))
         .collect();
     for (scene, values) in texel_means(texels) {
         scenes.entry(scene).or_default().extend(values);
     }
-    let mut of_dataset: BTreeMap<String, Mean> = BTreeMap::new();
+    let mut of_dataset: BTreeMap<ResultKey, Mean> = BTreeMap::new();
     for (key, value) in scenes.values().flatten() {
-        of_dataset.entry(key.clone()).or_default().add(*value);
+        of_dataset.entry(*key).or_default().add(*value);
     }
     let summary = of_dataset.into_iter().map(|(key, mean)| (key, mean.value())).collect();
     (scenes, summary)
 }
 
-/// `<picture>.<views>.<metric>`.
-pub(crate) fn key(picture: &PictureValue) -> String {
-    format!("{}.{}.{}", picture.picture, views(&picture.view, picture.region), picture.metric)
-}
-
-/// `input`, `novel` or `unobserved`.
-pub(crate) fn views(view: &ViewId, region: Region) -> &'static str {
-    match region {
-        Region::Unobserved => "unobserved",
-        Region::Valid if view.as_str() == mateval_scene::layout::INPUT => "input",
-        Region::Valid => "novel",
+impl PictureValue {
+    /// The mean that it counts for.
+    pub fn key(&self) -> ResultKey {
+        ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric: self.metric }
     }
 }
 
-/// `texture_<map>.<observed or unobserved>.<mse or psnr>` of each scene: the mean over all its texels by area, and the
-/// PSNR of that.
-fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<String, f64>> {
-    type Part = (&'static str, fn(&InstanceTexelErrors) -> &TexelErrors);
-    type Map = (&'static str, fn(&TexelErrors) -> Option<f64>);
-    let parts: [Part; 2] = [("observed", |t| &t.observed), ("unobserved", |t| &t.unobserved)];
+/// Texels of each map, seen or unseen, in each scene: the mean of their squared errors by area, and its PSNR.
+fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
+    type Part = (Views, fn(&InstanceTexelErrors) -> &TexelErrors);
+    type Map = (PictureKind, fn(&TexelErrors) -> Option<f64>);
+    let parts: [Part; 2] = [(Views::Observed, |t| &t.observed), (Views::Unobserved, |t| &t.unobserved)];
     let maps: [Map; 3] = [
-        ("base_color", |errors| errors.base_color_mse),
-        ("roughness", |errors| errors.roughness_mse),
-        ("metallic", |errors| errors.metallic_mse),
+        (PictureKind::TextureBaseColor, |errors| errors.base_color_mse),
+        (PictureKind::TextureRoughness, |errors| errors.roughness_mse),
+        (PictureKind::TextureMetallic, |errors| errors.metallic_mse),
     ];
-    let mut sums: BTreeMap<(SceneId, String), [f64; 2]> = BTreeMap::new();
+    let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
     for instance in texels {
         for (part, errors) in parts.map(|(part, of)| (part, of(instance))) {
             for (map, mse) in maps.map(|(map, of)| (map, of(errors))) {
                 let Some(mse) = mse else { continue };
-                let sums = sums.entry((instance.scene.clone(), format!("texture_{map}.{part}"))).or_default();
+                let key = ResultKey::whole(map, part, Metric::Mse);
+                let sums = sums.entry((instance.scene.clone(), key)).or_default();
                 sums[0] += errors.area_m2 * mse;
                 sums[1] += errors.area_m2;
             }
         }
     }
-    let mut means: BTreeMap<SceneId, BTreeMap<String, f64>> = BTreeMap::new();
+    let mut means: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
     for ((scene, key), [sum, area]) in sums {
         let values = means.entry(scene).or_default();
         let mse = sum / area;
         if let Ok(psnr) = Psnr::from_mse(mse) {
-            values.insert(format!("{key}.mse"), mse);
-            values.insert(format!("{key}.psnr"), psnr.db);
+            values.insert(key, mse);
+            values.insert(key.with(Metric::Psnr), psnr.db);
         }
     }
     means
 }
 
 /// The standard error of the dataset's mean of each key that all its scenes have one of: scenes are independent.
-pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<String, PsnrNoise>>) -> BTreeMap<String, f64> {
-    let mut sums: BTreeMap<&str, (usize, Option<f64>)> = BTreeMap::new();
+pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>) -> BTreeMap<ResultKey, f64> {
+    let mut sums: BTreeMap<ResultKey, (usize, Option<f64>)> = BTreeMap::new();
     for (key, of_scene) in noise.values().flatten() {
-        let (count, squares) = sums.entry(key).or_insert((0, Some(0.0)));
+        let (count, squares) = sums.entry(*key).or_insert((0, Some(0.0)));
         *count += 1;
         *squares = squares.zip(of_scene.standard_error_db).map(|(sum, error)| sum + error * error);
     }
-    let errors = sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64)));
-    errors.map(|(key, error)| (key.to_owned(), error)).collect()
+    sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64))).collect()
 }
 
 #[derive(Default)]
@@ -325,13 +353,17 @@ impl Mean {
 mod tests {
     use super::*;
 
+    fn key(text: &str) -> ResultKey {
+        text.parse().unwrap()
+    }
+
     fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValue {
         PictureValue {
             scene: SceneId::new(scene).unwrap(),
             view: ViewId::new(view).unwrap(),
-            picture: "albedo".to_owned(),
+            picture: PictureName::whole(PictureKind::Albedo),
             region,
-            metric: "psnr".to_owned(),
+            metric: Metric::Psnr,
             lighting: None,
             noise: None,
             value,
@@ -350,8 +382,8 @@ mod tests {
             unobserved: TexelErrors::default(),
         };
         let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
-        assert!((summary["texture_base_color.observed.mse"] - 0.01).abs() < 1e-15);
-        assert!((summary["texture_base_color.observed.psnr"] - 20.0).abs() < 1e-12);
+        assert!((summary[&key("texture_base_color.observed.mse")] - 0.01).abs() < 1e-15);
+        assert!((summary[&key("texture_base_color.observed.psnr")] - 20.0).abs() < 1e-12);
         assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
     }
 
@@ -364,12 +396,11 @@ mod tests {
             samples: 16,
             state: NoiseState::Certified,
         };
-        let scene = |name: &str, key: &str, error| {
-            (SceneId::new(name).unwrap(), BTreeMap::from([(key.to_owned(), noise(error))]))
-        };
-        let both = BTreeMap::from([scene("a", "k", Some(0.03)), scene("b", "k", Some(0.04))]);
-        assert!((summary_noise(&both)["k"] - 0.025).abs() < 1e-15);
-        assert!(summary_noise(&BTreeMap::from([scene("a", "k", Some(0.1)), scene("b", "k", None)])).is_empty());
+        let key = key("rgb_true.input.psnr");
+        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, noise(error))]));
+        let both = BTreeMap::from([scene("a", Some(0.03)), scene("b", Some(0.04))]);
+        assert!((summary_noise(&both)[&key] - 0.025).abs() < 1e-15);
+        assert!(summary_noise(&BTreeMap::from([scene("a", Some(0.1)), scene("b", None)])).is_empty());
     }
 
     /// Scene a has two novel views, scene b one: each scene weighs the same.
@@ -383,9 +414,9 @@ mod tests {
             value("a", "input", Region::Valid, Some(1.0)),
         ];
         let (scenes, summary) = means(&all, &[]);
-        assert_eq!(summary["albedo.novel.psnr"], 25.0);
-        assert_eq!(summary["albedo.input.psnr"], 1.0);
-        assert!(!summary.contains_key("albedo.unobserved.psnr"));
-        assert_eq!(scenes[&SceneId::new("a").unwrap()]["albedo.novel.psnr"], 15.0);
+        assert_eq!(summary[&key("albedo.novel.psnr")], 25.0);
+        assert_eq!(summary[&key("albedo.input.psnr")], 1.0);
+        assert!(!summary.contains_key(&key("albedo.unobserved.psnr")));
+        assert_eq!(scenes[&SceneId::new("a").unwrap()][&key("albedo.novel.psnr")], 15.0);
     }
 }

@@ -12,6 +12,7 @@ use mateval_metrics::{
 };
 
 use crate::measure::{Measured, ValueNoise, rounded_lpips};
+use crate::metric::Metric;
 use crate::protocol::{MaskRule, Protocol};
 use crate::truth::RgbTruth;
 
@@ -134,11 +135,11 @@ pub fn rgb_metrics(
     values.push(match protocol.mask_rule {
         MaskRule::BlackFill => {
             let value = ssim_halves_black_fill(prediction.halves(), &truth.shown, mask)?;
-            Measured::plain("ssim", value, pixels)
+            Measured::plain(Metric::Ssim, value, pixels)
         }
         MaskRule::Inside => {
             let inside = ssim_halves_valid_windows(prediction.halves(), &truth.shown, mask)?;
-            Measured::plain("ssim", inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
+            Measured::plain(Metric::Ssim, inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
         }
     });
     if let Some(lpips) = lpips {
@@ -162,7 +163,7 @@ fn noise_free_values(
     pixels: usize,
 ) -> Result<Vec<Measured>, MetricError> {
     let (Some(mse), Some((bias, bias_bound))) = (mse, bias) else {
-        return Ok(["mse", "psnr"].map(|metric| Measured::plain(metric, None, pixels)).to_vec());
+        return Ok([Metric::Mse, Metric::Psnr].map(|metric| Measured::plain(metric, None, pixels)).to_vec());
     };
     let noise = |standard_error: f64| ValueNoise { standard_error, bias: None, bias_bound: None, lower_bound: false };
     let psnr = mse.psnr()?;
@@ -172,12 +173,12 @@ fn noise_free_values(
     Ok(vec![
         Measured {
             noise: Some(ValueNoise { bias: Some(bias), bias_bound: Some(bias_bound), ..noise(mse.standard_error()) }),
-            ..Measured::plain("mse", Some(mse.mse), pixels)
+            ..Measured::plain(Metric::Mse, Some(mse.mse), pixels)
         },
         Measured {
             exact: psnr.exact,
             noise: Some(ValueNoise { lower_bound: psnr.lower_bound, ..noise(psnr_error.min(Psnr::CAP_DB)) }),
-            ..Measured::plain("psnr", Some(psnr.db), pixels)
+            ..Measured::plain(Metric::Psnr, Some(psnr.db), pixels)
         },
     ])
 }

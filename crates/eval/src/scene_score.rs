@@ -20,7 +20,9 @@ use crate::material_pictures::{MaterialPictures, material_pictures};
 use crate::measure::{Measured, albedo_metrics, scalar_metrics};
 use crate::predicted_light::FittedRadiances;
 use crate::protocol::{AlbedoSpace, Protocol};
-use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValue, PsnrNoise, Region, TexelErrors, views};
+use crate::relit::LightingName;
+use crate::result::{InstancePixelErrors, InstanceTexelErrors, PictureValue, PsnrNoise, TexelErrors};
+use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Surfaces, Views};
 use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
 use crate::truth::{ViewTruth, intersection};
 use mateval_submission::prediction::PredictedScene;
@@ -32,7 +34,7 @@ pub(crate) struct SceneScore {
     pub(crate) pictures: Vec<PictureValue>,
     pub(crate) texels: Vec<InstanceTexelErrors>,
     pub(crate) instances: Vec<InstancePixelErrors>,
-    pub(crate) noise: BTreeMap<String, PsnrNoise>,
+    pub(crate) noise: BTreeMap<ResultKey, PsnrNoise>,
     pub(crate) fit: Option<FittedRadiances>,
     /// Contributions of light that were not finite and count as none.
     pub(crate) not_finite: u64,
@@ -54,10 +56,10 @@ pub(crate) struct SceneOrder<'a> {
     pub(crate) progress: Progress<'a>,
 }
 
-/// A region of a view's pixels and what its pictures' names end with.
+/// Some of a view's pixels.
 pub(crate) struct MaskedRegion {
     pub(crate) region: Region,
-    pub(crate) suffix: &'static str,
+    pub(crate) surfaces: Surfaces,
     pub(crate) mask: Mask,
 }
 
@@ -70,9 +72,8 @@ struct Predicted<'a> {
 }
 
 impl<'a> Predicted<'a> {
-    /// By the names of the result's pictures.
-    fn albedos(self) -> [(&'static str, &'a Picture<LinearRgb>); 2] {
-        [("albedo", &self.pictures.base_color), ("albedo_aligned", self.aligned)]
+    fn albedos(self) -> [(PictureKind, &'a Picture<LinearRgb>); 2] {
+        [(PictureKind::Albedo, &self.pictures.base_color), (PictureKind::AlbedoAligned, self.aligned)]
     }
 }
 
@@ -135,17 +136,17 @@ impl SceneOrder<'_> {
     ) -> Result<Vec<PictureValue>, EvalError> {
         let mut values = Vec::new();
         for region in regions {
-            for (name, picture) in predicted.albedos() {
+            for (kind, picture) in predicted.albedos() {
                 let found = albedo_metrics(protocol, self.lpips, picture, &truth.albedo, &region.mask);
-                values.extend(self.values(view, region, name, None, self.or_named(view, found)?));
+                values.extend(self.values(view, region, kind, None, self.or_named(view, found)?));
             }
             let scalars = [
-                ("roughness", &predicted.pictures.roughness, &truth.roughness),
-                ("metallic", &predicted.pictures.metallic, &truth.metallic),
+                (PictureKind::Roughness, &predicted.pictures.roughness, &truth.roughness),
+                (PictureKind::Metallic, &predicted.pictures.metallic, &truth.metallic),
             ];
-            for (name, picture, truth) in scalars {
+            for (kind, picture, truth) in scalars {
                 let found = scalar_metrics(protocol, picture, truth, &region.mask);
-                values.extend(self.values(view, region, name, None, self.or_named(view, found)?));
+                values.extend(self.values(view, region, kind, None, self.or_named(view, found)?));
             }
         }
         Ok(values)
@@ -159,15 +160,15 @@ impl SceneOrder<'_> {
         truth: &ViewTruth,
         errors: &mut InstanceErrors,
     ) {
-        for (name, picture) in predicted.albedos() {
+        for (kind, picture) in predicted.albedos() {
             let spaces = match protocol.albedo_space {
                 AlbedoSpace::Linear => [picture.clone(), truth.albedo.clone()],
                 AlbedoSpace::Srgb => [picture, &truth.albedo].map(|p| p.to_srgb().map(|SrgbRgb(v)| LinearRgb(v))),
             };
             let error = |k: usize| mean_square(spaces[0].pixels()[k].0, spaces[1].pixels()[k].0);
-            errors.add(name, views(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
+            errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
-                errors.add(name, "unobserved", &truth.instances, unobserved, error);
+                errors.add(kind, Views::Unobserved, &truth.instances, unobserved, error);
             }
         }
     }
@@ -188,15 +189,15 @@ impl SceneOrder<'_> {
         &self,
         view: &View,
         region: &MaskedRegion,
-        name: &str,
-        lighting: Option<&String>,
+        kind: PictureKind,
+        lighting: Option<LightingName>,
         measured: Vec<Measured>,
     ) -> Vec<PictureValue> {
         let value = |measured: Measured| PictureValue {
             scene: self.scene.id.clone(),
             view: view.id.clone(),
-            picture: format!("{name}{}", region.suffix),
-            lighting: lighting.cloned(),
+            picture: PictureName { kind, surfaces: region.surfaces },
+            lighting,
             region: region.region,
             metric: measured.metric,
             value: measured.value,
@@ -218,14 +219,18 @@ impl SceneOrder<'_> {
 
 /// The regions of a view that have values of their own.
 pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
-    let mut regions = vec![MaskedRegion { region: Region::Valid, suffix: "", mask: truth.valid.clone() }];
+    let mut regions = vec![MaskedRegion { region: Region::Valid, surfaces: Surfaces::All, mask: truth.valid.clone() }];
     let unobserved = truth.unobserved.as_ref();
-    regions.extend(unobserved.map(|mask| MaskedRegion { region: Region::Unobserved, suffix: "", mask: mask.clone() }));
+    regions.extend(unobserved.map(|mask| MaskedRegion {
+        region: Region::Unobserved,
+        surfaces: Surfaces::All,
+        mask: mask.clone(),
+    }));
     if let Some(specular) = &truth.specular {
-        regions.push(MaskedRegion { region: Region::Valid, suffix: "_specular", mask: specular.clone() });
+        regions.push(MaskedRegion { region: Region::Valid, surfaces: Surfaces::Specular, mask: specular.clone() });
         regions.extend(unobserved.map(|mask| MaskedRegion {
             region: Region::Unobserved,
-            suffix: "_specular",
+            surfaces: Surfaces::Specular,
             mask: intersection(mask, specular),
         }));
     }

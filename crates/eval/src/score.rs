@@ -15,9 +15,12 @@ use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
+use crate::metric::Metric;
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
-use crate::result::{MissingMetric, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise};
+use crate::result::{
+    MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
+};
 use crate::scene_score::{SceneOrder, SceneScore, score_scene};
 use mateval_submission::map_file::{MapFault, check_place, is_there};
 use mateval_submission::prediction::{PredictedScene, map_files, read_scene};
@@ -326,14 +329,18 @@ fn protocol_result(protocol: &Protocol, fingerprint: String, scores: Vec<(SceneI
 fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
     let mut missing = Vec::new();
     if let LpipsWeights::Missing { reason, mend } = &plan.lpips {
-        missing.push(MissingMetric { metric: "lpips_alex".to_owned(), reason: reason.clone(), mend: mend.clone() });
+        missing.push(MissingMetric {
+            metric: MissingNumbers::Metric(Metric::LpipsAlex),
+            reason: reason.clone(),
+            mend: mend.clone(),
+        });
     }
     if plan.dataset.file.scored_renderer.is_none() {
         let mut tracks: Vec<Track> = plan.protocols.iter().flat_map(|p| p.light.tracks.clone()).collect();
         tracks.sort_unstable();
         tracks.dedup();
         missing.extend(tracks.into_iter().map(|track| MissingMetric {
-            metric: track.picture().to_owned(),
+            metric: MissingNumbers::Picture(track.picture()),
             reason: "the dataset has no renders to compare with".to_owned(),
             mend: "mateval prep render DATASET".to_owned(),
         }));

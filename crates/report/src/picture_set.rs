@@ -44,10 +44,10 @@ pub fn write(
                 Ok(png_io::write_rgb_bytes(&path, picture)?)
             };
             for (method, picture) in std::iter::once(&TRUTH).chain(names).zip(&row.shown) {
-                write(method, shown.name(), &valid_alone(&row, picture))?;
+                write(method, shown.kind().word(), &valid_alone(&row, picture))?;
             }
             for (method, error) in names.iter().zip(errors(&row)) {
-                write(method, &format!("{}{ERROR}", shown.name()), &error)?;
+                write(method, &format!("{}{ERROR}", shown.kind()), &error)?;
             }
         }
     }

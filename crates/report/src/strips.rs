@@ -12,6 +12,7 @@ use mateval_scene::{Progress, SceneError, SceneId};
 use crate::error::ReportError;
 use mateval_eval::light_rules::Track;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result_key::PictureKind;
 use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
 
@@ -65,10 +66,10 @@ pub(crate) struct StripRow {
 }
 
 impl Shown {
-    /// As in the keys of a result.
-    pub fn name(self) -> &'static str {
+    /// The kind of picture, after which files are named.
+    pub fn kind(self) -> PictureKind {
         match self {
-            Self::Albedo => "albedo",
+            Self::Albedo => PictureKind::Albedo,
             Self::Light { track, .. } => track.picture(),
         }
     }
@@ -82,7 +83,7 @@ impl Shown {
 pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, ReportError> {
     let chosen = plan.dataset.chosen_scenes(plan.scenes)?;
     let paths = |scene: &SceneId, shown: Shown| {
-        ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.name())))
+        ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.kind())))
     };
     let jobs: Vec<(&SceneFile, Shown)> =
         chosen.iter().flat_map(|scene| plan.shown.iter().map(|shown| (*scene, *shown))).collect();

@@ -6,6 +6,7 @@ use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_path_to_error::Segment;
 
 use crate::{Finding, SceneError, Severity};
 
@@ -25,7 +26,7 @@ pub fn write<T: Serialize>(path: &Path, value: &T) -> Result<(), SceneError> {
     Ok(write_whole(path, to_text(value).as_bytes())?)
 }
 
-/// Reads a file. An error names the line and column.
+/// Reads a file; what does not fit is an error with its JSON pointer, line and column.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
     read_within(path, MAX_JSON_BYTES)
 }
@@ -33,8 +34,21 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
 /// Reads a file of at most `most` bytes.
 pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
     let text = read_at_most(path, most).map_err(SceneError::io("read", path))?;
-    serde_json::from_slice(&text)
-        .map_err(|error| invalid(path, format!("line {} column {}", error.line(), error.column()), error.to_string()))
+    // The path costs time, so that only a second look at what is known to be bad follows it.
+    serde_json::from_slice(&text).map_err(|error| invalid(path, pointer::<T>(&text), error.to_string()))
+}
+
+/// The JSON pointer of the first fault; empty where the text is no JSON at all, or the fault is in the whole of it.
+fn pointer<T: DeserializeOwned>(text: &[u8]) -> String {
+    let fault = serde_path_to_error::deserialize::<_, T>(&mut serde_json::Deserializer::from_slice(text)).err();
+    let step = |segment: &Segment| match segment {
+        Segment::Map { key } => Some(key.replace('~', "~0").replace('/', "~1")),
+        Segment::Seq { index } => Some(index.to_string()),
+        // Which variant of an enum was chosen is no place of a file.
+        Segment::Enum { .. } | Segment::Unknown => None,
+    };
+    let steps = fault.iter().flat_map(|fault| fault.path().iter()).filter_map(step);
+    steps.map(|step| format!("/{step}")).collect()
 }
 
 fn invalid(path: &Path, place: String, message: String) -> SceneError {
@@ -60,6 +74,16 @@ mod tests {
         std::fs::write(&path, "{\n \"format\": 3}").unwrap();
         let text = read::<crate::dataset::TargetsFile>(&path).unwrap_err().to_string();
         assert!(text.contains("targets.json") && text.contains("line 2"), "{text}");
+    }
+
+    #[test]
+    fn faults_carry_their_json_pointer() {
+        type Nested = std::collections::BTreeMap<String, Vec<std::collections::BTreeMap<String, u8>>>;
+        for (text, expected) in
+            [(r#"{"a/b": [{}, {"c": 1, "d": "x"}]}"#, "/a~1b/1/d"), (r#"{"a": 3}"#, "/a"), ("[]", ""), ("{", "")]
+        {
+            assert_eq!(pointer::<Nested>(text.as_bytes()), expected, "{text}");
+        }
     }
 
     #[test]

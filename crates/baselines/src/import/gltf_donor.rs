@@ -10,7 +10,6 @@ use gltf::mesh::Mode;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
-use mateval_scene::gltf_error::GltfError;
 use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};

@@ -1,6 +1,8 @@
 //! What the pictures of `eval pictures` and `eval leaderboard` show: `--picture` and `--samples`.
 
+use clap::builder::PossibleValue;
 use mateval_eval::light_rules::Track;
+use mateval_eval::result_key::PictureKind;
 use mateval_report::strips::Shown;
 
 /// Pictures to draw, and how exactly.
@@ -14,16 +16,26 @@ pub struct StripArgs {
     samples: u32,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum StripPicture {
-    /// base_color.
     Albedo,
-    /// RGB under the scene's own lights.
-    #[value(name = "rgb_true")]
     RgbTrue,
-    /// RGB under lights fitted to the input view.
-    #[value(name = "rgb_fitted")]
     RgbFitted,
+}
+
+impl clap::ValueEnum for StripPicture {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Albedo, Self::RgbTrue, Self::RgbFitted]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (kind, help) = match self {
+            Self::Albedo => (PictureKind::Albedo, "base_color"),
+            Self::RgbTrue => (PictureKind::RgbTrue, "RGB under the scene's own lights"),
+            Self::RgbFitted => (PictureKind::RgbFitted, "RGB under lights fitted to the input view"),
+        };
+        Some(PossibleValue::new(kind.word()).help(help))
+    }
 }
 
 impl StripArgs {

@@ -2,8 +2,10 @@
 
 use std::f64::consts::LN_10;
 
+use mateval_eval::metric::Metric;
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::result::ResultFile;
+use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::{Halves, NoiseFreeMse, noise_free_mse, psnr_mean_error};
 use mateval_scene::material::PrincipledFlavour;
@@ -30,10 +32,15 @@ pub struct TrackNoise {
     pub certified: f64,
 }
 
+/// The key of a track's PSNR (see [`crate::TRACKS`]).
+fn psnr(track: usize, views: Views) -> ResultKey {
+    ResultKey::whole([PictureKind::RgbTrue, PictureKind::RgbFitted][track], views, Metric::Psnr)
+}
+
 /// Samples a pixel and half that the tracks took.
 pub fn samples(scored: &ResultFile) -> [u32; 2] {
     let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
-    crate::TRACKS.map(|track| noise[&format!("rgb_{track}.input.psnr")].samples)
+    [0, 1].map(|track| noise[&psnr(track, Views::Input)].samples)
 }
 
 /// What was fitted, light by light.
@@ -138,11 +145,11 @@ pub fn plain_samples(room: &Room, pair: &Pair, masks: &[Mask], samples: u32, sco
         noise_free(room, pair, masks).iter().enumerate().map(|(view, mse)| too_small(view, mse)).collect();
     let (input, novel) = by_view.split_at(INPUT_VIEWS);
     let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
-    let needed = |(views, region): (&[f64], &str)| {
-        let mean = views.iter().sum::<f64>() / views.len() as f64;
-        mean / noise[&format!("rgb_{}.{region}.psnr", crate::TRACKS[track])].standard_error_db.unwrap()
+    let needed = |(values, views): (&[f64], Views)| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        mean / noise[&psnr(track, views)].standard_error_db.unwrap()
     };
-    [(input, "input"), (novel, "novel")].map(needed).into_iter().fold(0.0, f64::max)
+    [(input, Views::Input), (novel, Views::Novel)].map(needed).into_iter().fold(0.0, f64::max)
 }
 
 /// As it is compared: times the exposure, clipped to 0..1 and sRGB-encoded.

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-/// LPIPS depends on the processor in its last digits.
-const LPIPS_TOLERANCE: f64 = 1e-5;
+use crate::metric::Metric;
+use crate::result_key::ResultKey;
 
 /// Two values at one place that are not the same.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,56 +14,53 @@ pub(super) struct Difference {
     pub(super) found: String,
 }
 
-/// All differences, in the order of places. Numbers must be the same to the last bit, those of LPIPS to 1e-5.
+/// All differences, in the order of places. Numbers must be the same to the last bit, or within their metric's
+/// [`Metric::tolerance`].
 pub(super) fn differences(said: &Value, found: &Value) -> Vec<Difference> {
     let mut differences = Vec::new();
-    compare(said, found, &Place { pointer: String::new(), is_lpips: false }, &mut differences);
+    compare(said, found, &Place { pointer: String::new(), tolerance: 0.0 }, &mut differences);
     differences
 }
 
 struct Place {
     pointer: String,
-    is_lpips: bool,
+    tolerance: f64,
 }
 
 impl Place {
-    fn below(&self, key: &str, is_lpips: bool) -> Self {
+    fn below(&self, key: &str, tolerance: f64) -> Self {
         let escaped = key.replace('~', "~0").replace('/', "~1");
-        Self { pointer: format!("{}/{escaped}", self.pointer), is_lpips }
+        Self { pointer: format!("{}/{escaped}", self.pointer), tolerance }
     }
 }
 
 fn compare(said: &Value, found: &Value, place: &Place, differences: &mut Vec<Difference>) {
     match (said, found) {
         (Value::Object(a), Value::Object(b)) => {
-            let is_lpips_value = a.get("metric").and_then(Value::as_str).is_some_and(is_lpips);
+            let metric = a.get("metric").and_then(Value::as_str).and_then(|word| word.parse::<Metric>().ok());
             let mut keys: Vec<&String> = a.keys().chain(b.keys()).collect();
             keys.sort();
             keys.dedup();
             for key in keys {
-                // `<picture>.<views>.<metric>`, or the value beside its metric.
-                let lpips = key.rsplit('.').next().is_some_and(is_lpips) || (is_lpips_value && key == "value");
+                // A mean by its key, or the value beside its metric.
+                let metric = key.parse::<ResultKey>().map(|key| key.metric).ok().or(metric.filter(|_| key == "value"));
                 let pair = [a, b].map(|map| map.get(key).unwrap_or(&Value::Null));
-                compare(pair[0], pair[1], &place.below(key, lpips), differences);
+                compare(pair[0], pair[1], &place.below(key, metric.map_or(0.0, Metric::tolerance)), differences);
             }
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
             for (at, (a, b)) in a.iter().zip(b).enumerate() {
-                compare(a, b, &place.below(&at.to_string(), false), differences);
+                compare(a, b, &place.below(&at.to_string(), 0.0), differences);
             }
         }
-        _ if same(said, found, place.is_lpips) => {}
+        _ if same(said, found, place.tolerance) => {}
         _ => differences.push(Difference { place: place.pointer.clone(), said: short(said), found: short(found) }),
     }
 }
 
-fn is_lpips(metric: &str) -> bool {
-    metric.starts_with("lpips")
-}
-
-fn same(said: &Value, found: &Value, is_lpips: bool) -> bool {
+fn same(said: &Value, found: &Value, tolerance: f64) -> bool {
     match (said.as_f64(), found.as_f64()) {
-        (Some(a), Some(b)) if is_lpips => (a - b).abs() <= LPIPS_TOLERANCE,
+        (Some(a), Some(b)) if tolerance > 0.0 => (a - b).abs() <= tolerance,
         _ => said == found,
     }
 }

@@ -14,8 +14,9 @@ use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Progress, Severity, json};
 
 use crate::error::EvalError;
+use crate::metric::Metric;
 use crate::protocol::Protocol;
-use crate::result::ResultFile;
+use crate::result::{MissingNumbers, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
 use differences::{Difference, differences};
 pub use file::{VERIFICATION_FORMAT, VerificationFile};
@@ -80,7 +81,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
 
 /// A result without LPIPS is made anew without it.
 fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
-    match result.missing.iter().find(|missing| missing.metric == "lpips_alex") {
+    match result.missing.iter().find(|missing| missing.metric == MissingNumbers::Metric(Metric::LpipsAlex)) {
         Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), mend: missing.mend.clone() },
         None => lpips,
     }

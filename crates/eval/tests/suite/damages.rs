@@ -5,7 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mateval_eval::result::{PictureValue, ProtocolResult, Region};
+use mateval_eval::metric::Metric;
+use mateval_eval::result::ProtocolResult;
+use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 
@@ -105,26 +107,17 @@ fn results() -> Results {
 
 /// Standard errors of the summary's values that render noise makes: of each picture's, averaged as the values are, as if
 /// all were off by the same noise.
-fn noise(result: &ProtocolResult) -> BTreeMap<String, f64> {
-    let mut scenes: BTreeMap<(String, String), Vec<f64>> = BTreeMap::new();
+fn noise(result: &ProtocolResult) -> BTreeMap<ResultKey, f64> {
+    let mut scenes: BTreeMap<(ResultKey, String), Vec<f64>> = BTreeMap::new();
     for picture in result.pictures.iter().filter(|picture| picture.value.is_some()) {
         let error = picture.noise.as_ref().map_or(0.0, |noise| noise.standard_error);
-        scenes.entry((key(picture), picture.scene.to_string())).or_default().push(error);
+        scenes.entry((picture.key(), picture.scene.to_string())).or_default().push(error);
     }
-    let mut summary: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut summary: BTreeMap<ResultKey, Vec<f64>> = BTreeMap::new();
     for ((key, _), errors) in scenes {
         summary.entry(key).or_default().push(mean(&errors));
     }
     summary.into_iter().map(|(key, errors)| (key, mean(&errors))).collect()
-}
-
-fn key(picture: &PictureValue) -> String {
-    let views = match (picture.region, picture.view.as_str()) {
-        (Region::Unobserved, _) => "unobserved",
-        (_, "input") => "input",
-        _ => "novel",
-    };
-    format!("{}.{views}.{}", picture.picture, picture.metric)
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -132,18 +125,17 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// By how much `a` is better than `b`, in the metric's own units.
-fn lead(key: &str, a: &ProtocolResult, b: &ProtocolResult) -> f64 {
-    let less_is_better = key.ends_with("mse");
-    let difference = a.summary[key] - b.summary[key];
-    if less_is_better { -difference } else { difference }
+fn lead(key: ResultKey, a: &ProtocolResult, b: &ProtocolResult) -> f64 {
+    key.metric.better().sign() * (a.summary[&key] - b.summary[&key])
 }
 
 /// Pictures whose squared error a kind of damage has to raise, the more of it the more.
-fn told_by(kind: &str) -> &'static [&'static str] {
+fn told_by(kind: &str) -> &'static [PictureKind] {
+    use PictureKind::*;
     match kind {
-        "smoother" => &["roughness", "texture_roughness"],
-        "metallic" => &["metallic", "texture_metallic", "rgb_true", "rgb_relit"],
-        _ => &["albedo", "texture_base_color", "rgb_true", "rgb_fitted", "rgb_relit"],
+        "smoother" => &[Roughness, TextureRoughness],
+        "metallic" => &[Metallic, TextureMetallic, RgbTrue, RgbRelit],
+        _ => &[Albedo, TextureBaseColor, RgbTrue, RgbFitted, RgbRelit],
     }
 }
 
@@ -152,7 +144,7 @@ fn the_truth_is_never_beaten_and_more_damage_is_worse() {
     let Results { truth, damaged } = results();
     let noise = noise(&truth);
     let (mut wrong, mut compared) = (Vec::new(), 0);
-    let mut hold = |what: &str, key: &str, lead: f64, least: f64| {
+    let mut hold = |what: &str, key: ResultKey, lead: f64, least: f64| {
         compared += 1;
         if lead < least {
             wrong.push(format!("{what}: {key}: {lead:.2e}, expected {least:.2e} or more"));
@@ -161,15 +153,15 @@ fn the_truth_is_never_beaten_and_more_damage_is_worse() {
     for (kind, strengths) in &damaged {
         for (strength, damage) in strengths.iter().enumerate() {
             let what = format!("{kind} {strength}");
-            for key in truth.summary.keys() {
+            for &key in truth.summary.keys() {
                 // What SSIM owes to noise is not told with it.
-                let own = if key.ends_with("ssim") { 0.01 } else { noise.get(key).copied().unwrap_or(0.0) };
+                let own = if key.metric == Metric::Ssim { 0.01 } else { noise.get(&key).copied().unwrap_or(0.0) };
                 hold(&what, key, lead(key, &truth, damage), -3.0 * own);
             }
             let before = strength.checked_sub(1).map_or(&truth, |less| &strengths[less]);
-            for key in truth.summary.keys().filter(|key| key.ends_with(".mse")) {
-                let picture = key.split('.').next().unwrap();
-                if told_by(kind).contains(&picture) {
+            for &key in truth.summary.keys().filter(|key| key.metric == Metric::Mse) {
+                let is_whole = key.picture.surfaces == Surfaces::All;
+                if is_whole && told_by(kind).contains(&key.picture.kind) {
                     hold(&what, key, lead(key, before, damage), f64::MIN_POSITIVE);
                 }
             }
@@ -179,6 +171,6 @@ fn the_truth_is_never_beaten_and_more_damage_is_worse() {
     assert!(compared > 1000, "{compared}");
     // The twin: the worst damage as if it were the truth.
     let worst = &damaged[3].1[1];
-    let beaten = truth.summary.keys().filter(|key| lead(key, worst, &truth) < -3.0 * noise.get(*key).unwrap_or(&0.0));
+    let beaten = truth.summary.keys().filter(|key| lead(**key, worst, &truth) < -3.0 * noise.get(*key).unwrap_or(&0.0));
     assert!(beaten.count() > 20);
 }

@@ -1,6 +1,7 @@
 //! What the paper's mask rule does to a strip: most of the frame is black in both pictures, and counts as alike.
 
 use mateval_eval::measure::{Measured, albedo_metrics};
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::{MaskRule, Protocol};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_metrics::Lpips;
@@ -40,7 +41,7 @@ fn measured(rule: MaskRule, mask: &Mask, lpips: Option<&Lpips>) -> Vec<Measured>
     albedo_metrics(&protocol, lpips, &prediction(), &reference(), mask).unwrap()
 }
 
-fn value(measured: &[Measured], metric: &str) -> Option<f64> {
+fn value(measured: &[Measured], metric: Metric) -> Option<f64> {
     measured.iter().find(|found| found.metric == metric)?.value
 }
 
@@ -56,13 +57,13 @@ fn a_black_frame_dilutes_a_strip() {
         for mask in strips(columns) {
             let [inside, black] =
                 [MaskRule::Inside, MaskRule::BlackFill].map(|rule| measured(rule, &mask, lpips.as_ref()));
-            for metric in ["mse", "psnr"] {
+            for metric in [Metric::Mse, Metric::Psnr] {
                 assert_eq!(value(&inside, metric), value(&black, metric), "{metric} looks outside the strip");
             }
-            let [s, diluted] = [&inside, &black].map(|found| value(found, "ssim").unwrap());
+            let [s, diluted] = [&inside, &black].map(|found| value(found, Metric::Ssim).unwrap());
             let off = |share: f64| (diluted - (1.0 - share * (1.0 - s))).abs();
             assert!(off(share) < ACROSS && off(other) > ACROSS, "{share}: SSIM {s} inside, {diluted} black");
-            let [l, diluted] = [&inside, &black].map(|found| value(found, "lpips_alex"));
+            let [l, diluted] = [&inside, &black].map(|found| value(found, Metric::LpipsAlex));
             let Some((l, diluted)) = l.zip(diluted) else { continue };
             let off = |share: f64| (diluted / (share * l) - 1.0).abs();
             assert!(off(share) < 0.15 && off(other) > 0.3, "{share}: LPIPS {l} inside, {diluted} black");

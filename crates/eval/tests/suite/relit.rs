@@ -37,7 +37,7 @@ fn weights_follow_the_rule() {
         let scene = dataset().scenes.iter().find(|scene| scene.id.as_str() == id).unwrap();
         let (pictures, lightings) = groups_and_lightings(scene);
         let brightest_first = by_luminance(scene, &pictures);
-        let names: Vec<&str> = lightings.iter().map(|lighting| lighting.name.as_str()).collect();
+        let names: Vec<String> = lightings.iter().map(|lighting| lighting.name.to_string()).collect();
         assert_eq!(names, ["dim", "warm_cool", "alone_1", "alone_2", "alone_3"], "{id}");
         assert_eq!((pictures.len(), &lightings[0].weights), (groups, &vec![[rules.dim; 3]; groups]), "{id}");
         for (place, group) in brightest_first.iter().copied().enumerate() {
@@ -75,7 +75,7 @@ fn a_weighted_sum_is_a_render_under_those_lights() {
     for [id, name, other] in CASES {
         let scene = dataset().scenes.iter().find(|scene| scene.id.as_str() == id).unwrap();
         let (_, lightings) = groups_and_lightings(scene);
-        let named = |name: &str| lightings.iter().find(|lighting| lighting.name == name).unwrap();
+        let named = |name: &str| lightings.iter().find(|lighting| lighting.name.to_string() == name).unwrap();
         let fresh = fresh(scene, &lit(scene, named(name)).unwrap());
         let [pixels, tiles, whole] = compare(scene, named(name), &fresh);
         assert!(pixels < 1.7 && tiles < 2.0 && whole < 9.0, "{id} {name}: {pixels} {tiles} {whole}");

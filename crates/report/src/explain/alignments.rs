@@ -12,6 +12,7 @@ use crate::error::ReportError;
 use mateval_eval::alignment::scaled;
 use mateval_eval::measure::albedo_mse;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result_key::Views;
 use mateval_eval::shown_scene::SceneAlbedo;
 
 const ALL: [AlignedBy; 6] = [
@@ -46,22 +47,22 @@ pub(super) fn alignments(
 
 fn of_kind(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Result<Vec<AlignmentScores>, MetricError> {
     let scales = scales(by, views);
-    let mut values: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    let mut values: BTreeMap<Views, Vec<f64>> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
         let aligned = aligned(by, &scales, number, view);
         // Only the input view has no unobserved pixels.
-        let whole = if view.truth.unobserved.is_none() { "input" } else { "novel" };
-        let regions = [(whole, Some(&view.truth.valid)), ("unobserved", view.truth.unobserved.as_ref())];
+        let whole = if view.truth.unobserved.is_none() { Views::Input } else { Views::Novel };
+        let regions = [(whole, Some(&view.truth.valid)), (Views::Unobserved, view.truth.unobserved.as_ref())];
         for (name, mask) in regions {
             let Some(mask) = mask else { continue };
             let mse = albedo_mse(protocol, &aligned, &view.truth.albedo, mask)?;
             values.entry(name).or_default().extend(mse);
         }
     }
-    let score = |(views, values): (&str, Vec<f64>)| {
+    let score = |(views, values): (Views, Vec<f64>)| {
         let psnr = values.iter().map(|mse| Ok(Psnr::from_mse(*mse)?.db)).collect::<Result<Vec<f64>, MetricError>>()?;
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        Ok(AlignmentScores { scales: by, views: views.to_owned(), mse: mean(&values), psnr: mean(&psnr) })
+        Ok(AlignmentScores { scales: by, views, mse: mean(&values), psnr: mean(&psnr) })
     };
     values.into_iter().filter(|(_, values)| !values.is_empty()).map(score).collect()
 }
@@ -147,15 +148,15 @@ mod tests {
         let protocol = Protocol::named("mateval-1").unwrap();
         let scores = alignments(&SceneId::new("s").unwrap(), &protocol, &views()).unwrap();
         assert_eq!(scores.len(), 6 * 3);
-        let mse = |by: AlignedBy, views: &str| {
+        let mse = |by: AlignedBy, views: Views| {
             scores.iter().find(|score| score.scales == by && score.views == views).unwrap().mse
         };
-        for views in ["input", "novel", "unobserved"] {
+        for views in [Views::Input, Views::Novel, Views::Unobserved] {
             assert!(mse(AlignedBy::Instance, views) < 1e-12);
             assert!(mse(AlignedBy::InstanceAndChannel, views) < 1e-12);
             assert!(mse(AlignedBy::Scene, views) > 1e-3);
         }
-        assert!(mse(AlignedBy::SceneAndChannel, "input") <= mse(AlignedBy::Scene, "input"));
-        assert!(mse(AlignedBy::Scene, "input") < mse(AlignedBy::None, "input"));
+        assert!(mse(AlignedBy::SceneAndChannel, Views::Input) <= mse(AlignedBy::Scene, Views::Input));
+        assert!(mse(AlignedBy::Scene, Views::Input) < mse(AlignedBy::None, Views::Input));
     }
 }

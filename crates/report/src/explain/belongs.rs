@@ -5,8 +5,10 @@ use mateval_scene::submission::SUBMISSION;
 use super::file::{AlignedBy, ExplainFile};
 use super::{ExplainPlan, protocol_of};
 use crate::error::ReportError;
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::{ProtocolResult, RESULT_FORMAT};
+use mateval_eval::result_key::{PictureKind, ResultKey};
 use mateval_eval::score::{HashedSubmission, hashed_submission};
 
 /// The scores that are to be explained; fails with everything that does not fit.
@@ -67,10 +69,10 @@ fn submission_fault(plan: &ExplainPlan<'_>) -> Result<Option<String>, ReportErro
 /// something else.
 pub(super) fn check_scores(scores: &ProtocolResult, file: &ExplainFile) -> Result<(), ReportError> {
     let of_scene = scores.scenes.get(&file.scene);
-    let pictures = [(AlignedBy::None, "albedo"), (AlignedBy::PictureAndChannel, "albedo_aligned")];
+    let pictures = [(AlignedBy::None, PictureKind::Albedo), (AlignedBy::PictureAndChannel, PictureKind::AlbedoAligned)];
     for alignment in &file.alignments {
         let Some((_, picture)) = pictures.iter().find(|(scales, _)| *scales == alignment.scales) else { continue };
-        let key = format!("{picture}.{}.mse", alignment.views);
+        let key = ResultKey::whole(*picture, alignment.views, Metric::Mse);
         let expected = of_scene.and_then(|keys| keys.get(&key)).copied();
         if expected.is_none_or(|expected| (expected - alignment.mse).abs() > 1e-9 * expected.max(1e-12)) {
             let expected = expected.map_or("missing".to_owned(), |expected| expected.to_string());

@@ -1,5 +1,6 @@
 //! Type of the explanation that `mateval eval explain --format json` prints.
 
+use mateval_eval::result_key::{PictureKind, Views};
 use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -113,7 +114,7 @@ pub struct AlignmentScores {
     /// What has a scale of its own.
     pub scales: AlignedBy,
     /// `input`, `novel`, `unobserved`.
-    pub views: String,
+    pub views: Views,
     /// Mean over pictures.
     pub mse: f64,
     /// Mean of the pictures' PSNR, in dB.
@@ -143,7 +144,7 @@ pub enum AlignedBy {
 #[serde(deny_unknown_fields)]
 pub struct LightShare {
     /// `rgb_true` or `rgb_fitted`.
-    pub picture: String,
+    pub picture: PictureKind,
     /// The instance.
     pub instance: InstanceId,
     /// Its category.

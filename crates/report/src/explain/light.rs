@@ -7,24 +7,28 @@ use mateval_scene::{InstanceId, SceneId};
 use super::WORST;
 use super::file::LightShare;
 use mateval_eval::result::ProtocolResult;
+use mateval_eval::result_key::{PictureKind, Views};
+
+/// The tracks of light that instances have errors of.
+pub(super) const LIGHTS: [PictureKind; 2] = [PictureKind::RgbTrue, PictureKind::RgbFitted];
 
 /// Of each track in turn the instances with the largest shares of the scene's squared error in the input view and the
 /// novel ones, the largest first.
 pub(super) fn worst(scores: &ProtocolResult, scene: &SceneId) -> Vec<LightShare> {
-    ["rgb_true", "rgb_fitted"].into_iter().flat_map(|picture| of_track(scores, scene, picture)).collect()
+    LIGHTS.into_iter().flat_map(|picture| of_track(scores, scene, picture)).collect()
 }
 
-fn of_track(scores: &ProtocolResult, scene: &SceneId, picture: &str) -> Vec<LightShare> {
+fn of_track(scores: &ProtocolResult, scene: &SceneId, picture: PictureKind) -> Vec<LightShare> {
     let mut sums: BTreeMap<&InstanceId, (f64, usize, Option<String>)> = BTreeMap::new();
     let of_scene = scores.instances.iter().filter(|errors| errors.scene == *scene && errors.picture == picture);
-    for errors in of_scene.filter(|errors| errors.views == "input" || errors.views == "novel") {
+    for errors in of_scene.filter(|errors| matches!(errors.views, Views::Input | Views::Novel)) {
         let sum = sums.entry(&errors.instance).or_insert_with(|| (0.0, 0, errors.category.clone()));
         sum.0 += errors.mse * errors.pixels as f64;
         sum.1 += errors.pixels;
     }
     let total: f64 = sums.values().map(|(sum, ..)| sum).sum();
     let share = |(instance, (sum, pixels, category)): (&InstanceId, (f64, usize, Option<String>))| LightShare {
-        picture: picture.to_owned(),
+        picture,
         instance: instance.clone(),
         category,
         pixels,

@@ -8,6 +8,7 @@ use super::patch::Patch;
 use super::{light, lost_detail, text};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{InstancePixelErrors, ProtocolResult};
+use mateval_eval::result_key::{PictureKind, Views};
 
 type Pixel = [f64; 3];
 
@@ -147,14 +148,14 @@ fn sums_of_instances_add_up() {
     assert!((shares[0] * whole.squared_error - scale).abs() < 1e-9 * scale);
 }
 
-fn errors(instance: &str, views: &str, pixels: usize, mse: f64) -> InstancePixelErrors {
+fn errors(instance: &str, views: Views, pixels: usize, mse: f64) -> InstancePixelErrors {
     InstancePixelErrors {
         scene: SceneId::new("s").unwrap(),
         instance: InstanceId::new(instance).unwrap(),
         category: None,
         super_category: None,
-        picture: "rgb_true".to_owned(),
-        views: views.to_owned(),
+        picture: PictureKind::RgbTrue,
+        views,
         pixels,
         mse,
     }
@@ -164,10 +165,10 @@ fn errors(instance: &str, views: &str, pixels: usize, mse: f64) -> InstancePixel
 #[test]
 fn lights_worst_instances_by_share() {
     let instances = vec![
-        errors("a", "input", 10, 0.2),
-        errors("a", "novel", 30, 0.2),
-        errors("a", "unobserved", 30, 9.0),
-        errors("b", "input", 100, 0.02),
+        errors("a", Views::Input, 10, 0.2),
+        errors("a", Views::Novel, 30, 0.2),
+        errors("a", Views::Unobserved, 30, 9.0),
+        errors("b", Views::Input, 100, 0.02),
     ];
     let scores = ProtocolResult {
         protocol: Protocol::named("mateval-1").unwrap(),

@@ -5,8 +5,11 @@ use std::fmt::Write as _;
 use mateval_scene::ViewId;
 use mateval_scene::text_table::Table;
 
+use mateval_eval::result_key::{PictureKind, Views};
+
 use super::WORST;
 use super::file::{AlignedBy, AlignmentScores, ExplainFile, InstanceExplanation, KindShares, LightShare};
+use super::light::LIGHTS;
 use crate::strips::WHITE_ERROR;
 
 /// A picture of one of the worst instances.
@@ -76,9 +79,9 @@ fn findings(file: &ExplainFile) -> Option<String> {
 
 fn tables(file: &ExplainFile) -> Vec<Table> {
     let mut tables = vec![kinds(file), details(file), alignments(&file.alignments)];
-    for (picture, title) in [("rgb_true", "true light"), ("rgb_fitted", "fitted light")] {
+    for picture in LIGHTS {
         let shares: Vec<&LightShare> = file.light.iter().filter(|share| share.picture == picture).collect();
-        tables.extend((!shares.is_empty()).then(|| light(title, &shares)));
+        tables.extend((!shares.is_empty()).then(|| light(picture, &shares)));
     }
     tables
 }
@@ -127,7 +130,7 @@ fn details(file: &ExplainFile) -> Table {
 }
 
 fn alignments(scores: &[AlignmentScores]) -> Table {
-    let views = ["input", "novel", "unobserved"];
+    let views = [Views::Input, Views::Novel, Views::Unobserved];
     let heads = views.iter().flat_map(|views| [format!("{views} MSE (1e-3)"), format!("{views} PSNR")]);
     let mut rows = vec![["Scales of".to_owned()].into_iter().chain(heads).collect::<Vec<_>>()];
     let kinds = [
@@ -149,14 +152,14 @@ fn alignments(scores: &[AlignmentScores]) -> Table {
     Table { title: "What scales alone would mend (in the protocol's space)".to_owned(), words: 1, rows }
 }
 
-fn light(title: &str, shares: &[&LightShare]) -> Table {
+fn light(picture: PictureKind, shares: &[&LightShare]) -> Table {
     let mut rows = vec![["Instance", "Category", "Share %", "Pixels", "MSE (1e-3)"].map(str::to_owned).to_vec()];
     rows.extend(shares.iter().map(|share| {
         let category = share.category.as_deref().unwrap_or("other").to_owned();
         let numbers = [percent(share.share), share.pixels.to_string(), thousandths(share.mse)];
         [share.instance.to_string(), category].into_iter().chain(numbers).collect()
     }));
-    Table { title: format!("RGB, {title}: the worst instances of the result"), words: 2, rows }
+    Table { title: format!("{}: the worst instances of the result", picture.title()), words: 2, rows }
 }
 
 fn percent(share: f64) -> String {

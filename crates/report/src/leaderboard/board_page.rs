@@ -11,6 +11,8 @@ use super::columns::{Choices, Column, choices};
 use super::heads::{Cell, MethodHead, rank_text, standing};
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
+use mateval_eval::result_key::ResultKey;
+
 use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
 
 #[derive(Serialize)]
@@ -58,14 +60,14 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     })?;
     for column in &board.columns {
         if let Some(key) = board.ranking().keys.get(&column.key) {
-            site.file(&format!("wins/{}.js", column.key), &wins(&column.key, key, &board.ranking().methods))?;
+            site.file(&format!("wins/{}.js", column.key), &wins(column.key, key, &board.ranking().methods))?;
         }
     }
     Ok(())
 }
 
 fn row<'a>(board: &'a Board<'_>, head: &'a MethodHead, first: &Column) -> Row<'a> {
-    let of = |column: &Column| standing(board.ranking(), &column.key, &head.id);
+    let of = |column: &Column| standing(board.ranking(), column.key, &head.id);
     let cells = board.columns.iter().map(|column| of(column).map(|standing| Cell::new(column, standing)));
     let first = of(first);
     Row {
@@ -85,7 +87,7 @@ struct Wins<'a> {
 }
 
 /// A script that hands the page who beats whom, the best first.
-fn wins(key: &str, ranking: &KeyRanking, methods: &[RankedMethod]) -> String {
+fn wins(key: ResultKey, ranking: &KeyRanking, methods: &[RankedMethod]) -> String {
     let mut standings: Vec<&Standing> = ranking.standings.iter().collect();
     standings.sort_by(|a, b| (ranking.better.sign() * b.value).total_cmp(&(ranking.better.sign() * a.value)));
     let ids: Vec<&str> = standings.iter().map(|standing| standing.method.as_str()).collect();
@@ -109,5 +111,5 @@ fn wins(key: &str, ranking: &KeyRanking, methods: &[RankedMethod]) -> String {
         }
     }
     // JSON is JavaScript.
-    format!("boardWins({}, {});\n", serde_json::Value::from(key), serde_json::json!(told))
+    format!("boardWins({}, {});\n", serde_json::json!(key), serde_json::json!(told))
 }

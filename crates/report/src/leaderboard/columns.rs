@@ -1,43 +1,22 @@
 //! Keys of results as the columns that readers choose from: picture, views, metric.
 
+use mateval_eval::metric::{Better, Metric};
+use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
 use serde::Serialize;
 
 use crate::ranking::file::Ranking;
-use mateval_eval::metric_kind::{Better, Metric, SCORES, score_of_key};
-
-/// Pictures in the order in which they are offered.
-const PICTURES: [(&str, &str); 10] = [
-    ("albedo", "Albedo"),
-    ("albedo_aligned", "Aligned albedo"),
-    ("rgb_true", "RGB, true light"),
-    ("rgb_fitted", "RGB, fitted light"),
-    ("rgb_relit", "RGB, relit"),
-    ("roughness", "Roughness"),
-    ("metallic", "Metallic"),
-    ("texture_base_color", "Base colour texels"),
-    ("texture_roughness", "Roughness texels"),
-    ("texture_metallic", "Metallic texels"),
-];
-
-const VIEWS: [(&str, &str); 4] =
-    [("input", "Input view"), ("novel", "Novel views"), ("observed", "Observed"), ("unobserved", "Unobserved")];
-
-/// What of a picture counts.
-const REGIONS: [(&str, &str); 2] = [("all", "All surfaces"), ("specular", "Specular regions")];
-
-/// Behind the name of a picture of which only specular regions count.
-const SPECULAR: &str = "_specular";
-
-/// What is shown before anybody has chosen.
-const SHOWN: [&[&str]; 4] = [&["albedo", "rgb_true"], &["input", "novel"], &["psnr"], &["all"]];
 
 /// A board is sorted by the first of these that it has.
-const FIRST: [&str; 3] = ["albedo.novel.psnr", "albedo.novel.mse", "albedo.input.psnr"];
+const FIRST: [ResultKey; 3] = [
+    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Psnr),
+    ResultKey::whole(PictureKind::Albedo, Views::Novel, Metric::Mse),
+    ResultKey::whole(PictureKind::Albedo, Views::Input, Metric::Psnr),
+];
 
 /// One number of a method.
 #[derive(Clone, Serialize)]
 pub(super) struct Column {
-    pub(super) key: String,
+    pub(super) key: ResultKey,
     pub(super) picture: &'static str,
     pub(super) views: &'static str,
     pub(super) metric: &'static str,
@@ -49,56 +28,58 @@ pub(super) struct Column {
     pub(super) better: Better,
     /// Whether it is shown before anybody has chosen.
     pub(super) is_shown: bool,
-    #[serde(skip)]
-    pub(super) kind: &'static Metric,
 }
 
 impl Column {
-    fn of_key(key: &str) -> Option<Self> {
-        let kind = score_of_key(key)?;
-        let mut words = key.split('.');
-        // Keys become names of files: picture, views, metric, and nothing besides.
-        let (picture, views, None) = (words.next()?, words.next()?, words.nth(1)) else { return None };
-        let (picture, region) = match picture.strip_suffix(SPECULAR) {
-            Some(whole) => (whole, REGIONS[1]),
-            None => (picture, REGIONS[0]),
+    fn of_key(key: ResultKey) -> Self {
+        let ResultKey { picture, views, metric } = key;
+        let region = match picture.surfaces {
+            Surfaces::All => "",
+            Surfaces::Specular => ", specular",
         };
-        let [picture, views] = [find(&PICTURES, picture)?, find(&VIEWS, views)?];
-        let of_region = if region == REGIONS[1] { ", specular" } else { "" };
-        let chosen = [picture.0, views.0, kind.key, region.0];
-        Some(Self {
-            key: key.to_owned(),
-            picture: picture.0,
-            views: views.0,
-            metric: kind.key,
-            region: region.0,
-            title: format!("{}, {}{of_region}", picture.1, views.1.to_lowercase()),
-            metric_title: kind.title,
-            better: kind.better?,
-            is_shown: SHOWN.iter().zip(chosen).all(|(shown, word)| shown.contains(&word)),
-            kind,
-        })
+        Self {
+            key,
+            picture: picture.kind.word(),
+            views: views.word(),
+            metric: metric.word(),
+            region: picture.surfaces.word(),
+            title: format!("{}, {}{region}", picture.kind.title(), views.title().to_lowercase()),
+            metric_title: metric.style().title,
+            better: metric.better(),
+            is_shown: is_shown(key),
+        }
     }
 
     fn order(&self) -> [usize; 4] {
-        let place = |words: &[(&str, &str)], word| words.iter().position(|(known, _)| *known == word).unwrap_or(0);
-        let metric = SCORES.iter().position(|metric| metric.key == self.metric).unwrap_or(0);
-        [place(&REGIONS, self.region), place(&PICTURES, self.picture), place(&VIEWS, self.views), metric]
+        fn place<T: PartialEq>(all: &[T], one: T) -> usize {
+            all.iter().position(|known| *known == one).unwrap_or(all.len())
+        }
+        let ResultKey { picture, views, metric } = self.key;
+        [
+            place(Surfaces::ALL, picture.surfaces),
+            place(PictureKind::ALL, picture.kind),
+            place(Views::ALL, views),
+            place(Metric::ALL, metric),
+        ]
     }
 
     /// The value as tables show it.
     pub(super) fn text(&self, value: f64) -> String {
-        format!("{:.*}", self.kind.digits, value * self.kind.scale)
+        self.key.metric.style().text(value)
     }
 }
 
-fn find(words: &[(&'static str, &'static str)], word: &str) -> Option<(&'static str, &'static str)> {
-    words.iter().find(|(known, _)| *known == word).copied()
+/// Whether a column is shown before anybody has chosen.
+fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
+    matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue)
+        && matches!(views, Views::Input | Views::Novel)
+        && metric == Metric::Psnr
+        && picture.surfaces == Surfaces::All
 }
 
-/// Every key of the ranking that a reader can choose, in the order of pictures, views and metrics.
+/// Every key of the ranking, in the order of surfaces, pictures, views and metrics.
 pub(super) fn columns(ranking: &Ranking) -> Vec<Column> {
-    let mut columns: Vec<Column> = ranking.keys.keys().filter_map(|key| Column::of_key(key)).collect();
+    let mut columns: Vec<Column> = ranking.keys.keys().map(|key| Column::of_key(*key)).collect();
     columns.sort_by_key(Column::order);
     if !columns.iter().any(|column| column.is_shown) {
         columns.iter_mut().take(4).for_each(|column| column.is_shown = true);
@@ -112,9 +93,10 @@ pub(super) fn first(columns: &[Column]) -> Option<&Column> {
     known.or_else(|| columns.iter().find(|column| column.is_shown))
 }
 
-/// A column a picture and views, of whole pictures and in its best known metric: what a page of a scene or a method shows.
+/// The PSNR of whole pictures, a column for each picture and views: what a page of a scene or a method shows.
 pub(super) fn headlines(columns: &[Column]) -> Vec<&Column> {
-    let is_headline = |column: &&Column| column.metric == "psnr" && column.region == REGIONS[0].0;
+    let is_headline =
+        |column: &&Column| column.key.metric == Metric::Psnr && column.key.picture.surfaces == Surfaces::All;
     columns.iter().filter(is_headline).collect()
 }
 
@@ -140,15 +122,19 @@ struct Choice {
 
 /// The words that some column has.
 pub(super) fn choices(columns: &[Column]) -> Choices {
-    let metrics: Vec<(&str, &str)> = SCORES.iter().map(|metric| (metric.key, metric.title)).collect();
-    type Group<'a> = (&'static str, &'static str, &'a [(&'static str, &'static str)], fn(&Column) -> &'static str);
-    let groups: [Group<'_>; 4] = [
-        ("picture", "Pictures", &PICTURES, |column| column.picture),
-        ("views", "Views", &VIEWS, |column| column.views),
-        ("metric", "Metrics", &metrics, |column| column.metric),
-        ("region", "Where", &REGIONS, |column| column.region),
+    type Words = Vec<(&'static str, &'static str)>;
+    let pictures: Words = PictureKind::ALL.iter().map(|kind| (kind.word(), kind.title())).collect();
+    let views: Words = Views::ALL.iter().map(|views| (views.word(), views.title())).collect();
+    let metrics: Words = Metric::ALL.iter().map(|metric| (metric.word(), metric.style().title)).collect();
+    let surfaces: Words = Surfaces::ALL.iter().map(|surfaces| (surfaces.word(), surfaces.title())).collect();
+    type Group = (&'static str, &'static str, Words, fn(&Column) -> &'static str);
+    let groups: [Group; 4] = [
+        ("picture", "Pictures", pictures, |column| column.picture),
+        ("views", "Views", views, |column| column.views),
+        ("metric", "Metrics", metrics, |column| column.metric),
+        ("region", "Where", surfaces, |column| column.region),
     ];
-    let group = |(name, title, words, of): Group<'_>| {
+    let group = |(name, title, words, of): Group| {
         let has = |word: &str, shown: bool| columns.iter().any(|c| of(c) == word && (c.is_shown || !shown));
         let choice = |&(word, title): &(&'static str, &'static str)| Choice { word, title, is_shown: has(word, true) };
         ChoiceGroup { name, title, choices: words.iter().filter(|(word, _)| has(word, false)).map(choice).collect() }

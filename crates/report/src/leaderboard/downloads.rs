@@ -11,6 +11,7 @@ use crate::error::ReportError;
 use crate::tables::csv::quoted;
 use crate::tables::{Grouping, TableFormat, tables};
 use mateval_eval::result::{ProtocolResult, ResultFile};
+use mateval_eval::result_key::ResultKey;
 
 /// The tables in the paper's layout; not there where no two results cover the same scenes.
 pub(super) const TABLES: &str = "downloads/tables.tex";
@@ -76,10 +77,11 @@ fn word<T: serde::Serialize>(value: &T) -> String {
 
 /// A line a scene, a column a key.
 fn scenes_csv(scenes: &[SceneId], scores: &ProtocolResult) -> String {
-    let keys: std::collections::BTreeSet<&String> =
+    let keys: std::collections::BTreeSet<&ResultKey> =
         scores.scenes.values().flat_map(std::collections::BTreeMap::keys).collect();
-    let mut lines =
-        vec![std::iter::once("scene").chain(keys.iter().map(|key| key.as_str())).collect::<Vec<_>>().join(",")];
+    let mut lines = vec![
+        std::iter::once("scene".to_owned()).chain(keys.iter().map(ToString::to_string)).collect::<Vec<_>>().join(","),
+    ];
     for scene in scenes {
         let values = scores.scenes.get(scene);
         let cells = keys

@@ -3,6 +3,8 @@
 use mateval_scene::submission::Cost;
 use serde::Serialize;
 
+use mateval_eval::result_key::ResultKey;
+
 use super::columns::Column;
 use super::file::LeaderboardMethod;
 use super::verified::Verified;
@@ -110,8 +112,8 @@ pub(super) fn rank_text(rank: RankRange) -> String {
 }
 
 /// The method's place by one number.
-pub(super) fn standing<'a>(ranking: &'a Ranking, key: &str, method: &str) -> Option<&'a Standing> {
-    ranking.keys.get(key)?.standings.iter().find(|standing| standing.method == method)
+pub(super) fn standing<'a>(ranking: &'a Ranking, key: ResultKey, method: &str) -> Option<&'a Standing> {
+    ranking.keys.get(&key)?.standings.iter().find(|standing| standing.method == method)
 }
 
 #[cfg(test)]

@@ -16,9 +16,10 @@ use crate::error::ReportError;
 use crate::ranking::file::Pair;
 use crate::tables::Grouping;
 use crate::tables::pooled::pooled;
-use crate::tables::rows::Value;
-use mateval_eval::metric_kind::{MSE, Metric, PSNR, SCORES};
+use crate::tables::value::{CellKey, Value};
+use mateval_eval::metric::Metric;
 use mateval_eval::result::InstancePixelErrors;
+use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
 /// How many of the worst scenes and objects are shown.
 const WORST_SCENES: usize = 5;
@@ -110,7 +111,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         verified_text: verified_text(head.verified),
         submission_sha256: &result.submission.sha256,
         tool: &result.tool,
-        metrics: SCORES.iter().map(|metric| metric.title).collect(),
+        metrics: Metric::ALL.iter().map(|metric| metric.style().title).collect(),
         scores: score_rows(board, &head.id),
         first: board.first(),
         duels: duels(board, &head.id),
@@ -144,11 +145,11 @@ fn verified_text(verified: Verified) -> &'static str {
 fn score_rows<'a>(board: &'a Board<'_>, id: &str) -> Vec<ScoreRow<'a>> {
     let mut rows: Vec<ScoreRow<'a>> = Vec::new();
     for column in &board.columns {
-        let Some(standing) = standing(board.ranking(), &column.key, id) else { continue };
+        let Some(standing) = standing(board.ranking(), column.key, id) else { continue };
         if rows.last().is_none_or(|row| row.title != column.title) {
-            rows.push(ScoreRow { title: &column.title, cells: SCORES.iter().map(|_| None).collect() });
+            rows.push(ScoreRow { title: &column.title, cells: Metric::ALL.iter().map(|_| None).collect() });
         }
-        let place = SCORES.iter().position(|metric| metric.key == column.metric);
+        let place = Metric::ALL.iter().position(|metric| *metric == column.key.metric);
         if let Some((row, place)) = rows.last_mut().zip(place) {
             row.cells[place] = Some(Cell::new(column, standing));
         }
@@ -203,8 +204,10 @@ fn worst_scenes<'a>(board: &'a Board<'_>, at: usize) -> Vec<WorstScene<'a>> {
 fn worst_instances(instances: &[InstancePixelErrors]) -> Vec<WorstInstance<'_>> {
     // Freed of noise an error may be below 0.
     let error = |errors: &InstancePixelErrors| errors.mse.max(0.0) * errors.pixels as f64;
-    let mut found: Vec<&InstancePixelErrors> =
-        instances.iter().filter(|errors| errors.picture == "albedo" && errors.views == "novel").collect();
+    let mut found: Vec<&InstancePixelErrors> = instances
+        .iter()
+        .filter(|errors| errors.picture == PictureKind::Albedo && errors.views == Views::Novel)
+        .collect();
     let all: f64 = found.iter().map(|errors| error(errors)).sum();
     found.sort_by(|a, b| error(b).total_cmp(&error(a)));
     found.truncate(WORST_INSTANCES);
@@ -213,7 +216,7 @@ fn worst_instances(instances: &[InstancePixelErrors]) -> Vec<WorstInstance<'_>> 
         instance: errors.instance.as_str(),
         category: errors.category.as_deref().unwrap_or(""),
         pixels: errors.pixels,
-        mse: format!("{:.*}", MSE.digits, errors.mse * MSE.scale),
+        mse: Metric::Mse.style().text(errors.mse),
         share: format!("{:.1}", 100.0 * error(errors) / all),
     });
     rows.collect()
@@ -221,14 +224,15 @@ fn worst_instances(instances: &[InstancePixelErrors]) -> Vec<WorstInstance<'_>> 
 
 /// Albedo by category and by broader category.
 fn categories(instances: &[InstancePixelErrors]) -> Vec<CategoryTable> {
-    let views = [("Input view", "input"), ("Novel views", "novel"), ("Unobserved", "unobserved")];
-    let columns: Vec<_> =
-        views.into_iter().flat_map(|(title, views)| [(title, views, MSE), (title, views, PSNR)]).collect();
+    let key = |views, metric| ResultKey::whole(PictureKind::Albedo, views, metric);
+    let views = [Views::Input, Views::Novel, Views::Unobserved];
+    let columns: Vec<ResultKey> =
+        views.into_iter().flat_map(|views| [Metric::Mse, Metric::Psnr].map(|metric| key(views, metric))).collect();
     let table = |(title, grouping)| {
-        let cells = |values: &BTreeMap<String, Value>| {
-            let cell = |(_, views, metric): &(&str, &str, Metric)| {
-                let value = values.get(&format!("albedo.{views}.{}", metric.key))?.value;
-                Some(format!("{:.*}", metric.digits, value * metric.scale))
+        let cells = |values: &BTreeMap<CellKey, Value>| {
+            let cell = |key: &ResultKey| {
+                let value = values.get(&CellKey::from(*key))?.value;
+                Some(key.metric.style().text(value))
             };
             columns.iter().map(cell).collect::<Vec<_>>()
         };
@@ -236,7 +240,7 @@ fn categories(instances: &[InstancePixelErrors]) -> Vec<CategoryTable> {
         let rows = rows.iter().map(|(name, values)| CategoryRow { name: name.clone(), cells: cells(values) });
         CategoryTable {
             title,
-            heads: columns.iter().map(|(title, _, metric)| [*title, metric.title]).collect(),
+            heads: columns.iter().map(|key| [key.views.title(), key.metric.style().title]).collect(),
             rows: rows.filter(|row| row.cells.iter().any(Option::is_some)).collect(),
         }
     };

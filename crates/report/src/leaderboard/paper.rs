@@ -1,7 +1,7 @@
 //! The paper's own Tables II to V. They were measured on other pictures and are never ranked with ours.
 
-use std::collections::BTreeMap;
-
+use mateval_eval::metric::Metric;
+use mateval_eval::result_key::{PictureKind, Views};
 use serde::{Deserialize, Serialize};
 
 const TABLES: &str = include_str!("paper_tables.json");
@@ -20,8 +20,19 @@ struct PaperRow {
     method: String,
     /// `a`, `r`, `m`: which maps are the method's own; null where it says nothing of it.
     estimated: Option<Vec<String>>,
-    /// By our keys; MSE in units of 1e-3, as printed.
-    values: BTreeMap<String, f64>,
+    scores: Vec<PaperScores>,
+}
+
+/// A block of four numbers. The paper does not name the network of its LPIPS, so that its numbers have no keys of ours.
+#[derive(Deserialize)]
+struct PaperScores {
+    picture: PictureKind,
+    views: Views,
+    /// In units of 1e-3, as printed.
+    mse: f64,
+    psnr: f64,
+    ssim: f64,
+    lpips: f64,
 }
 
 /// The tables as the page shows them.
@@ -46,17 +57,29 @@ struct ShownRow {
     cells: Vec<String>,
 }
 
-/// Last words of keys, and digits that the paper prints.
-const METRICS: [(&str, usize); 4] = [("mse", 3), ("psnr", 2), ("ssim", 4), ("lpips", 4)];
+/// A block's title, picture and views.
+type Block = (&'static str, PictureKind, Views);
 
-/// Number, title, and blocks with their keys.
-type Words = (&'static str, &'static [(&'static str, &'static str)]);
+/// Number and title, and the blocks.
+type Words = (&'static str, &'static [Block]);
 
 const LAYOUT: [Words; 4] = [
-    ("Table II: RGB, fitted light", &[("Input view", "rgb_fitted.input"), ("Novel views", "rgb_fitted.novel")]),
-    ("Table III: albedo, input view", &[("Albedo", "albedo.input"), ("Aligned albedo", "albedo_aligned.input")]),
-    ("Table IV: albedo, novel views", &[("Albedo", "albedo.novel"), ("Aligned albedo", "albedo_aligned.novel")]),
-    ("Table V: aligned albedo, unobserved regions", &[("Aligned albedo", "albedo_aligned.unobserved")]),
+    (
+        "Table II: RGB, fitted light",
+        &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],
+    ),
+    (
+        "Table III: albedo, input view",
+        &[("Albedo", PictureKind::Albedo, Views::Input), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Input)],
+    ),
+    (
+        "Table IV: albedo, novel views",
+        &[("Albedo", PictureKind::Albedo, Views::Novel), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Novel)],
+    ),
+    (
+        "Table V: aligned albedo, unobserved regions",
+        &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)],
+    ),
 ];
 
 /// The tables, ready to be shown.
@@ -64,18 +87,27 @@ pub(super) fn page() -> PaperPage {
     let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
     let table = |(title, blocks): Words| PaperTable {
         title,
-        blocks: blocks.iter().map(|(title, _)| *title).collect(),
+        blocks: blocks.iter().map(|(title, ..)| *title).collect(),
         rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
     };
     PaperPage { source: tables.source, note: tables.note, tables: LAYOUT.map(table).into() }
 }
 
 /// None where the paper leaves the row out of the table.
-fn shown(row: &PaperRow, blocks: &[(&str, &str)]) -> Option<ShownRow> {
-    let cell = |block: &str, (metric, digits): (&str, usize)| {
-        row.values.get(&format!("{block}.{metric}")).map(|value| format!("{value:.digits$}"))
+fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
+    let cells = |(_, picture, views): &Block| -> [Option<String>; 4] {
+        let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
+        let text = |metric: Metric, value: f64| Some(format!("{value:.*}", metric.style().digits));
+        found.map_or([const { None }; 4], |scores| {
+            [
+                text(Metric::Mse, scores.mse),
+                text(Metric::Psnr, scores.psnr),
+                text(Metric::Ssim, scores.ssim),
+                text(Metric::LpipsAlex, scores.lpips),
+            ]
+        })
     };
-    let cells: Vec<_> = blocks.iter().flat_map(|(_, block)| METRICS.map(|metric| cell(block, metric))).collect();
+    let cells: Vec<Option<String>> = blocks.iter().flat_map(cells).collect();
     let maps = row.estimated.as_ref().map(|maps| format!(" ({})", maps.join(", ")));
     cells.iter().any(Option::is_some).then(|| ShownRow {
         family: row.family.clone(),

@@ -12,6 +12,7 @@ use crate::error::ReportError;
 use crate::picture_set::{self, ERROR, PictureSet};
 use crate::ranking::file::Ranking;
 use crate::strips::StripPlan;
+use mateval_eval::result_key::PictureKind;
 use mateval_eval::score::hashed_submission;
 
 /// Puts all pictures into `folder`, and tells which there are.
@@ -84,23 +85,14 @@ pub(super) struct Kind {
     is_error: bool,
 }
 
-const TITLES: [(&str, &str); 6] = [
-    ("albedo", "Albedo"),
-    ("rgb_true", "RGB, true light"),
-    ("rgb_fitted", "RGB, fitted light"),
-    ("rgb_relit", "RGB, relit"),
-    ("roughness", "Roughness"),
-    ("metallic", "Metallic"),
-];
-
 /// Known kinds first, each with its errors behind it.
 pub(super) fn kinds_in_order(words: BTreeSet<&str>) -> Vec<Kind> {
-    let known = |stem: &str| TITLES.iter().position(|(word, _)| *word == stem);
+    let known = |stem: &str| PictureKind::ALL.iter().position(|kind| kind.word() == stem);
     let kind = |word: &str| {
         let stem = word.strip_suffix(ERROR).unwrap_or(word);
-        let title = known(stem).map_or_else(|| stem.replace('_', " "), |at| TITLES[at].1.to_owned());
+        let title = known(stem).map_or_else(|| stem.replace('_', " "), |at| PictureKind::ALL[at].title().to_owned());
         let is_error = stem != word;
-        let order = (known(stem).unwrap_or(TITLES.len()), stem.to_owned(), is_error);
+        let order = (known(stem).unwrap_or(PictureKind::ALL.len()), stem.to_owned(), is_error);
         (
             order,
             Kind { word: word.to_owned(), title: if is_error { format!("{title}: error") } else { title }, is_error },

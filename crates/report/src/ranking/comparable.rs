@@ -89,13 +89,11 @@ fn changed(entrant: &Entrant<'_>) -> Option<String> {
     })
 }
 
-/// Keys are words and dots, and no score is so large that a sum of them could be infinite.
+/// No score is so large that a sum of them could be infinite.
 fn odd_score(entrant: &Entrant<'_>) -> Option<String> {
-    let is_of_word = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
-    let is_score = |key: &str, value: f64| key.chars().all(is_of_word) && value.abs() < 1e12;
-    let (key, value) =
-        entrant.scores.scenes.values().flatten().find(|(key, value)| !is_score(key.as_str(), **value))?;
-    Some(format!("'{}' holds {key:?} of {value:e}, which is no score; score it again", entrant.result.method))
+    let is_score = |value: f64| value.abs() < 1e12;
+    let (key, value) = entrant.scores.scenes.values().flatten().find(|(_, value)| !is_score(**value))?;
+    Some(format!("'{}' holds '{key}' of {value:e}, which is no score; score it again", entrant.result.method))
 }
 
 fn odd_scene(entrant: &Entrant<'_>) -> Option<String> {

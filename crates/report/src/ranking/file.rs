@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::holm::LEVEL;
-use mateval_eval::metric_kind::Better;
+use mateval_eval::metric::Better;
+use mateval_eval::result_key::ResultKey;
 
 /// Methods ranked under one protocol.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -25,8 +26,8 @@ pub struct Ranking {
     pub houses: BTreeMap<SceneId, String>,
     /// In the order in which the results were given.
     pub methods: Vec<RankedMethod>,
-    /// By `<picture>.<views>.<metric>`.
-    pub keys: BTreeMap<String, KeyRanking>,
+    /// By each number that can be ranked.
+    pub keys: BTreeMap<ResultKey, KeyRanking>,
 }
 
 /// How it was drawn and judged.

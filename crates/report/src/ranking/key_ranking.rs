@@ -5,7 +5,7 @@ use super::clusters::Clusters;
 use super::draws::DrawTable;
 use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankingRules, Standing};
 use super::holm::{corrected, rank_ranges};
-use mateval_eval::metric_kind::Better;
+use mateval_eval::metric::Better;
 
 /// Values of one key.
 pub(super) struct KeyValues<'a> {

@@ -24,8 +24,8 @@ use self::draws::{DrawTable, Draws};
 use self::file::{RankedMethod, Ranking, RankingRules};
 use self::key_ranking::{KeyValues, rank_key};
 use crate::error::ReportError;
-use mateval_eval::metric_kind::score_of_key;
 use mateval_eval::result::ResultFile;
+use mateval_eval::result_key::ResultKey;
 
 /// Draws of the houses, where pairs do not ask for more.
 const DRAWS: usize = 10_000;
@@ -53,8 +53,8 @@ pub fn rank(results: &[ResultFile], protocol: &str, partial: bool) -> Result<Ran
     let methods = methods(&board, partial);
     let values = values_by_key(&board, &methods, partial);
     let draws = DrawTable::new(rules.seed, rules.draws);
-    let keys: BTreeMap<String, _> =
-        values.par_iter().map(|(key, values)| (key.clone(), rank_key(values, &houses, &rules, &draws))).collect();
+    let keys: BTreeMap<ResultKey, _> =
+        values.par_iter().map(|(key, values)| (*key, rank_key(values, &houses, &rules, &draws))).collect();
     if keys.is_empty() {
         let what = format!("the results hold nothing under protocol '{protocol}' that can be ranked");
         return Err(ReportError::Invalid(what));
@@ -117,12 +117,15 @@ fn unused_id(name: &str, used: &mut BTreeSet<String>) -> String {
     id
 }
 
-/// Every key that is a score, and what each method has of it.
-fn values_by_key<'a>(board: &Board<'_>, methods: &'a [RankedMethod], partial: bool) -> BTreeMap<String, KeyValues<'a>> {
-    let keys: BTreeSet<&String> =
+/// Every key, and what each method has of it.
+fn values_by_key<'a>(
+    board: &Board<'_>,
+    methods: &'a [RankedMethod],
+    partial: bool,
+) -> BTreeMap<ResultKey, KeyValues<'a>> {
+    let keys: BTreeSet<&ResultKey> =
         board.entrants.iter().flat_map(|entrant| entrant.scores.scenes.values().flat_map(BTreeMap::keys)).collect();
-    let of_key = |key: &String| {
-        let better = score_of_key(key)?.better?;
+    let of_key = |key: &ResultKey| {
         let column = |entrant: &Entrant<'_>| -> Vec<Option<f64>> {
             let covers = |scene: &SceneId| !(partial && entrant.left_out.contains(scene));
             let value = |scene: &SceneId| entrant.scores.scenes.get(scene)?.get(key).copied();
@@ -133,7 +136,7 @@ fn values_by_key<'a>(board: &Board<'_>, methods: &'a [RankedMethod], partial: bo
             .filter(|(_, values)| values.iter().any(Option::is_some))
             .map(|(method, values)| (method.id.as_str(), values))
             .unzip();
-        Some((key.clone(), KeyValues { better, methods, values }))
+        (*key, KeyValues { better: key.metric.better(), methods, values })
     };
-    keys.into_iter().filter_map(of_key).filter(|(_, values)| !values.methods.is_empty()).collect()
+    keys.into_iter().map(of_key).filter(|(_, values)| !values.methods.is_empty()).collect()
 }

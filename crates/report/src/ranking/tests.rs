@@ -7,8 +7,10 @@ use super::bootstrap::{duels, intervals};
 use super::clusters::Clusters;
 use super::file::{IntervalKind, RankRange, Standing};
 use super::*;
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{InstanceTexelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId, TexelErrors};
+use mateval_eval::result_key::{PictureKind, Views};
 
 /// Standard normals and even numbers, in a row.
 struct Chance(u64, u64);
@@ -25,6 +27,9 @@ impl Chance {
         radius * (2.0 * std::f64::consts::PI * self.even()).cos()
     }
 }
+
+const PSNR: ResultKey = ResultKey::whole(PictureKind::Albedo, Views::Input, Metric::Psnr);
+const MSE: ResultKey = PSNR.with(Metric::Mse);
 
 const METHODS: usize = 4;
 const VIEWS: usize = 4;
@@ -134,10 +139,10 @@ fn scene(number: usize) -> SceneId {
     SceneId::new(format!("s{number:02}")).unwrap()
 }
 
-fn summary(scenes: &BTreeMap<SceneId, BTreeMap<String, f64>>) -> BTreeMap<String, f64> {
+fn summary(scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>) -> BTreeMap<ResultKey, f64> {
     let mut summary = BTreeMap::new();
     for (key, value) in scenes.values().flatten() {
-        *summary.entry(key.clone()).or_insert(0.0) += value / scenes.len() as f64;
+        *summary.entry(*key).or_insert(0.0) += value / scenes.len() as f64;
     }
     summary
 }
@@ -148,8 +153,8 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
         .iter()
         .enumerate()
         .map(|(at, psnr)| {
-            let values = [("albedo.input.psnr", *psnr), ("albedo.input.mse", 10_f64.powf(-psnr / 10.0))];
-            (scene(at), values.map(|(key, value)| (key.to_owned(), value)).into())
+            let values = [(PSNR, *psnr), (MSE, 10_f64.powf(-psnr / 10.0))];
+            (scene(at), values.into())
         })
         .collect();
     let protocol = Protocol::named("mateval-1").unwrap();
@@ -198,7 +203,7 @@ pub(crate) fn scores(mean: f64, wobble: f64) -> Vec<f64> {
     (0..12).map(|at| mean + 0.7 * f64::from(at % 5) + wobble * f64::from(at * 7 % 11 - 5)).collect()
 }
 
-fn standings<'a>(ranking: &'a Ranking, key: &str) -> &'a [Standing] {
+fn standings<'a>(ranking: &'a Ranking, key: &ResultKey) -> &'a [Standing] {
     &ranking.keys[key].standings
 }
 
@@ -209,7 +214,7 @@ fn copies_share_a_rank() {
     let ranking = rank(&results, "mateval-1", false).unwrap();
     let ids: Vec<&str> = ranking.methods.iter().map(|method| method.id.as_str()).collect();
     assert_eq!(ids, ["good", "bad", "good-2"]);
-    for key in ["albedo.input.psnr", "albedo.input.mse"] {
+    for key in &[PSNR, MSE] {
         let ranks: Vec<RankRange> = standings(&ranking, key).iter().map(|standing| standing.rank).collect();
         let [first, last] = [RankRange { best: 1, worst: 2 }, RankRange { best: 3, worst: 3 }];
         assert_eq!(ranks, [first, last, first], "{key}");
@@ -248,9 +253,9 @@ fn few_houses_say_nothing() {
         let cut = |method: &str, mean| result(method, &scores(mean, 0.1)[..scenes]);
         rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-1", false).unwrap()
     });
-    let first = |ranking: &Ranking| standings(ranking, "albedo.input.psnr")[0].clone();
+    let first = |ranking: &Ranking| standings(ranking, &PSNR)[0].clone();
     assert!(first(&four).interval.is_none() && first(&five).interval.is_some());
-    let pair = &four.keys["albedo.input.psnr"].pairs[0];
+    let pair = &four.keys[&PSNR].pairs[0];
     assert_eq!((pair.win, pair.p, first(&four).rank), (None, None, RankRange { best: 1, worst: 2 }));
 }
 
@@ -263,13 +268,13 @@ fn partial_results_are_let_in_only_when_asked() {
     let ranking = rank(&results, "mateval-1", true).unwrap();
     let partial: Vec<bool> = ranking.methods.iter().map(|method| method.partial).collect();
     assert_eq!((partial, ranking.methods[1].not_scored.len()), (vec![false, true, false], 6));
-    let standings = standings(&ranking, "albedo.input.psnr");
+    let standings = standings(&ranking, &PSNR);
     assert_eq!([standings[0].scenes, standings[1].scenes], [12, 6]);
-    let pairs: Vec<usize> = ranking.keys["albedo.input.psnr"].pairs.iter().map(|pair| pair.scenes).collect();
+    let pairs: Vec<usize> = ranking.keys[&PSNR].pairs.iter().map(|pair| pair.scenes).collect();
     assert_eq!(pairs, [6, 12, 6]);
     // What the whole ones get does not depend on the part.
     let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-1", false).unwrap();
-    let interval = |ranking: &Ranking| ranking.keys["albedo.input.psnr"].standings[0].interval;
+    let interval = |ranking: &Ranking| ranking.keys[&PSNR].standings[0].interval;
     assert_eq!(interval(&ranking), interval(&alone));
 }
 
@@ -298,7 +303,7 @@ fn scenes_left_out_of_a_submission() {
     for (partial, scenes) in [(false, 12), (true, 11)] {
         let ranking = rank(&results, "mateval-1", partial).unwrap();
         assert_eq!(ranking.methods[0].left_out, [scene(3)]);
-        assert_eq!(standings(&ranking, "albedo.input.psnr")[0].scenes, scenes);
+        assert_eq!(standings(&ranking, &PSNR)[0].scenes, scenes);
         assert_eq!(ranking.methods[0].partial, partial);
     }
 }
@@ -325,13 +330,11 @@ fn what_cannot_be_ranked_together() {
     assert!(error.contains("it has been changed"), "{error}");
     let error = refused(|other| other.dataset.houses.clear());
     assert!(error.contains("of which house scene 's00' is"), "{error}");
-    for (key, value) in [("albedo.input.psnr", 1e300), ("albedo.input./../../evil.psnr", 1.0), ("a\nb.psnr", 1.0)] {
-        let mut other = result("other", &scores(20.0, 0.0));
-        let scenes = &mut other.protocols.get_mut("mateval-1").unwrap().scenes;
-        scenes.get_mut(&scene(3)).unwrap().insert(key.to_owned(), value);
-        let error = rank(&[good.clone(), other], "mateval-1", false).unwrap_err().to_string();
-        assert!(error.contains("which is no score"), "{error}");
-    }
+    let mut other = result("other", &scores(20.0, 0.0));
+    let scenes = &mut other.protocols.get_mut("mateval-1").unwrap().scenes;
+    scenes.get_mut(&scene(3)).unwrap().insert(PSNR, 1e300);
+    let error = rank(&[good.clone(), other], "mateval-1", false).unwrap_err().to_string();
+    assert!(error.contains("'albedo.input.psnr' of 1e300, which is no score"), "{error}");
     let error = refused(|other| other.dataset.houses.values_mut().for_each(|house| house.push('2')));
     assert!(error.contains("put scene 's00' into different houses"), "{error}");
     let error = refused(|other| other.protocols.clear());

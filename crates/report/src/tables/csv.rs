@@ -7,8 +7,9 @@ pub(super) fn text(table: &Table<'_>) -> String {
     let names = table.group_head.into_iter().chain([table.title]).map(quoted);
     let heads = table.columns.iter().flat_map(|column| {
         let head = column.head();
-        let error =
-            column.has_errors.then(|| quoted(&format!("{} {} standard error", column.block, column.metric.title)));
+        let error = column
+            .has_errors
+            .then(|| quoted(&format!("{} {} standard error", column.block, column.key.quantity.style().title)));
         [quoted(&head)].into_iter().chain(error)
     });
     let mut lines = vec![names.chain(heads).collect::<Vec<_>>().join(",")];
@@ -22,7 +23,7 @@ pub(super) fn text(table: &Table<'_>) -> String {
     lines.join("\n") + "\n\n"
 }
 
-fn numbers(column: &Column<'_>, cell: &Cell) -> impl Iterator<Item = String> {
+fn numbers(column: &Column, cell: &Cell) -> impl Iterator<Item = String> {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let error = column.has_errors.then(|| number(cell.value.and_then(|value| value.standard_error)));
     [number(cell.value.map(|value| value.value))].into_iter().chain(error)

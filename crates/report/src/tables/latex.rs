@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::table::Table;
-use mateval_eval::metric_kind::Better;
+use mateval_eval::metric::Better;
 
 /// A comment with the title and the table.
 pub(super) fn text(table: &Table<'_>) -> String {
@@ -15,12 +15,12 @@ pub(super) fn text(table: &Table<'_>) -> String {
     // Writing to a String cannot fail, here and below.
     let _ = writeln!(text, "{} \\\\", blocks.join(" & ").trim_start());
     let heads = table.columns.iter().map(|column| {
-        let arrow = match column.metric.better {
+        let arrow = match column.key.quantity.better() {
             Some(Better::Lower) => " $\\downarrow$",
             Some(Better::Higher) => " $\\uparrow$",
             None => "",
         };
-        format!("{}{arrow}", column.metric.title.replace("1e-3", "$10^{-3}$"))
+        format!("{}{arrow}", column.key.quantity.style().title.replace("1e-3", "$10^{-3}$"))
     });
     let names = table.group_head.into_iter().chain(["Method"]).map(str::to_owned);
     let _ = writeln!(text, "{} \\\\", names.chain(heads).collect::<Vec<_>>().join(" & "));

@@ -1,13 +1,16 @@
-//! Which tables there are, and their columns.
+//! Which tables exist, and their columns.
 
-use mateval_eval::metric_kind::{MSE, Metric, PIXELS, PSNR, SCORES};
+use mateval_eval::metric::Metric;
+use mateval_eval::result_key::{PictureKind, PictureName, Surfaces, Views};
+
+use super::value::Quantity;
 
 /// Columns that stand under one title.
 pub(super) struct Block {
     pub(super) title: &'static str,
-    /// `<picture>.<views>`.
-    pub(super) key: String,
-    pub(super) metrics: &'static [Metric],
+    pub(super) picture: PictureName,
+    pub(super) views: Views,
+    pub(super) quantities: Vec<Quantity>,
 }
 
 /// One table.
@@ -16,69 +19,95 @@ pub(super) struct Layout {
     pub(super) blocks: Vec<Block>,
 }
 
-const POOLED: &[Metric] = &[PIXELS, MSE, PSNR];
+const POOLED: [Quantity; 3] = [Quantity::Pixels, Quantity::Score(Metric::Mse), Quantity::Score(Metric::Psnr)];
 
-/// A block's title, picture and views.
-type BlockWords = (&'static str, &'static str, &'static str);
+/// A block's title, kind of picture and views.
+type BlockWords = (&'static str, PictureKind, Views);
 
 /// A table's title, and its blocks.
 type TableWords = (&'static str, &'static [BlockWords]);
 
 /// The paper's Tables II to V in its order.
 const PAPER: [TableWords; 4] = [
-    ("RGB, fitted light", &[("Input view", "rgb_fitted", "input"), ("Novel views", "rgb_fitted", "novel")]),
-    ("Albedo, input view", &[("Albedo", "albedo", "input"), ("Aligned albedo", "albedo_aligned", "input")]),
-    ("Albedo, novel views", &[("Albedo", "albedo", "novel"), ("Aligned albedo", "albedo_aligned", "novel")]),
-    ("Aligned albedo, unobserved regions", &[("Aligned albedo", "albedo_aligned", "unobserved")]),
+    (
+        "RGB, fitted light",
+        &[("Input view", PictureKind::RgbFitted, Views::Input), ("Novel views", PictureKind::RgbFitted, Views::Novel)],
+    ),
+    (
+        "Albedo, input view",
+        &[("Albedo", PictureKind::Albedo, Views::Input), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Input)],
+    ),
+    (
+        "Albedo, novel views",
+        &[("Albedo", PictureKind::Albedo, Views::Novel), ("Aligned albedo", PictureKind::AlbedoAligned, Views::Novel)],
+    ),
+    ("Aligned albedo, unobserved regions", &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)]),
 ];
 
 /// Those that the paper does not have.
 const OURS: [TableWords; 4] = [
-    ("RGB, true light", &[("Input view", "rgb_true", "input"), ("Novel views", "rgb_true", "novel")]),
-    ("RGB, relit", &[("Input view", "rgb_relit", "input"), ("Novel views", "rgb_relit", "novel")]),
-    ("Roughness and metallic, input view", &[("Roughness", "roughness", "input"), ("Metallic", "metallic", "input")]),
-    ("Roughness and metallic, novel views", &[("Roughness", "roughness", "novel"), ("Metallic", "metallic", "novel")]),
+    (
+        "RGB, true light",
+        &[("Input view", PictureKind::RgbTrue, Views::Input), ("Novel views", PictureKind::RgbTrue, Views::Novel)],
+    ),
+    (
+        "RGB, relit",
+        &[("Input view", PictureKind::RgbRelit, Views::Input), ("Novel views", PictureKind::RgbRelit, Views::Novel)],
+    ),
+    (
+        "Roughness and metallic, input view",
+        &[("Roughness", PictureKind::Roughness, Views::Input), ("Metallic", PictureKind::Metallic, Views::Input)],
+    ),
+    (
+        "Roughness and metallic, novel views",
+        &[("Roughness", PictureKind::Roughness, Views::Novel), ("Metallic", PictureKind::Metallic, Views::Novel)],
+    ),
 ];
 
-/// What texels are compared in.
 const TEXTURE_SPACE: TableWords = (
     "Base colour, texture space",
-    &[("Observed", "texture_base_color", "observed"), ("Unobserved", "texture_base_color", "unobserved")],
+    &[
+        ("Observed", PictureKind::TextureBaseColor, Views::Observed),
+        ("Unobserved", PictureKind::TextureBaseColor, Views::Unobserved),
+    ],
 );
 
-/// What is pooled over instances: title and picture.
-const POOLED_PICTURES: [(&str, &str); 4] = [
-    ("Albedo", "albedo"),
-    ("Aligned albedo", "albedo_aligned"),
-    ("RGB, true light", "rgb_true"),
-    ("RGB, fitted light", "rgb_fitted"),
-];
+/// Pictures whose errors are pooled over instances.
+const POOLED_PICTURES: [PictureKind; 4] =
+    [PictureKind::Albedo, PictureKind::AlbedoAligned, PictureKind::RgbTrue, PictureKind::RgbFitted];
 
 /// The tables of scores: the paper's, ours, and all of them again over specular regions.
 pub(super) fn all() -> Vec<Layout> {
-    let plain = PAPER.into_iter().chain(OURS).chain([TEXTURE_SPACE]).map(|(title, blocks)| layout(title, blocks, ""));
-    let specular = PAPER
-        .into_iter()
-        .chain(OURS)
-        .map(|(title, blocks)| layout(&format!("{title}, specular regions only"), blocks, "_specular"));
+    let pictures = || PAPER.into_iter().chain(OURS);
+    let plain =
+        pictures().chain([TEXTURE_SPACE]).map(|(title, blocks)| layout(title.to_owned(), blocks, Surfaces::All));
+    let specular =
+        pictures().map(|(title, blocks)| layout(format!("{title}, specular regions only"), blocks, Surfaces::Specular));
     plain.chain(specular).collect()
 }
 
-fn layout(title: &str, blocks: &[BlockWords], suffix: &str) -> Layout {
-    let block = |&(title, picture, views): &BlockWords| Block {
+fn layout(title: String, blocks: &[BlockWords], surfaces: Surfaces) -> Layout {
+    let block = |&(title, kind, views): &BlockWords| Block {
         title,
-        key: format!("{picture}{suffix}.{views}"),
-        metrics: SCORES,
+        picture: PictureName { kind, surfaces },
+        views,
+        quantities: Quantity::scores(),
     };
-    Layout { title: title.to_owned(), blocks: blocks.iter().map(block).collect() }
+    Layout { title, blocks: blocks.iter().map(block).collect() }
 }
 
 /// The tables of what is pooled over instances' pixels.
 pub(super) fn pooled() -> Vec<Layout> {
-    let views = [("Input view", "input"), ("Novel views", "novel"), ("Unobserved", "unobserved")];
-    let layout = |(title, picture): (&str, &str)| Layout {
-        title: format!("{title}, pooled over pixels"),
-        blocks: views.map(|(title, views)| Block { title, key: format!("{picture}.{views}"), metrics: POOLED }).into(),
+    let views = [Views::Input, Views::Novel, Views::Unobserved];
+    let block = |kind, views: Views| Block {
+        title: views.title(),
+        picture: PictureName::whole(kind),
+        views,
+        quantities: POOLED.into(),
+    };
+    let layout = |kind: PictureKind| Layout {
+        title: format!("{}, pooled over pixels", kind.title()),
+        blocks: views.map(|views| block(kind, views)).into(),
     };
     POOLED_PICTURES.map(layout).into()
 }

@@ -4,14 +4,18 @@
 //! and a file for each format writes them.
 
 pub(crate) mod csv;
+mod grouping;
 mod latex;
 mod layouts;
 mod markdown;
 pub(crate) mod pooled;
-pub(crate) mod rows;
+mod rows;
 mod table;
 #[cfg(test)]
 mod tests;
+pub(crate) mod value;
+
+pub use grouping::Grouping;
 
 use crate::error::ReportError;
 use mateval_eval::result::{RESULT_FORMAT, ResultFile};
@@ -25,19 +29,6 @@ pub enum TableFormat {
     Latex,
     /// Comma-separated, all digits, no marks; standard errors in columns of their own.
     Csv,
-}
-
-/// What has rows of its own, one for each method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Grouping {
-    /// The whole dataset: means over scenes.
-    Dataset,
-    /// Each scene: means over its pictures.
-    Scene,
-    /// Each category of instances: errors pooled over pixels.
-    Category,
-    /// Each broader category, in the same way.
-    SuperCategory,
 }
 
 /// Sets the results side by side under one protocol. Results of different fingerprints, or of different scenes, are

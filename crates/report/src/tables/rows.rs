@@ -4,23 +4,16 @@ use std::collections::BTreeMap;
 
 use mateval_scene::SceneId;
 
-use super::Grouping;
+use super::grouping::Grouping;
 use super::pooled::{OTHER, pooled};
+use super::value::{CellKey, Value};
 use mateval_eval::result::{ProtocolResult, ResultFile};
-
-/// A number and how sure it is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Value {
-    pub(crate) value: f64,
-    /// That render noise makes, in the value's unit.
-    pub(crate) standard_error: Option<f64>,
-}
+use mateval_eval::result_key::ResultKey;
 
 /// One method's numbers.
 pub(super) struct Row {
     pub(super) method: String,
-    /// By `<picture>.<views>.<metric>`.
-    pub(super) values: BTreeMap<String, Value>,
+    pub(super) values: BTreeMap<CellKey, Value>,
 }
 
 /// Rows that are held against each other.
@@ -35,7 +28,7 @@ pub(super) struct Group {
 pub(super) fn groups(results: &[ResultFile], protocol: &str, grouping: Grouping) -> Vec<Group> {
     let scored: Vec<(&str, &ProtocolResult)> =
         results.iter().filter_map(|result| Some((result.method.as_str(), result.protocols.get(protocol)?))).collect();
-    let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<String, Value>| {
+    let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
         let row = |(at, (method, scores)): (usize, &(&str, &ProtocolResult))| Row {
             method: (*method).to_owned(),
             values: values(at, scores),
@@ -59,18 +52,18 @@ pub(super) fn groups(results: &[ResultFile], protocol: &str, grouping: Grouping)
     }
 }
 
-fn of_dataset(scores: &ProtocolResult) -> BTreeMap<String, Value> {
-    let value = |(key, value): (&String, &f64)| {
-        (key.clone(), Value { value: *value, standard_error: scores.summary_noise.get(key).copied() })
+fn of_dataset(scores: &ProtocolResult) -> BTreeMap<CellKey, Value> {
+    let value = |(key, value): (&ResultKey, &f64)| {
+        (CellKey::from(*key), Value { value: *value, standard_error: scores.summary_noise.get(key).copied() })
     };
     scores.summary.iter().map(value).collect()
 }
 
-fn of_scene(scores: &ProtocolResult, scene: &SceneId) -> BTreeMap<String, Value> {
+fn of_scene(scores: &ProtocolResult, scene: &SceneId) -> BTreeMap<CellKey, Value> {
     let noise = scores.noise.get(scene);
-    let value = |(key, value): (&String, &f64)| {
+    let value = |(key, value): (&ResultKey, &f64)| {
         let standard_error = noise.and_then(|noise| noise.get(key)?.standard_error_db);
-        (key.clone(), Value { value: *value, standard_error })
+        (CellKey::from(*key), Value { value: *value, standard_error })
     };
     scores.scenes.get(scene).into_iter().flatten().map(value).collect()
 }

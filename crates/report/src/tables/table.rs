@@ -1,9 +1,11 @@
 //! A table before it is written: heads, cells, and which of them are best.
 
-use super::Grouping;
+use mateval_eval::metric::Better;
+
+use super::grouping::Grouping;
 use super::layouts::Layout;
-use super::rows::{Group, Value};
-use mateval_eval::metric_kind::{Better, Metric};
+use super::rows::Group;
+use super::value::{CellKey, Quantity, Value};
 
 /// A table whose every column has a value somewhere.
 pub(super) struct Table<'a> {
@@ -12,17 +14,16 @@ pub(super) struct Table<'a> {
     pub(super) group_head: Option<&'static str>,
     /// Titles of blocks and how many columns each has left.
     pub(super) blocks: Vec<(&'static str, usize)>,
-    pub(super) columns: Vec<Column<'a>>,
+    pub(super) columns: Vec<Column>,
     pub(super) groups: Vec<TableGroup<'a>>,
 }
 
 /// A column.
-pub(super) struct Column<'a> {
+pub(super) struct Column {
     pub(super) block: &'static str,
-    pub(super) metric: &'a Metric,
     /// Whether any of its values says how sure it is.
     pub(super) has_errors: bool,
-    key: String,
+    pub(super) key: CellKey,
 }
 
 /// Rows that are held against each other.
@@ -54,15 +55,15 @@ pub(super) enum Mark {
 impl<'a> Table<'a> {
     /// Fills a layout. Columns without any value are left out, and so are groups; none where nothing is left.
     pub(super) fn fill(layout: &'a Layout, grouping: Grouping, groups: &'a [Group]) -> Option<Self> {
-        let mut columns: Vec<Column<'a>> = Vec::new();
+        let mut columns: Vec<Column> = Vec::new();
         let mut blocks = Vec::new();
         for block in &layout.blocks {
-            let of_block = block.metrics.iter().filter_map(|metric| {
-                let key = format!("{}.{}", block.key, metric.key);
+            let of_block = block.quantities.iter().filter_map(|&quantity| {
+                let key = CellKey { picture: block.picture, views: block.views, quantity };
                 let mut values = groups.iter().flat_map(|g| &g.rows).filter_map(|row| row.values.get(&key)).peekable();
                 values.peek()?;
                 let has_errors = values.any(|value| value.standard_error.is_some());
-                Some(Column { block: block.title, metric, has_errors, key })
+                Some(Column { block: block.title, has_errors, key })
             });
             let before = columns.len();
             columns.extend(of_block);
@@ -82,13 +83,13 @@ impl<'a> Table<'a> {
 }
 
 impl<'a> TableGroup<'a> {
-    fn fill(group: &'a Group, columns: &[Column<'_>]) -> Option<Self> {
+    fn fill(group: &'a Group, columns: &[Column]) -> Option<Self> {
         let by_column: Vec<Vec<Cell>> = columns
             .iter()
             .map(|column| {
-                let scaled = |value: &Value| Value { value: value.value * column.metric.scale, ..*value };
+                let scaled = |value: &Value| Value { value: value.value * column.key.quantity.style().scale, ..*value };
                 let values: Vec<_> = group.rows.iter().map(|row| row.values.get(&column.key).map(scaled)).collect();
-                marked(&values, column.metric)
+                marked(&values, column.key.quantity)
             })
             .collect();
         if by_column.iter().flatten().all(|cell| cell.value.is_none()) {
@@ -101,37 +102,38 @@ impl<'a> TableGroup<'a> {
 }
 
 /// Marks the best and the second best value; equal values share a mark, and a value that is alone has none.
-fn marked(values: &[Option<Value>], metric: &Metric) -> Vec<Cell> {
+fn marked(values: &[Option<Value>], quantity: Quantity) -> Vec<Cell> {
+    let better = quantity.better();
     let mut distinct: Vec<f64> = values.iter().flatten().map(|value| value.value).collect();
     let is_contest = distinct.len() > 1;
     distinct.sort_by(f64::total_cmp);
-    if metric.better == Some(Better::Higher) {
+    if better == Some(Better::Higher) {
         distinct.reverse();
     }
     distinct.dedup();
     let mark = |value: f64| match distinct.iter().position(|other| *other == value) {
-        Some(0) if is_contest && metric.better.is_some() => Mark::Best,
-        Some(1) if metric.better.is_some() => Mark::Second,
+        Some(0) if is_contest && better.is_some() => Mark::Best,
+        Some(1) if better.is_some() => Mark::Second,
         _ => Mark::None,
     };
     let cell = |value: &Option<Value>| Cell {
         value: *value,
         has_rivals: values.iter().flatten().count() > usize::from(value.is_some()),
-        digits: metric.digits,
+        digits: quantity.style().digits,
         mark: value.map_or(Mark::None, |value| mark(value.value)),
     };
     values.iter().map(cell).collect()
 }
 
-impl Column<'_> {
+impl Column {
     /// Title of block and metric, and an arrow to what is better.
     pub(super) fn head(&self) -> String {
-        let arrow = match self.metric.better {
+        let arrow = match self.key.quantity.better() {
             Some(Better::Lower) => " ↓",
             Some(Better::Higher) => " ↑",
             None => "",
         };
-        format!("{} {}{arrow}", self.block, self.metric.title)
+        format!("{} {}{arrow}", self.block, self.key.quantity.style().title)
     }
 }
 

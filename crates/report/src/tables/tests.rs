@@ -4,17 +4,19 @@ use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::{InstanceId, SceneId};
 
 use super::*;
+use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{InstancePixelErrors, NoiseState, ProtocolResult, PsnrNoise, SubmissionId};
+use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
 fn scene(name: &str) -> SceneId {
     SceneId::new(name).unwrap()
 }
 
 fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
-    let summary: BTreeMap<String, f64> = summary.iter().map(|(key, value)| ((*key).to_owned(), *value)).collect();
-    let key = "rgb_true.input.psnr";
-    let summary_noise = summary.keys().filter(|other| *other == key).map(|key| (key.clone(), 0.016)).collect();
+    let summary: BTreeMap<ResultKey, f64> = summary.iter().map(|(key, value)| (key.parse().unwrap(), *value)).collect();
+    let key = ResultKey::whole(PictureKind::RgbTrue, Views::Input, Metric::Psnr);
+    let summary_noise = summary.keys().filter(|other| **other == key).map(|key| (*key, 0.016)).collect();
     let noise = PsnrNoise {
         standard_error_db: Some(0.25),
         own_db: None,
@@ -26,7 +28,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         protocol: Protocol::named("paper").unwrap(),
         fingerprint: "f".to_owned(),
         scenes: BTreeMap::from([(scene("b"), summary.clone()), (scene("a"), BTreeMap::new())]),
-        noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key.to_owned(), noise)]))]),
+        noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key, noise)]))]),
         summary,
         summary_noise,
         fits: BTreeMap::new(),
@@ -156,14 +158,14 @@ fn papers_tables_then_ours() {
     assert!(!markdown.contains("**") && !markdown.contains("missing"), "{markdown}");
 }
 
-fn errors(of: &str, category: Option<&str>, picture: &str, pixels: usize, mse: f64) -> InstancePixelErrors {
+fn errors(of: &str, category: Option<&str>, picture: PictureKind, pixels: usize, mse: f64) -> InstancePixelErrors {
     InstancePixelErrors {
         scene: scene(of),
         instance: InstanceId::new("i").unwrap(),
         category: category.map(str::to_owned),
         super_category: category.map(|_| "Seat".to_owned()),
-        picture: picture.to_owned(),
-        views: "input".to_owned(),
+        picture,
+        views: Views::Input,
         pixels,
         mse,
     }
@@ -172,11 +174,11 @@ fn errors(of: &str, category: Option<&str>, picture: &str, pixels: usize, mse: f
 fn with_instances() -> ResultFile {
     let mut result = result("m", &[]);
     result.protocols.get_mut("paper").unwrap().instances = vec![
-        errors("a", Some("Sofa"), "albedo", 100, 0.04),
-        errors("b", Some("Sofa"), "albedo", 300, 0.0),
-        errors("b", Some("Zebra"), "albedo", 600, 0.11),
-        errors("b", None, "albedo", 10, 0.1),
-        errors("b", None, "rgb_true", 10, -1e-6),
+        errors("a", Some("Sofa"), PictureKind::Albedo, 100, 0.04),
+        errors("b", Some("Sofa"), PictureKind::Albedo, 300, 0.0),
+        errors("b", Some("Zebra"), PictureKind::Albedo, 600, 0.11),
+        errors("b", None, PictureKind::Albedo, 10, 0.1),
+        errors("b", None, PictureKind::RgbTrue, 10, -1e-6),
     ];
     result
 }
@@ -204,13 +206,14 @@ fn pooled_noise_has_no_psnr() {
 #[test]
 fn missing_or_nothing_to_measure() {
     let mut both = [with_instances(), with_instances()];
-    both[0].protocols.get_mut("paper").unwrap().instances.push(errors("b", None, "albedo", 10, 0.1));
+    both[0].protocols.get_mut("paper").unwrap().instances.push(errors("b", None, PictureKind::Albedo, 10, 0.1));
     both[1].protocols.get_mut("paper").unwrap().instances.retain(|errors| errors.category.is_some());
     both.iter_mut().for_each(|result| {
         let scores = result.protocols.get_mut("paper").unwrap();
-        scores
-            .instances
-            .push(InstancePixelErrors { views: "novel".to_owned(), ..errors("b", Some("Sofa"), "albedo", 1, 0.1) });
+        scores.instances.push(InstancePixelErrors {
+            views: Views::Novel,
+            ..errors("b", Some("Sofa"), PictureKind::Albedo, 1, 0.1)
+        });
     });
     let markdown = shown(&both, Grouping::Category, TableFormat::Markdown);
     assert!(markdown.contains("| other | m | missing | missing | missing | - | - | - |"), "{markdown}");

@@ -1,0 +1,95 @@
+//! The metrics of results: their words, which way is better, and how they are shown.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::word_enum::word_enum;
+
+/// Whether more is better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Better {
+    /// As with errors.
+    Lower,
+    /// As with similarities.
+    Higher,
+}
+
+impl Better {
+    /// The factor after which the greater of two values is the better one.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Lower => -1.0,
+            Self::Higher => 1.0,
+        }
+    }
+}
+
+word_enum! {
+    /// A kind of score: the last word of a result's key.
+    Metric, a "metric":
+    /// Mean squared error.
+    Mse = "mse",
+    /// Peak signal-to-noise ratio, in dB.
+    Psnr = "psnr",
+    /// Structural similarity.
+    Ssim = "ssim",
+    /// LPIPS by AlexNet.
+    LpipsAlex = "lpips_alex",
+}
+
+/// How a number is shown to people.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NumberStyle {
+    /// As a table's head has it, with the unit.
+    pub title: &'static str,
+    /// The factor that values are shown with.
+    pub scale: f64,
+    /// Digits after the point.
+    pub digits: usize,
+}
+
+impl NumberStyle {
+    /// The value as tables show it.
+    pub fn text(&self, value: f64) -> String {
+        format!("{:.*}", self.digits, value * self.scale)
+    }
+}
+
+impl Metric {
+    /// Which way is better.
+    pub const fn better(self) -> Better {
+        match self {
+            Self::Mse | Self::LpipsAlex => Better::Lower,
+            Self::Psnr | Self::Ssim => Better::Higher,
+        }
+    }
+
+    /// Title, scale and digits. The paper prints MSE in units of 1e-3.
+    pub const fn style(self) -> NumberStyle {
+        match self {
+            Self::Mse => NumberStyle { title: "MSE (1e-3)", scale: 1e3, digits: 3 },
+            Self::Psnr => NumberStyle { title: "PSNR", scale: 1.0, digits: 2 },
+            Self::Ssim => NumberStyle { title: "SSIM", scale: 1.0, digits: 4 },
+            Self::LpipsAlex => NumberStyle { title: "LPIPS", scale: 1.0, digits: 4 },
+        }
+    }
+
+    /// By how much a value may differ between two processors: LPIPS depends on them in its last digits.
+    pub const fn tolerance(self) -> f64 {
+        match self {
+            Self::Mse | Self::Psnr | Self::Ssim => 0.0,
+            Self::LpipsAlex => 1e-5,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lpips_has_its_networks_word() {
+        assert_eq!(Metric::LpipsAlex.word(), mateval_metrics::Net::Alex.key());
+    }
+}

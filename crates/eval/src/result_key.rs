@@ -1,0 +1,351 @@
+//! The keys of a result, as in `rgb_true_specular.novel.psnr`: the one place that prints and parses them.
+
+use std::borrow::Cow;
+use std::cmp::Ordering;
+use std::fmt;
+use std::str::FromStr;
+
+use mateval_scene::ViewId;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+
+use crate::metric::Metric;
+use crate::word_enum::{UnknownWord, quoted, word_enum};
+
+word_enum! {
+    /// What is compared with the truth.
+    PictureKind, a "kind of picture":
+    /// Pictures of the base colour.
+    Albedo = "albedo",
+    /// The same times the scale of each channel that fits the truth best.
+    AlbedoAligned = "albedo_aligned",
+    /// Renders under the scene's own lights.
+    RgbTrue = "rgb_true",
+    /// Renders under lights that are fitted to the input view.
+    RgbFitted = "rgb_fitted",
+    /// Renders under the scene's own lights with other weights.
+    RgbRelit = "rgb_relit",
+    /// Pictures of roughness.
+    Roughness = "roughness",
+    /// Pictures of metallic.
+    Metallic = "metallic",
+    /// The texels of base colour.
+    TextureBaseColor = "texture_base_color",
+    /// The texels of roughness.
+    TextureRoughness = "texture_roughness",
+    /// The texels of metallic.
+    TextureMetallic = "texture_metallic",
+}
+
+word_enum! {
+    /// Which surfaces count.
+    Surfaces, a "kind of surfaces":
+    /// All of them.
+    All = "all",
+    /// Those that are metal or smooth in truth.
+    Specular = "specular",
+}
+
+word_enum! {
+    /// Which views a number is a mean over, and which of their pixels count; or which texels.
+    Views, a "kind of views":
+    /// The valid pixels of the input view.
+    Input = "input",
+    /// The valid pixels of the other views.
+    Novel = "novel",
+    /// Texels that the input view sees.
+    Observed = "observed",
+    /// Pixels of the other views, or texels, that the input view does not see.
+    Unobserved = "unobserved",
+}
+
+word_enum! {
+    /// Which pixels of a picture count.
+    Region, a "region":
+    /// All that `valid.png` holds.
+    Valid = "valid",
+    /// Those of them that the input view does not see.
+    Unobserved = "unobserved",
+}
+
+impl PictureKind {
+    /// As people are shown it.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Albedo => "Albedo",
+            Self::AlbedoAligned => "Aligned albedo",
+            Self::RgbTrue => "RGB, true light",
+            Self::RgbFitted => "RGB, fitted light",
+            Self::RgbRelit => "RGB, relit",
+            Self::Roughness => "Roughness",
+            Self::Metallic => "Metallic",
+            Self::TextureBaseColor => "Base colour texels",
+            Self::TextureRoughness => "Roughness texels",
+            Self::TextureMetallic => "Metallic texels",
+        }
+    }
+
+    /// Whether it is rendered light, whose errors are freed of noise.
+    pub const fn is_light(self) -> bool {
+        matches!(self, Self::RgbTrue | Self::RgbFitted | Self::RgbRelit)
+    }
+}
+
+impl Surfaces {
+    /// As people are shown it.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::All => "All surfaces",
+            Self::Specular => "Specular regions",
+        }
+    }
+
+    /// What the name of a picture ends with.
+    const fn suffix(self) -> &'static str {
+        match self {
+            Self::All => "",
+            Self::Specular => "_specular",
+        }
+    }
+}
+
+impl Views {
+    /// As people are shown it.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Input => "Input view",
+            Self::Novel => "Novel views",
+            Self::Observed => "Observed",
+            Self::Unobserved => "Unobserved",
+        }
+    }
+
+    /// The views that a region of one view counts for.
+    pub fn of(view: &ViewId, region: Region) -> Self {
+        match region {
+            Region::Unobserved => Self::Unobserved,
+            Region::Valid if view.as_str() == mateval_scene::layout::INPUT => Self::Input,
+            Region::Valid => Self::Novel,
+        }
+    }
+}
+
+/// What is compared and on which surfaces, as in `albedo` or `rgb_true_specular`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct PictureName {
+    /// What is compared.
+    pub kind: PictureKind,
+    /// Where.
+    pub surfaces: Surfaces,
+}
+
+/// Which mean of a result a number is: `<picture>.<views>.<metric>`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct ResultKey {
+    /// What is compared and on which surfaces.
+    pub picture: PictureName,
+    /// In which views.
+    pub views: Views,
+    /// By which metric.
+    pub metric: Metric,
+}
+
+/// A text that is no key of a result.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum BadResultKey {
+    /// It has fewer or more than three words.
+    #[error("{} is no key of a result; expected <picture>.<views>.<metric>", quoted(.0))]
+    Shape(String),
+    /// One of its words is unknown.
+    #[error("{} is no key of a result: {source}", quoted(key))]
+    Word {
+        /// The text.
+        key: String,
+        /// The word.
+        source: UnknownWord,
+    },
+}
+
+impl PictureName {
+    /// That kind of picture, on all surfaces.
+    pub const fn whole(kind: PictureKind) -> Self {
+        Self { kind, surfaces: Surfaces::All }
+    }
+
+    /// The words that it is printed as, one after the other.
+    const fn parts(self) -> [&'static str; 2] {
+        [self.kind.word(), self.surfaces.suffix()]
+    }
+}
+
+impl ResultKey {
+    /// Of a picture on all surfaces.
+    pub const fn whole(kind: PictureKind, views: Views, metric: Metric) -> Self {
+        Self { picture: PictureName::whole(kind), views, metric }
+    }
+
+    /// The same mean by another metric.
+    pub const fn with(self, metric: Metric) -> Self {
+        Self { metric, ..self }
+    }
+
+    fn parts(self) -> [&'static str; 6] {
+        let [kind, suffix] = self.picture.parts();
+        [kind, suffix, ".", self.views.word(), ".", self.metric.word()]
+    }
+}
+
+impl FromStr for PictureName {
+    type Err = UnknownWord;
+
+    fn from_str(text: &str) -> Result<Self, UnknownWord> {
+        let specular = Surfaces::Specular;
+        let (kind, surfaces) =
+            text.strip_suffix(specular.suffix()).map_or((text, Surfaces::All), |kind| (kind, specular));
+        Ok(Self { kind: kind.parse()?, surfaces })
+    }
+}
+
+impl FromStr for ResultKey {
+    type Err = BadResultKey;
+
+    fn from_str(text: &str) -> Result<Self, BadResultKey> {
+        let words: Vec<&str> = text.split('.').collect();
+        let [picture, views, metric] = words.as_slice() else { return Err(BadResultKey::Shape(text.to_owned())) };
+        let bad = |source| BadResultKey::Word { key: text.to_owned(), source };
+        Ok(Self {
+            picture: picture.parse().map_err(bad)?,
+            views: views.parse().map_err(bad)?,
+            metric: metric.parse().map_err(bad)?,
+        })
+    }
+}
+
+/// What both kinds of names do by way of their text. They compare as their texts do, which is the order of a result's keys.
+macro_rules! by_text {
+    ($name:ident, $error:ty, $pattern:literal) => {
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.parts().iter().try_for_each(|part| f.write_str(part))
+            }
+        }
+
+        impl Ord for $name {
+            fn cmp(&self, other: &Self) -> Ordering {
+                let [a, b] = [self, other].map(|name| name.parts());
+                let bytes = |parts: &'static str| parts.bytes();
+                a.into_iter().flat_map(bytes).cmp(b.into_iter().flat_map(bytes))
+            }
+        }
+
+        impl PartialOrd for $name {
+            fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+                Some(self.cmp(other))
+            }
+        }
+
+        impl TryFrom<String> for $name {
+            type Error = $error;
+
+            fn try_from(text: String) -> Result<Self, $error> {
+                text.parse()
+            }
+        }
+
+        impl From<$name> for String {
+            fn from(name: $name) -> Self {
+                name.to_string()
+            }
+        }
+
+        impl JsonSchema for $name {
+            fn schema_name() -> Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!({ "type": "string", "pattern": $pattern })
+            }
+        }
+    };
+}
+// The patterns hold the shape alone: the words are listed once, in `dataset_spec/FORMAT.md`.
+by_text!(PictureName, UnknownWord, "^[a-z_]+$");
+by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z]+\\.[a-z0-9_]+$");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn all() -> Vec<ResultKey> {
+        let mut keys = Vec::new();
+        for &kind in PictureKind::ALL {
+            for &surfaces in Surfaces::ALL {
+                for &views in Views::ALL {
+                    let picture = PictureName { kind, surfaces };
+                    keys.extend(Metric::ALL.iter().map(|&metric| ResultKey { picture, views, metric }));
+                }
+            }
+        }
+        keys
+    }
+
+    #[test]
+    fn keys_are_parsed_from_what_they_print() {
+        let keys = all();
+        assert_eq!(keys.len(), 10 * 2 * 4 * 4);
+        for key in &keys {
+            assert_eq!(key.to_string().parse(), Ok(*key));
+            let json = serde_json::to_string(key).unwrap();
+            assert_eq!((json.as_str(), serde_json::from_str(&json).unwrap()), (format!("\"{key}\"").as_str(), *key));
+        }
+        let key = ResultKey {
+            picture: PictureName { kind: PictureKind::RgbTrue, surfaces: Surfaces::Specular },
+            views: Views::Novel,
+            metric: Metric::Psnr,
+        };
+        assert_eq!(key.to_string(), "rgb_true_specular.novel.psnr");
+    }
+
+    #[test]
+    fn keys_are_in_the_order_of_their_texts() {
+        let mut keys = all();
+        keys.sort();
+        let mut texts: Vec<String> = all().iter().map(ResultKey::to_string).collect();
+        texts.sort();
+        assert_eq!(keys.iter().map(ResultKey::to_string).collect::<Vec<_>>(), texts);
+        texts.dedup();
+        assert_eq!(texts.len(), keys.len());
+    }
+
+    #[test]
+    fn unknown_words_are_named() {
+        for (text, unknown) in [
+            ("albedo.novel.rmse", "'rmse' is no metric; expected one of: mse, psnr, ssim, lpips_alex"),
+            ("albedo.behind.psnr", "'behind' is no kind of views"),
+            ("shading.novel.psnr", "'shading' is no kind of picture"),
+            ("albedo_specular_specular.novel.psnr", "'albedo_specular' is no kind of picture"),
+            ("albedo.novel", "expected <picture>.<views>.<metric>"),
+            ("albedo.input./../../evil.psnr", "expected <picture>.<views>.<metric>"),
+            ("a\nb.novel.psnr", "'a\\nb' is no kind of picture"),
+            ("", "expected <picture>.<views>.<metric>"),
+        ] {
+            let error = text.parse::<ResultKey>().unwrap_err().to_string();
+            assert!(error.contains(unknown), "{error}");
+        }
+    }
+
+    /// The key of the sample's result in the published example, and its twins with a word that nobody knows.
+    #[test]
+    fn the_published_example_holds_known_keys_alone() {
+        let text = include_str!("../../../dataset_spec/examples/result.json");
+        let read = |text: &str| serde_json::from_str::<crate::result::ResultFile>(text).map_err(|e| e.to_string());
+        assert!(read(text).unwrap().protocols["mateval-1"].summary.len() >= 4);
+        for twin in ["albedo.input.mze", "albido.input.mse", "albedo.inputs.mse"] {
+            let error = read(&text.replace("albedo.input.mse", twin)).unwrap_err();
+            assert!(error.contains(&format!("'{twin}' is no key of a result")), "{error}");
+        }
+    }
+}

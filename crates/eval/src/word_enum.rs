@@ -1,0 +1,78 @@
+//! A macro for enums whose every variant is one word of a file: it is printed and parsed here and nowhere else.
+
+/// A word that an enum does not have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{} is no {what}; expected one of: {expected}", quoted(.word))]
+pub struct UnknownWord {
+    /// What it should have been, as in "metric".
+    pub what: &'static str,
+    /// The word.
+    pub word: String,
+    /// The words that are known, separated by commas.
+    pub expected: String,
+}
+
+/// An untrusted text in quotes, without control characters and at most 80 characters long.
+pub(crate) fn quoted(text: &str) -> String {
+    format!("'{}'", text.chars().take(80).collect::<String>().escape_debug())
+}
+
+/// Defines an enum with `ALL`, `word`, `Display`, `FromStr`, serde and a schema. Variants compare as their words do, so
+/// that maps of them are written in the order of the printed text; `ALL` keeps the order of the definition.
+macro_rules! word_enum {
+    (
+        $(#[$meta:meta])*
+        $name:ident, a $what:literal:
+        $($(#[$variant_meta:meta])* $variant:ident = $word:literal,)+
+    ) => {
+        $(#[$meta])*
+        #[derive(
+            Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+        )]
+        pub enum $name {
+            $($(#[$variant_meta])* #[serde(rename = $word)] $variant,)+
+        }
+
+        impl $name {
+            /// Every variant, in the order in which people are shown them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The word for it in files.
+            pub const fn word(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $word,)+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $name {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.word())
+            }
+        }
+
+        impl std::str::FromStr for $name {
+            type Err = $crate::word_enum::UnknownWord;
+
+            fn from_str(word: &str) -> Result<Self, Self::Err> {
+                Self::ALL.iter().copied().find(|known| known.word() == word).ok_or_else(|| {
+                    let expected = [$($word),+].join(", ");
+                    $crate::word_enum::UnknownWord { what: $what, word: word.to_owned(), expected }
+                })
+            }
+        }
+
+        impl Ord for $name {
+            fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+                self.word().cmp(other.word())
+            }
+        }
+
+        impl PartialOrd for $name {
+            fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+                Some(self.cmp(other))
+            }
+        }
+    };
+}
+pub(crate) use word_enum;
