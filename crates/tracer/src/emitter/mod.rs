@@ -459,7 +459,8 @@ mod tests {
                 assert_eq!((found.light, found.radiance), (sample.light, sample.radiance));
                 lights.insert(sample.light.0);
             }
-            assert_eq!(lights.len(), if surfaces == 70 { lights.len() } else { scene.lights.len() });
+            // Of many emitters, some are too small to be found.
+            assert!(lights.len() == scene.lights.len() || (surfaces == 70 && lights.len() > 60), "{}", lights.len());
         }
     }
 

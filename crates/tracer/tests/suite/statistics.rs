@@ -56,6 +56,11 @@ impl Renders {
         Self(pictures.collect())
     }
 
+    /// The renders of the same scene with all lights scaled by `factor`: light is linear in emission.
+    pub fn scaled(&self, factor: f32) -> Self {
+        Self(self.0.iter().map(|picture| picture.map(|pixel| LinearRgb(pixel.0.map(|v| factor * v)))).collect())
+    }
+
     /// The individual renders.
     pub fn pictures(&self) -> &[Picture<LinearRgb>] {
         &self.0
