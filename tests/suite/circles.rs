@@ -124,6 +124,9 @@ impl<'ast> Visit<'ast> for Walk<'_> {
         visit::visit_path(self, path);
     }
 
+    /// `pub(super)` and `pub(crate)` say who may use an item; they use nothing.
+    fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
+
     fn visit_macro(&mut self, item: &'ast syn::Macro) {
         self.tokens(item.tokens.clone());
     }
@@ -191,7 +194,7 @@ fn modules(source: &Path) -> BTreeMap<Module, String> {
             let path = entry.unwrap().path();
             let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
             let is_test = stem.starts_with("tests");
-            let below = [module.as_slice(), &[stem.clone()]].concat();
+            let below = [module.as_slice(), std::slice::from_ref(&stem)].concat();
             if path.is_dir() && !is_test {
                 folders.push((path, below));
             } else if path.extension().is_some_and(|extension| extension == "rs") && !is_test {
@@ -241,6 +244,8 @@ fn circles_are_found() {
     let behind_a_signpost =
         of(&[("", "mod a; mod b; pub use b::B;"), ("a", "use crate::B;"), ("b", "use crate::a::A;")]);
     assert_eq!(behind_a_signpost.len(), 2);
+    let by_visibility = of(&[("", "mod a;"), ("a", "mod c; fn f() { c::g() }"), ("a::c", "pub(super) fn g() {}")]);
+    assert_eq!(by_visibility, [""; 0]);
     let in_tests =
         of(&[("", "mod a; mod b;"), ("a", "use crate::b::B;"), ("b", "#[cfg(test)] mod t { use crate::a::A; }")]);
     assert_eq!(in_tests, [""; 0]);

@@ -122,7 +122,7 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     let mut render: RenderArgs = parse_args(&render_words)?;
     render.by = args.by.clone();
     Ok(Plan {
-        sample: parse_args(&words(Vec::new(), &[source.clone()]))?,
+        sample: parse_args(&words(Vec::new(), std::slice::from_ref(&source)))?,
         build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
         render,
         baselines: args.baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,

@@ -32,8 +32,8 @@ const SECOND_ORDER: f64 = 1.0;
 /// Estimates the bias of [`noise_free_mse`](crate::noise_free_mse()) over the mask when it is given halves that went
 /// through `encode`. The halves given here are in linear light.
 ///
-/// The bias of a half is about twice that of the halves' mean, so the jackknife (Quenouille 1956) estimates b as f(a1)
-/// + f(a2) - 2 f((a1 + a2) / 2), for the prediction minus the same for the reference. The difference M of the encoded
+/// The bias of a half is about twice that of the halves' mean, so the jackknife (Quenouille 1956) estimates b as
+/// f(a1) + f(a2) - 2 f((a1 + a2) / 2), for the prediction minus the same for the reference. The difference M of the encoded
 /// means is about d + b / 2, hence 2 M b = 2 d b + b² without squaring a noisy value. The bound adds up the estimate's
 /// absolute value, its own noise by `blocks` (as in [`noise_free_mse`](crate::noise_free_mse())), and the mean of both
 /// squared biases for terms of higher order.

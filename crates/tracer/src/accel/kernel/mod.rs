@@ -15,8 +15,8 @@
 //! padding is the same for the whole ray and is added to its origin, so it costs nothing.
 //!
 //! **Triangles**, watertight: Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013). Corners are
-//! moved into the ray's own sheared space, where the ray is the z axis, and rounded there. The three edge functions a b
-//! - c d are computed by Kahan's method with fused multiply-adds, whose relative error is below 2^-22 (Jeannerod,
+//! moved into the ray's own sheared space, where the ray is the z axis, and rounded there. The three edge functions
+//! a b - c d are computed by Kahan's method with fused multiply-adds, whose relative error is below 2^-22 (Jeannerod,
 //! Louvet, Muller, "Further analysis of Kahan's algorithm for the accurate computation of 2x2 determinants", 2013).
 //! Their signs are therefore exact unless numbers below 3e-16 m are multiplied, so two triangles that share an edge
 //! agree on which side of it the ray passes, and around a shared corner there is no gap.
