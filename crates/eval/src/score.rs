@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use mateval_metrics::Lpips;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::dataset_id::DatasetId;
-use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
+use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SubmissionFile};
 use mateval_scene::{Finding, Progress, SceneId, Severity, json};
@@ -22,8 +22,9 @@ use crate::result::{
     MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
 };
 use crate::scene_score::{SceneOrder, SceneScore, score_scene};
-use mateval_submission::map_file::{MapFault, check_place, is_there};
-use mateval_submission::prediction::{PredictedScene, map_files, read_scene};
+use mateval_submission::hashed_file::{HashedFile, submission_sha256};
+use mateval_submission::prediction::{PredictedScene, read_scene};
+use mateval_submission::submission_json::SubmissionJson;
 
 /// The network that scores use, or why it is not there.
 pub enum LpipsWeights {
@@ -71,7 +72,7 @@ pub struct ScorePlan<'a> {
 struct Entry {
     file: SubmissionFile,
     findings: Vec<Finding>,
-    files: Vec<(String, String)>,
+    files: Vec<HashedFile>,
     /// By protocol, scene by scene.
     scores: Vec<Vec<(SceneId, SceneScore)>>,
 }
@@ -79,7 +80,7 @@ struct Entry {
 /// What one submission got in one scene.
 struct Outcome {
     findings: Vec<Finding>,
-    files: Vec<(String, String)>,
+    files: Vec<HashedFile>,
     /// By protocol.
     scores: Vec<SceneScore>,
 }
@@ -198,18 +199,8 @@ impl ScorePlan<'_> {
     }
 }
 
-/// Reads `submission.json`, if it is not a link that leads out.
-fn read_submission_file(submission: &Path) -> Result<SubmissionFile, EvalError> {
-    let place = submission.join(SUBMISSION);
-    if is_there(&place) {
-        let invalid = |fault: MapFault| EvalError::Invalid(format!("'{}': {}", place.display(), fault.message));
-        check_place(submission, &place).map_err(invalid)?;
-    }
-    Ok(SubmissionFile::read(submission)?)
-}
-
 fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError> {
-    let file = read_submission_file(path)?;
+    let SubmissionJson { file, hashed } = SubmissionJson::read(path)?;
     let mut findings = Vec::new();
     let expected = &plan.dataset.file.manifest_sha256;
     if file.dataset_manifest_sha256 != *expected {
@@ -222,32 +213,7 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
             action: "scored all the same; make it anew for this dataset".to_owned(),
         });
     }
-    let files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    Ok(Entry { file, findings, files, scores: vec![Vec::new(); plan.protocols.len()] })
-}
-
-/// What tells a submission from others.
-pub struct HashedSubmission {
-    /// As it calls itself.
-    pub method: String,
-    /// As a result of these scenes has it.
-    pub sha256: String,
-    /// How many files the hash is over, `submission.json` aside.
-    pub maps: usize,
-}
-
-/// Hashes the files of a submission that matter for these scenes.
-pub fn hashed_submission(path: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<HashedSubmission, EvalError> {
-    let file = read_submission_file(path)?;
-    let mut files = vec![(SUBMISSION.to_owned(), sha256_of_file(&path.join(SUBMISSION))?)];
-    files.extend(dataset.chosen_scenes(scenes)?.into_iter().flat_map(|scene| map_files(path, scene)));
-    Ok(HashedSubmission { method: file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
-}
-
-/// The hash of a submission: of `submission.json` and of the maps of the scored scenes, path and SHA-256 each, in order.
-fn submission_sha256(files: &[(String, String)]) -> String {
-    let lines: String = files.iter().map(|(path, sha256)| format!("{sha256}  {path}\n")).collect();
-    sha256_of_bytes(lines.as_bytes())
+    Ok(Entry { file, findings, files: vec![hashed], scores: vec![Vec::new(); plan.protocols.len()] })
 }
 
 fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> ResultFile {

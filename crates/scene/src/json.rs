@@ -33,9 +33,13 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
 
 /// Reads a file of at most `most` bytes.
 pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
-    let text = read_at_most(path, most).map_err(SceneError::io("read", path))?;
-    // The path costs time, so that only a second look at what is known to be bad follows it.
-    serde_json::from_slice(&text).map_err(|error| invalid(path, pointer::<T>(&text), error.to_string()))
+    parse(path, &read_at_most(path, most).map_err(SceneError::io("read", path))?)
+}
+
+/// Parses the bytes of a file; `path` is for the error alone.
+pub fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, SceneError> {
+    // Following the JSON path costs time, so only a text that is known to be bad is parsed that way.
+    serde_json::from_slice(text).map_err(|error| invalid(path, pointer::<T>(text), error.to_string()))
 }
 
 /// The JSON pointer of the first fault; empty where the text is no JSON at all, or the fault is in the whole of it.

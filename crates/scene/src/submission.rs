@@ -43,15 +43,14 @@ pub struct SubmissionFile {
 }
 
 impl SubmissionFile {
-    /// Reads the file of a submission. Fails where its format is another one.
-    pub fn read(submission: &Path) -> Result<Self, SceneError> {
-        let path = submission.join(SUBMISSION);
-        let file: Self = json::read_within(&path, MAX_SUBMISSION_BYTES)?;
+    /// Parses the bytes of a submission's file; `path` is for the error alone. Fails where its format is another one.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
+        let file: Self = json::parse(path, bytes)?;
         if file.format == SUBMISSION_FORMAT {
             return Ok(file);
         }
         let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", shortened(&file.format));
-        Err(SceneError::Unsupported { path, what })
+        Err(SceneError::Unsupported { path: path.to_owned(), what })
     }
 }
 

@@ -1,17 +1,24 @@
-//! Submissions as anyone sends them.
+//! Submissions from untrusted makers.
 //!
-//! In: a folder or an archive of untrusted files, and the dataset that it answers. Out: maps ready to be rendered
-//! ([`prediction`]), and findings about everything that is wrong ([`lint`]).
+//! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered ([`prediction`]), the hash
+//! that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`]).
 //!
-//! Between: [`archive`] unpacks within limits, [`map_file`] reads one map, [`texel_map`] says where an atlas's texels lie
-//! and which of them the input view shows.
+//! Between: [`archive`] unpacks within limits, [`submitted_file`] reads a file once and hashes the same bytes, [`map_file`]
+//! decodes one map, [`texel_map`] says where an atlas's texels lie and which of them the input view shows.
 
 pub mod archive;
 mod coverage;
 pub mod error;
+pub mod file_fault;
+pub mod hashed_file;
+pub mod hashed_submission;
 pub mod lint;
 pub mod map_file;
+mod map_place;
+pub mod memory_budget;
 pub mod prediction;
+pub mod submission_json;
+pub mod submitted_file;
 pub mod texel_map;
 
 pub use error::SubmissionError;

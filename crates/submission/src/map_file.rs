@@ -1,32 +1,32 @@
-//! One map of a submission, read as scores and `eval lint` read it: what the file says of itself and its texels, or why it
-//! cannot be used.
+//! One map of a submission, decoded as scoring and `eval lint` decode it: what the file's header says and the texels, or
+//! why it cannot be used.
 //!
-//! A stranger made it. Nothing outside the submission's folder is read, and sizes are checked before memory is taken.
+//! The file is untrusted input: sizes are checked before memory is taken.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_image::exr_header::{EXR_SIGNATURE, ExrHeader};
-use mateval_image::limits::read_at_most;
 use mateval_image::png_header::{PNG_SIGNATURE, PngHeader};
 use mateval_image::{ImageError, Texels, Texture, map_io};
 use mateval_scene::findings::shortened;
-use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::submission::{MAP_SIZES, Map, instance_folder};
-use mateval_scene::{InstanceId, SceneId};
+use mateval_scene::submission::{MAP_SIZES, Map};
+
+use crate::file_fault::FileFault;
+use crate::submitted_file::SubmittedFile;
 
 /// Largest file of a map, in bytes.
 pub const MAX_MAP_BYTES: u64 = 512 << 20;
 
-/// Most numbers of an OpenEXR file, all its parts and channels together: eight channels of the largest map.
+/// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest map.
 pub const MAX_EXR_NUMBERS: usize = 8 * 4096 * 4096;
 
-/// What a base colour may be, linear; a stray value must not swamp the mean over all pixels.
+/// The range of a linear base colour. One stray value must not dominate the mean over all pixels.
 pub const BASE_COLOR_RANGE: std::ops::RangeInclusive<f32> = -1.0..=16.0;
 
-/// What a roughness and a metallic may be.
+/// The range of a roughness and of a metallic.
 pub const SCALAR_RANGE: std::ops::RangeInclusive<f32> = 0.0..=1.0;
 
-/// What a file says of itself.
+/// The header of a map's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MapHeader {
     /// Of a PNG.
@@ -38,7 +38,7 @@ pub enum MapHeader {
 /// A map that can be used.
 #[derive(Clone, Debug)]
 pub struct MapFile {
-    /// What the file says of itself.
+    /// The file's header.
     pub header: MapHeader,
     /// Colours of a base colour; scalars of the others.
     pub texture: Texture,
@@ -46,54 +46,19 @@ pub struct MapFile {
     pub sha256: String,
 }
 
-/// Why a map cannot be used.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MapFault {
-    /// A stable word, as in `not_square`.
-    pub code: &'static str,
-    /// Where in the file, as in `texel (3, 2)`; empty for the whole file.
-    pub place: String,
-    /// What was expected and what was found.
-    pub message: String,
-    /// What to do.
-    pub action: &'static str,
+/// Decodes the file of a map; its ending says whether it should be a PNG or an EXR.
+pub fn decode(file: SubmittedFile, map: Map) -> Result<MapFile, FileFault> {
+    let header = check_header(file.path(), file.bytes(), map)?;
+    let (path, sha256) = (file.path().to_owned(), file.hashed().sha256.clone());
+    let texture = texels(&path, file.into_bytes(), map, &header)?;
+    check_values(&texture, map)?;
+    Ok(MapFile { header, texture, sha256 })
 }
 
-impl MapFault {
-    fn new(code: &'static str, message: impl Into<String>, action: &'static str) -> Self {
-        Self { code, place: String::new(), message: message.into(), action }
-    }
-}
-
-/// Where an instance's map may lie: as PNG, as EXR.
-pub fn candidates(submission: &Path, scene: &SceneId, instance: &InstanceId, map: Map) -> [PathBuf; 2] {
-    let folder = instance_folder(submission, scene, instance);
-    ["png", "exr"].map(|ending| folder.join(map.stem()).with_extension(ending))
-}
-
-/// Whether something is at a path, be it a link that leads nowhere.
-pub fn is_there(path: &Path) -> bool {
-    path.symlink_metadata().is_ok()
-}
-
-/// Reads a map; `path` is one of [`candidates`].
-pub fn read(submission: &Path, path: &Path, map: Map) -> Result<MapFile, MapFault> {
-    check_place(submission, path)?;
-    let bytes = read_at_most(path, MAX_MAP_BYTES).map_err(|error| match error.kind() {
-        std::io::ErrorKind::FileTooLarge => MapFault::new(
-            "file_too_large",
-            format!("more than {MAX_MAP_BYTES} bytes"),
-            "save it with compression, or with fewer texels",
-        ),
-        _ => MapFault::new("unreadable_file", error.to_string(), "make it an ordinary file that can be read"),
-    })?;
-    read_bytes(path, bytes, map)
-}
-
-/// The same from a file's bytes; its ending says what they should be.
-pub fn read_bytes(path: &Path, bytes: Vec<u8>, map: Map) -> Result<MapFile, MapFault> {
-    check_kind(path, &bytes)?;
-    let header = header_of(path, &bytes)?;
+/// The header of a file whose texels are worth decoding.
+fn check_header(path: &Path, bytes: &[u8], map: Map) -> Result<MapHeader, FileFault> {
+    check_kind(path, bytes)?;
+    let header = header_of(path, bytes)?;
     match &header {
         MapHeader::Png(png) => {
             check_size(png.width as usize, png.height as usize)?;
@@ -101,37 +66,12 @@ pub fn read_bytes(path: &Path, bytes: Vec<u8>, map: Map) -> Result<MapFile, MapF
         }
         MapHeader::Exr(exr) => check_exr(exr, map)?,
     }
-    let sha256 = sha256_of_bytes(&bytes);
-    let texture = decode(path, bytes, map, &header)?;
-    check_values(&texture, map)?;
-    Ok(MapFile { header, texture, sha256 })
+    Ok(header)
 }
 
-/// Whether a file is an ordinary one that does not lie outside the submission's folder, behind links.
-pub fn check_place(submission: &Path, path: &Path) -> Result<(), MapFault> {
-    let unreadable = |error: std::io::Error| {
-        MapFault::new("unreadable_file", error.to_string(), "make it an ordinary file that can be read")
-    };
-    let place = path.canonicalize().map_err(|error| match error.kind() {
-        std::io::ErrorKind::NotFound => {
-            MapFault::new("broken_link", "a link to nothing", "put the file itself in its place")
-        }
-        _ => unreadable(error),
-    })?;
-    let root = submission.canonicalize().map_err(unreadable)?;
-    if !place.starts_with(&root) {
-        let message = "a link that leads out of the submission's folder; it is not followed";
-        return Err(MapFault::new("link_leads_out", message, "put the file itself in its place"));
-    }
-    if !place.metadata().map_err(unreadable)?.is_file() {
-        return Err(MapFault::new("not_a_file", "not an ordinary file", "put a PNG or an EXR in its place"));
-    }
-    Ok(())
-}
-
-fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), MapFault> {
+fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), FileFault> {
     if bytes.is_empty() {
-        return Err(MapFault::new("empty_file", "a file of 0 bytes", "write the map again"));
+        return Err(FileFault::new("empty_file", "a file of 0 bytes", "write the map again"));
     }
     let (expected, name) = if path.extension().is_some_and(|ending| ending == "exr") {
         (EXR_SIGNATURE, "EXR")
@@ -140,17 +80,17 @@ fn check_kind(path: &Path, bytes: &[u8]) -> Result<(), MapFault> {
     };
     if bytes.starts_with(b"version https://git-lfs") {
         let message = "a Git LFS pointer, not the file that it stands for";
-        return Err(MapFault::new("git_lfs_pointer", message, "fetch the file itself (git lfs pull)"));
+        return Err(FileFault::new("git_lfs_pointer", message, "fetch the file itself (git lfs pull)"));
     }
-    // What is cut within its first bytes is a cut file of its kind.
+    // A file that was cut within its signature is a truncated file of that kind.
     if bytes.starts_with(expected) || expected.starts_with(bytes) {
         return Ok(());
     }
     let message = format!("{} in a file named .{}", kind_of(bytes), name.to_lowercase());
-    Err(MapFault::new("wrong_kind", message, "write a PNG as .png, an EXR as .exr; nothing else is read"))
+    Err(FileFault::new("wrong_kind", message, "write a PNG as .png, an EXR as .exr; nothing else is read"))
 }
 
-/// What a file is, by its first bytes.
+/// The kind of a file by its first bytes.
 fn kind_of(bytes: &[u8]) -> &'static str {
     const KINDS: [(&[u8], &str); 11] = [
         (PNG_SIGNATURE, "a PNG"),
@@ -165,75 +105,75 @@ fn kind_of(bytes: &[u8]) -> &'static str {
         (b"\x93NUMPY", "a NumPy array"),
         (b"BM", "a BMP"),
     ];
-    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map_or("no picture", |(_, name)| name)
+    KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map_or("not a picture", |(_, name)| name)
 }
 
-fn header_of(path: &Path, bytes: &[u8]) -> Result<MapHeader, MapFault> {
+fn header_of(path: &Path, bytes: &[u8]) -> Result<MapHeader, FileFault> {
     let header = if path.extension().is_some_and(|ending| ending == "exr") {
         ExrHeader::of(bytes).map(MapHeader::Exr).map_err(|error| error.to_string())
     } else {
         PngHeader::of(bytes).map(MapHeader::Png).map_err(|error| error.to_string())
     };
     header.map_err(|what| {
-        let message = format!("its header is not sound: {}", shortened(&what));
-        MapFault::new("bad_header", message, "write the map again")
+        let message = format!("its header is invalid: {}", shortened(&what));
+        FileFault::new("bad_header", message, "write the map again")
     })
 }
 
-/// Square, and of a side that a submission may use.
-fn check_size(width: usize, height: usize) -> Result<(), MapFault> {
+/// Fails unless the map is a square of a size that a submission may use.
+fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
     let (least, most) = (*MAP_SIZES.start(), *MAP_SIZES.end());
     let found = format!("{width}x{height} texels; expected a square of {least} to {most} a side");
     if width != height {
-        return Err(MapFault::new("not_square", found, "bake it to the square atlas of instances.glb"));
+        return Err(FileFault::new("not_square", found, "bake it to the square atlas of instances.glb"));
     }
     if width < least {
-        return Err(MapFault::new("too_few_texels", found, "bake it larger"));
+        return Err(FileFault::new("too_few_texels", found, "bake it larger"));
     }
     if width > most {
-        return Err(MapFault::new("too_many_texels", found, "bake it smaller"));
+        return Err(FileFault::new("too_many_texels", found, "bake it smaller"));
     }
     Ok(())
 }
 
-/// A PNG whose closing chunk is not there was cut, be it behind its last texel: nothing says that this was the last.
-fn check_end(png: &PngHeader) -> Result<(), MapFault> {
+/// A PNG without its closing chunk was truncated. That holds even if all texels are there: nothing says that none is missing.
+fn check_end(png: &PngHeader) -> Result<(), FileFault> {
     if png.ended {
         return Ok(());
     }
-    let message = "it ends early: there is no closing chunk (IEND)";
-    Err(MapFault::new("truncated_picture", message, "write or copy it again, whole"))
+    let message = "truncated: it has no closing chunk (IEND)";
+    Err(FileFault::new("truncated_picture", message, "write or copy it again, whole"))
 }
 
-fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), MapFault> {
+fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {
     if exr.deep {
-        let message = "deep data: lists of samples a pixel";
-        return Err(MapFault::new("deep_data", message, "write one number a texel and channel"));
+        let message = "deep data: a list of samples in each texel";
+        return Err(FileFault::new("deep_data", message, "write one number a texel and channel"));
     }
     check_size(exr.width, exr.height)?;
     let wanted: &[&str] = if map == Map::BaseColor { &["R", "G", "B"] } else { &["V"] };
-    // Others write a grey picture as Y.
+    // Some programs write a grey picture as Y.
     let instead = |name: &str| if name == "V" { exr.channel("Y") } else { None };
     for name in wanted {
         let Some(channel) = exr.channel(name).or_else(|| instead(name)) else {
             let names: Vec<&str> = exr.channels.iter().map(|channel| channel.name.as_str()).collect();
             let message = format!("expected channels {}, found {}", wanted.join(", "), shortened(&names.join(", ")));
             let action = "write R, G, B for base_color, V for roughness and metallic";
-            return Err(MapFault::new("missing_channel", message, action));
+            return Err(FileFault::new("missing_channel", message, action));
         };
         if channel.subsampled {
             let message = format!("channel {name} has numbers for some texels only");
-            return Err(MapFault::new("subsampled_channel", message, "write one number a texel and channel"));
+            return Err(FileFault::new("subsampled_channel", message, "write one number a texel and channel"));
         }
     }
     if exr.samples > MAX_EXR_NUMBERS {
         let message = format!("{} numbers in all parts and channels; expected at most {MAX_EXR_NUMBERS}", exr.samples);
-        return Err(MapFault::new("too_many_channels", message, "leave out all but the channels that are asked for"));
+        return Err(FileFault::new("too_many_channels", message, "write the required channels only"));
     }
     Ok(())
 }
 
-fn decode(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<Texture, MapFault> {
+fn texels(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<Texture, FileFault> {
     let decoded = match (header, map) {
         (MapHeader::Png(_), Map::BaseColor) => map_io::png_color(path, bytes),
         (MapHeader::Png(_), _) => map_io::png_scalar(path, bytes),
@@ -245,12 +185,12 @@ fn decode(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<T
             ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what,
             other => other.to_string(),
         };
-        MapFault::new("unreadable_picture", what, "write the map again")
+        FileFault::new("unreadable_picture", what, "write the map again")
     })
 }
 
-/// Every number finite and within its range.
-fn check_values(texture: &Texture, map: Map) -> Result<(), MapFault> {
+/// Fails unless every number is finite and within its range.
+fn check_values(texture: &Texture, map: Map) -> Result<(), FileFault> {
     let (name, range) = match map {
         Map::BaseColor => ("base colour", BASE_COLOR_RANGE),
         Map::Roughness => ("roughness", SCALAR_RANGE),
@@ -259,11 +199,11 @@ fn check_values(texture: &Texture, map: Map) -> Result<(), MapFault> {
     let (values, a_texel): (&[f32], usize) = match texture.texels() {
         Texels::Linear(values) => (values.as_flattened(), 3),
         Texels::Grey(values) => (values, 1),
-        // Whole numbers are 0 to 1.
+        // Integers decode to 0 to 1.
         _ => return Ok(()),
     };
     let Some(at) = values.iter().position(|value| !range.contains(value)) else { return Ok(()) };
-    // What is not finite is told before what is only too large.
+    // A value that is not finite is reported rather than one that is only too large.
     let at = values.iter().position(|value| !value.is_finite()).unwrap_or(at);
     let (value, texel) = (values[at], at / a_texel);
     let (low, high) = (range.start(), range.end());
@@ -274,8 +214,12 @@ fn check_values(texture: &Texture, map: Map) -> Result<(), MapFault> {
     } else {
         "out_of_range"
     };
-    Err(MapFault {
+    Err(FileFault {
         place: format!("texel ({}, {})", texel % texture.width(), texel / texture.width()),
-        ..MapFault::new(code, format!("a {name} of {value}; expected {low} to {high}"), "write finite numbers in range")
+        ..FileFault::new(
+            code,
+            format!("a {name} of {value}; expected {low} to {high}"),
+            "write finite numbers in range",
+        )
     })
 }

@@ -1,15 +1,20 @@
-//! A submission's maps, read for one scene; what is missing or unsound scores as the default, and is a finding unless the
-//! format lets it be left out.
+//! The maps that a submission holds for one scene, ready to be rendered. A missing or unusable map scores as its default.
+//! That is a finding, unless the format lets the map be left out.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_image::{Texels, Texture, Wrap};
-use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::submission::{GREY, Map};
 use mateval_scene::{Finding, Severity};
 
-use crate::map_file::{self, MAX_MAP_BYTES, MapFile, candidates, check_place, is_there};
+use crate::file_fault::FileFault;
+use crate::hashed_file::HashedFile;
+use crate::map_file::{self, MAX_MAP_BYTES, MapFile};
+use crate::map_place::MapFolder;
+use crate::memory_budget::MemoryBudget;
+use crate::submitted_file::{SubmittedFile, relative};
 
 /// What a missing roughness scores as; perceptual.
 pub const MISSING_ROUGHNESS: f32 = 0.5;
@@ -17,7 +22,7 @@ pub const MISSING_ROUGHNESS: f32 = 0.5;
 /// What a missing metallic scores as.
 pub const MISSING_METALLIC: f32 = 0.0;
 
-/// One instance's maps. A map that is the same everywhere is one texel.
+/// One instance's maps. A map with the same value everywhere has one texel.
 #[derive(Clone, Debug)]
 pub struct PredictedMaterial {
     /// Linear at lookup.
@@ -44,93 +49,97 @@ impl PredictedMaterial {
 pub struct PredictedScene {
     /// None for instances without an atlas.
     pub materials: Vec<Option<PredictedMaterial>>,
-    /// SHA-256, hex, over all texels of roughness and metallic as they were decoded. Submissions of equal keys have the same
-    /// roughness and metallic at every place of the scene, whatever files say so; those of others may.
+    /// SHA-256, hex, over all decoded texels of roughness and metallic. Submissions with equal keys have the same roughness
+    /// and metallic everywhere in the scene, however their files store them. Different keys prove nothing.
     pub scattering_key: String,
-    /// What was wrong and what is scored instead.
+    /// Every fault, with what is scored instead.
     pub findings: Vec<Finding>,
-    /// Path in the submission and SHA-256 of every map that is there.
-    pub files: Vec<(String, String)>,
+    /// Every map that could be read, with the hash of the bytes that [`PredictedScene::materials`] were decoded from. A
+    /// file that cannot be decoded, or stands beside another of the same map, is hashed too.
+    pub files: Vec<HashedFile>,
 }
 
-/// Most bytes that the texels of a scene's maps may take in memory together.
-pub const MAX_SCENE_BYTES: usize = 8 << 30;
-
-/// Reads the maps of one scene.
+/// Reads, hashes and decodes the maps of one scene, each file once.
 pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
-    let (mut findings, mut files) = (Vec::new(), Vec::new());
-    let mut room = Room { bytes: MAX_SCENE_BYTES };
-    let materials: Vec<Option<PredictedMaterial>> = scene
-        .instances
-        .iter()
-        .map(|instance| {
-            instance.atlas.as_ref()?;
-            let mut map = |map| read_map(submission, scene, instance, map, &mut room, &mut findings);
-            let [base_color, roughness, metallic] = Map::ALL.map(&mut map);
-            files.extend(files_there(submission, scene, instance));
-            Some(PredictedMaterial { base_color, roughness, metallic })
-        })
-        .collect();
+    let mut reader = Reader { submission, memory: MemoryBudget::of_scene(), findings: Vec::new(), files: Vec::new() };
+    let material = |instance: &mateval_scene::dataset::Instance| {
+        instance.atlas.as_ref()?;
+        let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
+        let [base_color, roughness, metallic] = Map::ALL.map(|map| reader.texture(folder, map));
+        Some(PredictedMaterial { base_color, roughness, metallic })
+    };
+    let materials: Vec<Option<PredictedMaterial>> = scene.instances.iter().map(material).collect();
+    let Reader { findings, files, .. } = reader;
     PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files }
 }
 
-/// One map, or its default.
-fn read_map(
-    submission: &Path,
-    scene: &SceneFile,
-    instance: &Instance,
-    map: Map,
-    room: &mut Room,
-    findings: &mut Vec<Finding>,
-) -> Texture {
-    let candidates = candidates(submission, &scene.id, &instance.id, map);
-    let present: Vec<&PathBuf> = candidates.iter().filter(|path| is_there(path)).collect();
-    let fault = match present.as_slice() {
-        [path] => match map_file::read(submission, path, map) {
-            Ok(file) => match room.holding(in_memory(file, map)) {
-                Some(texture) => return texture,
-                None => replaced("unsound_map", &relative(submission, path), map, &Room::full()),
+/// Reads maps one by one and gathers what is known about their files.
+struct Reader<'a> {
+    submission: &'a Path,
+    memory: MemoryBudget,
+    findings: Vec<Finding>,
+    files: Vec<HashedFile>,
+}
+
+impl Reader<'_> {
+    /// A map, or its default.
+    fn texture(&mut self, folder: MapFolder<'_>, map: Map) -> Texture {
+        let present = folder.present(map);
+        let fault = match present.as_slice() {
+            [path] => match self.decoded(path, map) {
+                Ok(texture) => return texture,
+                Err(finding) => finding,
             },
-            Err(fault) => {
-                let finding = replaced("unsound_map", &relative(submission, path), map, &fault.message);
-                Finding { place: fault.place, ..finding }
+            // The format lets the others be left out.
+            [] if map != Map::BaseColor => return default_of(map),
+            [] => self.replaced("missing_map", &folder.candidates(map)[0], map, "expected a PNG or an EXR, found none"),
+            several => {
+                // Neither is scored, but both belong to the submission's hash. An unreadable one has no hash.
+                several.iter().for_each(|path| drop(self.read(path)));
+                let message = "found both a PNG and an EXR; expected one of them";
+                self.replaced("ambiguous_map", &several[0], map, message)
             }
-        },
-        // The format lets the others be left out.
-        [] if map != Map::BaseColor => return default_of(map),
-        [] => {
-            let message = "expected a PNG or an EXR, found none";
-            replaced("missing_map", &relative(submission, &candidates[0]), map, message)
-        }
-        _ => {
-            let message = "found both a PNG and an EXR; expected one of them";
-            replaced("ambiguous_map", &relative(submission, &candidates[0]), map, message)
-        }
-    };
-    findings.push(fault);
-    default_of(map)
-}
-
-/// What is left for a scene's texels in memory.
-pub struct Room {
-    /// Bytes that may still be taken.
-    pub bytes: usize,
-}
-
-impl Room {
-    /// The texture, if there is room for it.
-    pub fn holding(&mut self, texture: Texture) -> Option<Texture> {
-        self.bytes = self.bytes.checked_sub(texture.bytes().len())?;
-        Some(texture)
+        };
+        self.findings.push(fault);
+        default_of(map)
     }
 
-    /// What is wrong where there is none.
-    pub fn full() -> String {
-        format!("the maps of its scene take more than {MAX_SCENE_BYTES} bytes together")
+    fn decoded(&mut self, path: &Path, map: Map) -> Result<Texture, Finding> {
+        let decoded = self.read(path).and_then(|file| map_file::decode(file, map));
+        let file = decoded.map_err(|fault| {
+            let finding = self.replaced("unsound_map", path, map, &fault.message);
+            Finding { place: fault.place, ..finding }
+        })?;
+        let held = self.memory.holding(in_memory(file, map));
+        held.ok_or_else(|| self.replaced("unsound_map", path, map, &MemoryBudget::exceeded()))
+    }
+
+    /// Reads a file and records its hash.
+    fn read(&mut self, path: &Path) -> Result<SubmittedFile, FileFault> {
+        let file = SubmittedFile::read(self.submission, path, MAX_MAP_BYTES)?;
+        self.files.push(file.hashed().clone());
+        Ok(file)
+    }
+
+    /// The finding that a map's default is scored.
+    fn replaced(&self, code: &str, path: &Path, map: Map, message: &str) -> Finding {
+        let scored = match map {
+            Map::BaseColor => format!("base colour {GREY} (linear)"),
+            Map::Roughness => format!("roughness {MISSING_ROUGHNESS}"),
+            Map::Metallic => format!("metallic {MISSING_METALLIC}"),
+        };
+        Finding {
+            severity: Severity::Warning,
+            code: code.to_owned(),
+            file: relative(self.submission, path),
+            place: String::new(),
+            message: message.to_owned(),
+            action: format!("scored as {scored}"),
+        }
     }
 }
 
-/// What scores where a map is missing or unsound.
+/// What is scored where a map is missing or unusable.
 fn default_of(map: Map) -> Texture {
     one_texel(match map {
         Map::BaseColor => GREY,
@@ -143,26 +152,8 @@ fn one_texel(value: f32) -> Texture {
     Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
 }
 
-/// Every map that is there with its hash: what a result was made of, whatever was made of it. A file that is too large to
-/// be read as a map has none: hashing it would take as long as its maker likes.
-fn files_there(submission: &Path, scene: &SceneFile, instance: &Instance) -> Vec<(String, String)> {
-    let paths = Map::ALL.into_iter().flat_map(|map| candidates(submission, &scene.id, &instance.id, map));
-    let is_bounded = |path: &PathBuf| path.metadata().is_ok_and(|data| data.len() <= MAX_MAP_BYTES);
-    let inside = paths.filter(|path| check_place(submission, path).is_ok() && is_bounded(path));
-    inside.filter_map(|path| Some((relative(submission, &path), sha256_of_file(&path).ok()?))).collect()
-}
-
-/// Path in the submission and SHA-256 of every map of the scene that is there, as [`read_scene`] tells them.
-pub fn map_files(submission: &Path, scene: &SceneFile) -> Vec<(String, String)> {
-    let recovered = scene.instances.iter().filter(|instance| instance.atlas.is_some());
-    recovered.flat_map(|instance| files_there(submission, scene, instance)).collect()
-}
-
-fn relative(submission: &Path, path: &Path) -> String {
-    path.strip_prefix(submission).unwrap_or(path).to_string_lossy().replace('\\', "/")
-}
-
-/// In as little memory as holds it. Equal scalars everywhere become one float, whatever they were stored as.
+/// The map's texels in as little memory as possible: one texel where all are equal, and for scalars one float then, however
+/// they were stored.
 pub fn in_memory(file: MapFile, map: Map) -> Texture {
     let texture = file.texture.collapsed();
     if map != Map::BaseColor && texture.width() == 1 { one_texel(texture.texel(0, 0)[0]) } else { texture }
@@ -179,24 +170,12 @@ fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
     sha256_of_bytes(text.as_bytes())
 }
 
-fn replaced(code: &str, file: &str, map: Map, message: &str) -> Finding {
-    let scored = match map {
-        Map::BaseColor => format!("base colour {GREY} (linear)"),
-        Map::Roughness => format!("roughness {MISSING_ROUGHNESS}"),
-        Map::Metallic => format!("metallic {MISSING_METALLIC}"),
-    };
-    Finding {
-        severity: Severity::Warning,
-        code: code.to_owned(),
-        file: file.to_owned(),
-        place: String::new(),
-        message: message.to_owned(),
-        action: format!("scored as {scored}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+    use std::path::PathBuf;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
     use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
     use serde_json::json;
@@ -282,17 +261,9 @@ mod tests {
         assert_eq!((read.files.len(), super::read_scene(sound().path(), &scene()).files.len()), (4, 6));
     }
 
+    /// The file is sparse and takes hardly any disk space.
     #[test]
-    fn a_scene_has_so_much_room_and_no_more() {
-        let texture = |side: usize| Texture::new(side, side, Texels::Grey8(vec![0; side * side]), Wrap::Clamp).unwrap();
-        let mut room = Room { bytes: 150 };
-        assert!(room.holding(texture(10)).is_some() && room.holding(texture(8)).is_none());
-        assert!(room.holding(texture(7)).is_some() && room.bytes == 1);
-    }
-
-    /// Almost all of it is a hole, that takes no room on the disk.
-    #[test]
-    fn what_is_too_large_to_be_read_is_not_hashed_either() {
+    fn a_file_too_large_to_read_has_no_hash() {
         let folder = sound();
         let path = file(&folder, "a", "roughness.png");
         std::fs::File::options().write(true).open(&path).unwrap().set_len(1 << 30).unwrap();
@@ -380,5 +351,38 @@ mod tests {
         assert!(others.iter().all(|other| *other != plain) && others[1] != others[2]);
         // No metallic is the default, 0; so says a file of zeros, of whatever size.
         assert_eq!(key(no_metal), key(black));
+    }
+
+    /// A map is replaced over and over while scenes are read: each hash is of the version whose texels were decoded.
+    #[test]
+    fn a_hash_is_of_the_bytes_that_were_decoded() {
+        let folder = sound();
+        let map = file(&folder, "a", "roughness.png");
+        let versions = [40_u8, 200].map(|value| {
+            png_io::write_grey_bytes(&map, &Picture::filled(64, 64, value)).unwrap();
+            let bytes = std::fs::read(&map).unwrap();
+            (f32::from(value) / 255.0, sha256_of_bytes(&bytes), bytes)
+        });
+        let (done, mut reads) = (AtomicBool::new(false), BTreeMap::new());
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for (_, _, bytes) in versions.iter().cycle().take_while(|_| !done.load(Ordering::Relaxed)) {
+                    std::fs::write(map.with_extension("new"), bytes).unwrap();
+                    std::fs::rename(map.with_extension("new"), &map).unwrap();
+                }
+            });
+            let start = std::time::Instant::now();
+            while (reads.len() < 2 || reads.values().any(|count| *count < 100)) && start.elapsed().as_secs() < 60 {
+                let read = read(&folder);
+                let value = constant(&read.materials[0].as_ref().unwrap().roughness);
+                let hashed = read.files.into_iter().find(|file| file.path == "scenes/s/a/roughness.png");
+                let version = versions.iter().position(|(version, ..)| Some(*version) == value);
+                *reads.entry((version, hashed.map(|file| file.sha256))).or_insert(0) += 1;
+            }
+            done.store(true, Ordering::Relaxed);
+        });
+        let expected: Vec<_> =
+            versions.iter().enumerate().map(|(at, (_, sha256, _))| (Some(at), Some(sha256.clone()))).collect();
+        assert_eq!(reads.keys().cloned().collect::<Vec<_>>(), expected, "{reads:?}");
     }
 }

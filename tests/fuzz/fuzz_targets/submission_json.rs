@@ -2,15 +2,16 @@
 //! `submission.json`, as scores read it and as `eval lint` does: both must agree on what can be read.
 
 use libfuzzer_sys::fuzz_target;
-use mateval_submission::lint::submission_json;
 use mateval_scene::Severity;
-use mateval_scene::submission::{SUBMISSION, SubmissionFile};
+use mateval_scene::submission::SUBMISSION;
+use mateval_submission::lint::submission_json;
+use mateval_submission::submission_json::SubmissionJson;
 
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file(SUBMISSION, bytes, |path| {
         let folder = path.parent().expect("the file lies in a folder");
         let (_, findings) = submission_json::check(folder, &"0".repeat(64));
         let is_sound = findings.iter().all(|finding| finding.severity != Severity::Error);
-        assert_eq!(SubmissionFile::read(folder).is_ok(), is_sound, "{findings:?}");
+        assert_eq!(SubmissionJson::read(folder).is_ok(), is_sound, "{findings:?}");
     });
 });

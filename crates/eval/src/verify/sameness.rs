@@ -7,7 +7,8 @@ use super::{VerifyPlan, file_name};
 use crate::error::EvalError;
 use crate::protocol::Protocol;
 use crate::result::{RESULT_FORMAT, ResultFile};
-use crate::score::{LpipsWeights, hashed_submission};
+use crate::score::LpipsWeights;
+use mateval_submission::hashed_submission::hashed_submission;
 
 /// Everything that has changed; numbers must be made anew only where this is empty. Fails where weights of LPIPS that the
 /// result was made with are missing.

@@ -179,8 +179,8 @@ fn cut_and_changed_archives_are_errors_that_are_told() {
     let checksum = changed.len() - 8;
     changed[checksum] ^= 1;
     assert_eq!(codes(&changed), ["damaged_archive"]);
-    assert!(matches!(opened("a.zip", b"no archive").1, Err(SubmissionError::Invalid(_))));
-    assert!(matches!(opened("a.zip", b"").1, Err(SubmissionError::Invalid(_))));
+    assert!(matches!(opened("a.zip", b"no archive").1, Err(SubmissionError::UnknownKind { .. })));
+    assert!(matches!(opened("a.zip", b"").1, Err(SubmissionError::UnknownKind { .. })));
 }
 
 proptest! {

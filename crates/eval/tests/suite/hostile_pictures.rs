@@ -5,21 +5,23 @@ use std::path::Path;
 use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::submission::Map;
-use mateval_submission::map_file::{MapFault, MapFile, read_bytes};
+use mateval_submission::file_fault::FileFault;
+use mateval_submission::map_file::{MapFile, decode};
+use mateval_submission::submitted_file::SubmittedFile;
 use proptest::prelude::*;
 
 use super::lint::written::{chunk, exr_header, png, rows};
 
-fn read_png(bytes: &[u8]) -> Result<MapFile, MapFault> {
-    read_bytes(Path::new("a.png"), bytes.to_vec(), Map::Roughness)
+fn read_png(bytes: &[u8]) -> Result<MapFile, FileFault> {
+    decode(SubmittedFile::from_bytes(Path::new(""), Path::new("a.png"), bytes.to_vec()), Map::Roughness)
 }
 
-fn read_exr(bytes: &[u8]) -> Result<MapFile, MapFault> {
-    read_bytes(Path::new("a.exr"), bytes.to_vec(), Map::BaseColor)
+fn read_exr(bytes: &[u8]) -> Result<MapFile, FileFault> {
+    decode(SubmittedFile::from_bytes(Path::new(""), Path::new("a.exr"), bytes.to_vec()), Map::BaseColor)
 }
 
 #[track_caller]
-fn code(read: Result<MapFile, MapFault>) -> &'static str {
+fn code(read: Result<MapFile, FileFault>) -> &'static str {
     read.map(|file| file.sha256).unwrap_err().code
 }
 
@@ -138,7 +140,7 @@ fn numbers_that_are_none() {
     for (value, expected) in [(f32::NAN, "nan"), (f32::NEG_INFINITY, "infinity"), (-1e-3, "out_of_range")] {
         let picture = Picture::from_fn(64, 64, |x, y| if (x, y) == (7, 9) { value } else { 0.5 });
         write_scalar(&path, &picture, Precision::Float).unwrap();
-        let fault = read_bytes(&path, std::fs::read(&path).unwrap(), Map::Metallic).unwrap_err();
+        let fault = decode(SubmittedFile::read(folder.path(), &path, 1 << 20).unwrap(), Map::Metallic).unwrap_err();
         assert_eq!((fault.code, fault.place.as_str()), (expected, "texel (7, 9)"));
     }
 }

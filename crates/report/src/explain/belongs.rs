@@ -9,7 +9,7 @@ use mateval_eval::metric::Metric;
 use mateval_eval::protocol::SCORER_VERSION;
 use mateval_eval::result::{ProtocolResult, RESULT_FORMAT};
 use mateval_eval::result_key::{PictureKind, ResultKey};
-use mateval_eval::score::{HashedSubmission, hashed_submission};
+use mateval_submission::hashed_submission::{HashedSubmission, hashed_submission};
 
 /// The scores that are to be explained; fails with everything that does not fit.
 pub(super) fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, ReportError> {

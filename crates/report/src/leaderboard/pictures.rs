@@ -13,7 +13,7 @@ use crate::picture_set::{self, ERROR, PictureSet};
 use crate::ranking::file::Ranking;
 use crate::strips::StripPlan;
 use mateval_eval::result_key::PictureKind;
-use mateval_eval::score::hashed_submission;
+use mateval_submission::hashed_submission::hashed_submission;
 
 /// Puts all pictures into `folder`, and tells which there are.
 pub(super) fn gather(

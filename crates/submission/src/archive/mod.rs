@@ -13,7 +13,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use mateval_scene::submission::SUBMISSION;
-use mateval_scene::{Finding, SceneError, Severity};
+use mateval_scene::{Finding, Severity};
 
 pub use limits::{ALWAYS_ALLOWED, MAX_ENTRIES, MAX_RATIO, MAX_UNPACKED};
 pub use tar_gz::unpack_tar_gz;
@@ -38,7 +38,7 @@ impl Opened {
 /// Opens a submission: a folder as it is, an archive unpacked below `work`. An archive may hold the submission in one folder
 /// of its own.
 pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
-    let data = std::fs::metadata(path).map_err(SceneError::io("read", path))?;
+    let data = std::fs::metadata(path).map_err(SubmissionError::io("read", path))?;
     if data.is_dir() {
         return Ok(Opened { root: path.to_owned(), _unpacked: None });
     }
@@ -46,8 +46,8 @@ pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
     let folder = tempfile::Builder::new()
         .prefix("mateval-unpacked-")
         .tempdir_in(work)
-        .map_err(SceneError::io("make a folder in", work))?;
-    let file = std::fs::File::open(path).map_err(SceneError::io("read", path))?;
+        .map_err(SubmissionError::io("make a folder in", work))?;
+    let file = std::fs::File::open(path).map_err(SubmissionError::io("read", path))?;
     unpack(file, folder.path()).map_err(|fault| fault.of(path, folder.path()))?;
     Ok(Opened { root: root_of(folder.path()), _unpacked: Some(folder) })
 }
@@ -59,16 +59,13 @@ fn kind_of(path: &Path, data: &std::fs::Metadata) -> Result<Unpack, SubmissionEr
     let mut start = Vec::new();
     // What has no end, as a pipe, is not begun.
     if data.is_file() {
-        let file = std::fs::File::open(path).map_err(SceneError::io("read", path))?;
-        file.take(4).read_to_end(&mut start).map_err(SceneError::io("read", path))?;
+        let file = std::fs::File::open(path).map_err(SubmissionError::io("read", path))?;
+        file.take(4).read_to_end(&mut start).map_err(SubmissionError::io("read", path))?;
     }
     match start.as_slice() {
         [b'P', b'K', 3, 4] | [b'P', b'K', 5, 6] => Ok(unpack_zip),
         [0x1f, 0x8b, ..] => Ok(unpack_tar_gz),
-        _ => Err(SubmissionError::Invalid(format!(
-            "'{}' is no submission: expected a folder, a .zip or a .tar.gz",
-            path.display()
-        ))),
+        _ => Err(SubmissionError::UnknownKind { path: path.to_owned() }),
     }
 }
 
@@ -103,7 +100,7 @@ impl Fault {
     fn of(self, archive: &Path, folder: &Path) -> SubmissionError {
         match self {
             Self::Refused(findings) => SubmissionError::Archive { path: archive.to_owned(), findings },
-            Self::Io(source) => SceneError::io("unpack to", folder)(source).into(),
+            Self::Io(source) => SubmissionError::io("unpack to", folder)(source),
         }
     }
 }

@@ -1,7 +1,5 @@
 //! One scene: every map read once, an instance at a time, and what they show together.
 
-use std::path::PathBuf;
-
 use mateval_image::Texture;
 use mateval_scene::Finding;
 use mateval_scene::dataset::{Instance, SceneFile};
@@ -17,8 +15,11 @@ use super::sight::{InstanceSight, Sight};
 use super::unobserved::{Fill, fill};
 use super::{LintPlan, map_remarks, orientation, scalars, shading, unobserved};
 use crate::error::SubmissionError;
-use crate::map_file::{self, MapFile, MapHeader, candidates, is_there};
-use crate::prediction::{MAX_SCENE_BYTES, Room, in_memory};
+use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
+use crate::map_place::MapFolder;
+use crate::memory_budget::{MAX_SCENE_BYTES, MemoryBudget};
+use crate::prediction::in_memory;
+use crate::submitted_file::{SubmittedFile, relative};
 
 /// Instances whose maps are in memory at once.
 const AT_ONCE: usize = 4;
@@ -72,7 +73,7 @@ fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> (Vec<Finding>, De
     let place = format!("scenes/{}", scene.id);
     let mut findings = Vec::new();
     if all.iter().map(|seen| seen.bytes).sum::<usize>() > MAX_SCENE_BYTES {
-        findings.push(error("scene_too_large", &place, Room::full(), "bake them smaller, or with 8 bits"));
+        findings.push(error("scene_too_large", &place, MemoryBudget::exceeded(), "bake them smaller, or with 8 bits"));
     }
     if !sight.has_photo {
         let message = "the dataset has no input picture";
@@ -110,12 +111,12 @@ fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceS
 }
 
 fn read(plan: &LintPlan<'_>, scene: &SceneFile, instance: &Instance, map: Map, seen: &mut Seen) -> Option<MapFile> {
-    let candidates = candidates(plan.submission, &scene.id, &instance.id, map);
-    let present: Vec<&PathBuf> = candidates.iter().filter(|path| is_there(path)).collect();
-    // None, and both, the layout tells.
-    let [path] = present.as_slice() else { return None };
-    let name = path.strip_prefix(plan.submission).unwrap_or(path).to_string_lossy().replace('\\', "/");
-    match map_file::read(plan.submission, path, map) {
+    let folder = MapFolder { submission: plan.submission, scene: &scene.id, instance: &instance.id };
+    // A missing map, and two files for one map, are findings of `layout`.
+    let [path] = folder.present(map).try_into().ok()?;
+    let name = relative(plan.submission, &path);
+    let file = SubmittedFile::read(plan.submission, &path, MAX_MAP_BYTES);
+    match file.and_then(|file| map_file::decode(file, map)) {
         Ok(file) => {
             seen.maps += 1;
             // A clone shares its texels.

@@ -13,7 +13,7 @@ use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
-use crate::error::SubmissionError;
+use crate::error::{SceneFault, SubmissionError};
 use crate::texel_map::TexelMap;
 
 /// Most pixels of the picture that are looked at.
@@ -69,7 +69,7 @@ impl Sight {
                 || file == "views/input/rgb.exr"
         })?;
         let folder = dataset.folder(&scene.id);
-        let view = scene.view(INPUT).ok_or_else(|| unsound(&folder, "it has no input view"))?;
+        let view = scene.view(INPUT).ok_or_else(|| unsound(&folder, SceneFault::NoInputView))?;
         let eye = Eye::read(&folder, scene, view)?;
         let mut instances = vec![InstanceSight::default(); scene.instances.len()];
         for (instance, pixel) in eye.pixels() {
@@ -82,9 +82,8 @@ impl Sight {
     }
 }
 
-fn unsound(folder: &SceneFolder, what: &str) -> SubmissionError {
-    let path = folder.scene_file();
-    SubmissionError::Invalid(format!("'{}': {what}; run `mateval prep verify`", path.display()))
+fn unsound(folder: &SceneFolder, fault: SceneFault) -> SubmissionError {
+    SubmissionError::UnsoundScene { scene_file: folder.scene_file(), fault }
 }
 
 /// What is looked through.
@@ -104,12 +103,13 @@ impl<'a> Eye<'a> {
             (png_io::read_mask(&shown.join("valid.png"))?, png_io::read_ids(&shown.join("instance.png"))?);
         let rgb = shown.join("rgb.exr");
         let photo = if rgb.exists() { Some(exr_io::read_linear(&rgb)?) } else { None };
-        let size = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
-        let fits = (valid.width(), valid.height()) == size
-            && valid.same_size(&ids)
-            && photo.as_ref().is_none_or(|photo| photo.same_size(&ids));
-        if !fits {
-            return Err(unsound(folder, "the input view's pictures are not as large as it says"));
+        let expected = [view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize];
+        let sizes = [Some([valid.width(), valid.height()]), Some([ids.width(), ids.height()])]
+            .into_iter()
+            .chain([photo.as_ref().map(|photo| [photo.width(), photo.height()])])
+            .flatten();
+        if let Some(found) = sizes.into_iter().find(|size| *size != expected) {
+            return Err(unsound(folder, SceneFault::PictureSize { expected, found }));
         }
         let world = World::new(Arc::new(plain_instances::read(folder, scene)?))?;
         Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })

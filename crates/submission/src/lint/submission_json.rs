@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use mateval_image::limits::read_at_most;
 use mateval_scene::Finding;
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
@@ -10,7 +9,9 @@ use serde_json::{Map, Value};
 
 use super::finding::{error, warning};
 use super::names::nearest;
-use crate::map_file::{check_place, is_there};
+use crate::file_fault::FileFault;
+use crate::map_place::exists;
+use crate::submitted_file::SubmittedFile;
 
 /// Its keys, and whether it must have them.
 const KEYS: [(&str, bool); 4] =
@@ -33,25 +34,24 @@ pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<F
 fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
     let path = submission.join(SUBMISSION);
     let fault = |code: &str, message: String, action: &str| Box::new(error(code, SUBMISSION, message, action));
-    if !is_there(&path) {
-        let action = "write it beside scenes/; FORMAT.md, section 11, tells its keys";
-        return Err(fault("no_submission_file", "there is none".to_owned(), action));
+    if !exists(&path) {
+        let action = "write it beside scenes/; FORMAT.md, section 11, lists its keys";
+        return Err(fault("no_submission_file", "the file is missing".to_owned(), action));
     }
-    check_place(submission, &path).map_err(|found| fault(found.code, found.message, found.action))?;
-    let bytes = read_at_most(&path, MAX_SUBMISSION_BYTES).map_err(|found| match found.kind() {
-        std::io::ErrorKind::FileTooLarge => {
-            let message = format!("more than {MAX_SUBMISSION_BYTES} bytes");
+    let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES).map_err(|found| match found {
+        FileFault { code: "file_too_large", message, .. } => {
             fault("json_too_large", message, "shorten the description; results need no more")
         }
-        _ => fault("unreadable_file", found.to_string(), "make it an ordinary file that can be read"),
+        FileFault { code, message, action, .. } => fault(code, message, action),
     })?;
+    let bytes = source.bytes();
     let bad = |found: serde_json::Error| {
         let place = format!("line {} column {}", found.line(), found.column());
         Box::new(Finding { place, ..*fault("bad_json", found.to_string(), "write it as JSON") })
     };
-    match serde_json::from_slice(&bytes).map_err(bad)? {
-        // What a map of keys cannot tell, as a key that is there twice, the type does.
-        Value::Object(object) => match serde_json::from_slice::<SubmissionFile>(&bytes) {
+    match serde_json::from_slice(bytes).map_err(bad)? {
+        // Parsing the type finds what the parsed object no longer shows, such as a key that occurs twice.
+        Value::Object(object) => match serde_json::from_slice::<SubmissionFile>(bytes) {
             Err(found) if is_sound(&object) => Err(bad(found)),
             _ => Ok(object),
         },

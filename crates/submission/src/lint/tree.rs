@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use mateval_scene::Finding;
 use mateval_scene::findings::shortened;
-use mateval_scene::{Finding, SceneError};
 
 use super::finding::error;
 use crate::archive::MAX_ENTRIES;
@@ -32,13 +32,13 @@ pub(super) struct Tree {
 impl Tree {
     /// Lists the folder. Names that are no text, and more entries than are looked at, are findings.
     pub(super) fn walk(root: &Path) -> Result<(Self, Vec<Finding>), SubmissionError> {
-        let real = root.canonicalize().map_err(SceneError::io("open", root))?;
+        let real = root.canonicalize().map_err(SubmissionError::io("open", root))?;
         let (mut tree, mut findings) = (Self { entries: BTreeMap::new() }, Vec::new());
         let mut folders = vec![(String::new(), 1)];
         while let Some((folder, depth)) = folders.pop() {
             let path = real.join(&folder);
-            for entry in std::fs::read_dir(&path).map_err(SceneError::io("list", &path))? {
-                let entry = entry.map_err(SceneError::io("list", &path))?;
+            for entry in std::fs::read_dir(&path).map_err(SubmissionError::io("list", &path))? {
+                let entry = entry.map_err(SubmissionError::io("list", &path))?;
                 if tree.entries.len() == MAX_ENTRIES {
                     let message = format!("more than {MAX_ENTRIES} files and folders; the rest was not looked at");
                     findings.push(error("too_many_files", &folder, message, "leave out what is no map"));
