@@ -71,7 +71,7 @@ fn light(dataset: &Path, file: &str) -> Picture<LinearRgb> {
 #[track_caller]
 fn fails(run: Run, words: &[&str]) -> Run {
     let run = run.ends_with(2);
-    for word in words.iter().chain(&["blender_failed", "to see it again: "]) {
+    for word in words.iter().chain(&["blender_failed", "to repeat the failure: "]) {
         assert!(run.stderr.contains(word), "'{word}' not in {}", run.stderr);
     }
     run

@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use mateval_audit::compare::file::{CompareFile, Quantity, State};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
-use mateval_prep::render::{BLENDER, RenderFile, RenderNoise};
+use mateval_prep::render::{RenderFile, RenderNoise, RendererKind};
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
@@ -128,7 +128,7 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
         png_io::write_ids(&folder.join("instance.png"), &geometry.instance).unwrap();
         png_io::write_ids(&folder.join("part.png"), &geometry.triangle.map(|seen| part(seen).unwrap_or(0))).unwrap();
         let render = RenderFile {
-            renderer: BLENDER.to_owned(),
+            renderer: RendererKind::Blender.id(),
             renderer_version: None,
             samples_each_half: samples,
             seeds: [71, 72].map(|seed| format!("{seed:016x}")),

@@ -1,37 +1,92 @@
-//! The one error of this crate.
+//! The error of this crate.
 
 use std::path::PathBuf;
 
-/// Why nothing could be said of a dataset.
+use mateval_prep::render::RendererKind;
+use mateval_scene::{SceneId, ViewId};
+
+/// Why a dataset could not be examined, exported or published.
 #[derive(Debug, thiserror::Error)]
 pub enum AuditError {
     /// The file system refused.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
-        /// What was tried, as in "read" or "write".
+        /// What was attempted, as in "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The output is in the way, or the input is no finished dataset.
-    #[error("'{}' {what}", path.display())]
-    Output {
+    /// The folder contains no finished dataset.
+    #[error("'{}' holds no dataset.json: no dataset, or an unfinished `prep build` (run it again)", path.display())]
+    NotADataset {
         /// The folder.
         path: PathBuf,
-        /// What is wrong with it and what to do.
-        what: String,
     },
-    /// A scene of which nothing can be said.
-    #[error("scene '{scene}': {what}")]
-    Scene {
-        /// Its id.
-        scene: String,
-        /// What is missing.
-        what: String,
+    /// The dataset has no ground truth that could be withheld.
+    #[error("'{}' has no ground truth to withhold", path.display())]
+    NoGroundTruth {
+        /// The dataset's folder.
+        path: PathBuf,
     },
-    /// Pictures could not be rendered or read.
+    /// The scene has no such view.
+    #[error("'{}' has no view '{view}' of the scene '{scene}'", path.display())]
+    NoView {
+        /// The dataset's folder.
+        path: PathBuf,
+        /// The scene.
+        scene: SceneId,
+        /// The view that it does not have.
+        view: ViewId,
+    },
+    /// The renderer has rendered no view of any of the scenes.
+    #[error(
+        "'{}' has no pictures by {renderer} of scene {}; run `mateval prep render DATASET --renderer {renderer}`",
+        path.display(), quoted(scenes)
+    )]
+    NotRendered {
+        /// The dataset's folder.
+        path: PathBuf,
+        /// The renderer.
+        renderer: RendererKind,
+        /// The scenes.
+        scenes: Vec<SceneId>,
+    },
+    /// A view's pictures do not have the size of its camera's picture.
+    #[error(
+        "'{}' contains pictures that do not have the camera's {}x{} pixels; run `mateval prep verify`",
+        path.display(), expected[0], expected[1]
+    )]
+    WrongSize {
+        /// The view's folder.
+        path: PathBuf,
+        /// Width and height of the camera's picture, in pixels.
+        expected: [usize; 2],
+    },
+    /// The pictures of one view under each light are larger than the memory reserved for them.
+    #[error("scene '{scene}': the pictures of one view under {lights} lights take more than {most_bytes} bytes")]
+    TooManyLights {
+        /// The scene.
+        scene: SceneId,
+        /// The number of its lights.
+        lights: usize,
+        /// The memory reserved, in bytes.
+        most_bytes: u64,
+    },
+    /// The output would lie in the dataset.
+    #[error("'{}' would lie in the dataset, whose manifest does not list it; choose another --out", path.display())]
+    OutputInDataset {
+        /// The output.
+        path: PathBuf,
+    },
+    /// The output exists and is not a comparison.
+    #[error("'{}' exists and is not a comparison; it is not replaced: choose another --out", path.display())]
+    NotAComparison {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// Pictures could not be rendered, or the recipe could not be read.
     #[error(transparent)]
     Prep(#[from] mateval_prep::PrepError),
     /// The tracer cannot work with the scene.
@@ -46,9 +101,14 @@ pub enum AuditError {
 }
 
 impl AuditError {
-    /// An [`AuditError::Io`]; to be used with `map_err`.
+    /// A constructor of [`AuditError::Io`] for `map_err`.
     pub fn io(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();
         move |source| Self::Io { action, path, source }
     }
+}
+
+/// `'a', 'b'`.
+fn quoted(scenes: &[SceneId]) -> String {
+    scenes.iter().map(|scene| format!("'{scene}'")).collect::<Vec<_>>().join(", ")
 }

@@ -1,7 +1,7 @@
-//! What is said of a finished dataset: whether it is sound, whether two renderers agree on it, what it contains.
+//! Examines finished datasets: whether they are sound, whether two renderers agree on them, what they contain.
 //!
-//! In: a dataset's folder. Out: findings ([`verify`]), agreement of Blender's pictures with the built-in tracer's
-//! ([`compare`]), counts ([`stats`]), a scene for Mitsuba 3 ([`mitsuba_export`]), a public and a private copy
+//! In: a dataset's folder. Out: findings ([`verify`]), the agreement of Blender's pictures with those of the built-in
+//! tracer ([`compare`]), counts ([`stats`]), a scene for Mitsuba 3 ([`mitsuba_export`]), a public and a private copy
 //! ([`publish`]).
 
 pub mod compare;

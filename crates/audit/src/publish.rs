@@ -1,7 +1,7 @@
-//! A dataset in two trees: what everybody may see, and the ground truth that a hidden split withholds.
+//! Splits a dataset into two folders: the files that everybody may see, and the ground truth that a hidden split withholds.
 //!
-//! Both are of one dataset: the public tree keeps the whole manifest, so that its identity is the same, and with it the
-//! hash of every file that is withheld. Laid over the public tree the private one gives the dataset again.
+//! The public folder keeps the whole manifest. It therefore has the same identity as the dataset, and lists the hash of
+//! every withheld file. Copied over the public folder, the private one restores the dataset.
 
 use std::path::Path;
 
@@ -12,20 +12,20 @@ use mateval_scene::{Progress, SceneError};
 
 use crate::error::AuditError;
 
-/// What was published.
+/// The result of publishing a dataset.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
-    /// SHA-256, hex, of the manifest's lines of the withheld files, each with its newline: anyone who has the public tree
-    /// can hash them too, and hold the private tree against them when it is shown.
+    /// SHA-256, in hexadecimal, of the manifest's lines of the withheld files, each with its newline. Whoever has the public
+    /// folder can compute it too, and check the private folder against the manifest once that is published.
     pub commitment_sha256: String,
-    /// Files of the public tree.
+    /// Number of files in the public folder.
     pub public_files: usize,
-    /// Files of the private tree.
+    /// Number of files in the private folder.
     pub private_files: usize,
 }
 
-/// Writes the dataset in `root` to `public` and its ground truth to `private`; what is in their places is replaced. Fails,
-/// before anything is written, where a file is not what the manifest says, or where there is no ground truth.
+/// Writes the public files of the dataset in `root` to `public` and its ground truth to `private`; both are replaced where
+/// they exist. Fails before anything is written where a file differs from the manifest or there is no ground truth.
 pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_>) -> Result<Published, AuditError> {
     progress("hashes", 0, 1);
     let findings = manifest::check(root)?;
@@ -35,16 +35,15 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     let (withheld, shown): (Vec<Entry>, Vec<Entry>) =
         manifest::entries(root)?.into_iter().partition(|entry| is_ground_truth(&entry.file));
     if withheld.is_empty() {
-        let what = "has no ground truth to withhold".to_owned();
-        return Err(AuditError::Output { path: root.to_owned(), what });
+        return Err(AuditError::NoGroundTruth { path: root.to_owned() });
     }
     let lines: String = withheld.iter().map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect();
     let mut shown: Vec<&str> = shown.iter().map(|entry| entry.file.as_str()).collect();
     shown.extend([MANIFEST, DATASET]);
     let withheld: Vec<&str> = withheld.iter().map(|entry| entry.file.as_str()).collect();
-    let trees = [(public, &shown, "public tree"), (private, &withheld, "private tree")];
+    let folders = [(public, &shown, "public folder"), (private, &withheld, "private folder")];
     let mut works = Vec::new();
-    for (place, files, what) in trees {
+    for (place, files, what) in folders {
         let work = WorkFolder::start(place)?;
         copy(root, work.path(), files, &|done| progress(what, done, files.len()))?;
         works.push(work);
@@ -57,7 +56,7 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     })
 }
 
-/// Whether it is `scenes/<scene>/ground_truth/...`.
+/// Whether the path is of the form `scenes/<scene>/ground_truth/...`.
 fn is_ground_truth(file: &str) -> bool {
     let mut parts = file.split('/');
     parts.next() == Some("scenes") && parts.nth(1) == Some("ground_truth")

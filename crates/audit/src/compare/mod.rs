@@ -1,10 +1,11 @@
-//! Another renderer's pictures of a dataset against our own tracer's, view by view.
+//! Compares Blender's pictures of a dataset with those of the built-in tracer, view by view.
 //!
-//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] sets in tables; and, where asked for, a folder
-//! with it and a page of both pictures side by side.
+//! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] prints as tables; and, on request, a folder
+//! that holds it and a page with both pictures side by side.
 //!
-//! Between: `theirs` reads, `ours` renders, `geometry` compares pictures without light, `light` those with it by `tiles`;
-//! `kind` says what may differ, [`bounds`] how far; `previews` and `page` show it.
+//! Between: `theirs` reads Blender's pictures and `ours` renders; `geometry` compares pictures without light, and `light`
+//! compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `previews` and
+//! `page` show the result.
 
 pub mod bounds;
 pub mod file;
@@ -28,7 +29,7 @@ use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
+use mateval_scene::{Progress, SceneId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::error::AuditError;
@@ -37,31 +38,32 @@ use file::{COMPARE_FORMAT, CompareFile, ComparedDataset, LightComparison, SceneC
 use geometry::{OurGeometry, TheirGeometry};
 use kind::MaterialKind;
 use light::ShownKinds;
-use mateval_prep::render::{BLENDER, RenderFile};
+use mateval_prep::render::{RENDER_FILE, RenderFile, RendererKind};
 use ours::OurLight;
 use previews::ViewPreviews;
 use theirs::{TheirView, file_check};
 use tiles::Halves;
 
-/// Its place in the output's folder.
+/// The file's name in the output's folder.
 pub const COMPARE: &str = "compare.json";
 
-/// What to compare, and where to show it.
+/// What to compare, and where to write the page.
 #[derive(Clone, Debug, Default)]
 pub struct CompareOptions {
     /// The dataset's folder.
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
-    /// Samples a pixel of each of our halves; as many as theirs where absent.
+    /// Samples per pixel of each half that the built-in tracer renders; as many as Blender's where absent.
     pub samples: Option<u32>,
-    /// Folder for the page; none is written where absent.
+    /// Folder for the page; no page is written where absent.
     pub out: Option<PathBuf>,
-    /// Replace a comparison that is there.
+    /// Replace a comparison that already exists.
     pub force: bool,
 }
 
-/// Compares. Fails where no view of any scene was rendered; a scene or view that was not is told as `missing`.
+/// Compares the pictures of the dataset's scenes. A view that Blender has not rendered is reported as `missing`; fails where
+/// that is every view.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
     let scenes = dataset.chosen_scenes(&options.scenes)?;
@@ -77,7 +79,7 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
             version: dataset.file.version.clone(),
             manifest_sha256: dataset.file.manifest_sha256.clone(),
         },
-        renderer: BLENDER.to_owned(),
+        renderer: COMPARED.name().to_owned(),
         bounds: BOUNDS,
         agrees: true,
         scenes: Vec::new(),
@@ -98,40 +100,36 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
     Ok(file)
 }
 
-fn renderer() -> RendererId {
-    RendererId::new(BLENDER).expect("our own word is an id")
-}
+/// The renderer whose pictures are compared with the built-in tracer's.
+const COMPARED: RendererKind = RendererKind::Blender;
 
-/// The view's folder of renders, if it was finished: `render.json` is written last.
+/// The folder of Blender's pictures of the view; none where they are missing or incomplete.
 fn rendered(folder: &SceneFolder, view: &View) -> Option<PathBuf> {
-    let place = folder.render(&renderer(), &view.id);
-    place.join("render.json").is_file().then_some(place)
+    let place = folder.render(&COMPARED.id(), &view.id);
+    place.join(RENDER_FILE).is_file().then_some(place)
 }
 
+/// Fails where Blender has rendered no view of any of the scenes.
 fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), AuditError> {
     let has_any =
         |scene: &&&SceneFile| scene.views.iter().any(|view| rendered(&dataset.folder(&scene.id), view).is_some());
     if scenes.iter().any(|scene| has_any(&scene)) {
         return Ok(());
     }
-    let names: Vec<&str> = scenes.iter().map(|scene| scene.id.as_str()).collect();
-    let what = format!(
-        "holds no pictures by Blender of scene '{}'; run `mateval prep render DATASET --renderer blender`",
-        names.join("', '")
-    );
-    Err(AuditError::Output { path: dataset.root.clone(), what })
+    let scenes = scenes.iter().map(|scene| scene.id.clone()).collect();
+    Err(AuditError::NotRendered { path: dataset.root.clone(), renderer: COMPARED, scenes })
 }
 
+/// Fails where the output would lie in the dataset, or exists and may not be replaced.
 fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
     let Some(out) = &options.out else { return Ok(()) };
-    let refused = |what: &str| Err(AuditError::Output { path: out.clone(), what: what.to_owned() });
-    // The nearest folder above that is there: the others are still to be made.
+    // The nearest ancestor that exists; the folders below it are yet to be made.
     let above = out.ancestors().skip(1).find_map(|folder| match folder.as_os_str().is_empty() {
         true => Path::new(".").canonicalize().ok(),
         false => folder.canonicalize().ok(),
     });
     if above.is_some_and(|above| options.dataset.canonicalize().is_ok_and(|dataset| above.starts_with(dataset))) {
-        return refused("would lie in the dataset, whose manifest does not list it; choose another --out");
+        return Err(AuditError::OutputInDataset { path: out.clone() });
     }
     if !out.exists() {
         return Ok(());
@@ -139,11 +137,11 @@ fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
     check_free(out, options.force, "--out")?;
     match json::read::<CompareFile>(&out.join(COMPARE)).is_ok_and(|file| file.format == COMPARE_FORMAT) {
         true => Ok(()),
-        false => refused("is there and is no comparison: it is not replaced; choose another --out"),
+        false => Err(AuditError::NotAComparison { path: out.clone() }),
     }
 }
 
-/// Compares the views of a scene that were rendered; writes their previews below `out`.
+/// Compares the views of a scene that Blender has rendered, and writes their previews below `out`.
 fn compare_scene(
     folder: &SceneFolder,
     scene: &SceneFile,
@@ -158,15 +156,15 @@ fn compare_scene(
         true => LAMBERT_TILE,
         false => OTHER_TILE,
     };
-    let there: Vec<&View> = scene.views.iter().filter(|view| rendered(folder, view).is_some()).collect();
+    let compared: Vec<&View> = scene.views.iter().filter(|view| rendered(folder, view).is_some()).collect();
     let samples = match samples {
-        _ if there.is_empty() => 0,
+        _ if compared.is_empty() => 0,
         Some(samples) => samples,
-        None => their_samples(folder, &there)?,
+        None => their_samples(folder, &compared)?,
     };
-    let mut ours = match there.is_empty() {
+    let mut ours = match compared.is_empty() {
         true => Vec::new(),
-        false => ours::render(&world, &scene.id, &there, samples, progress)?,
+        false => ours::render(&world, &scene.id, &compared, samples, progress)?,
     }
     .into_iter();
     let (mut views, mut previews) = (Vec::new(), Vec::new());
@@ -196,23 +194,23 @@ fn size(view: &View) -> (usize, usize) {
     (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize)
 }
 
-/// As many samples as the view that has most.
+/// The largest number of samples that Blender has rendered any of the views with.
 fn their_samples(folder: &SceneFolder, views: &[&View]) -> Result<u32, AuditError> {
     let mut most = 1;
     for place in views.iter().filter_map(|view| rendered(folder, view)) {
-        let render: RenderFile = json::read(&place.join("render.json"))?;
+        let render: RenderFile = json::read(&place.join(RENDER_FILE))?;
         most = most.max(render.samples_each_half);
     }
     Ok(most)
 }
 
 fn missing(view: &View) -> ViewComparison {
-    let message = "the view was not rendered; run `mateval prep render DATASET --renderer blender`".to_owned();
+    let message = format!("the view was not rendered; run `mateval prep render DATASET --renderer {COMPARED}`");
     let checks = vec![file_check("render", State::Missing, message)];
     ViewComparison { view: view.id.clone(), checks, light: Vec::new() }
 }
 
-/// A view that both have rendered.
+/// A view that both renderers have rendered.
 struct ViewPair<'a> {
     folder: &'a SceneFolder,
     view: &'a View,
@@ -232,9 +230,7 @@ impl ViewPair<'_> {
         let ours = OurGeometry::read(self.folder, self.view, self.world)?;
         if !ours.has_size(theirs.size) {
             let (width, height) = theirs.size;
-            let what =
-                format!("holds pictures that are not of the camera's {width}x{height}; run `mateval prep verify`");
-            return Err(AuditError::Output { path: self.folder.view(&self.view.id), what });
+            return Err(AuditError::WrongSize { path: self.folder.view(&self.view.id), expected: [width, height] });
         }
         let mut found = ViewComparison { view: self.view.id.clone(), checks: Vec::new(), light: Vec::new() };
         let their_geometry = TheirGeometry::read(theirs, &mut found.checks);
@@ -252,7 +248,8 @@ impl ViewPair<'_> {
         Ok((found, Some(previews)))
     }
 
-    /// Compares RGB, each group, and their sums; gives theirs in this order, where they could be read.
+    /// Compares RGB, each light group, and the sum of the groups. Returns Blender's pictures in this order; none for those
+    /// that could not be read.
     fn compare_lights(
         &self,
         light: &OurLight,
@@ -265,8 +262,8 @@ impl ViewPair<'_> {
             let name = Some(group.name.clone());
             all.push(self.compare_light(&format!("group_{at:02}"), name, ours, theirs, shown, found));
         }
-        let there: Vec<&Halves> = all.iter().flatten().collect();
-        if let Some((rgb, groups)) = there.split_first().filter(|_| there.len() == all.len()) {
+        let read: Vec<&Halves> = all.iter().flatten().collect();
+        if let Some((rgb, groups)) = read.split_first().filter(|_| read.len() == all.len()) {
             let sums = |half: fn(&Halves) -> &_| groups.iter().map(|group| half(group)).collect::<Vec<_>>();
             found.checks.push(light::sum_check("rgb_a", &rgb.a, &sums(|group| &group.a)));
             found.checks.push(light::sum_check("rgb_b", &rgb.b, &sums(|group| &group.b)));
@@ -274,7 +271,7 @@ impl ViewPair<'_> {
         all
     }
 
-    /// Compares one picture of light; gives theirs, if it could be read.
+    /// Compares one picture of light. Returns Blender's picture; none where it could not be read.
     fn compare_light(
         &self,
         picture: &str,

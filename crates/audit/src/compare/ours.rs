@@ -1,4 +1,4 @@
-//! Our own pictures of light, rendered on the spot.
+//! The built-in tracer's pictures of light, rendered for the comparison.
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::View;
@@ -11,15 +11,15 @@ use super::tiles::Halves;
 use crate::error::AuditError;
 use mateval_prep::render::MAX_BOUNCES;
 
-/// Our pictures of one view.
+/// The built-in tracer's pictures of one view.
 pub(super) struct OurLight {
     /// Under all lights.
     pub(super) rgb: Halves,
-    /// Under each group alone, in the order of `lights.json`.
+    /// Under each light group alone, in the order of `lights.json`.
     pub(super) groups: Vec<Halves>,
 }
 
-/// The seeds of a scene's two halves: of no other render of the scene, so that no error is shared.
+/// The seeds of a scene's two halves. No other render of the scene uses them, so that the errors are independent.
 pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
     ["a", "b"].map(|half| {
         let text = sha256_of_bytes(format!("compare/{scene}/{half}").as_bytes());
@@ -27,8 +27,8 @@ pub(super) fn seeds(scene: &SceneId) -> [u64; 2] {
     })
 }
 
-/// Renders `views` of the scene, all from one set of paths where they share a centre and their pictures fit in memory, or
-/// else one after the other.
+/// Renders `views` of the scene: all from one set of paths where they share a centre and their pictures fit in memory,
+/// otherwise one after the other.
 pub(super) fn render(
     world: &World,
     id: &SceneId,
@@ -48,12 +48,11 @@ pub(super) fn render(
     let passes = cameras.len().div_ceil(at_once);
     for (pass, cameras) in cameras.chunks(at_once).enumerate() {
         if merged(cameras)? {
-            let what = format!("one view's pictures of {lights} lights are over {DEFAULT_BASIS_BYTES} bytes");
-            return Err(AuditError::Scene { scene: id.to_string(), what });
+            return Err(AuditError::TooManyLights { scene: id.clone(), lights, most_bytes: DEFAULT_BASIS_BYTES });
         }
         let step = format!("{id} ours");
-        let told = |done: usize, all: usize| progress(&step, pass * all + done, passes * all);
-        let rendered = render_views(world, cameras, &groups, &settings, &seeds(id), &told)?;
+        let shown = |done: usize, all: usize| progress(&step, pass * all + done, passes * all);
+        let rendered = render_views(world, cameras, &groups, &settings, &seeds(id), &shown)?;
         found.extend(rendered.views.iter().map(light));
     }
     Ok(found)

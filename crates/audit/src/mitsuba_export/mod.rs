@@ -78,9 +78,10 @@ pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> 
 
 fn find_view<'d>(dataset: &'d Dataset, options: &ExportOptions) -> Result<&'d View, AuditError> {
     let view = dataset.scene(&options.scene)?.views.iter().find(|view| view.id == options.view);
-    view.ok_or_else(|| {
-        let what = format!("has no view '{}' of the scene '{}'", options.view, options.scene);
-        AuditError::Output { path: options.dataset.clone(), what }
+    view.ok_or_else(|| AuditError::NoView {
+        path: options.dataset.clone(),
+        scene: options.scene.clone(),
+        view: options.view.clone(),
     })
 }
 

@@ -1,4 +1,4 @@
-//! A dataset held against its own rules: every fault is named, none is mended.
+//! Checks a dataset against the rules of its format. Every fault is reported, none is fixed.
 
 mod geometry;
 mod pictures;
@@ -13,19 +13,17 @@ use mateval_prep::faults::Faults;
 use mateval_prep::scene_meshes;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use mateval_scene::{Finding, json, manifest, reference_io};
+use mateval_scene::{Finding, Progress, json, manifest, reference_io};
 use mateval_tracer::World;
 
 use crate::error::AuditError;
-use mateval_scene::Progress;
 
-/// Looks for faults: hashes, schemas, cameras, meshes against ids, masks, reprojection. Sorted; errors only where the
-/// dataset is unsound. Fails where there is no dataset at all.
+/// Checks hashes, schemas, cameras, meshes, ids, masks and reprojection, and returns all faults, sorted. A sound dataset has
+/// no finding of severity `error`. Fails where the folder contains no dataset.
 pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, AuditError> {
     let dataset_path = root.join(DATASET);
     if !dataset_path.is_file() {
-        let what = "holds no dataset.json: no dataset, or an unfinished `prep build` (run it again)".to_owned();
-        return Err(AuditError::Output { path: root.to_owned(), what });
+        return Err(AuditError::NotADataset { path: root.to_owned() });
     }
     let mut faults = Faults::default();
     progress("hashes", 0, 1);
@@ -54,7 +52,7 @@ fn check_manifest(root: &Path, faults: &mut Faults) {
     }
 }
 
-/// Whether a file is missing because its scene's ground truth is withheld as a whole, which is no fault.
+/// Whether a file is missing because the whole ground truth of its scene is withheld, which is not a fault.
 fn is_withheld(root: &Path, finding: &Finding) -> bool {
     let inside = finding.file.split_once("/ground_truth/").map(|(scene, _)| root.join(scene).join("ground_truth"));
     finding.code == "missing_file" && inside.is_some_and(|folder| !folder.exists())
@@ -66,15 +64,15 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
     }
     match manifest::sha256_of_file(&root.join(MANIFEST)) {
         Ok(found) if found != dataset.manifest_sha256 => {
-            let message = format!("{}, but MANIFEST.sha256 hashes to {found}", dataset.manifest_sha256);
+            let message = format!("'{}', but the SHA-256 of MANIFEST.sha256 is '{found}'", dataset.manifest_sha256);
             faults.add("wrong_manifest", DATASET, "/manifest_sha256", message);
         }
-        // A manifest that is not there has been named already.
+        // A missing manifest has been reported already.
         _ => {}
     }
     for (at, licence) in dataset.licences.iter().enumerate() {
         if !dataset.scenes.contains(&licence.scene) {
-            let message = format!("there is no scene '{}'", licence.scene);
+            let message = format!("the dataset has no scene '{}'", licence.scene);
             faults.add("dangling_reference", DATASET, format!("/licences/{at}/scene"), message);
         }
     }
@@ -84,16 +82,21 @@ fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
     let Some(file) = faults.read(TARGETS, json::read::<TargetsFile>(&root.join(TARGETS))) else { return };
     let mut seen = std::collections::BTreeSet::new();
     for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
-        faults.add("no_target", TARGETS, "/targets", format!("no view of the scene '{scene}' is scored"));
+        faults.add("no_target", TARGETS, "/targets", format!("no view of scene '{scene}' is scored"));
     }
     for (at, target) in file.targets.iter().enumerate() {
         let place = format!("/targets/{at}");
         if !seen.insert(target) {
-            faults.add("duplicate_target", TARGETS, &place, format!("{} {} is there twice", target.scene, target.view));
+            faults.add(
+                "duplicate_target",
+                TARGETS,
+                &place,
+                format!("view '{}' of scene '{}' is listed twice", target.view, target.scene),
+            );
         }
-        let view_is_there = SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
-        if !dataset.scenes.contains(&target.scene) || !view_is_there {
-            let message = format!("there is no view '{}' of a scene '{}'", target.view, target.scene);
+        let view_exists = SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
+        if !dataset.scenes.contains(&target.scene) || !view_exists {
+            let message = format!("the dataset has no view '{}' of a scene '{}'", target.view, target.scene);
             faults.add("dangling_reference", TARGETS, &place, message);
         }
     }

@@ -1,13 +1,15 @@
-//! The scored renders: there for every view, of its size, and what the input view shows.
+//! Checks the scored renders: that every view has them, at its size, and that the input view shows one of them.
 
 use mateval_image::exr_io;
 use mateval_scene::RendererId;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::{INPUT, SceneFolder};
 
-use super::{Faults, schema};
+use super::schema;
+use mateval_prep::faults::Faults;
 use mateval_prep::render::RenderFile;
 
+/// Reports every view whose renders are missing, unreadable or of another size than its camera's picture.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
     for view in &scene.views {
         if folder.truth().is_dir() {
@@ -31,9 +33,10 @@ pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &Renderer
             let file = format!("views/{INPUT}/rgb.exr");
             let path = folder.view(&view.id).join("rgb.exr");
             let Some(shown) = faults.read(&file, exr_io::read_linear(&path)) else { continue };
-            let truth = exr_io::read_linear(&folder.render(renderer, &view.id).join("rgb.exr"));
-            if truth.is_ok_and(|truth| truth != shown) {
-                let message = format!("not the picture of ground_truth/renders/{renderer}/{INPUT}");
+            let render = exr_io::read_linear(&folder.render(renderer, &view.id).join("rgb.exr"));
+            if render.is_ok_and(|render| render != shown) {
+                let message =
+                    format!("differs from ground_truth/renders/{renderer}/{INPUT}/rgb.exr, which it must equal");
                 faults.add("wrong_input", &file, "", message);
             }
         }

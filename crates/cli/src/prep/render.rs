@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use mateval_prep::render::{RenderOptions, Renderer};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mateval_prep::render::{RenderOptions, Renderer, RendererKind};
 use mateval_scene::SceneId;
 
 use super::blender::BlenderArgs;
@@ -32,27 +33,24 @@ pub struct RenderArgs {
 #[derive(clap::Args, Clone)]
 pub struct RendererArgs {
     /// What renders.
-    #[arg(long, value_enum, default_value = "builtin")]
-    renderer: RendererName,
+    #[arg(long, default_value = RendererKind::Builtin.name(), value_parser = renderer_parser())]
+    renderer: RendererKind,
     #[command(flatten)]
     blender: BlenderArgs,
 }
 
-/// A renderer by its name on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum RendererName {
-    /// The built-in path tracer.
-    Builtin,
-    /// Blender's Cycles: denoised, and each light group in pictures of its own.
-    Blender,
+/// Reads a renderer's name; the help lists every renderer with its summary.
+fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
+    let names = RendererKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.summary()));
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<RendererKind>())
 }
 
 impl RendererArgs {
     /// The renderer; fails where Blender is to render and cannot be found.
     pub fn checked(&self) -> anyhow::Result<Renderer> {
         Ok(match self.renderer {
-            RendererName::Builtin => Renderer::Builtin,
-            RendererName::Blender => Renderer::Blender(self.blender.options()?),
+            RendererKind::Builtin => Renderer::Builtin,
+            RendererKind::Blender => Renderer::Blender(self.blender.options()?),
         })
     }
 }

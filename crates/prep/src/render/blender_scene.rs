@@ -1,27 +1,60 @@
-//! Renders by Blender: a process a scene, tried again where it fails, and taken up where it ended.
+//! Renders with Blender: one process per scene, which is run again where it fails and resumes where it ended.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Mutex;
+use std::time::Duration;
 
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Finding, Progress, RendererId, SceneId, Severity, json, reference_io};
+use mateval_scene::{Finding, Progress, SceneId, Severity, json, reference_io};
 
+use super::noise::RenderNoise;
+use super::order::{MAX_BOUNCES, Order, seed, seed_texts};
+use super::render_file::RenderFile;
+use super::report::RenderReport;
 use super::store::{self, ViewRender};
-use super::{BLENDER, BlenderOptions, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
-use crate::blender::{BlenderResult, BlenderView, JobPlan, JobView, News, Workplace, tail};
+use crate::blender::{
+    BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobPlan, JobView, News, Workplace, tail,
+};
 use crate::error::PrepError;
 use crate::scene_meshes;
 
-/// Where jobs lie while they are rendered, in the dataset's folder: names with a dot are no part of a dataset.
+/// Folder of the jobs while they are rendered, inside the dataset's folder. Names that start with a dot do not belong to a
+/// dataset.
 const WORK: &str = ".render";
-/// How much of a log a finding shows.
+/// How much of the end of a log a finding quotes, in bytes.
 const TAIL_BYTES: u64 = 1500;
-/// Cycles' seeds are below this.
+/// Cycles takes seeds below this number.
 const SEEDS: u64 = 1 << 31;
 
-/// Renders the scenes, several at a time if so asked. Those that fail are told of, the others go on.
+/// How Blender is run.
+#[derive(Clone, Debug)]
+pub struct BlenderOptions {
+    /// The program to run.
+    pub program: BlenderProgram,
+    /// Limits of one run.
+    pub limits: BlenderLimits,
+    /// Number of scenes rendered at once.
+    pub jobs: usize,
+    /// How often Blender is run for a scene before the scene counts as failed.
+    pub attempts: u32,
+}
+
+impl BlenderOptions {
+    /// One scene at a time and two attempts, each of two hours and 16 GiB at most.
+    pub fn new(program: BlenderProgram) -> Self {
+        let limits = BlenderLimits {
+            time: Duration::from_secs(2 * 3600),
+            silence: Duration::from_secs(15 * 60),
+            memory_bytes: 16 << 30,
+        };
+        Self { program, limits, jobs: 1, attempts: 2 }
+    }
+}
+
+/// Renders the scenes, `options.jobs` at a time. A scene that fails becomes a failure in the report and does not stop the
+/// others.
 pub(super) fn render_scenes(
     order: &Order<'_>,
     options: &BlenderOptions,
@@ -31,7 +64,7 @@ pub(super) fn render_scenes(
     let queue: Mutex<VecDeque<usize>> = Mutex::new((0..scenes.len()).collect());
     let done: Mutex<Vec<(usize, Result<RenderReport, PrepError>)>> = Mutex::new(Vec::new());
     let work = || {
-        // A panic elsewhere leaves a queue and a list that are whole.
+        // A panic of another thread leaves the queue and the list in a valid state.
         let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
         while let Some(at) = next() {
             let scene = BlenderScene { order, options, id: scenes[at], progress };
@@ -47,16 +80,13 @@ pub(super) fn render_scenes(
     done.sort_by_key(|(at, _)| *at);
     let mut all = RenderReport::default();
     for (_, report) in done {
-        let report = report?;
-        all.rendered += report.rendered;
-        all.kept += report.kept;
-        all.remarks.extend(report.remarks);
-        all.failures.extend(report.failures);
+        all.add(report?);
     }
     remove_if_empty(order.root.join(WORK));
     Ok(all)
 }
 
+/// A scene that Blender is to render.
 struct BlenderScene<'a> {
     order: &'a Order<'a>,
     options: &'a BlenderOptions,
@@ -106,8 +136,7 @@ impl BlenderScene<'_> {
     }
 
     fn views_to_render(&self, folder: &SceneFolder, scene: &SceneFile) -> Vec<JobView> {
-        let renderer = renderer();
-        let is_missing = |view: &&View| !self.order.is_done(folder, view, &renderer, &seed_texts(self.seeds(view)));
+        let is_missing = |view: &&View| !self.order.is_done(folder, view, &seed_texts(self.seeds(view)));
         let job_view = |view: &View| JobView {
             id: view.id.clone(),
             camera: view.camera,
@@ -120,7 +149,7 @@ impl BlenderScene<'_> {
         [0, 1].map(|half| seed(self.id, view, half) % SEEDS)
     }
 
-    /// Several Blenders share the processors.
+    /// Threads of one process: several processes share the processors; 0 leaves the number to Blender.
     fn threads(&self) -> u32 {
         match self.options.jobs {
             0 | 1 => 0,
@@ -128,7 +157,7 @@ impl BlenderScene<'_> {
         }
     }
 
-    /// Runs Blender once; takes the views that it finished out of `views`.
+    /// Runs Blender once and removes the views that it finished from `views`.
     fn attempt(
         &self,
         place: &Workplace,
@@ -139,7 +168,7 @@ impl BlenderScene<'_> {
         let mut step = format!("{} start", self.id);
         let ended = place.run(&self.options.program, &self.options.limits, &mut |news| match news {
             News::Line(line) => {
-                self.tell(line, &mut step);
+                self.show_progress(line, &mut step);
                 Ok(())
             }
             News::View(view, result, pictures) => {
@@ -158,14 +187,14 @@ impl BlenderScene<'_> {
             Err(error) => Err(failed(error.to_string())),
             Ok(_) if views.is_empty() => Ok(()),
             Ok(ended) => {
-                let told = place.result().ok().flatten().and_then(|result| result.error);
-                Err(failed(told.map_or(ended.to_string(), |error| format!("{ended}: {error}"))))
+                let reported = place.result().ok().flatten().and_then(|result| result.error);
+                Err(failed(reported.map_or(ended.to_string(), |error| format!("{ended}: {error}"))))
             }
         }
     }
 
-    /// Shows how far Blender is: its own lines of samples, ours of views.
-    fn tell(&self, line: &str, step: &mut String) {
+    /// Shows how far Blender is, from a line that it printed: Blender itself counts samples, our script names views.
+    fn show_progress(&self, line: &str, step: &mut String) {
         if let Some(text) = line.strip_prefix("mateval: ") {
             *step = format!("{} {text}", self.id);
             (self.progress)(step, 0, 1);
@@ -176,6 +205,7 @@ impl BlenderScene<'_> {
         }
     }
 
+    /// Writes the pictures of a view to their place in the dataset.
     fn keep(
         &self,
         folder: &SceneFolder,
@@ -187,14 +217,15 @@ impl BlenderScene<'_> {
         let (width, height) = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
         let [a, b] = &pictures.halves;
         if (a.rgb.width(), a.rgb.height()) != (width, height) {
-            let what = format!("Blender's picture of '{}' is {}x{}", view.id, a.rgb.width(), a.rgb.height());
-            return Err(PrepError::Scene {
-                scene: self.id.to_string(),
-                what: format!("{what}, expected {width}x{height}"),
+            return Err(PrepError::RenderedSize {
+                scene: self.id.clone(),
+                view: view.id.clone(),
+                expected: [width, height],
+                found: [a.rgb.width(), a.rgb.height()],
             });
         }
         let file = RenderFile {
-            renderer: BLENDER.to_owned(),
+            renderer: self.order.renderer.clone(),
             renderer_version: Some(result.blender.clone()),
             samples_each_half: self.order.samples,
             seeds: seed_texts(view.seeds.map(u64::from)),
@@ -205,7 +236,7 @@ impl BlenderScene<'_> {
             approximations: result.approximations.clone(),
         };
         let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };
-        store::write(&folder.render(&renderer(), &view.id), &render, scene.exposure, &file)
+        store::write(&folder.render(&self.order.renderer, &view.id), &render, scene.exposure, &file)
     }
 
     fn finding(&self, failure: Failure) -> Finding {
@@ -214,25 +245,23 @@ impl BlenderScene<'_> {
             code: "blender_failed".to_owned(),
             file: format!("scenes/{}", self.id),
             place: String::new(),
-            message: format!("{}; the end of its log:\n{}", failure.what, failure.log),
-            action: format!("to see it again: {}; then run `prep render` again", failure.repeat),
+            message: format!("Blender failed: {}; the log ends with:\n{}", failure.what, failure.log),
+            action: format!("to repeat the failure: {}; then run `prep render` again", failure.repeat),
         }
     }
 }
 
-/// Why an attempt failed, the end of the log, and how to see it again.
+/// Why an attempt failed.
 struct Failure {
     what: String,
+    /// The end of the log.
     log: String,
+    /// The command that repeats the attempt.
     repeat: String,
 }
 
-fn renderer() -> RendererId {
-    RendererId::new(BLENDER).expect("our own id is an id")
-}
-
-/// Leaves what failed jobs left.
+/// Removes the folder unless failed jobs left files in it.
 fn remove_if_empty(folder: PathBuf) {
-    // It is no fault if it is not empty, or not there.
+    // An error means that the folder is not empty or does not exist, and either is fine.
     let _ = std::fs::remove_dir(folder);
 }

@@ -1,18 +1,22 @@
-//! Renders by our own tracer.
+//! Renders with MatEval's own path tracer.
 
 use std::sync::Arc;
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Progress, RendererId, SceneId, json, reference_io};
+use mateval_scene::{Progress, SceneId, json, reference_io};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
+use super::noise::RenderNoise;
+use super::order::{MAX_BOUNCES, Order, seed, seed_texts};
+use super::render_file::RenderFile;
+use super::report::RenderReport;
 use super::store::{self, ViewRender};
-use super::{BUILTIN, MAX_BOUNCES, Order, RenderFile, RenderNoise, RenderReport, seed, seed_texts};
 use crate::blender::LightPictures;
 use crate::error::PrepError;
 
+/// Renders the views that no earlier run has rendered, scene by scene.
 pub(super) fn render_scenes(
     order: &Order<'_>,
     scenes: &[&SceneId],
@@ -31,13 +35,12 @@ fn render_scene(
     progress: Progress<'_>,
     report: &mut RenderReport,
 ) -> Result<(), PrepError> {
-    let renderer = RendererId::new(BUILTIN).expect("our own id is an id");
     let folder = SceneFolder::of(order.root, id);
     let scene: SceneFile = json::read(&folder.scene_file())?;
     let mut world: Option<World> = None;
     for view in &scene.views {
         let seeds = [0, 1].map(|half| seed(id, view, half));
-        if order.is_done(&folder, view, &renderer, &seed_texts(seeds)) {
+        if order.is_done(&folder, view, &seed_texts(seeds)) {
             report.kept += 1;
             continue;
         }
@@ -54,7 +57,7 @@ fn render_scene(
             std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
         report.remarks.extend(remark(&step, &render.stats));
         let file = RenderFile {
-            renderer: BUILTIN.to_owned(),
+            renderer: order.renderer.clone(),
             renderer_version: None,
             samples_each_half: order.samples,
             seeds: seed_texts(seeds),
@@ -69,14 +72,15 @@ fn render_scene(
             groups: a.groups.iter().zip(&b.groups).map(|(a, b)| mean(a, b)).collect(),
         };
         let render = ViewRender { halves: [&a, &b], shown: &shown, passes: None };
-        store::write(&folder.render(&renderer, &view.id), &render, scene.exposure, &file)?;
+        store::write(&folder.render(&order.renderer, &view.id), &render, scene.exposure, &file)?;
         report.rendered += 1;
     }
     Ok(())
 }
 
 fn remark(step: &str, stats: &RenderStats) -> Option<String> {
-    (stats.not_finite > 0).then(|| format!("{step}: {} samples were not finite and left out: a bug", stats.not_finite))
+    (stats.not_finite > 0)
+        .then(|| format!("{step}: left out {} samples that were not finite; please report this bug", stats.not_finite))
 }
 
 fn light_pictures(basis: LightBasis) -> LightPictures {

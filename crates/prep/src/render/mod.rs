@@ -1,153 +1,105 @@
-//! The RGB truth: every view rendered in two independent halves, by our own tracer or by Blender.
+//! The RGB ground truth: every view rendered in two independent halves.
+//!
+//! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the scored renderer's name in `dataset.json`,
+//! its picture of the input view as the photo that methods see, and a new manifest.
+//!
+//! A new renderer is a file beside `builtin.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in
+//! the command line's `prep render`.
 
 mod blender_scene;
 mod builtin;
+mod kind;
 mod noise;
+mod order;
+mod render_file;
+mod report;
 mod store;
 
 use std::path::Path;
-use std::time::Duration;
 
-use mateval_scene::dataset::{DatasetFile, SceneFile, View};
+use mateval_scene::dataset::{DatasetFile, SceneFile};
 use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
-use mateval_scene::manifest::{self, sha256_of_bytes};
 use mateval_scene::open::chosen_ids;
-use mateval_scene::{Finding, Progress, RendererId, SceneError, SceneId, json};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use mateval_scene::{Progress, RendererId, SceneError, SceneId, json, manifest};
 
 pub use crate::blender::{BlenderLimits, BlenderProgram};
 use crate::build::RECIPE;
 use crate::error::PrepError;
 use crate::recipe;
+pub use blender_scene::BlenderOptions;
+pub use kind::{RendererKind, UnknownRenderer};
 pub use noise::RenderNoise;
-
-/// The name that our own tracer's renders are kept under.
-pub const BUILTIN: &str = "builtin";
-/// The name that Blender's renders are kept under.
-pub const BLENDER: &str = "blender";
-/// Scatterings after the first hit after which a path is cut.
-pub const MAX_BOUNCES: u32 = 16;
+pub use order::MAX_BOUNCES;
+use order::Order;
+pub use render_file::{RENDER_FILE, RenderFile};
+pub use report::RenderReport;
 
 /// What to render.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
-    /// By what.
+    /// What renders.
     pub renderer: Renderer,
-    /// Samples a pixel of each half; the recipe's where absent.
+    /// Samples per pixel of each half; the recipe's number where absent.
     pub samples: Option<u32>,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
-    /// Render again what is there.
+    /// Render pictures again that already exist.
     pub force: bool,
 }
 
-/// What renders.
+/// A renderer with its options.
 #[derive(Clone, Debug, Default)]
 pub enum Renderer {
-    /// Our own path tracer.
+    /// MatEval's own path tracer.
     #[default]
     Builtin,
     /// Blender's Cycles.
     Blender(BlenderOptions),
 }
 
-/// How Blender is run.
-#[derive(Clone, Debug)]
-pub struct BlenderOptions {
-    /// What is run.
-    pub program: BlenderProgram,
-    /// What a run may take.
-    pub limits: BlenderLimits,
-    /// Scenes rendered at once.
-    pub jobs: usize,
-    /// How often a scene is tried.
-    pub attempts: u32,
-}
-
-impl BlenderOptions {
-    /// One scene at a time, tried twice, in two hours and 16 GiB at most.
-    pub fn new(program: BlenderProgram) -> Self {
-        let limits = BlenderLimits {
-            time: Duration::from_secs(2 * 3600),
-            silence: Duration::from_secs(15 * 60),
-            memory_bytes: 16 << 30,
-        };
-        Self { program, limits, jobs: 1, attempts: 2 }
-    }
-}
-
 impl Renderer {
-    fn id(&self) -> RendererId {
-        let name = match self {
-            Self::Builtin => BUILTIN,
-            Self::Blender(_) => BLENDER,
-        };
-        RendererId::new(name).expect("our own ids are ids")
+    /// Which renderer it is.
+    pub fn kind(&self) -> RendererKind {
+        match self {
+            Self::Builtin => RendererKind::Builtin,
+            Self::Blender(_) => RendererKind::Blender,
+        }
+    }
+
+    fn render_scenes(
+        &self,
+        order: &Order<'_>,
+        scenes: &[&SceneId],
+        progress: Progress<'_>,
+    ) -> Result<RenderReport, PrepError> {
+        match self {
+            Self::Builtin => builtin::render_scenes(order, scenes, progress),
+            Self::Blender(options) => blender_scene::render_scenes(order, options, scenes, progress),
+        }
     }
 }
 
-/// What came of it.
-#[derive(Clone, Debug, Default)]
-pub struct RenderReport {
-    /// Views rendered.
-    pub rendered: usize,
-    /// Views that an earlier run had rendered.
-    pub kept: usize,
-    /// What a user should know, a line each.
-    pub remarks: Vec<String>,
-    /// Scenes that could not be rendered, and why; the others were.
-    pub failures: Vec<Finding>,
-}
-
-/// `render.json` beside a view's pictures: how they were made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RenderFile {
-    /// `builtin` or `blender`.
-    pub renderer: String,
-    /// The renderer's own version; null for ours, which is that of the dataset's tool.
-    pub renderer_version: Option<String>,
-    /// Samples a pixel of each of the two halves.
-    pub samples_each_half: u32,
-    /// Seeds of `rgb_a` and `rgb_b`, 16 hexadecimal digits each.
-    pub seeds: [String; 2],
-    /// Scatterings after which a path is cut.
-    pub max_bounces: u32,
-    /// What cut paths still carried, averaged over all: times the radiance there, the light that is missing. Null
-    /// where the renderer does not tell.
-    pub capped_throughput: Option<f64>,
-    /// What took the noise out of `rgb`; null where that is the plain mean of the halves.
-    pub denoiser: Option<String>,
-    /// How noisy the pictures are.
-    pub noise: RenderNoise,
-    /// What the renderer shows only nearly as the source means it, a line a material.
-    pub approximations: Vec<String>,
-}
-
-/// Renders, then names the scored renderer and renews the manifest. Views that are there with the same settings are
-/// kept, so that a killed run goes on; a scene that Blender cannot render is a failure in the report, and the others go on.
+/// Renders the dataset in `root`, then names the scored renderer and writes a new manifest.
+///
+/// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
+/// cannot render becomes a failure in the report; the others are still rendered.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let mut dataset: DatasetFile = json::read(&root.join(DATASET))?;
     if !root.join(MANIFEST).is_file() {
-        let what = "holds no MANIFEST.sha256: an unfinished `prep build`; run that again".to_owned();
-        return Err(PrepError::Output { path: root.to_owned(), what });
+        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
     }
     let wanted = chosen_ids(root, &dataset, &options.scenes)?;
-    let renderer = options.renderer.id();
+    let renderer = options.renderer.kind().id();
     check_hashes(root, &renderer)?;
     let samples = match options.samples {
         Some(samples) => samples,
         None => recipe::read(&root.join(RECIPE))?.0.samples,
     };
-    let order = Order { root, samples, force: options.force };
-    let mut report = match &options.renderer {
-        Renderer::Builtin => builtin::render_scenes(&order, &wanted, progress)?,
-        Renderer::Blender(blender) => blender_scene::render_scenes(&order, blender, &wanted, progress)?,
-    };
+    let order = Order { root, renderer: renderer.clone(), samples, force: options.force };
+    let mut report = options.renderer.render_scenes(&order, &wanted, progress)?;
     dataset.scored_renderer = scored_renderer(root, &dataset);
     if dataset.scored_renderer.is_none() {
-        report.remarks.push("some scenes have no pictures yet: the dataset names no scored renderer".to_owned());
+        report.remarks.push("some scenes have no pictures yet, so the dataset names no scored renderer".to_owned());
     }
     let shown = dataset.scored_renderer.clone().unwrap_or(renderer);
     for id in &dataset.scenes {
@@ -159,25 +111,7 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     Ok(report)
 }
 
-/// What every scene is rendered with.
-struct Order<'a> {
-    root: &'a Path,
-    samples: u32,
-    force: bool,
-}
-
-impl Order<'_> {
-    /// Whether the view's pictures are there and were made so.
-    fn is_done(&self, folder: &SceneFolder, view: &View, renderer: &RendererId, seeds: &[String; 2]) -> bool {
-        let mark = folder.render(renderer, &view.id).join(store::MARK);
-        let is_same = |found: RenderFile| {
-            (found.samples_each_half, &found.seeds, found.max_bounces) == (self.samples, seeds, MAX_BOUNCES)
-        };
-        !self.force && json::read::<RenderFile>(&mark).is_ok_and(is_same)
-    }
-}
-
-/// Everything that is no render of this renderer must be what the manifest says: it is about to be renewed.
+/// Checks every file but this renderer's pictures against the manifest, which is about to be replaced.
 fn check_hashes(root: &Path, renderer: &RendererId) -> Result<(), PrepError> {
     let ours = format!("/ground_truth/renders/{renderer}/");
     let shown = format!("/views/{INPUT}/rgb.");
@@ -189,25 +123,14 @@ fn check_hashes(root: &Path, renderer: &RendererId) -> Result<(), PrepError> {
     Err(SceneError::Invalid { path: root.to_owned(), findings }.into())
 }
 
-/// Blender where it has rendered every view, else our own tracer where that has.
+/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view; none where none has.
 fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
-    let known = [BLENDER, BUILTIN].map(|name| RendererId::new(name).expect("our own ids are ids"));
-    known.into_iter().find(|renderer| dataset.scenes.iter().all(|id| is_complete(root, id, renderer)))
+    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
+    known.find(|renderer| dataset.scenes.iter().all(|id| is_complete(root, id, renderer)))
 }
 
 fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
     let folder = SceneFolder::of(root, id);
     json::read::<SceneFile>(&folder.scene_file())
-        .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(store::MARK).is_file()))
-}
-
-/// The two halves of a picture must not share a sequence: their errors would be correlated.
-fn seed(scene: &SceneId, view: &View, half: usize) -> u64 {
-    let text = sha256_of_bytes(format!("{scene}/{}/{half}", view.id).as_bytes());
-    u64::from_str_radix(&text[..16], 16).expect("a hash is hexadecimal")
-}
-
-/// Seeds as `render.json` tells them.
-fn seed_texts(seeds: [u64; 2]) -> [String; 2] {
-    seeds.map(|seed| format!("{seed:016x}"))
+        .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(RENDER_FILE).is_file()))
 }

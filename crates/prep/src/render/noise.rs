@@ -4,19 +4,19 @@ use mateval_image::{LinearRgb, Picture};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Means over all pixels and channels, linear, before exposure.
+/// How noisy a picture is: means over all pixels and channels, linear, before exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenderNoise {
-    /// Of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
+    /// Mean of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
     pub mean_of_halves_mse: f64,
-    /// Of (rgb - a) (rgb - b): how far the denoised picture is from the truth, the halves' noise taken out (so it
-    /// may be slightly below 0); null where `rgb` is the plain mean.
+    /// Mean of (rgb - a) (rgb - b): the squared error of the denoised picture, without the noise of the halves, so that it
+    /// may be slightly below 0. Null where `rgb` is the plain mean.
     pub denoised_mse: Option<f64>,
 }
 
 impl RenderNoise {
-    /// Of two halves and what the denoiser made of their mean.
+    /// Measures the noise of two halves and, where there is one, of the picture denoised from their mean.
     pub fn of([a, b]: [&Picture<LinearRgb>; 2], denoised: Option<&Picture<LinearRgb>>) -> Self {
         let halves = || values(a).zip(values(b));
         let squares = halves().map(|(a, b)| (a - b) * (a - b) / 4.0);

@@ -1,4 +1,4 @@
-//! A view's renders on disk: `ground_truth/renders/<renderer>/<view>/`.
+//! A view's pictures on disk: `ground_truth/renders/<renderer>/<view>/`.
 
 use std::path::Path;
 
@@ -7,27 +7,24 @@ use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::{RendererId, ViewId, json};
 
-use super::RenderFile;
+use super::render_file::{RENDER_FILE, RenderFile};
 use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
 
-/// The file that says that a view's pictures are whole, and how they were made.
-pub(super) const MARK: &str = "render.json";
-
-/// What is kept of a view.
+/// The pictures of a view that are written.
 pub(super) struct ViewRender<'a> {
     pub(super) halves: [&'a LightPictures; 2],
-    /// What people see: denoised, or the halves' mean.
+    /// What people see: denoised, or the mean of the halves.
     pub(super) shown: &'a LightPictures,
-    /// What else Blender gives.
+    /// Pictures that only Blender makes: base colour, ids, depth, normals.
     pub(super) passes: Option<&'a BlenderView>,
 }
 
-/// Writes the pictures; the mark goes first and comes last.
+/// Writes the pictures. `render.json` is removed first and written last, so that it never vouches for pictures that are
+/// half replaced.
 pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: &RenderFile) -> Result<(), PrepError> {
     std::fs::create_dir_all(place).map_err(PrepError::io("make", place))?;
-    // It must not vouch for pictures that are half replaced.
-    let mark = place.join(MARK);
+    let mark = place.join(RENDER_FILE);
     if mark.exists() {
         std::fs::remove_file(&mark).map_err(PrepError::io("remove", &mark))?;
     }
@@ -60,11 +57,12 @@ fn write_passes(place: &Path, view: &BlenderView) -> Result<(), PrepError> {
     Ok(())
 }
 
-/// Shows the renderer's picture as the photo that methods get, where there is one.
+/// Copies the renderer's picture of the input view to `views/input/`, as the photo that methods see. Does nothing where
+/// the renderer has not rendered that view.
 pub(super) fn show_input(folder: &SceneFolder, renderer: &RendererId) -> Result<(), PrepError> {
-    let input = ViewId::new(INPUT).expect("our own id is an id");
+    let input = ViewId::new(INPUT).expect("'input' is a valid id");
     let (from, to) = (folder.render(renderer, &input), folder.view(&input));
-    if !from.join(MARK).is_file() {
+    if !from.join(RENDER_FILE).is_file() {
         return Ok(());
     }
     for name in ["rgb.exr", "rgb.png"] {

@@ -1,4 +1,4 @@
-//! The rooms of one house: what they are like, and cameras in them with what these see.
+//! The rooms of one house: their properties, and cameras in them with what these see.
 
 use std::collections::BTreeSet;
 
@@ -12,38 +12,40 @@ use mateval_tracer::World;
 use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
+use super::camera_refusal::{CameraRefusal, RefusedCamera};
 use super::intersect::intersecting_pairs;
+use super::options::SurveyOptions;
 use super::rules::{Rejection, RoomFacts};
-use super::{CandidateCamera, SurveyOptions, SurveyedRoom, THUMBNAILS};
+use super::survey_file::{CandidateCamera, SurveyedRoom, THUMBNAILS};
 use crate::error::PrepError;
 use crate::recipe::Offset;
 use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
 use mateval_sources::front3d::{FurnishedHouse, Role};
 
-/// sRGB bytes.
+/// A picture of sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;
 
-/// Longer side of thumbnails.
+/// Length of a thumbnail's longer side, in pixels.
 const THUMBNAIL_SIDE: u32 = 320;
 
-/// A house looked through.
+/// The rooms of a house and the pictures of their cameras.
 pub(super) struct HouseSurvey {
     pub(super) rooms: Vec<SurveyedRoom>,
-    /// Files, relative to the survey's folder.
+    /// Files, relative to the survey's folder, and what they show.
     pub(super) pictures: Vec<(String, Thumbnail)>,
 }
 
-/// Looks through all rooms. `taken` holds the ids of scenes so far.
-pub(super) fn look_through(
+/// Searches all rooms of the house. `taken` holds the ids of all scenes so far.
+pub(super) fn search_rooms(
     options: &SurveyOptions,
     house: &FurnishedHouse,
     taken: &mut BTreeSet<String>,
 ) -> Result<HouseSurvey, PrepError> {
     let world = World::new(house.scene.clone())?;
-    let look = Look { options, house, world: &world, views: crate::recipe::default_views() };
+    let search = RoomSearch { options, house, world: &world, views: crate::recipe::default_views() };
     let mut survey = HouseSurvey { rooms: Vec::new(), pictures: Vec::new() };
     for room in 0..house.house.rooms.len() {
-        let (mut room, pictures) = look.room(room)?;
+        let (mut room, pictures) = search.room(room)?;
         for (camera, picture) in room.cameras.iter_mut().zip(pictures) {
             camera.scene = free_id(&camera.scene, taken);
             camera.thumbnail = format!("{THUMBNAILS}/{}.png", camera.scene);
@@ -54,7 +56,7 @@ pub(super) fn look_through(
     Ok(survey)
 }
 
-/// The id, with a number behind it where it is taken: houses and rooms of other names may be cut to the same one.
+/// The id, with a number appended where it is taken: the names of several rooms may be shortened to the same id.
 fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
     let numbered = (2..).map(|number| format!("{id}-{number}"));
     let free = std::iter::once(id.to_owned()).chain(numbered).find(|id| !taken.contains(id));
@@ -63,25 +65,26 @@ fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
     free
 }
 
-struct Look<'a> {
+/// A house that is searched, and how.
+struct RoomSearch<'a> {
     options: &'a SurveyOptions,
     house: &'a FurnishedHouse,
     world: &'a World,
     views: Vec<Offset>,
 }
 
-/// A camera and where it is from.
+/// A camera and where it comes from.
 struct Posed {
     origin: String,
     camera: Camera,
     fov_y_deg: f64,
 }
 
-/// A camera that keeps to the rules, and its thumbnail.
+/// A camera that breaks no rule, and its thumbnail.
 type Candidate = (CandidateCamera, Thumbnail);
 
-impl Look<'_> {
-    /// A room, and a picture for each of its cameras.
+impl RoomSearch<'_> {
+    /// Searches a room. Returns it with a picture for each of its cameras.
     fn room(&self, room: usize) -> Result<(SurveyedRoom, Vec<Thumbnail>), PrepError> {
         let facts = self.facts(room)?;
         let source = &self.house.house.rooms[room];
@@ -91,7 +94,8 @@ impl Look<'_> {
         if rejections.is_empty() {
             let (found, refused) = self.cameras(room);
             if found.is_empty() {
-                let none = "none was drawn, and no designer's is in the room".to_owned();
+                let none = "no camera was drawn, and no designer's camera is in the room".to_owned();
+                let refused: Vec<String> = refused.iter().map(RefusedCamera::to_string).collect();
                 let reason = if refused.is_empty() { none } else { refused.join("; ") };
                 rejections.push(Rejection::new("no_camera", reason));
             }
@@ -119,7 +123,7 @@ impl Look<'_> {
         let furniture: Vec<usize> = (0..house.placed.len()).filter(|&k| self.is_furniture_of(k, room)).collect();
         let meshes: Vec<&TriangleMesh> = furniture.iter().map(|&k| &house.scene.surfaces[k].mesh).collect();
         let name = |place: usize| house.scene.surfaces[furniture[place]].name.clone();
-        // Each with each other: the room is rejected anyway.
+        // Such a room is rejected anyway, and testing every pair of its pieces takes long.
         let too_many = furniture.len() > self.options.rules.max_objects;
         let pairs = if too_many { Vec::new() } else { intersecting_pairs(&meshes)? };
         let complete = |k: &&usize| matches!(house.placed[**k].role, Role::Furniture { complete: true, .. });
@@ -153,7 +157,7 @@ impl Look<'_> {
         [f64::from(high.x - low.x), f64::from(high.z - low.z)]
     }
 
-    /// The room, its house, and its models may each be listed.
+    /// A rejection for each list entry that names the room, its house or one of its models.
     fn listed(&self, room: usize) -> Vec<Rejection> {
         let lists = &self.options.lists;
         let jids: BTreeSet<&str> = (0..self.house.placed.len())
@@ -167,26 +171,27 @@ impl Look<'_> {
         ids.into_iter().chain(jids).filter_map(|id| lists.reason(id)).collect()
     }
 
-    /// Drawn cameras and the designers' in this room that keep to the rules, the best score first; and why others do not.
-    fn cameras(&self, room: usize) -> (Vec<Candidate>, Vec<String>) {
+    /// The drawn cameras and the designers' cameras in this room that break no rule, the best score first; and the others
+    /// with the rules that they break.
+    fn cameras(&self, room: usize) -> (Vec<Candidate>, Vec<RefusedCamera>) {
         let (posed, mut refused) = self.posed(room);
         let mut found = Vec::new();
         for Posed { origin, camera, fov_y_deg } in posed {
             match self.candidate(room, &origin, camera, fov_y_deg) {
                 Ok(candidate) => found.push(candidate),
-                Err(why) => refused.push(format!("{origin}: {why}")),
+                Err(why) => refused.push(RefusedCamera { origin: Some(origin), why }),
             }
         }
         found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score).then(a.0.scene.cmp(&b.0.scene)));
         (found, refused)
     }
 
-    /// Every camera that may be tried in a room; and why no more are drawn.
-    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<String>) {
+    /// Every camera of a room that may be tried; and why no more could be drawn.
+    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<RefusedCamera>) {
         let [width, height] = self.options.resolution;
         let sampler = match RoomSampler::new(self.house, self.world, room) {
             Ok(sampler) => sampler,
-            Err(why) => return (Vec::new(), vec![why.to_string()]),
+            Err(why) => return (Vec::new(), vec![RefusedCamera { origin: None, why: why.into() }]),
         };
         let (mut posed, mut refused) = (Vec::new(), Vec::new());
         let turns: Vec<[f64; 2]> = self.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
@@ -197,8 +202,8 @@ impl Look<'_> {
             match sampler.sample(intrinsics, &turns, &SamplerRules::default(), seed) {
                 Ok(drawn) => posed.push(Posed { origin: format!("seed {seed}"), camera: drawn.camera, fov_y_deg }),
                 Err(why) => {
-                    // Another seed would take as long and hardly do better.
-                    refused.push(format!("seed {seed}: {why}"));
+                    // Another seed would take as long and is unlikely to succeed.
+                    refused.push(RefusedCamera { origin: Some(format!("seed {seed}")), why: why.into() });
                     break;
                 }
             }
@@ -212,29 +217,28 @@ impl Look<'_> {
         (posed, refused)
     }
 
-    /// What a camera sees; in words which rule it breaks.
-    fn candidate(&self, room: usize, origin: &str, camera: Camera, fov_y_deg: f64) -> Result<Candidate, String> {
+    /// Looks through a camera. Fails where it breaks a rule.
+    fn candidate(&self, room: usize, origin: &str, camera: Camera, fov_y_deg: f64) -> Result<Candidate, CameraRefusal> {
         let small = thumbnail_camera(&camera);
         let seen = self.seen(&small);
         let pieces: BTreeSet<usize> =
             seen.iter().flatten().map(|hit| hit.0).filter(|&k| self.is_furniture_of(k, room)).collect();
         let turned: Vec<Vec<Option<Seen>>> =
             self.views.iter().map(|view| self.seen(&small.turned(view.x_deg, view.y_deg))).collect();
-        let all: usize = turned.iter().chain([&seen]).map(|seen| seen.iter().filter(|hit| hit.is_none()).count()).sum();
-        let outside = all as f64 / (seen.len() * (1 + self.views.len())) as f64;
+        let pixels = seen.len() * (1 + self.views.len());
+        let missed: usize =
+            turned.iter().chain([&seen]).map(|seen| seen.iter().filter(|hit| hit.is_none()).count()).sum();
+        let outside = missed as f64 / pixels as f64;
         let rules = &self.options.rules;
-        if all == seen.len() * (1 + self.views.len()) || outside > rules.max_outside {
-            return Err(format!("{:.0} % of the pixels see the outside", 100.0 * outside));
+        if missed == pixels || outside > rules.max_outside {
+            return Err(CameraRefusal::SeesOutside { share: outside, most: rules.max_outside });
         }
         if pieces.len() < rules.min_seen_objects {
-            return Err(format!("it sees {} pieces of furniture", pieces.len()));
+            return Err(CameraRefusal::SeesTooLittle { seen: pieces.len(), least: rules.min_seen_objects });
         }
         let nearest_of_all = turned.iter().map(|seen| nearest(seen)).fold(nearest(&seen), f64::min);
         if nearest_of_all < rules.min_nearest_m {
-            return Err(format!(
-                "something is {nearest_of_all:.1e} m away, expected at least {} m",
-                rules.min_nearest_m
-            ));
+            return Err(CameraRefusal::TooNear { nearest_m: nearest_of_all, least_m: rules.min_nearest_m });
         }
         let surfaces: Vec<Option<usize>> =
             score_grid(&small.intrinsics).map(|place| Some(self.look_at(&small, place)?.0)).collect();
@@ -258,19 +262,21 @@ impl Look<'_> {
         Ok((candidate, picture))
     }
 
-    /// Room, house and camera, so that ids stay the same whatever else is picked.
+    /// An id from room, house and camera, so that it does not depend on what else is picked.
     fn scene_id(&self, room: usize, origin: &str) -> String {
         let house: String = self.house.house.uid.chars().take(8).collect();
         let room: String = self.house.house.rooms[room].id.chars().take(28).collect();
         id_text_from(&format!("{room}-{house}-{}", origin.replace(' ', "")), "room")
     }
 
+    /// What each pixel of the camera sees, row by row.
     fn seen(&self, camera: &Camera) -> Vec<Option<Seen>> {
         let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
         let place = |k: usize| DVec2::new((k % width) as f64 + 0.5, (k / width) as f64 + 0.5);
         (0..width * height).into_par_iter().map(|k| self.look_at(camera, place(k))).collect()
     }
 
+    /// What the camera sees at a place of its picture; none for the outside.
     fn look_at(&self, camera: &Camera, place: DVec2) -> Option<Seen> {
         let hit = hit_through(self.world, camera, place)?;
         let surface = &self.house.scene.surfaces[hit.surface.0];
@@ -278,24 +284,25 @@ impl Look<'_> {
         let material = &self.house.scene.materials[surface.material.0];
         let color = material.appearance(self.world.textures(), uv).map_or([0.5; 3], |seen| seen.base_color);
         let distance = camera.camera_direction(place).length() * hit.depth;
-        // As if lit by a lamp on the camera: shapes show, and no path is traced.
+        // Shaded as if lit by a lamp on the camera, which shows shapes without tracing paths.
         let facing = hit.normal.as_dvec3().dot(camera.direction(place)).abs() as f32;
         let shade = 0.25 + 0.75 * facing;
         Some((hit.surface.0, distance, color.map(|v| byte_from_unit(srgb_from_linear(v * shade)))))
     }
 }
 
-/// Surface, distance in metres, colour as sRGB bytes.
+/// Index of the surface, distance in metres, colour as sRGB bytes.
 type Seen = (usize, f64, [u8; 3]);
 
-/// Metres to the nearest of what is seen; infinite where nothing is.
+/// Distance to the nearest surface seen, in metres; infinite where none is seen.
 fn nearest(seen: &[Option<Seen>]) -> f64 {
     seen.iter().flatten().map(|hit| hit.1).fold(f64::INFINITY, f64::min)
 }
 
-/// The colour of what is outside: none that a room has.
+/// The colour of the outside, which no room has: magenta.
 const OUTSIDE: [u8; 3] = [255, 0, 255];
 
+/// The camera at a thumbnail's resolution.
 fn thumbnail_camera(camera: &Camera) -> Camera {
     let old = camera.intrinsics;
     let scale = f64::from(THUMBNAIL_SIDE) / f64::from(old.width.max(old.height));
@@ -333,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn ids_are_given_once() {
+    fn every_id_is_unique() {
         let mut taken = BTreeSet::new();
         let ids = ["a", "a", "b", "a", "a-2"].map(|id| free_id(id, &mut taken));
         assert_eq!(ids, ["a", "a-2", "b", "a-3", "a-2-2"]);

@@ -1,8 +1,9 @@
-//! Furniture that stands in other furniture: our own test, on the meshes and not on their boxes.
+//! Finds furniture that stands in other furniture, by the meshes and not by their bounding boxes.
 //!
-//! Two pieces intersect where an edge of one goes through a face of the other and reaches further than a tolerance to both
-//! sides of it, or where a corner of one lies within the other, further than the tolerance from its surface (the edges of
-//! fine meshes are short). So a lamp that sinks a millimetre into its table, or two shelves side by side, do not.
+//! Two pieces intersect where an edge of one passes through a face of the other and extends further than a tolerance on
+//! both sides of it, or where a vertex of one lies inside the other, further than the tolerance from its surface (the edges
+//! of fine meshes are short). A lamp that sinks a millimetre into its table therefore does not intersect it, and neither do
+//! two shelves side by side.
 
 use std::cell::Cell;
 
@@ -11,16 +12,16 @@ use mateval_scene::TriangleMesh;
 use mateval_tracer::{Accel, Ray, TracerError};
 use rayon::prelude::*;
 
-/// How far a piece must reach into another, in metres.
+/// How far a piece must reach into another to intersect it, in metres.
 pub const TOLERANCE_M: f32 = 0.02;
 
-/// A piece made ready.
+/// A piece with its acceleration structure.
 struct Piece<'a> {
     mesh: &'a TriangleMesh,
     accel: Accel,
 }
 
-/// The pairs of meshes that intersect, by their places in the list, the lower one first; sorted.
+/// The pairs of meshes that intersect: their indices in `meshes`, the lower one first; sorted.
 pub fn intersecting_pairs(meshes: &[&TriangleMesh]) -> Result<Vec<[usize; 2]>, TracerError> {
     let pieces: Vec<Piece<'_>> = meshes
         .par_iter()
@@ -42,13 +43,13 @@ fn boxes_overlap(a: &Piece<'_>, b: &Piece<'_>) -> bool {
     (low_a + TOLERANCE_M).cmplt(high_b).all() && (low_b + TOLERANCE_M).cmplt(high_a).all()
 }
 
-/// Whether an edge of `one` goes through a face of `other`, or a corner of it lies within.
+/// Whether an edge of `one` passes through a face of `other`, or a vertex of `one` lies inside `other`.
 fn reaches_into(one: &Piece<'_>, other: &Piece<'_>) -> bool {
     let [low, high] = other.accel.bounds();
     let near = |from: Vec3, to: Vec3| from.min(to).cmple(high).all() && from.max(to).cmpge(low).all();
     let through = (0..one.mesh.triangles.len()).any(|triangle| {
         let [a, b, c] = one.mesh.corners(triangle);
-        // Both ways: the first face met may be one that is only touched.
+        // Each edge is traced both ways, since the first face hit may be one that the edge only touches.
         [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]
             .into_iter()
             .any(|(from, to)| near(from, to) && edge_goes_through(from, to, other))
@@ -64,14 +65,14 @@ fn edge_goes_through(from: Vec3, to: Vec3, other: &Piece<'_>) -> bool {
     (from - a).dot(normal).abs().min((to - a).dot(normal).abs()) > TOLERANCE_M
 }
 
-/// Whether a place is enclosed, with nothing within the tolerance: rays on three axes, aslant so that they follow no edge,
-/// each meet an odd number of faces both ways. What is open encloses nothing.
+/// Whether a place is enclosed and further than the tolerance from the surface: rays both ways along three axes, which are
+/// oblique so that they follow no edge, each hit an odd number of faces. An open mesh encloses nothing.
 fn lies_within(place: Vec3, other: &Piece<'_>) -> bool {
     const AXES: [Vec3; 3] = [Vec3::new(0.93, 0.29, 0.21), Vec3::new(-0.27, 0.91, 0.31), Vec3::new(0.19, -0.33, 0.92)];
     AXES.into_iter().flat_map(|axis| [axis, -axis]).all(|direction| {
         let (count, nearest) = (Cell::new(0_u32), Cell::new(f32::INFINITY));
         let ray = Ray::endless(place, direction.normalize());
-        // None is taken, so every one is met.
+        // Every hit is rejected, so that the ray visits all of them.
         other.accel.closest_where(&ray, |hit| {
             count.set(count.get() + 1);
             nearest.set(nearest.get().min(hit.distance));
@@ -103,16 +104,16 @@ mod tests {
     }
 
     #[test]
-    fn boxes_into_each_other_beside_and_touching() {
+    fn cubes_that_overlap_touch_and_are_apart() {
         assert!(intersect(Vec3::new(0.5, 0.5, 0.5)));
         assert!(intersect(Vec3::new(0.9, 0.3, -0.2)));
-        // Touching, sunk by a centimetre, apart.
+        // Touching, overlapping by a centimetre, apart.
         assert!(!intersect(Vec3::new(1.0, 0.3, 0.2)));
         assert!(!intersect(Vec3::new(0.99, 0.3, 0.2)));
         assert!(!intersect(Vec3::new(1.5, 0.0, 0.0)));
     }
 
-    /// Boxes around two crossed poles overlap; the poles do not.
+    /// The bounding boxes of two crossed poles overlap; the poles do not.
     #[test]
     fn overlapping_boxes_are_not_enough() {
         let pole = |turned: bool, height: f32| {
@@ -132,7 +133,7 @@ mod tests {
         assert_eq!(intersecting_pairs(&[&a, &c]).unwrap(), [[0, 1]]);
     }
 
-    /// A ball of triangles with edges of about two centimetres.
+    /// A sphere of triangles whose edges are about two centimetres long.
     fn ball(middle: Vec3, radius: f32) -> TriangleMesh {
         const SIDES: u32 = 96;
         let mut mesh = TriangleMesh::default();
@@ -152,24 +153,24 @@ mod tests {
         mesh
     }
 
-    /// No edge of theirs reaches far enough on its own.
+    /// None of their edges is long enough to show the intersection.
     #[test]
-    fn fine_meshes_are_told_by_their_corners() {
+    fn fine_meshes_intersect_by_their_vertices() {
         let pairs = |apart: f32| intersecting_pairs(&[&ball(Vec3::ZERO, 0.3), &ball(Vec3::X * apart, 0.3)]).unwrap();
         assert_eq!(pairs(0.3), [[0, 1]]);
         assert_eq!(pairs(0.5), [[0, 1]]);
-        // One centimetre each into the other, and apart.
+        // Overlapping by a centimetre, and apart.
         assert!(pairs(0.59).is_empty());
         assert!(pairs(0.7).is_empty());
     }
 
-    /// A cup in an open box is not within the box's boards.
+    /// A cup in an open bowl is not inside the bowl's mesh.
     #[test]
-    fn what_is_open_encloses_nothing() {
+    fn an_open_mesh_encloses_nothing() {
         let mut bowl = ball(Vec3::ZERO, 0.3);
         bowl.triangles.retain(|triangle| triangle.iter().all(|vertex| bowl.positions[*vertex as usize].y < 0.1));
         assert!(intersecting_pairs(&[&bowl, &ball(Vec3::ZERO, 0.05)]).unwrap().is_empty());
-        // The twin: in the closed ball it is.
+        // The twin: the same cup in a closed ball does intersect it.
         assert_eq!(intersecting_pairs(&[&ball(Vec3::ZERO, 0.3), &ball(Vec3::ZERO, 0.05)]).unwrap(), [[0, 1]]);
     }
 }

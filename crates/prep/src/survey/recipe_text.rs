@@ -1,18 +1,55 @@
-//! Picks as a recipe: a pose, and the SHA-256 of everything that the scene is made of.
+//! The rooms that are picked, as text of a recipe: a camera, and the SHA-256 of every file that the scene is made of.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::{CandidateCamera, SurveyOptions};
+use serde::Serialize;
 
-/// What stands before the scenes.
-pub(super) fn head(options: &SurveyOptions) -> String {
+use super::options::SurveyOptions;
+use super::survey_file::{CandidateCamera, SurveyFile};
+
+/// Pieces of recipes, from which the page joins a recipe of whatever is picked.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct RecipeTexts {
+    /// The lines before the first scene.
+    pub(super) head: String,
+    /// Ids of scenes that are already taken.
+    #[serde(skip)]
+    pub(super) taken: BTreeSet<String>,
+    /// The text of each scene without its inputs, by the scene's id.
+    pub(super) scenes: BTreeMap<String, String>,
+    /// The inputs of each house's scenes, by the house's file.
+    pub(super) inputs: BTreeMap<String, String>,
+}
+
+impl RecipeTexts {
+    /// The texts of a survey that has found nothing yet.
+    pub(super) fn new(options: &SurveyOptions) -> Self {
+        Self { head: head(options), ..Default::default() }
+    }
+
+    /// The recipe of the best camera of every room that is offered.
+    pub(super) fn of_best(&self, survey: &SurveyFile) -> String {
+        let mut text = self.head.clone();
+        for house in &survey.houses {
+            for camera in house.rooms.iter().filter_map(|room| room.cameras.first()) {
+                text.push_str(&self.scenes[&camera.scene]);
+                text.push_str(&self.inputs[&house.file]);
+            }
+        }
+        text
+    }
+}
+
+/// The lines before the first scene.
+fn head(options: &SurveyOptions) -> String {
     let [width, height] = options.resolution;
     let remark = "# Paths are relative to the folder that was surveyed: name it with --source.\n";
     format!("{remark}name = \"picked\"\nresolution = [{width}, {height}]\n")
 }
 
-/// One scene but for its inputs, which follow.
+/// A scene without its inputs, which follow it.
 pub(super) fn scene(options: &SurveyOptions, house: &str, room: &str, camera: &CandidateCamera) -> String {
     let shown = |path: &Path| quoted(&path.to_string_lossy().replace('\\', "/"));
     let mut keys = format!("house = {}, room = {}, models = {}", quoted(house), quoted(room), shown(&options.models));
@@ -30,7 +67,7 @@ pub(super) fn scene(options: &SurveyOptions, house: &str, room: &str, camera: &C
     )
 }
 
-/// The files of a house and their SHA-256: the same for each of its rooms.
+/// The files of a house and their SHA-256, which are the same for each of its rooms.
 pub(super) fn inputs(files: &[(String, String)]) -> String {
     files.iter().fold("[scene.inputs]\n".to_owned(), |mut text, (file, sha256)| {
         // Writing to a String cannot fail.
@@ -39,7 +76,7 @@ pub(super) fn inputs(files: &[(String, String)]) -> String {
     })
 }
 
-/// As a TOML basic string on one line, which is a key as well as a value.
+/// The text as a TOML basic string on one line, which is valid as a key and as a value.
 fn quoted(text: &str) -> String {
     let mut quoted = String::from('"');
     for c in text.chars() {
@@ -58,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_file_name_is_a_key_and_comes_back() {
+    fn any_file_name_is_a_key_that_reads_back() {
         for name in ["a/b.json", "Bob's \"flat\".json", "a\\b\n\u{7f}", "客厅"] {
             let table: toml::Table = toml::from_str(&format!("{} = 1", quoted(name))).unwrap();
             assert_eq!(table.keys().collect::<Vec<_>>(), [name]);

@@ -1,4 +1,4 @@
-//! Which rooms become scenes: limits in a TOML file, and lists of what is known to be bad.
+//! Which rooms become scenes: limits in a TOML file, and lists of rooms, houses and models that are known to be bad.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,36 +9,36 @@ use serde::Deserialize;
 use crate::error::PrepError;
 use crate::recipe::read_text;
 
-/// What a room must be like. Every key may be left out of the file.
+/// Conditions that a room must meet. Every key of the file is optional.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SelectionRules {
-    /// Room types, as in `LivingDiningRoom`; any where empty.
+    /// Accepted room types, as in `LivingDiningRoom`; any type where empty.
     pub room_types: Vec<String>,
-    /// Least pieces of furniture placed.
+    /// Smallest number of pieces of furniture placed.
     pub min_objects: usize,
-    /// Most of them.
+    /// Largest number of pieces of furniture placed.
     pub max_objects: usize,
-    /// Least different super-categories.
+    /// Smallest number of different super-categories.
     pub min_super_categories: usize,
-    /// Longest sides of the floor's box, metres.
+    /// Longest sides of the bounding box of the floor, in metres.
     pub max_size_m: [f64; 2],
-    /// Most pairs of pieces that stand in each other.
+    /// Largest number of pairs of pieces that intersect.
     pub max_intersecting: usize,
-    /// Most valid pieces without their model or their texture.
+    /// Largest number of valid pieces whose model or texture is missing.
     pub max_missing: usize,
-    /// Largest share of the five views' pixels that see the outside.
+    /// Largest share of the pixels of the five views that see the outside.
     pub max_outside: f64,
-    /// Least pieces that the input view sees.
+    /// Smallest number of pieces that the input view sees.
     pub min_seen_objects: usize,
-    /// Least metres from the camera to what any of the five views sees. Designers do stand close to things, unlike drawn
-    /// cameras, which keep a metre; but some of their cameras lie in the very plane of a wall, and half of such a picture
-    /// is noise.
+    /// Smallest distance from the camera to a surface that any of the five views sees, in metres. Designers place cameras
+    /// close to objects, while drawn cameras keep a metre away; but some of the designers' cameras lie in the plane of a
+    /// wall, and half of such a picture is noise.
     pub min_nearest_m: f64,
 }
 
 impl Default for SelectionRules {
-    /// Sizes are ATISS' for living rooms.
+    /// The sizes are those that ATISS uses for living rooms.
     fn default() -> Self {
         Self {
             room_types: Vec::new(),
@@ -59,7 +59,7 @@ impl Default for SelectionRules {
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rejection {
-    /// The rule's key, `listed`, or `no_camera`.
+    /// The key of the rule, `listed` or `no_camera`.
     pub rule: String,
     /// What was expected and what was found.
     pub reason: String,
@@ -71,7 +71,7 @@ impl Rejection {
     }
 }
 
-/// What is known of a room before cameras are tried.
+/// The properties of a room that are known before cameras are tried.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct RoomFacts {
     pub(super) kind: String,
@@ -83,11 +83,10 @@ pub(super) struct RoomFacts {
 }
 
 impl SelectionRules {
-    /// Reads them from a TOML file.
+    /// Reads the rules from a TOML file.
     pub fn read(path: &Path) -> Result<Self, PrepError> {
         let text = read_text(path)?;
-        let faults = |what: String| PrepError::Rules { path: path.to_owned(), what };
-        toml::from_str(&text).map_err(|error| faults(error.to_string().trim_end().to_owned()))
+        toml::from_str(&text).map_err(|source| PrepError::Rules { path: path.to_owned(), source: Box::new(source) })
     }
 
     /// Every rule that the room breaks.
@@ -99,13 +98,17 @@ impl SelectionRules {
             }
         };
         let known_type = self.room_types.is_empty() || self.room_types.contains(&room.kind);
-        check(known_type, "room_types", format!("it is a {}", room.kind));
+        check(
+            known_type,
+            "room_types",
+            format!("its type is '{}', expected one of: {}", room.kind, self.room_types.join(", ")),
+        );
         let least = format!("{} pieces of furniture, expected at least {}", room.objects, self.min_objects);
         check(room.objects >= self.min_objects, "min_objects", least);
         let most = format!("{} pieces of furniture, expected at most {}", room.objects, self.max_objects);
         check(room.objects <= self.max_objects, "max_objects", most);
         let kinds = room.super_categories;
-        let reason = format!("{kinds} super-categories, expected at least {}", self.min_super_categories);
+        let reason = format!("furniture of {kinds} super-categories, expected at least {}", self.min_super_categories);
         check(kinds >= self.min_super_categories, "min_super_categories", reason);
         let fits = room.size_m.iter().zip(&self.max_size_m).all(|(size, most)| size <= most);
         let [width, depth] = room.size_m;
@@ -115,47 +118,50 @@ impl SelectionRules {
             format!("its floor is {width:.2} by {depth:.2} m, expected at most {:?}", self.max_size_m),
         );
         let pairs: Vec<String> = room.intersecting.iter().map(|[a, b]| format!("'{a}' in '{b}'")).collect();
-        let reason = format!("furniture stands in other furniture: {}", pairs.join(", "));
+        let reason = format!(
+            "furniture stands in other furniture, expected at most {}: {}",
+            self.max_intersecting,
+            pairs.join(", ")
+        );
         check(pairs.len() <= self.max_intersecting, "max_intersecting", reason);
         let reason =
-            format!("{} pieces without their model or texture, expected at most {}", room.missing, self.max_missing);
+            format!("{} pieces lack their model or texture, expected at most {}", room.missing, self.max_missing);
         check(room.missing <= self.max_missing, "max_missing", reason);
         broken
     }
 }
 
-/// Ids of rooms, houses or models that are not to be used, each with its reason.
+/// Ids of rooms, houses and models that are not to be used, each with a reason.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RejectionLists {
     reasons: BTreeMap<String, String>,
 }
 
-/// Largest list that is read, in bytes.
+/// Size of the largest list that is read, in bytes.
 const MAX_LIST_BYTES: u64 = 64 << 20;
-/// Most rows of all lists together.
+/// Largest number of rows of all lists together.
 const MAX_ROWS: usize = 1_000_000;
 
 impl RejectionLists {
-    /// Adds a CSV file of rows `id,reason`; the reason may be missing, lines that begin with `#` are remarks.
+    /// Adds a CSV file of rows `id,reason`. The reason is optional; lines that begin with `#` are comments.
     pub fn add(&mut self, path: &Path) -> Result<(), PrepError> {
-        let fault = |what: String| PrepError::Rules { path: path.to_owned(), what };
         let rows = read_at_most(path, MAX_LIST_BYTES).map_err(PrepError::io("read", path))?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut reader =
             csv::ReaderBuilder::new().has_headers(false).flexible(true).comment(Some(b'#')).from_reader(&*rows);
         for row in reader.records() {
-            let row = row.map_err(|error| fault(error.to_string()))?;
+            let row = row.map_err(|source| PrepError::List { path: path.to_owned(), source })?;
             let Some(id) = row.get(0).map(str::trim).filter(|id| !id.is_empty()) else { continue };
             let reason = row.get(1).map(str::trim).filter(|reason| !reason.is_empty()).unwrap_or("no reason given");
             if self.reasons.len() >= MAX_ROWS {
-                return Err(fault(format!("more than {MAX_ROWS} rows in all")));
+                return Err(PrepError::LongLists { path: path.to_owned(), most: MAX_ROWS });
             }
             self.reasons.entry(id.to_owned()).or_insert_with(|| format!("'{id}' is in {name}: {reason}"));
         }
         Ok(())
     }
 
-    /// Why something is not to be used.
+    /// The rejection of a listed id; none where the id is on no list.
     pub(super) fn reason(&self, id: &str) -> Option<Rejection> {
         self.reasons.get(id).map(|reason| Rejection::new("listed", reason.clone()))
     }
@@ -170,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn each_rule_is_told_by_its_name() {
+    fn each_broken_rule_is_reported_under_its_key() {
         let rules = SelectionRules { room_types: vec!["Bedroom".into()], ..Default::default() };
         assert_eq!(rules.check(&good()), []);
         let broken = |room: RoomFacts| rules.check(&room).into_iter().map(|r| r.rule).collect::<Vec<_>>().join(" ");
@@ -199,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_are_toml_and_unknown_words_are_refused() {
+    fn rules_are_toml_and_unknown_keys_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("rules.toml");
         std::fs::write(&path, "min_objects = 7\n").unwrap();
