@@ -1,4 +1,4 @@
-//! `compare.json`: what two renderers' pictures of a dataset have in common.
+//! `compare.json`: how far two renderers' pictures of a dataset agree.
 
 use mateval_scene::{SceneId, ViewId};
 use schemars::JsonSchema;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::bounds::Bounds;
 use super::kind::MaterialKind;
 
-/// The word for this version of the file.
+/// The value of `format` in this version of the file.
 pub const COMPARE_FORMAT: &str = "mateval-compare/1";
 
 /// `compare.json`, and what `mateval prep compare --format json` prints.
@@ -16,17 +16,17 @@ pub const COMPARE_FORMAT: &str = "mateval-compare/1";
 pub struct CompareFile {
     /// Always `mateval-compare/1`.
     pub format: String,
-    /// What compared, as in `mateval 0.1.0`.
+    /// The program that compared and its version, as in `mateval 0.1.0`.
     pub tool: String,
-    /// What was compared.
+    /// The dataset that was compared.
     pub dataset: ComparedDataset,
-    /// Whose pictures are held against our own tracer's: `blender`.
+    /// The renderer whose pictures are compared with the built-in tracer's: `blender`.
     pub renderer: String,
-    /// What agreement means.
+    /// The bounds that decide whether a check agrees.
     pub bounds: Bounds,
     /// Whether every check of every view agrees.
     pub agrees: bool,
-    /// In the dataset's order.
+    /// The scenes, in the dataset's order.
     pub scenes: Vec<SceneComparison>,
 }
 
@@ -38,7 +38,7 @@ pub struct ComparedDataset {
     pub name: String,
     /// Its version.
     pub version: String,
-    /// SHA-256 of its manifest, hex.
+    /// SHA-256 of its manifest, in hexadecimal.
     pub manifest_sha256: String,
 }
 
@@ -48,15 +48,16 @@ pub struct ComparedDataset {
 pub struct SceneComparison {
     /// The scene.
     pub scene: SceneId,
-    /// The kinds of material that its surfaces are of, sorted.
+    /// The kinds of material that its surfaces have, sorted.
     pub kinds: Vec<MaterialKind>,
-    /// How far a tile of light may be off, as a share of the mean ([`LightComparison::means`]): less where all is Lambert.
+    /// How far a tile of light may be off, as a share of the mean ([`LightComparison::means`]); smaller where all surfaces are
+    /// Lambertian.
     pub tile_bound: f64,
-    /// Samples a pixel of each of our halves; 0 where no view was compared.
+    /// Samples per pixel of each half that the built-in tracer rendered; 0 where no view was compared.
     pub samples_each_half: u32,
-    /// Seeds of our halves, 16 hexadecimal digits each.
+    /// Seeds of the built-in tracer's halves, 16 hexadecimal digits each.
     pub seeds: [String; 2],
-    /// In the scene's order.
+    /// The views, in the scene's order.
     pub views: Vec<ViewComparison>,
 }
 
@@ -66,27 +67,27 @@ pub struct SceneComparison {
 pub struct ViewComparison {
     /// The view.
     pub view: ViewId,
-    /// What was checked, picture by picture; one check of state `missing` where the view was not rendered.
+    /// The checks, picture by picture; one check of state `missing` where the view was not rendered.
     pub checks: Vec<Check>,
-    /// What stands behind the checks of RGB and of each group of lights.
+    /// The measurements behind the checks of RGB and of each light group.
     pub light: Vec<LightComparison>,
 }
 
-/// What came of a check.
+/// The outcome of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum State {
     /// Within its bound. The only state that passes.
     Agrees,
-    /// Outside of its bound.
+    /// Outside its bound.
     Differs,
-    /// Within its bound, but so noisy that it would be anyway.
+    /// Within its bound, but so noisy that it would be within it in any case.
     TooNoisy,
     /// Nothing was left to compare.
     Undecided,
-    /// There is no such file.
+    /// The file does not exist.
     Missing,
-    /// The file cannot be read, or is of another size.
+    /// The file cannot be read, or has another size.
     Unreadable,
 }
 
@@ -94,21 +95,21 @@ pub enum State {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// Whether the picture is there: no number.
+    /// Whether the picture exists and can be read; has no number.
     File,
-    /// PSNR over valid pixels, linear, peak 1, decibels; at least the bound.
+    /// PSNR over valid pixels, linear, peak 1, in decibels. Agrees where it is at least the bound.
     PsnrDb,
-    /// Share of pixels away from edges with equal ids; at least the bound.
+    /// Share of the pixels away from edges whose ids are equal. Agrees where it is at least the bound.
     EqualShare,
-    /// Median absolute difference, metres.
+    /// Median absolute difference, in metres.
     MedianM,
-    /// Median angle, degrees.
+    /// Median angle, in degrees.
     MedianDeg,
-    /// Tiles over the tile bound; at most the bound, which is a number of tiles.
+    /// Number of tiles over the tile bound. Agrees where it is at most the bound, which is a number of tiles too.
     TilesOver,
-    /// Relative difference of the means in the worst channel. The bound has the noise in it.
+    /// Relative difference of the means in the worst channel. The bound includes the noise.
     MeanDifference,
-    /// Largest difference of a half's groups, summed, from the half, relative to the pixel.
+    /// Largest difference between a half and the sum of its groups, relative to the pixel.
     GroupSum,
 }
 
@@ -116,19 +117,19 @@ pub enum Quantity {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
-    /// The picture, as its file is named: `rgb`, `group_00`, `base_color`, ...
+    /// The picture, by the name of its file: `rgb`, `group_00`, `base_color`, ...
     pub picture: String,
     /// What was measured.
     pub quantity: Quantity,
-    /// What came of it.
+    /// The outcome.
     pub state: State,
-    /// The number; null where there is none.
+    /// The number measured; null where there is none.
     pub measured: Option<f64>,
-    /// Where agreement ends; null where there is no number.
+    /// The bound that decides; null where there is no number.
     pub bound: Option<f64>,
-    /// Pixels, or tiles, that the number is of.
+    /// Number of pixels or tiles that were measured.
     pub count: usize,
-    /// What was found, for people.
+    /// What was found, as a sentence.
     pub message: String,
 }
 
@@ -140,27 +141,27 @@ pub struct LightComparison {
     pub picture: String,
     /// The group's name; null for RGB.
     pub light: Option<String>,
-    /// Mean of each channel, ours and theirs, over the valid pixels of the tiles that decide (over all of their pixels where
-    /// none is valid). Ours is what every difference is relative to.
+    /// Mean of each channel, first the built-in tracer's and then the other renderer's, over the valid pixels of the tiles
+    /// that decide, or over all of their pixels where none is valid. Every difference is relative to the first.
     pub means: [[f64; 3]; 2],
-    /// How far those means are apart; null where no tile decides.
+    /// The difference of these means; null where no tile decides.
     pub mean: Option<MeanDifference>,
     /// The tiles that decide.
     pub tiles: TilesCompared,
-    /// Tiles that show what is known to differ, by the kind of it. They decide nothing.
+    /// Tiles that show materials that are known to differ, by the kind of material. They do not count for the verdict.
     pub apart: Vec<TilesApart>,
 }
 
-/// How far means are apart, for the channel where that is most against what is allowed. All relative to our mean in that
-/// channel.
+/// The difference of two means, in the channel where it is largest in proportion to what is allowed there. All numbers are
+/// relative to the built-in tracer's mean in that channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeanDifference {
     /// 0 red, 1 green, 2 blue.
     pub channel: usize,
-    /// Theirs minus ours; null where ours is black and theirs is not.
+    /// The other renderer's mean minus the built-in tracer's; null where only the latter is black.
     pub difference: Option<f64>,
-    /// Its standard error, from the halves of both.
+    /// Its standard error, from the halves of both renderers.
     pub standard_error: Option<f64>,
 }
 
@@ -168,19 +169,19 @@ pub struct MeanDifference {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TilesCompared {
-    /// How many there are.
+    /// Number of tiles.
     pub count: usize,
-    /// How many are over the bound in a channel.
+    /// Number of tiles that are over the bound in a channel.
     pub over: usize,
-    /// How many may be: 1 %, and what noise alone puts there.
+    /// Number of tiles that may be over the bound: 1 %, and those that noise alone may cause.
     pub allowed: usize,
-    /// How many noise alone puts there, on the average.
+    /// Number of tiles that noise alone puts over the bound on average.
     pub expected_by_noise: f64,
-    /// Median of the tiles' largest relative difference, without a sign; null without tiles, or in a black picture.
+    /// Median of the absolute value of each tile's largest relative difference; null without tiles, or in a black picture.
     pub median: Option<f64>,
-    /// Median of three standard errors over the bound; null as above. Above 5 the picture is too noisy to tell.
+    /// Median of three standard errors divided by the bound; null as above. Above 5 the picture is too noisy for a verdict.
     pub noise: Option<f64>,
-    /// The tile that is furthest over, or nearest to it.
+    /// The tile that is furthest over the bound, or nearest to it where none is over.
     pub worst: Option<WorstTile>,
 }
 
@@ -188,28 +189,28 @@ pub struct TilesCompared {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorstTile {
-    /// Its left column.
+    /// The tile's left column.
     pub x: usize,
-    /// Its upper row.
+    /// The tile's upper row.
     pub y: usize,
-    /// In which channel, and by how much.
+    /// The channel in which it is off most, and by how much.
     pub off: MeanDifference,
 }
 
-/// Tiles that show one kind of material that is known to differ. A tile that shows several counts with the last of them
-/// in the order of [`MaterialKind`].
+/// Tiles that show a kind of material that is known to differ. A tile that shows several such kinds counts for the last of
+/// them in the order of [`MaterialKind`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TilesApart {
     /// The kind.
     pub kind: MaterialKind,
-    /// How many tiles.
+    /// Number of tiles.
     pub count: usize,
-    /// How many of them would be over the bound.
+    /// Number of these tiles that are over the bound.
     pub over: usize,
-    /// Median of their largest relative difference, without a sign; null in a black picture.
+    /// Median of the absolute value of each tile's largest relative difference; null in a black picture.
     pub median: Option<f64>,
-    /// The largest of them, with its sign; null in a black picture.
+    /// The largest of these differences, with its sign; null in a black picture.
     pub largest: Option<f64>,
 }
 
@@ -222,19 +223,19 @@ impl CompareFile {
 }
 
 impl ViewComparison {
-    /// The check of a picture and a quantity.
+    /// The check of this quantity of this picture; none where it was not made.
     pub fn check(&self, picture: &str, quantity: Quantity) -> Option<&Check> {
         self.checks.iter().find(|check| check.picture == picture && check.quantity == quantity)
     }
 }
 
 impl State {
-    /// As people read it.
+    /// The word for it in tables and messages.
     pub fn word(self) -> &'static str {
         match self {
             Self::Agrees => "agrees",
             Self::Differs => "DIFFERS",
-            Self::TooNoisy => "too noisy to tell",
+            Self::TooNoisy => "too noisy",
             Self::Undecided => "undecided",
             Self::Missing => "missing",
             Self::Unreadable => "unreadable",

@@ -24,7 +24,7 @@ pub fn verdict(file: &CompareFile) -> String {
     let all = file.checks().count();
     let others = [
         (State::Differs, "differ"),
-        (State::TooNoisy, "too noisy to tell"),
+        (State::TooNoisy, "too noisy"),
         (State::Undecided, "undecided"),
         (State::Missing, "missing"),
         (State::Unreadable, "unreadable"),

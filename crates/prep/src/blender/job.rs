@@ -1,8 +1,8 @@
 //! A job for `blender_scripts/render.py`: its JSON and the files beside it.
 //!
-//! In: a reference scene, its instances' parts, views. Out: a folder with `job.json`, meshes as raw little-endian
-//! numbers and textures as linear EXR. Textures are decoded here: Cycles interpolates 8-bit sRGB before it decodes
-//! it, and we after.
+//! In: a reference scene, the parts of its instances, views. Out: a folder with `job.json`, meshes as raw little-endian
+//! numbers and textures as linear EXR files. Textures are decoded here, since Cycles interpolates 8-bit sRGB before it
+//! decodes it, while the built-in tracer decodes first.
 
 use std::path::Path;
 
@@ -17,12 +17,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
 
-/// What `format` says in a job.
+/// The value of `format` in a job.
 pub const JOB_FORMAT: &str = "mateval-blender-job/1";
-/// What `format` says in a result.
+/// The value of `format` in a result.
 pub const RESULT_FORMAT: &str = "mateval-blender-result/1";
 
-/// `job.json`: a scene, where it is seen from, and how it is to be rendered. Files are relative to its folder.
+/// `job.json`: a scene, the views to render and the settings. Files are relative to its folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BlenderJob {
@@ -30,51 +30,51 @@ pub struct BlenderJob {
     pub format: String,
     /// The scene's id.
     pub scene: SceneId,
-    /// What there is to see.
+    /// The scene's surfaces.
     pub surfaces: Vec<JobSurface>,
-    /// As in `reference.json`.
+    /// Materials as in `reference.json`.
     pub materials: Vec<Material>,
-    /// What materials and lights look up.
+    /// Textures that materials and lights refer to by index.
     pub textures: Vec<JobTexture>,
-    /// As in `lights.json`.
+    /// Light groups as in `lights.json`.
     pub lights: Vec<LightGroup>,
     /// The views to render.
     pub views: Vec<JobView>,
-    /// Samples a pixel of each half.
+    /// Samples per pixel of each half.
     pub samples_each_half: u32,
-    /// Scatterings after the first hit after which a path is cut, of every kind.
+    /// Number of scatterings of any kind after the first hit after which a path is cut.
     pub max_bounces: u32,
-    /// Threads to render on; 0 for as many as there are.
+    /// Number of threads to render with; 0 for one per processor.
     pub threads: u32,
 }
 
-/// A surface: world space, metres, +Y up.
+/// A surface, in world space: metres, +Y up.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JobSurface {
-    /// 32-bit floats, three a vertex.
+    /// File of positions: 32-bit floats, three per vertex.
     pub positions: String,
-    /// 32-bit indices, three a triangle, counter-clockwise seen from the front.
+    /// File of 32-bit vertex indices, three per triangle, counter-clockwise seen from the front.
     pub triangles: String,
-    /// 32-bit floats, three a vertex; null where faces are flat.
+    /// File of normals: 32-bit floats, three per vertex; null where faces are shaded flat.
     pub normals: Option<String>,
-    /// 32-bit floats, two a vertex, v upwards; null where there is none.
+    /// File of texture coordinates: 32-bit floats, two per vertex, v upwards; null where there are none.
     pub uvs: Option<String>,
-    /// 16-bit indices, one a triangle: its value in `part.png`.
+    /// File of 16-bit part indices, one per triangle: its value in `part.png`.
     pub parts: String,
-    /// Its value in `instance.png`.
+    /// The surface's value in `instance.png`.
     pub instance: u16,
-    /// Its place in `materials`.
+    /// The index of its material in `materials`.
     pub material: usize,
 }
 
-/// A texture: linear RGB.
+/// A texture of linear RGB.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JobTexture {
     /// An EXR file.
     pub file: String,
-    /// How it goes on outside 0..1.
+    /// How it continues outside 0..1.
     pub wrap: WrapWord,
 }
 
@@ -82,15 +82,15 @@ pub struct JobTexture {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JobView {
-    /// Its id, and the folder of its pictures.
+    /// The view's id, and the name of the folder of its pictures.
     pub id: ViewId,
-    /// Where it is seen from.
+    /// The view's camera.
     pub camera: Camera,
-    /// Seeds of both halves, below 2^31.
+    /// Seeds of the two halves, below 2^31.
     pub seeds: [u32; 2],
 }
 
-/// `result.json`: what the script has made so far.
+/// `result.json`: what the script has rendered so far.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BlenderResult {
@@ -98,44 +98,44 @@ pub struct BlenderResult {
     pub format: String,
     /// Blender's version.
     pub blender: String,
-    /// What Blender renders only nearly as the job says, a line a material.
+    /// What Blender only approximates of the job, one line per material.
     pub approximations: Vec<String>,
-    /// The views whose pictures are whole.
+    /// The views whose pictures are complete.
     pub views: Vec<ResultView>,
-    /// Why it ended early; null where it did not, or has not yet.
+    /// Why the script ended early; null where it has not.
     pub error: Option<String>,
 }
 
-/// A view that is whole.
+/// A view whose pictures are complete.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultView {
-    /// Its id.
+    /// The view's id.
     pub id: ViewId,
-    /// Seconds that its halves `a` and `b` took, and `denoise`.
+    /// Seconds that each step took: the halves `a` and `b`, and `denoise`.
     pub seconds: std::collections::BTreeMap<String, f64>,
 }
 
-/// What a job renders, its files apart.
+/// What a job is written from.
 #[derive(Clone, Debug)]
 pub struct JobPlan<'a> {
     /// The scene's id.
     pub scene: &'a SceneId,
-    /// What there is to see; instance k is surface k - 1.
+    /// The scene; instance k is surface k - 1.
     pub reference: &'a ReferenceScene,
     /// The value in `part.png` of every triangle of every surface.
     pub parts: &'a [Vec<u16>],
-    /// The views.
+    /// The views to render.
     pub views: Vec<JobView>,
-    /// Samples a pixel of each half.
+    /// Samples per pixel of each half.
     pub samples_each_half: u32,
-    /// Scatterings after which a path is cut.
+    /// Number of scatterings after which a path is cut.
     pub max_bounces: u32,
-    /// Threads; 0 for all.
+    /// Number of threads; 0 for one per processor.
     pub threads: u32,
 }
 
-/// Writes the job into the folder, which must be there.
+/// Writes the job into the folder, which must exist.
 pub fn write(folder: &Path, plan: &JobPlan<'_>) -> Result<(), PrepError> {
     for name in ["meshes", "textures"] {
         let path = folder.join(name);
@@ -187,7 +187,7 @@ fn floats(values: impl Iterator<Item = f32>) -> Vec<u8> {
 fn write_texture(folder: &Path, at: usize, texture: &Texture) -> Result<JobTexture, PrepError> {
     let file = format!("textures/{at:04}.exr");
     let texels = Picture::from_fn(texture.width(), texture.height(), |x, y| LinearRgb(texture.texel(x, y)));
-    // 8 bits are well told apart by 16-bit floats; what is stored as floats may be beyond their range.
+    // 16-bit floats keep all values of 8 bits distinct; textures stored as floats may exceed their range.
     let precision = match texture.texels() {
         Texels::Srgb8(_) | Texels::Linear8(_) | Texels::Grey8(_) => Precision::Half,
         Texels::Srgb16(_) | Texels::Linear(_) | Texels::Grey(_) => Precision::Float,

@@ -13,7 +13,7 @@ pub const RENDER_FILE: &str = "render.json";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RenderFile {
-    /// The renderer's name, which is also the name of the folder: `builtin`, `blender`.
+    /// The renderer's name, which is also the name of its folder, as in `builtin`.
     pub renderer: RendererId,
     /// The renderer's own version; null for `builtin`, whose version is that of the dataset's tool.
     pub renderer_version: Option<String>,
