@@ -3,7 +3,7 @@
 use mateval_scene::submission::SUBMISSION;
 
 use super::file::{AlignedBy, ExplainFile};
-use super::{ExplainPlan, protocol_of};
+use super::plan::ExplainPlan;
 use crate::error::ReportError;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::SCORER_VERSION;
@@ -18,7 +18,7 @@ pub(super) fn check<'a>(plan: &ExplainPlan<'a>) -> Result<&'a ProtocolResult, Re
         let what = format!("the result is of format '{}'; this version reads '{RESULT_FORMAT}'", result.format);
         return Err(ReportError::Invalid(what));
     }
-    let scores = protocol_of(result, plan.protocol)?;
+    let scores = plan.scores()?;
     let mut faults = Vec::new();
     if scores.protocol.scorer_version != SCORER_VERSION {
         let found = scores.protocol.scorer_version;

@@ -3,7 +3,7 @@
 use mateval_image::transfer::byte_from_unit;
 use mateval_image::{LinearRgb, Picture};
 
-use super::kinds::patch_error;
+use super::model::patch_error;
 use super::patch::Patch;
 use crate::strips::{GAP_COLOR, SCALE_ROWS, error_color, grid, scale};
 use mateval_eval::shown_scene::SceneAlbedo;

@@ -23,6 +23,7 @@
 //! the truth does not have is rest. Views and instances of few pixels let steps 3 and 4 fit what is chance.
 
 use super::file::KindShares;
+use super::model::{Model, error};
 use super::patch::Patch;
 use super::{lost_detail, scales, shift, smooth_field};
 
@@ -40,9 +41,6 @@ pub(super) struct Explained {
     pub(super) shifts: Vec<shift::Shift>,
     pub(super) blur_sigma_pixels: Option<f64>,
 }
-
-/// The model's pixels, patch by patch.
-pub(super) type Model = Vec<Vec<[f64; 3]>>;
 
 /// Takes one instance's patches apart.
 pub(super) fn explained(patches: &[Patch]) -> Explained {
@@ -63,16 +61,6 @@ pub(super) fn explained(patches: &[Patch]) -> Explained {
     let left = [after_scale, after_chroma, after_shading, after_shift, error(patches, &model)];
     let pixels = patches.iter().map(|patch| patch.places.len()).sum();
     Explained { pixels, squared_error, left, scale, channel_scales, shifts, blur_sigma_pixels }
-}
-
-/// The sum of squares over pixels and channels.
-fn error(patches: &[Patch], model: &Model) -> f64 {
-    patches.iter().zip(model).map(|(patch, model)| patch_error(&patch.truth, model)).sum()
-}
-
-/// Of one patch.
-pub(super) fn patch_error(truth: &[[f64; 3]], model: &[[f64; 3]]) -> f64 {
-    truth.iter().zip(model).map(|(t, m)| (0..3).map(|c| (t[c] - m[c]).powi(2)).sum::<f64>()).sum()
 }
 
 impl Explained {

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use mateval_scene::{InstanceId, SceneId};
 
-use super::WORST;
 use super::file::LightShare;
+use super::plan::WORST;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result_key::{PictureKind, Views};
 

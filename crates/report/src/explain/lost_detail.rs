@@ -1,6 +1,6 @@
 //! Step 5: detail of the truth that the model lacks.
 
-use super::kinds::Model;
+use super::model::Model;
 use super::patch::Patch;
 
 /// Standard deviations of the Gaussians, in pixels.

@@ -14,7 +14,9 @@ pub mod file;
 mod kinds;
 mod light;
 mod lost_detail;
+mod model;
 mod patch;
+mod plan;
 mod scales;
 mod shift;
 mod smooth_field;
@@ -22,14 +24,15 @@ mod smooth_field;
 mod tests;
 pub mod text;
 
+pub use plan::{ExplainPlan, WORST};
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_metrics::Psnr;
 use mateval_scene::dataset::{Instance, SceneFile};
-use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::check_free;
-use mateval_scene::{Finding, Progress, SceneError, SceneId, ViewId};
+use mateval_scene::{Progress, SceneError, ViewId};
 use rayon::prelude::*;
 
 use self::file::{EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};
@@ -38,30 +41,10 @@ use self::patch::{Patch, patches};
 use crate::error::ReportError;
 use mateval_eval::instance_errors::categories;
 use mateval_eval::open_scene::scored_views;
-use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
-
-/// Instances that are told and shown.
-pub const WORST: usize = 10;
 
 /// The page that links the pictures.
 const PAGE: &str = "explain.md";
-
-/// What to explain.
-pub struct ExplainPlan<'a> {
-    /// The scores.
-    pub result: &'a ResultFile,
-    /// Their protocol.
-    pub protocol: &'a str,
-    /// What they were taken on.
-    pub dataset: &'a Dataset,
-    /// What was scored.
-    pub submission: &'a Path,
-    /// One of its scenes.
-    pub scene: &'a SceneId,
-    /// Name and version of the tool, for the file.
-    pub tool: String,
-}
 
 /// What was found, and what it takes to show it.
 pub struct Explanation {
@@ -153,14 +136,6 @@ fn instance_explanation(
     }
 }
 
-impl ExplainPlan<'_> {
-    /// The result's findings of this scene.
-    fn findings(&self) -> Vec<Finding> {
-        let folder = format!("scenes/{}/", self.scene);
-        self.result.findings.iter().filter(|finding| finding.file.starts_with(&folder)).cloned().collect()
-    }
-}
-
 impl Explanation {
     /// Writes a PNG for each of the worst instances and `explain.md` into the folder `out`; gives their paths.
     pub fn write(&self, out: &Path, force: bool) -> Result<Vec<PathBuf>, ReportError> {
@@ -193,15 +168,4 @@ impl Explanation {
 /// before, are looked at when they are written.
 pub fn check_out(out: &Path, force: bool) -> Result<(), ReportError> {
     Ok(check_free(&out.join(PAGE), force, "--out")?)
-}
-
-/// The scores of a protocol, or what the result has instead.
-fn protocol_of<'a>(result: &'a ResultFile, protocol: &str) -> Result<&'a ProtocolResult, ReportError> {
-    result.protocols.get(protocol).ok_or_else(|| {
-        let known: Vec<&str> = result.protocols.keys().map(String::as_str).collect();
-        ReportError::Invalid(format!(
-            "the result has no scores under protocol '{protocol}'; it has: {}; choose one by --protocol",
-            known.join(", ")
-        ))
-    })
 }

@@ -1,6 +1,6 @@
 //! Steps 1 and 2: scales of a whole instance and of its channels.
 
-use super::kinds::Model;
+use super::model::Model;
 use super::patch::Patch;
 
 /// Sums over all pixels, by channel, of truth times model and of the model's squares.

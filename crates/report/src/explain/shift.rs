@@ -1,6 +1,6 @@
 //! Step 4: a small shift of one view of an instance.
 
-use super::kinds::patch_error;
+use super::model::patch_error;
 use super::patch::{FEWEST_PIXELS, Patch};
 
 /// The farthest shift along either axis, in pixels.

@@ -6,7 +6,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::Board;
+use super::board::Board;
 use super::columns::{Choices, Column, choices};
 use super::heads::{Cell, MethodHead, rank_text, standing};
 use super::site::{Page, SiteWriter};

@@ -4,9 +4,9 @@ use std::borrow::Cow;
 
 use mateval_scene::{SceneId, json};
 
-use super::file::LeaderboardFile;
+use super::board::Board;
+use super::file::{LEADERBOARD_PATH, LeaderboardFile};
 use super::site::SiteWriter;
-use super::{Board, LEADERBOARD};
 use crate::error::ReportError;
 use crate::tables::csv::quoted;
 use crate::tables::{Grouping, TableFormat, tables};
@@ -18,7 +18,7 @@ pub(super) const TABLES: &str = "downloads/tables.tex";
 
 /// Writes them all.
 pub(super) fn write(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) -> Result<(), ReportError> {
-    site.file(LEADERBOARD, &json::to_text(&board.file))?;
+    site.file(LEADERBOARD_PATH, &json::to_text(&board.file))?;
     site.file("downloads/leaderboard.csv", &standings_csv(&board.file))?;
     // Tables hold results side by side only if these cover the same scenes.
     let scenes = &board.ranking().scenes;

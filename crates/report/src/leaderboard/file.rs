@@ -10,6 +10,9 @@ use crate::ranking::file::Ranking;
 /// The word for this version of a leaderboard.
 pub const LEADERBOARD_FORMAT: &str = "mateval-leaderboard/1";
 
+/// Where the file lies in a leaderboard's folder; what has no such file is not a leaderboard and is never replaced.
+pub(super) const LEADERBOARD_PATH: &str = "downloads/leaderboard.json";
+
 /// A leaderboard.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -7,7 +7,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::Board;
+use super::board::Board;
 use super::columns::{Column, headlines};
 use super::heads::{Cell, MethodHead, standing};
 use super::site::{Page, SiteWriter};

@@ -7,7 +7,7 @@ use mateval_scene::Progress;
 use mateval_scene::open::Dataset;
 use serde::Serialize;
 
-use super::{LeaderboardPlan, Submissions};
+use super::plan::{LeaderboardPlan, Submissions};
 use crate::error::ReportError;
 use crate::picture_set::{self, ERROR, PictureSet};
 use crate::ranking::file::Ranking;

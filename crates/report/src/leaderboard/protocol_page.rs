@@ -5,7 +5,7 @@ use minijinja::value::Serde;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::Board;
+use super::board::Board;
 use super::file::LeaderboardDataset;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;

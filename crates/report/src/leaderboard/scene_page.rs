@@ -8,7 +8,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::Board;
+use super::board::Board;
 use super::columns::{Column, headlines};
 use super::heads::MethodHead;
 use super::pictures::{Kind, kinds_in_order};

@@ -1,10 +1,13 @@
 //! A small site from made-up results; the browser's tests are in `tests/site`.
 
+use mateval_eval::result::ResultFile;
 use mateval_image::{Picture, png_io};
 use mateval_scene::json;
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::submission::Cost;
 
+use super::file::LeaderboardFile;
+use super::verified::Verified;
 use super::*;
 use crate::picture_set;
 use crate::ranking::tests::{result, scores};
@@ -62,7 +65,7 @@ fn a_site_has_all_its_pages() {
     assert!(text("errata.html").contains("None are known"));
     assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
     assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
-    let file: LeaderboardFile = json::read(&out.join(LEADERBOARD)).unwrap();
+    let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
     assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));
     let lines = text("downloads/leaderboard.csv").lines().count();
     assert_eq!((lines, text("methods/bad.csv").lines().count()), (1 + 3 * 2, 1 + 12));

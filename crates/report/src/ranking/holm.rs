@@ -1,6 +1,4 @@
-//! Many verdicts at once: Holm's correction, and ranks as ranges.
-
-use super::file::RankRange;
+//! Holm's correction of p-values for many comparisons at once.
 
 /// Chances that are less are differences.
 pub(super) const LEVEL: f64 = 0.05;
@@ -18,17 +16,6 @@ pub(super) fn corrected(chances: &[f64]) -> Vec<f64> {
     corrected
 }
 
-/// Ranks of `methods` methods: one behind those that are surely better, and before those that are surely worse. `beaten` holds
-/// pairs of a winner and a loser.
-pub(super) fn rank_ranges(methods: usize, beaten: &[(usize, usize)]) -> Vec<RankRange> {
-    let mut ranks = vec![RankRange { best: 1, worst: methods }; methods];
-    for (winner, loser) in beaten {
-        ranks[*loser].best += 1;
-        ranks[*winner].worst -= 1;
-    }
-    ranks
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -40,12 +27,5 @@ mod tests {
         for (found, expected) in corrected.iter().zip([0.03, 0.06, 0.06, 0.02]) {
             assert!((found - expected).abs() < 1e-15, "{corrected:?}");
         }
-    }
-
-    #[test]
-    fn ranks_by_hand() {
-        let range = |best, worst| RankRange { best, worst };
-        assert_eq!(rank_ranges(3, &[]), [range(1, 3); 3]);
-        assert_eq!(rank_ranges(3, &[(0, 2), (1, 2)]), [range(1, 2), range(1, 2), range(3, 3)]);
     }
 }

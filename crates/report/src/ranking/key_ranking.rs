@@ -4,7 +4,8 @@ use super::bootstrap::{Duel, duels, intervals};
 use super::clusters::Clusters;
 use super::draws::DrawTable;
 use super::file::{Interval, IntervalKind, KeyRanking, Pair, RankingRules, Standing};
-use super::holm::{corrected, rank_ranges};
+use super::holm::corrected;
+use super::rank_ranges::rank_ranges;
 use mateval_eval::metric::Better;
 
 /// Values of one key.

@@ -11,6 +11,7 @@ mod draws;
 pub mod file;
 mod holm;
 mod key_ranking;
+mod rank_ranges;
 #[cfg(test)]
 pub(crate) mod tests;
 
