@@ -87,7 +87,7 @@ def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: ob
         "instances": instances(scenes=scenes, psnr=psnr),
     }
     return {
-        "format": "mateval-result/2", "tool": "mateval 0.1.0", "method": method,
+        "format": "mateval-result/3", "tool": "mateval 0.1.0", "method": method,
         "submission": {"sha256": sha256(method + str(seed)), "description": said.pop("description", ""), **said},
         "dataset": {
             "name": "synthetic", "version": "1.0", "manifest_sha256": MANIFEST, "scenes": scenes,

@@ -36,7 +36,7 @@ fn values(folder: &Path, prediction: &str, case: &Value, mask: Option<&str>, net
     }
     let printed: Value = serde_json::from_str(&run(&mut command).ends_with(0).stdout).unwrap();
     if printed["missing"] != Value::Array(Vec::new()) {
-        report_missing(&format!("lpips_{net} of {prediction}: {}", printed["missing"][0]["mend"]));
+        report_missing(&format!("lpips_{net} of {prediction}: {}", printed["missing"][0]["fix"]));
         return None;
     }
     Some(printed["values"].clone())

@@ -8,8 +8,8 @@ use serde_json::Value;
 
 use super::command::run_words;
 
-/// What mends a schema that is not the program's.
-const MEND: &str = "cargo run -- schema dataset_spec/schema --force";
+/// The command that brings the schemas up to date.
+const FIX: &str = "cargo run -- schema dataset_spec/schema --force";
 
 fn spec(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("dataset_spec").join(path)
@@ -25,7 +25,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 fn differences(made: &Path, kept: &Path) -> Vec<String> {
     let (made, kept) = (files(made), files(kept));
     let names: std::collections::BTreeSet<&String> = made.keys().chain(kept.keys()).collect();
-    names.into_iter().filter(|name| made.get(*name) != kept.get(*name)).map(|n| format!("{n}; run: {MEND}")).collect()
+    names.into_iter().filter(|name| made.get(*name) != kept.get(*name)).map(|n| format!("{n}; run: {FIX}")).collect()
 }
 
 fn write_schemas(folder: &Path) {
@@ -51,7 +51,7 @@ fn a_changed_schema_is_found() {
     std::fs::write(&changed, text.replace("world_from_camera", "camera_from_world")).unwrap();
     std::fs::remove_file(kept.path().join("lights.schema.json")).unwrap();
     std::fs::write(kept.path().join("old.schema.json"), "{}").unwrap();
-    let expected = ["lights", "old", "scene"].map(|name| format!("{name}.schema.json; run: {MEND}"));
+    let expected = ["lights", "old", "scene"].map(|name| format!("{name}.schema.json; run: {FIX}"));
     assert_eq!(differences(made.path(), kept.path()), expected);
 }
 

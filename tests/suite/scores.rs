@@ -151,21 +151,21 @@ fn tables_show_both_and_refuse_other_fingerprints() {
 
 #[test]
 fn lpips_without_weights_is_missing_and_says_what_mends_it() {
-    const MEND: &str = "python3 tools/fetch_lpips_weights.py";
+    const FIX: &str = "python3 tools/fetch_lpips_weights.py";
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
     let mut command = score(&SCORED.join("grey"), &SCORED.join("dataset"), &out);
-    run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0).says("lpips_alex is missing").says(MEND);
+    run(command.env("MATEVAL_CACHE", folder.path())).ends_with(0).says("lpips_alex is missing").says(FIX);
     let result = json(&out);
     assert_eq!(result["missing"][0]["metric"], "lpips_alex");
-    assert_eq!(result["missing"][0]["mend"], MEND);
+    assert_eq!(result["missing"][0]["fix"], FIX);
     assert_eq!(result["lpips_weights"], serde_json::json!({ "alex": null }));
     for protocol in ["mateval-1", "paper"] {
         let summary = result["protocols"][protocol]["summary"].as_object().unwrap();
         assert!(!summary.keys().any(|key| key.contains("lpips")));
     }
     // The tables say it too.
-    run(mateval().args(["eval", "tables"]).arg(&out)).ends_with(0).says(MEND);
+    run(mateval().args(["eval", "tables"]).arg(&out)).ends_with(0).says(FIX);
 }
 
 /// The twin of the test above: with the weights, the distance is there and the fingerprint is another one.

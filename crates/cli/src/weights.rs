@@ -8,7 +8,7 @@ use mateval_metrics::{Lpips, Net};
 use crate::outcome::say;
 
 /// The command that downloads missing weights, run from the project's folder.
-pub const MEND: &str = "python3 tools/fetch_lpips_weights.py";
+pub const FIX: &str = "python3 tools/fetch_lpips_weights.py";
 
 /// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`, as in `tools/fetch_lpips_weights.py`.
 pub fn cache_folder() -> PathBuf {
@@ -24,8 +24,8 @@ pub fn load(net: Net) -> LpipsWeights {
     match Lpips::load(net, &cache_folder().join(net.file_name())) {
         Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
         Err(error) => {
-            say(&format!("warning: {} is missing: {error}; run: {MEND}", net.key()));
-            LpipsWeights::Missing { reason: error.to_string(), mend: MEND.to_owned() }
+            say(&format!("warning: {} is missing: {error}; run: {FIX}", net.key()));
+            LpipsWeights::Missing { reason: error.to_string(), fix: FIX.to_owned() }
         }
     }
 }

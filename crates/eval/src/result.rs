@@ -18,13 +18,13 @@ use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
 use crate::word_enum::UnknownWord;
 
 /// The word for this version of a result.
-pub const RESULT_FORMAT: &str = "mateval-result/2";
+pub const RESULT_FORMAT: &str = "mateval-result/3";
 
 /// A submission's scores on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultFile {
-    /// Always `mateval-result/2`.
+    /// Always `mateval-result/3`.
     pub format: String,
     /// What made it, as in `mateval 0.1.0`.
     pub tool: String,
@@ -38,7 +38,7 @@ pub struct ResultFile {
     pub lpips_weights: BTreeMap<String, Option<String>>,
     /// The scores, by protocol.
     pub protocols: BTreeMap<String, ProtocolResult>,
-    /// Metrics that could not be taken, with the command that mends it.
+    /// Metrics that could not be computed, each with the command that makes it available.
     pub missing: Vec<MissingMetric>,
     /// What was wrong with the submission and what was scored instead, sorted.
     pub findings: Vec<Finding>,
@@ -206,8 +206,8 @@ pub struct MissingMetric {
     pub metric: MissingNumbers,
     /// Why.
     pub reason: String,
-    /// The command that mends it.
-    pub mend: String,
+    /// The command that makes the metric available.
+    pub fix: String,
 }
 
 /// All numbers of a metric, or all of a kind of picture; one word in files.

@@ -34,8 +34,8 @@ pub enum LpipsWeights {
     Missing {
         /// Why.
         reason: String,
-        /// The command that mends it.
-        mend: String,
+        /// The command that makes the metric available.
+        fix: String,
     },
 }
 
@@ -294,11 +294,11 @@ fn protocol_result(protocol: &Protocol, fingerprint: String, scores: Vec<(SceneI
 /// What could not be measured for want of weights or renders.
 fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
     let mut missing = Vec::new();
-    if let LpipsWeights::Missing { reason, mend } = &plan.lpips {
+    if let LpipsWeights::Missing { reason, fix } = &plan.lpips {
         missing.push(MissingMetric {
             metric: MissingNumbers::Metric(Metric::LpipsAlex),
             reason: reason.clone(),
-            mend: mend.clone(),
+            fix: fix.clone(),
         });
     }
     if plan.dataset.file.scored_renderer.is_none() {
@@ -308,7 +308,7 @@ fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
         missing.extend(tracks.into_iter().map(|track| MissingMetric {
             metric: MissingNumbers::Picture(track.picture()),
             reason: "the dataset has no renders to compare with".to_owned(),
-            mend: "mateval prep render DATASET".to_owned(),
+            fix: "mateval prep render DATASET".to_owned(),
         }));
     }
     missing

@@ -1,24 +1,70 @@
-//! The one error of this crate.
+//! The error of this crate, split by what a caller can do about it.
 
 use std::path::PathBuf;
 
-/// Why something could not be shown.
+use crate::mismatch::Mismatch;
+
+/// Why results could not be shown.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
-    /// The file system refused.
-    #[error("cannot {action} '{}': {source}", path.display())]
-    Io {
-        /// What was tried, as in "read" or "write".
-        action: &'static str,
+    /// Results cannot be shown together, or do not match the dataset or the submission: every reason. Score again, or
+    /// choose other inputs.
+    #[error("{}", joined(.0))]
+    Mismatch(Vec<Mismatch>),
+    /// No result was given: name at least one.
+    #[error("cannot compare results: none was given; name at least one RESULT.json")]
+    NoResults,
+    /// The results hold no score that can be shown: choose another protocol, or score again.
+    #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
+    NothingToShow {
+        /// The protocol that was asked for.
+        protocol: String,
+        /// What was to be made of the scores, as in "a table".
+        output: &'static str,
+    },
+    /// A file has a format of another version: make it again, or use the version that reads it.
+    #[error("cannot read '{}': its format is '{found}', expected '{expected}'", path.display())]
+    Format {
         /// The file.
         path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
+        /// Its format.
+        found: String,
+        /// The format that this version reads.
+        expected: &'static str,
     },
-    /// What was asked for does not go together.
-    #[error("{0}")]
-    Invalid(String),
-    /// The dataset or the submission could not be read.
+    /// A folder that is no leaderboard would be replaced: choose another one.
+    #[error("cannot write the leaderboard: '{}' exists and is no leaderboard; choose another --out", path.display())]
+    NotALeaderboard {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A submission whose pictures should be shown belongs to none of the results: score it, or leave it out.
+    #[error(
+        "no result was made from the submission '{}' as it is now; score it, or leave it out of --submission",
+        path.display()
+    )]
+    UnscoredSubmission {
+        /// The folder of the submission.
+        path: PathBuf,
+    },
+    /// The dataset holds no renders to compare renders of a submission with: render them.
+    #[error("the dataset '{}' has no renders to compare with; run `mateval prep render DATASET`", dataset.display())]
+    NoRenders {
+        /// The folder of the dataset.
+        dataset: PathBuf,
+    },
+    /// The track `relit` has several pictures a view, of which none can be chosen: show another track.
+    #[error("cannot show track 'relit', which has several lights a view; show 'true' or 'fitted'")]
+    RelitTrack,
+    /// More houses than the bootstrap can draw from: rank fewer scenes.
+    #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]
+    TooManyHouses {
+        /// The number of houses.
+        houses: usize,
+        /// The largest number that is supported.
+        most: usize,
+    },
+    /// The dataset could not be read, or a file could not be read or written.
     #[error(transparent)]
     Dataset(#[from] mateval_scene::SceneError),
     /// A scene could not be rendered or scored again.
@@ -27,15 +73,26 @@ pub enum ReportError {
     /// The submission could not be read.
     #[error(transparent)]
     Submission(#[from] mateval_submission::SubmissionError),
-    /// A picture could not be read.
+    /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
     /// Two pictures could not be compared.
-    #[error("{what}: {source}")]
+    #[error("cannot compare {what}: {source}")]
     Metric {
         /// Which pictures.
         what: String,
         /// Why not.
         source: mateval_metrics::MetricError,
     },
+}
+
+impl ReportError {
+    /// Fails with all mismatches if there are any.
+    pub(crate) fn refuse(mismatches: Vec<Mismatch>) -> Result<(), Self> {
+        if mismatches.is_empty() { Ok(()) } else { Err(Self::Mismatch(mismatches)) }
+    }
+}
+
+fn joined(mismatches: &[Mismatch]) -> String {
+    mismatches.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }

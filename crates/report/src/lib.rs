@@ -7,6 +7,7 @@
 pub mod error;
 pub mod explain;
 pub mod leaderboard;
+pub mod mismatch;
 pub mod pair;
 pub mod picture_set;
 pub mod ranking;

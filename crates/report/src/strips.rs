@@ -117,17 +117,13 @@ pub(crate) fn rows(
 ) -> Result<Vec<StripRow>, ReportError> {
     match shown {
         Shown::Albedo => Ok(scene_albedo(plan.dataset, scene, plan.submissions)?.into_iter().map(albedo_row).collect()),
-        Shown::Light { track: Track::Relit, .. } => {
-            Err(ReportError::Invalid("track 'relit' has many lights; show 'true' or 'fitted'".to_owned()))
-        }
+        Shown::Light { track: Track::Relit, .. } => Err(ReportError::RelitTrack),
         Shown::Light { track, samples } => {
             let mut protocol = Protocol::named("mateval-1")?;
             protocol.light.tracks = vec![track];
             (protocol.light.noise.least_samples, protocol.light.noise.most_samples) = (samples, samples);
-            let renderer = plan.dataset.file.scored_renderer.as_ref().ok_or_else(|| {
-                let what = "the dataset has no pictures of light to compare with; run `mateval prep render DATASET`";
-                ReportError::Invalid(what.to_owned())
-            })?;
+            let renderer = plan.dataset.file.scored_renderer.as_ref();
+            let renderer = renderer.ok_or_else(|| ReportError::NoRenders { dataset: plan.dataset.root.clone() })?;
             let views = scene_light(plan.dataset, scene, plan.submissions, &protocol, renderer, progress)?;
             Ok(views.into_iter().map(light_row).collect())
         }

@@ -55,7 +55,7 @@ pub fn run(args: &ImageArgs) -> anyhow::Result<Outcome> {
             "values": values,
             "missing": missing
                 .iter()
-                .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "mend": weights::MEND }))
+                .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "fix": weights::FIX }))
                 .collect::<Vec<_>>(),
         })))?,
         Format::Text => print(&text(&values, &missing))?,
@@ -85,6 +85,6 @@ fn text(values: &PairValues, missing: &[(&str, String)]) -> String {
             }
         }
     }
-    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::MEND)));
+    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::FIX)));
     lines.join("\n") + "\n"
 }

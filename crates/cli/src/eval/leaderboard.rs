@@ -1,6 +1,6 @@
 //! `mateval eval leaderboard`: ranks results and writes a site.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
@@ -51,7 +51,7 @@ pub struct LeaderboardArgs {
 
 /// Writes the site and prints the path of its first page.
 pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
-    let errata = args.errata.as_deref().map(read_errata).transpose()?;
+    let errata = args.errata.as_deref().map(ErrataFile::read).transpose()?;
     let mut results = Vec::new();
     let mut marks = Vec::new();
     for path in &args.results {
@@ -89,10 +89,4 @@ pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
     with_progress(|progress| write(&plan, &args.out, args.force, progress)).context("cannot write the leaderboard")?;
     print(&format!("{}\n", args.out.join("index.html").display()))?;
     Ok(Outcome::Good)
-}
-
-fn read_errata(path: &Path) -> anyhow::Result<ErrataFile> {
-    let errata: ErrataFile = json::read(path)?;
-    errata.check()?;
-    Ok(errata)
 }

@@ -59,7 +59,7 @@ pub fn run(args: &TablesArgs) -> anyhow::Result<Outcome> {
         for missing in &result.missing {
             say(&format!(
                 "warning: '{}': {} is missing: {}; run: {}",
-                result.method, missing.metric, missing.reason, missing.mend
+                result.method, missing.metric, missing.reason, missing.fix
             ));
         }
     }

@@ -82,7 +82,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
 /// A result without LPIPS is made anew without it.
 fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
     match result.missing.iter().find(|missing| missing.metric == MissingNumbers::Metric(Metric::LpipsAlex)) {
-        Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), mend: missing.mend.clone() },
+        Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), fix: missing.fix.clone() },
         None => lpips,
     }
 }

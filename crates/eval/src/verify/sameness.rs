@@ -79,8 +79,8 @@ fn weights(
 ) -> Result<Option<Finding>, EvalError> {
     let Some(said) = result.lpips_weights.get("alex").and_then(Option::as_ref) else { return Ok(None) };
     match &plan.lpips {
-        LpipsWeights::Missing { reason, mend } => {
-            let what = format!("the result has LPIPS, and its weights are not here: {reason}; run: {mend}");
+        LpipsWeights::Missing { reason, fix } => {
+            let what = format!("the result has LPIPS, and its weights are not here: {reason}; run: {fix}");
             Err(EvalError::Invalid(what))
         }
         LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),

@@ -131,7 +131,7 @@ pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) 
         submissions: submissions.to_vec(),
         protocols: vec![protocol.clone()],
         scenes: scenes.iter().map(|id| SceneId::new(*id).unwrap()).collect(),
-        lpips: LpipsWeights::Missing { reason: "not asked for".to_owned(), mend: String::new() },
+        lpips: LpipsWeights::Missing { reason: "not asked for".to_owned(), fix: String::new() },
         tool: "test".to_owned(),
         jobs: 1,
         cache: None,

@@ -42,7 +42,7 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
 });
 
 fn missing() -> LpipsWeights {
-    LpipsWeights::Missing { reason: "not asked for".to_owned(), mend: String::new() }
+    LpipsWeights::Missing { reason: "not asked for".to_owned(), fix: String::new() }
 }
 
 fn verified(result: &Value, submission: &Path) -> VerificationFile {

@@ -7,6 +7,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, SceneId};
 
 use crate::error::ReportError;
+use crate::mismatch::Mismatch;
 
 /// How many of the worst instances are listed and shown.
 pub const WORST: usize = 10;
@@ -30,14 +31,8 @@ pub struct ExplainPlan<'a> {
 impl<'a> ExplainPlan<'a> {
     /// The result's scores under the plan's protocol.
     pub(super) fn scores(&self) -> Result<&'a ProtocolResult, ReportError> {
-        self.result.protocols.get(self.protocol).ok_or_else(|| {
-            let known: Vec<&str> = self.result.protocols.keys().map(String::as_str).collect();
-            ReportError::Invalid(format!(
-                "the result has no scores under protocol '{}'; it has: {}; choose one by --protocol",
-                self.protocol,
-                known.join(", ")
-            ))
-        })
+        ReportError::refuse(Mismatch::of_result(self.result, self.protocol).into_iter().collect())?;
+        Ok(&self.result.protocols[self.protocol])
     }
 
     /// The findings of the result that concern the scene.

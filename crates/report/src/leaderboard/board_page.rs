@@ -37,7 +37,8 @@ struct Row<'a> {
 /// `index.html`, and for each number who beats whom.
 pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let Some(first) = board.first() else {
-        return Err(ReportError::Invalid("the results hold nothing that a leaderboard shows".to_owned()));
+        let protocol = board.ranking().protocol.clone();
+        return Err(ReportError::NothingToShow { protocol, output: "a leaderboard" });
     };
     let mut rows: Vec<Row<'_>> = board.heads.iter().map(|head| row(board, head, first)).collect();
     let order = |row: &Row<'_>| row.value.map_or(f64::INFINITY, |value| -first.better.sign() * value);

@@ -1,5 +1,8 @@
 //! What was found wrong after it was published, from a file that the leaderboard's keeper writes.
 
+use std::path::Path;
+
+use mateval_scene::json;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,12 +37,12 @@ pub struct Erratum {
 }
 
 impl ErrataFile {
-    /// Fails where the file is of another format.
-    pub fn check(&self) -> Result<(), ReportError> {
-        if self.format == ERRATA_FORMAT {
-            return Ok(());
+    /// Reads the errata in the file `path`; fails if they have another format.
+    pub fn read(path: &Path) -> Result<Self, ReportError> {
+        let errata: Self = json::read(path)?;
+        match errata.format == ERRATA_FORMAT {
+            true => Ok(errata),
+            false => Err(ReportError::Format { path: path.to_owned(), found: errata.format, expected: ERRATA_FORMAT }),
         }
-        let what = format!("errata of format '{}'; this version reads '{ERRATA_FORMAT}'", self.format);
-        Err(ReportError::Invalid(what))
     }
 }

@@ -69,13 +69,11 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
 }
 
 fn check_place(out: &Path, force: bool) -> Result<(), ReportError> {
-    let path = out.display();
     if !out.exists() || out.read_dir().is_ok_and(|mut files| files.next().is_none()) {
         return Ok(());
     }
     if !out.join(LEADERBOARD_PATH).is_file() {
-        let what = format!("'{path}' is there and is no leaderboard; choose another --out");
-        return Err(ReportError::Invalid(what));
+        return Err(ReportError::NotALeaderboard { path: out.to_owned() });
     }
     Ok(check_free(out, force, "--out")?)
 }

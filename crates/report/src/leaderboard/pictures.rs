@@ -67,10 +67,7 @@ fn name_submissions<'a>(
             }
         }
         if ids.is_empty() {
-            return Err(ReportError::Invalid(format!(
-                "the submission '{}' is that of no result: another one, or a file of it has changed",
-                path.display()
-            )));
+            return Err(ReportError::UnscoredSubmission { path: path.clone() });
         }
         named.extend(ids);
     }

@@ -38,9 +38,7 @@ pub fn read(path: &Path, result: &ResultFile) -> Result<Verified, ReportError> {
     }
     let said: VerificationFile = json::read(&sidecar)?;
     if said.format != VERIFICATION_FORMAT {
-        let (path, format) = (sidecar.display(), said.format);
-        let what = format!("'{path}' is of format '{format}'; this version reads '{VERIFICATION_FORMAT}'");
-        return Err(ReportError::Invalid(what));
+        return Err(ReportError::Format { path: sidecar, found: said.format, expected: VERIFICATION_FORMAT });
     }
     let is_of_this = said.result_sha256 == sha256_of_file(path)?
         && said.submission_sha256 == result.submission.sha256

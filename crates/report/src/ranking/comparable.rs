@@ -6,7 +6,8 @@ use mateval_scene::SceneId;
 use mateval_scene::submission::Map;
 
 use crate::error::ReportError;
-use mateval_eval::result::{ProtocolResult, RESULT_FORMAT, ResultFile};
+use crate::mismatch::Mismatch;
+use mateval_eval::result::{ProtocolResult, ResultFile};
 
 /// One result's scores under the protocol.
 pub(super) struct Entrant<'a> {
@@ -19,6 +20,10 @@ pub(super) struct Entrant<'a> {
 impl<'a> Entrant<'a> {
     fn new(result: &'a ResultFile, scores: &'a ProtocolResult) -> Self {
         Self { result, scores, left_out: left_out(result, scores) }
+    }
+
+    fn name(&self) -> String {
+        self.result.method.clone()
     }
 
     /// What its fingerprint would be if these scenes had been scored; of none of them: all else that numbers depend on.
@@ -41,93 +46,66 @@ pub(super) struct Board<'a> {
 
 /// Fails with everything that keeps the results apart. Those of fewer scenes are let in where `partial`.
 pub(super) fn board<'a>(results: &'a [ResultFile], protocol: &str, partial: bool) -> Result<Board<'a>, ReportError> {
-    let mut faults = Vec::new();
-    let mut entrants = Vec::new();
-    for result in results {
-        if result.format != RESULT_FORMAT {
-            let (method, format) = (&result.method, &result.format);
-            faults.push(format!("'{method}' is of format '{format}'; this version reads '{RESULT_FORMAT}'"));
-        } else if let Some(scores) = result.protocols.get(protocol) {
-            entrants.push(Entrant::new(result, scores));
-        } else {
-            let method = &result.method;
-            faults.push(format!(
-                "'{method}' has no scores under protocol '{protocol}'; score it with --protocol {protocol}"
-            ));
-        }
-    }
     if results.is_empty() {
-        faults.push("no result to rank".to_owned());
+        return Err(ReportError::NoResults);
     }
-    faults.extend(entrants.iter().filter_map(own_fault));
-    faults.extend(entrants.iter().skip(1).filter_map(|entrant| mixed(&entrants[0], entrant)));
+    let mut mismatches: Vec<Mismatch> =
+        results.iter().filter_map(|result| Mismatch::of_result(result, protocol)).collect();
+    let is_readable = |result: &&ResultFile| Mismatch::of_result(result, protocol).is_none();
+    let entrant = |result: &'a ResultFile| Some(Entrant::new(result, result.protocols.get(protocol)?));
+    let entrants: Vec<Entrant<'a>> = results.iter().filter(is_readable).filter_map(entrant).collect();
+    mismatches.extend(entrants.iter().filter_map(own_fault));
+    mismatches.extend(entrants.iter().skip(1).filter_map(|entrant| mixed(&entrants[0], entrant)));
     let scenes = scenes_of_any(&entrants);
     if !partial {
-        faults.extend(entrants.iter().filter_map(|entrant| too_few_scenes(entrant, &scenes)));
+        mismatches.extend(entrants.iter().filter_map(|entrant| too_few_scenes(entrant, &scenes)));
     }
-    if !faults.is_empty() {
-        return Err(ReportError::Invalid(faults.join("; ")));
-    }
+    ReportError::refuse(mismatches)?;
     let houses = entrants.iter().flat_map(|entrant| entrant.result.dataset.houses.clone()).collect();
     let fingerprint = entrants[0].basis(&scenes.iter().collect::<Vec<_>>());
     Ok(Board { entrants, scenes, houses, fingerprint })
 }
 
-/// A result must be what its fingerprint says, hold scores, and tell the houses of its scenes.
-fn own_fault(entrant: &Entrant<'_>) -> Option<String> {
-    changed(entrant).or_else(|| odd_score(entrant)).or_else(|| odd_scene(entrant))
+/// What is wrong with one result by itself: it contradicts its fingerprint, or holds impossible scores or scenes.
+fn own_fault(entrant: &Entrant<'_>) -> Option<Mismatch> {
+    changed(entrant).or_else(|| impossible_score(entrant)).or_else(|| faulty_scene(entrant))
 }
 
-fn changed(entrant: &Entrant<'_>) -> Option<String> {
+fn changed(entrant: &Entrant<'_>) -> Option<Mismatch> {
     let found = entrant.basis(&entrant.result.dataset.scenes.iter().collect::<Vec<_>>());
-    (found != entrant.scores.fingerprint).then(|| {
-        format!(
-            "'{}' says fingerprint {}, but its protocol, dataset, scenes and weights have {found}: it has been \
-             changed; score it again",
-            entrant.result.method, entrant.scores.fingerprint
-        )
-    })
+    let stated = &entrant.scores.fingerprint;
+    (found != *stated).then(|| Mismatch::Changed { method: entrant.name(), stated: stated.clone(), found })
 }
 
-/// No score is so large that a sum of them could be infinite.
-fn odd_score(entrant: &Entrant<'_>) -> Option<String> {
-    let is_score = |value: f64| value.abs() < 1e12;
-    let (key, value) = entrant.scores.scenes.values().flatten().find(|(_, value)| !is_score(**value))?;
-    Some(format!("'{}' holds '{key}' of {value:e}, which is no score; score it again", entrant.result.method))
+/// Scores are bounded, so that no sum of them is infinite.
+fn impossible_score(entrant: &Entrant<'_>) -> Option<Mismatch> {
+    let is_possible = |value: f64| value.abs() < 1e12;
+    let (key, value) = entrant.scores.scenes.values().flatten().find(|(_, value)| !is_possible(**value))?;
+    Some(Mismatch::ImpossibleScore { method: entrant.name(), key: *key, value: *value })
 }
 
-fn odd_scene(entrant: &Entrant<'_>) -> Option<String> {
-    let (method, dataset) = (&entrant.result.method, &entrant.result.dataset);
+fn faulty_scene(entrant: &Entrant<'_>) -> Option<Mismatch> {
+    let dataset = &entrant.result.dataset;
     if dataset.scenes.iter().collect::<BTreeSet<_>>().len() < dataset.scenes.len() {
-        return Some(format!("'{method}' lists a scene twice; score it again"));
+        return Some(Mismatch::RepeatedScene { method: entrant.name() });
     }
-    let unknown = dataset.scenes.iter().find(|scene| !dataset.houses.contains_key(*scene))?;
-    Some(format!("'{method}' does not say of which house scene '{unknown}' is; score it again with this version"))
+    let scene = dataset.scenes.iter().find(|scene| !dataset.houses.contains_key(*scene))?;
+    Some(Mismatch::NoHouse { method: entrant.name(), scene: scene.clone() })
 }
 
-fn mixed(first: &Entrant<'_>, other: &Entrant<'_>) -> Option<String> {
-    let names = format!("'{}' and '{}'", first.result.method, other.result.method);
+fn mixed(first: &Entrant<'_>, other: &Entrant<'_>) -> Option<Mismatch> {
     if first.basis(&[]) != other.basis(&[]) {
-        return Some(format!(
-            "{names} have different fingerprints: dataset, protocol, scorer or LPIPS weights are not the same; \
-             score both again with one"
-        ));
+        return Some(Mismatch::Fingerprints { first: first.name(), other: other.name() });
     }
     let houses = &other.result.dataset.houses;
     let mut known = first.result.dataset.houses.iter();
     let (scene, _) = known.find(|(scene, house)| houses.get(*scene).is_some_and(|other| other != *house))?;
-    Some(format!("{names} put scene '{scene}' into different houses: one of them has been changed; score it again"))
+    Some(Mismatch::Houses { first: first.name(), other: other.name(), scene: scene.clone() })
 }
 
-fn too_few_scenes(entrant: &Entrant<'_>, scenes: &[SceneId]) -> Option<String> {
-    let scored = entrant.result.dataset.scenes.len();
-    (scored < scenes.len()).then(|| {
-        format!(
-            "'{}' was scored on {scored} of {} scenes; score it on all, or add --partial to rank it on these",
-            entrant.result.method,
-            scenes.len()
-        )
-    })
+fn too_few_scenes(entrant: &Entrant<'_>, scenes: &[SceneId]) -> Option<Mismatch> {
+    let (scored, scenes) = (entrant.result.dataset.scenes.len(), scenes.len());
+    (scored < scenes).then(|| Mismatch::TooFewScenes { method: entrant.name(), scored, scenes })
 }
 
 /// Every result has its scenes in the dataset's order; those that the longest lacks follow in the order of their names.

@@ -57,8 +57,7 @@ pub fn rank(results: &[ResultFile], protocol: &str, partial: bool) -> Result<Ran
     let keys: BTreeMap<ResultKey, _> =
         values.par_iter().map(|(key, values)| (*key, rank_key(values, &houses, &rules, &draws))).collect();
     if keys.is_empty() {
-        let what = format!("the results hold nothing under protocol '{protocol}' that can be ranked");
-        return Err(ReportError::Invalid(what));
+        return Err(ReportError::NothingToShow { protocol: protocol.to_owned(), output: "a ranking" });
     }
     let Board { scenes, houses, fingerprint, .. } = board;
     Ok(Ranking { protocol: protocol.to_owned(), fingerprint, rules, scenes, houses, methods, keys })
@@ -80,8 +79,7 @@ fn rules(methods: usize) -> RankingRules {
 fn house_numbers(board: &Board<'_>) -> Result<Vec<usize>, ReportError> {
     let names: Vec<&str> = board.houses.values().map(String::as_str).collect::<BTreeSet<_>>().into_iter().collect();
     if names.len() > Draws::MOST_CLUSTERS {
-        let what = format!("{} houses; at most {} can be drawn from", names.len(), Draws::MOST_CLUSTERS);
-        return Err(ReportError::Invalid(what));
+        return Err(ReportError::TooManyHouses { houses: names.len(), most: Draws::MOST_CLUSTERS });
     }
     let number = |scene: &SceneId| names.binary_search(&board.houses.get(scene)?.as_str()).ok();
     Ok(board.scenes.iter().filter_map(number).collect())

@@ -18,7 +18,8 @@ pub(crate) mod value;
 pub use grouping::Grouping;
 
 use crate::error::ReportError;
-use mateval_eval::result::{RESULT_FORMAT, ResultFile};
+use crate::mismatch::Mismatch;
+use mateval_eval::result::ResultFile;
 
 /// How a table is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,42 +56,26 @@ pub fn tables(
         })
         .collect();
     if text.is_empty() {
-        let what = format!("the results hold nothing under protocol '{protocol}' that a table shows");
-        return Err(ReportError::Invalid(what));
+        return Err(ReportError::NothingToShow { protocol: protocol.to_owned(), output: "a table" });
     }
     Ok(text)
 }
 
+/// Fails with every reason for which the results cannot stand side by side.
 fn check_comparable(results: &[ResultFile], protocol: &str) -> Result<(), ReportError> {
-    let Some(first) = results.first() else {
-        return Err(ReportError::Invalid("no result to make a table of".to_owned()));
-    };
-    let mut faults = Vec::new();
+    let first = results.first().ok_or(ReportError::NoResults)?;
+    let fingerprint = |result: &ResultFile| result.protocols.get(protocol).map(|scores| scores.fingerprint.clone());
+    let mut mismatches = Vec::new();
     for result in results {
-        if result.format != RESULT_FORMAT {
-            faults.push(format!(
-                "'{}' is of format '{}'; this version reads '{RESULT_FORMAT}'",
-                result.method, result.format
-            ));
-        }
-        let Some(scores) = result.protocols.get(protocol) else {
-            faults.push(format!(
-                "'{}' has no scores under protocol '{protocol}'; score it with --protocol {protocol}",
-                result.method
-            ));
-            continue;
-        };
-        let expected = first.protocols.get(protocol).map(|scores| &scores.fingerprint);
-        if expected.is_some_and(|expected| *expected != scores.fingerprint) {
-            faults.push(format!(
-                "'{}' and '{}' have different fingerprints: dataset, protocol, scorer or LPIPS weights are not the same; \
-                 score both again with one",
-                first.method, result.method
-            ));
+        let of_result = Mismatch::of_result(result, protocol);
+        let (first_name, other) = (first.method.clone(), result.method.clone());
+        if of_result.is_none() && fingerprint(first).is_some_and(|first| Some(first) != fingerprint(result)) {
+            mismatches.push(Mismatch::Fingerprints { first: first_name.clone(), other: other.clone() });
         }
         if result.dataset.scenes != first.dataset.scenes {
-            faults.push(format!("'{}' and '{}' were scored on different scenes", first.method, result.method));
+            mismatches.push(Mismatch::Scenes { first: first_name, other });
         }
+        mismatches.extend(of_result);
     }
-    if faults.is_empty() { Ok(()) } else { Err(ReportError::Invalid(faults.join("; "))) }
+    ReportError::refuse(mismatches)
 }

@@ -6,7 +6,7 @@ use mateval_scene::{InstanceId, SceneId};
 use super::*;
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::Protocol;
-use mateval_eval::result::{InstancePixelErrors, NoiseState, ProtocolResult, PsnrNoise, SubmissionId};
+use mateval_eval::result::{InstancePixelErrors, NoiseState, ProtocolResult, PsnrNoise, RESULT_FORMAT, SubmissionId};
 use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
 fn scene(name: &str) -> SceneId {
@@ -229,5 +229,5 @@ fn fingerprints_are_not_mixed() {
     let error = csv(&[result("a", &[])], "mateval-1").unwrap_err();
     assert!(error.to_string().contains("--protocol mateval-1"));
     let error = csv(&[result("a", &[])], "paper").unwrap_err();
-    assert!(error.to_string().contains("nothing under protocol 'paper'"));
+    assert!(error.to_string().contains("no score under protocol 'paper'"));
 }
