@@ -30,6 +30,7 @@ fn furnished() -> tempfile::TempDir {
     let copy = copied_dataset();
     Room::of(copy.path()).edit_scene(|scene| {
         for (at, (super_category, category)) in FURNITURE.iter().enumerate() {
+            scene["instances"][at]["role"] = serde_json::json!({ "type": "furniture" });
             scene["instances"][at]["super_category"] = Value::from(*super_category);
             scene["instances"][at]["category"] = Value::from(*category);
         }
@@ -38,7 +39,7 @@ fn furnished() -> tempfile::TempDir {
     copy
 }
 
-/// The sample's source names no super-categories: nothing is known of objects, and that is said.
+/// The sample's source states no roles: the tables show that nothing is known of its objects.
 #[test]
 fn the_sample_as_tables() {
     gives(&mut stats(dataset()), 0, SAMPLE_TEXT, "");
@@ -57,8 +58,9 @@ Beside Table I
   scenes of bitterli                      1
   instances                              24
     with an atlas                        23
-    objects: with a super-category        0
-    surfaces: without one                24
+    objects                               0
+    architecture                          0
+    others                               24
   different categories                    0
     avg. of a scene                 unknown
 
@@ -80,8 +82,8 @@ Findings about the sources
   none
 
 Scenes
-  scene  source    house   objects  super-categories  categories  surfaces  atlases  errors  warnings  notes
-  room   bitterli  sample        ?                 ?           ?        24       23       0         0      0
+  scene  source    house   objects  super-categories  categories  architecture  others  atlases  errors  warnings  notes
+  room   bitterli  sample        ?                 ?           ?             0      24       23       0         0      0
 
 Objects by scene and super-category
   scene  cabinet  sofa  lighting  chair  others  bed  table  stool
@@ -107,8 +109,9 @@ Beside Table I
   scenes of bitterli                  1
   instances                          24
     with an atlas                    23
-    objects: with a super-category    5
-    surfaces: without one            19
+    objects                           5
+    architecture                      0
+    others                           19
   different categories                3
     avg. of a scene                 3.0    3    3       1
 
@@ -135,8 +138,8 @@ Findings about the sources
   none
 
 Scenes
-  scene  source    house   objects  super-categories  categories  surfaces  atlases  errors  warnings  notes
-  room   bitterli  sample        5                 3           3        19       23       0         0      0
+  scene  source    house   objects  super-categories  categories  architecture  others  atlases  errors  warnings  notes
+  room   bitterli  sample        5                 3           3             0      19       23       0         0      0
 
 Objects by scene and super-category
   scene  cabinet  sofa  lighting  chair  others  bed  table  stool  not of the eight
@@ -146,7 +149,7 @@ Objects by scene and super-category
 /// The instances of `scene.json`, counted without the program's types.
 fn by_hand(scene: &Value) -> (usize, usize, usize) {
     let instances = scene["instances"].as_array().unwrap();
-    let objects = instances.iter().filter(|instance| !instance["super_category"].is_null()).count();
+    let objects = instances.iter().filter(|instance| instance["role"]["type"] == "furniture").count();
     let with_atlas = instances.iter().filter(|instance| !instance["atlas"].is_null()).count();
     (instances.len(), objects, with_atlas)
 }
@@ -234,10 +237,13 @@ fn places_that_a_picture_must_not_have() {
 /// JSON by strangers, with hashes that fit it: exit code 2, the file's name, and never a crash.
 #[test]
 fn hostile_json() {
-    let hostile: [fn(&mut Value); 6] = [
+    let hostile: [fn(&mut Value); 9] = [
         |scene| *scene = Value::Null,
         |scene| scene["instances"] = Value::from("all of them"),
         |scene| scene["instances"][0]["super_category"] = Value::from(7),
+        |scene| scene["instances"][0]["role"] = serde_json::json!({ "type": "ghost" }),
+        |scene| scene["source"]["kind"] = Value::from("elsewhere"),
+        |scene| scene["lights"] = Value::from("none"),
         |scene| scene["instances"][0]["index"] = Value::from(0),
         |scene| scene["instances"][0]["triangles"] = Value::from(-1),
         |scene| scene["findings"] = serde_json::json!([{ "severity": "fatal" }]),

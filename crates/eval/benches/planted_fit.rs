@@ -15,7 +15,7 @@ use mateval_eval::truth::ViewTruth;
 use mateval_light::light_fit::{fit_lights, pooled};
 use mateval_light::light_stage;
 use mateval_scene::material::PrincipledFlavour;
-use mateval_scene::{Camera, SceneId, glb, open::Dataset, reference_io};
+use mateval_scene::{SceneId, SceneLights, glb, open::Dataset, reference_io};
 use mateval_submission::prediction::read_scene;
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
@@ -34,15 +34,13 @@ fn main() {
     let own = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
     let rules = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Blender);
-    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let world = if scene.source.kind == "bitterli" {
-        own
-    } else {
-        let architecture: Vec<usize> =
-            (0..scene.instances.len()).filter(|&at| scene.instances[at].category.is_none()).collect();
-        let lights = light_stage::lights(&rules.stage, &own, &architecture, &cameras);
-        let quads: Vec<StageLight> = lights.into_iter().map(|named| named.light).collect();
-        own.on_stage(&quads).unwrap()
+    let world = match scene.lights {
+        SceneLights::Own => own,
+        SceneLights::Stage => {
+            let lights = light_stage::scene_lights(&rules.stage, scene, &own);
+            let quads: Vec<StageLight> = lights.into_iter().map(|named| named.light).collect();
+            own.on_stage(&quads).unwrap()
+        }
     };
     let predicted = read_scene(Path::new(submission), scene);
     let coats = predicted.materials.iter().map(|material| {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use mateval_image::{Mask, Picture};
-use mateval_scene::dataset::{Instance, SceneFile};
+use mateval_scene::dataset::SceneFile;
 
 use crate::result::InstancePixelErrors;
 use crate::result_key::{PictureKind, Views};
@@ -39,12 +39,11 @@ impl InstanceErrors {
     pub fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
         let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
             let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;
-            let (category, super_category) = categories(scene, instance);
             Some(InstancePixelErrors {
                 scene: scene.id.clone(),
                 instance: instance.id.clone(),
-                category,
-                super_category,
+                category: instance.listed_category().map(str::to_owned),
+                super_category: instance.listed_super_category().map(str::to_owned),
                 picture,
                 views,
                 pixels,
@@ -53,13 +52,4 @@ impl InstanceErrors {
         });
         means.collect()
     }
-}
-
-/// The source's categories; of 3D-FRONT's architecture its kind of mesh, the last word of its name but for a number.
-pub fn categories(scene: &SceneFile, instance: &Instance) -> (Option<String>, Option<String>) {
-    if instance.category.is_some() || scene.source.kind != "front3d" {
-        return (instance.category.clone(), instance.super_category.clone());
-    }
-    let kind = instance.name.split(' ').rfind(|word| !word.bytes().all(|byte| byte.is_ascii_digit()));
-    (kind.map(str::to_owned), Some("Architecture".to_owned()))
 }

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{Camera, Progress, TriangleMesh};
+use mateval_scene::{Camera, Progress, SceneLights, TriangleMesh};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World, render_repainted,
@@ -26,7 +26,7 @@ use crate::relit::{LightingName, RelitLighting};
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
 use mateval_light::light_fit::{LightFit, fit_lights};
-use mateval_light::light_stage::{self, NamedLight};
+use mateval_light::light_stage;
 use mateval_submission::prediction::PredictedScene;
 
 /// A scene and the truth of its light.
@@ -138,7 +138,7 @@ pub fn predicted_light(
     each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>,
 ) -> Result<(), EvalError> {
     let has = |track| rules.tracks.contains(&track);
-    let staged = lit.scene.source.kind != "bitterli";
+    let staged = lit.scene.lights == SceneLights::Stage;
     let mut own = Vec::new();
     if has(Track::True) {
         own.push((Track::True, None));
@@ -155,7 +155,7 @@ pub fn predicted_light(
         Renderer { lit, rules, pass, predictions, progress }.render(each)?;
     }
     if has(Track::Fitted) && staged {
-        let stage = stage(lit, rules);
+        let stage = light_stage::scene_lights(&rules.stage, lit.scene, lit.world);
         let quads: Vec<StageLight> = stage.iter().map(|named| named.light.clone()).collect();
         let world = lit.world.on_stage(&quads)?;
         let lights = stage.into_iter().map(|named| named.name).collect();
@@ -164,15 +164,6 @@ pub fn predicted_light(
         Renderer { lit, rules, pass, predictions, progress }.render(each)?;
     }
     Ok(())
-}
-
-/// The stage of a 3D-FRONT scene: its architecture is what has no category.
-fn stage(lit: &LitScene<'_>, rules: &LightRules) -> Vec<NamedLight> {
-    let instances = lit.scene.instances.iter().zip(0..);
-    let architecture: Vec<usize> =
-        instances.filter(|(instance, _)| instance.category.is_none()).map(|(_, surface)| surface).collect();
-    let cameras: Vec<Camera> = lit.scene.views.iter().map(|view| view.camera).collect();
-    light_stage::lights(&rules.stage, lit.world, &architecture, &cameras)
 }
 
 /// One pass over all predictions.

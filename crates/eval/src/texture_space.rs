@@ -337,10 +337,11 @@ mod tests {
         }
         let atlas = json!({"size": 64, "charts": 1, "coverage": 0.5, "texel_m": 0.1, "half_pixel_m": null});
         let file = json!({
-            "format": "mateval/1", "id": "s", "source": {"kind": "test", "house": "s", "files": []}, "exposure": 1.0,
+            "format": "mateval/1", "id": "s", "source": {"kind": "bitterli", "house": "s", "files": []},
+            "lights": "own", "exposure": 1.0,
             "views": [{"id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera()}],
-            "instances": [{"id": "a", "index": 1, "name": "a", "category": null, "super_category": null, "triangles": 2,
-                           "atlas": atlas}],
+            "instances": [{"id": "a", "index": 1, "name": "a", "role": {"type": "other"}, "category": null,
+                           "super_category": null, "triangles": 2, "atlas": atlas}],
             "parts": [], "part_sets": [], "findings": [],
         });
         (folder, scene, serde_json::from_value(file).unwrap())

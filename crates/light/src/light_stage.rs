@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use glam::{DVec3, Vec3};
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Ray, StageLight, World};
 
@@ -38,6 +39,13 @@ const UPRIGHT: f64 = 0.05;
 const SAME_PLANE_M: f64 = 0.01;
 /// A place counts as seen if nothing is nearer than this before it.
 const NEARLY_M: f64 = 2e-3;
+
+/// The lights of a scene's stage, for all views of the scene. Instances that belong to the building may be walls; no other
+/// instance is one. `world` holds a surface for each instance, in the order of the instances.
+pub fn scene_lights(rules: &StageRules, scene: &SceneFile, world: &World) -> Vec<NamedLight> {
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    lights(rules, world, &scene.architecture(), &cameras)
+}
 
 /// The lights of a stage. `architecture` says which surfaces of the world may be walls. `cameras` are those of all views,
 /// the input view's first; there is at least one, and all stand in one place or near to it.

@@ -5,7 +5,7 @@ use std::num::NonZeroU16;
 
 use mateval_scene::ids::id_text_from;
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::{InstanceId, InstanceIndex};
+use mateval_scene::{InstanceId, InstanceIndex, Role};
 
 use crate::part_split::PartSplit;
 use mateval_sources::parts::connected_parts;
@@ -18,6 +18,8 @@ pub struct InstanceEntry {
     pub id: InstanceId,
     /// Its value in `instance.png`.
     pub index: InstanceIndex,
+    /// Its role in the scene.
+    pub role: Role,
     /// What it is, where the source says so.
     pub category: Option<String>,
     /// The broader category, where the source says so.
@@ -42,6 +44,7 @@ pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<In
             Ok(InstanceEntry {
                 id,
                 index: InstanceIndex(number(at + 1)?),
+                role: origin.role.clone(),
                 category: origin.category.clone(),
                 super_category: origin.super_category.clone(),
             })

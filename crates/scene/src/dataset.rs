@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
+use crate::role::{Role, SceneLights, SourceKind};
 
 /// The name of this version of the format.
 pub const FORMAT: &str = "mateval/1";
@@ -74,6 +75,8 @@ pub struct SceneFile {
     pub id: SceneId,
     /// Where it came from.
     pub source: SceneSource,
+    /// The lights whose radiances track `fitted` fits: the scene's own, or a light stage's.
+    pub lights: SceneLights,
     /// Multiplies every RGB picture before clipping.
     pub exposure: f64,
     /// The input view first, then the novel ones.
@@ -93,7 +96,7 @@ pub struct SceneFile {
 #[serde(deny_unknown_fields)]
 pub struct SceneSource {
     /// `bitterli` or `front3d`.
-    pub kind: String,
+    pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,
     /// Every file that was read, sorted by path.
@@ -134,6 +137,8 @@ pub struct Instance {
     pub index: InstanceIndex,
     /// Its name in the source.
     pub name: String,
+    /// Its role in the scene.
+    pub role: Role,
     /// What it is, where the source says so.
     pub category: Option<String>,
     /// The benchmark's broader category, where the source says so.
@@ -185,7 +190,24 @@ pub struct PartSet {
     pub parts: Vec<Part>,
 }
 
+impl Instance {
+    /// The category under which results list the instance: the source's, or for architecture its kind.
+    pub fn listed_category(&self) -> Option<&str> {
+        self.role.architecture_kind().or(self.category.as_deref())
+    }
+
+    /// The broader category under which results list the instance: the source's, or for architecture `Architecture`.
+    pub fn listed_super_category(&self) -> Option<&str> {
+        if self.role.is_architecture() { Some("Architecture") } else { self.super_category.as_deref() }
+    }
+}
+
 impl SceneFile {
+    /// The indices of the instances that belong to the building.
+    pub fn architecture(&self) -> Vec<usize> {
+        (0..self.instances.len()).filter(|&at| self.instances[at].role.is_architecture()).collect()
+    }
+
     /// Every way to split the instances into parts: the source's own, which has no id, then those of `part_sets`.
     pub fn all_part_sets(&self) -> impl Iterator<Item = (Option<&PartSetId>, &[Part])> {
         let others = self.part_sets.iter().map(|set| (Some(&set.id), set.parts.as_slice()));

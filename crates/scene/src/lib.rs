@@ -3,7 +3,7 @@
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
-//! [`mod@reference`] describe a scene with its source materials and lights; [`dataset`], [`layout`], [`manifest`] and
+//! [`mod@reference`] describe a scene with its source materials and lights; [`role`] says what its instances are; [`dataset`], [`layout`], [`manifest`] and
 //! [`open`] are the files of a dataset, [`submission`] those of a submission. [`obj`], [`gltf_accessor`] and
 //! [`source_folder`] read untrusted files.
 
@@ -27,6 +27,7 @@ pub mod plain_instances;
 pub mod progress;
 pub mod reference;
 pub mod reference_io;
+pub mod role;
 pub mod source_folder;
 pub mod splitmix64;
 pub mod submission;
@@ -42,3 +43,4 @@ pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;
 pub use progress::Progress;
+pub use role::{Role, SceneLights, SourceKind};

@@ -150,6 +150,30 @@ fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), Scen
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Role;
+
+    /// An untrusted word is refused where it stands in the file.
+    #[test]
+    fn unknown_roles_sources_and_lights_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let id = SceneId::new("room").unwrap();
+        let path = SceneFolder::of(folder.path(), &id).scene_file();
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        let example = include_str!("../../../dataset_spec/examples/scene.json");
+        std::fs::write(&path, example).unwrap();
+        assert_eq!(read_scene(folder.path(), &id).unwrap().instances[0].role, Role::Other {});
+        let words = [
+            ("\"other\"", "\"ghost\"", "/instances/0/role"),
+            ("\"bitterli\"", "\"elsewhere\"", "/source/kind"),
+            ("\"own\"", "\"candles\"", "/lights"),
+        ];
+        for (known, unknown, pointer) in words {
+            std::fs::write(&path, example.replacen(known, unknown, 1)).unwrap();
+            let error = read_scene(folder.path(), &id).unwrap_err();
+            let SceneError::Invalid { findings, .. } = &error else { panic!("{error}") };
+            assert_eq!(findings[0].place, pointer);
+        }
+    }
 
     #[test]
     fn scenes_are_chosen_in_the_datasets_order() {

@@ -6,7 +6,7 @@ use crate::error::{InvalidSource, SourceError};
 
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{Camera, Finding};
+use mateval_scene::{Camera, Finding, Role, SceneLights, SourceKind};
 
 /// A licence that must be passed on with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +20,8 @@ pub struct LicenceText {
 /// Facts about an instance besides its mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct InstanceOrigin {
+    /// Its role in the scene.
+    pub role: Role,
     /// Its category, as in `Dining Chair`.
     pub category: Option<String>,
     /// Its broader category, as in `Chair`.
@@ -31,8 +33,10 @@ pub struct InstanceOrigin {
 /// A scene read from any source.
 #[derive(Clone, Debug)]
 pub struct SourceScene {
-    /// `bitterli` or `front3d`.
-    pub kind: &'static str,
+    /// The kind of source.
+    pub kind: SourceKind,
+    /// Whether the source describes the scene's lights.
+    pub lights: SceneLights,
     /// The house; scenes with the same house are not independent of each other.
     pub house: String,
     /// The file that findings refer to by default.

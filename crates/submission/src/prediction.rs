@@ -187,11 +187,12 @@ mod tests {
         let instance = |id: &str, index: usize, atlas: bool| {
             let atlas =
                 atlas.then(|| json!({"size": 64, "charts": 1, "coverage": 1.0, "texel_m": 0.1, "half_pixel_m": null}));
-            json!({"id": id, "index": index, "name": id, "category": null, "super_category": null, "triangles": 2,
+            json!({"id": id, "index": index, "name": id, "role": {"type": "other"}, "category": null, "super_category": null, "triangles": 2,
                    "atlas": atlas})
         };
         serde_json::from_value(json!({
-            "format": "mateval/1", "id": "s", "source": {"kind": "test", "house": "s", "files": []}, "exposure": 1.0,
+            "format": "mateval/1", "id": "s", "source": {"kind": "bitterli", "house": "s", "files": []},
+            "lights": "own", "exposure": 1.0,
             "views": [], "instances": [instance("a", 1, true), instance("pane", 2, false), instance("b", 3, true)],
             "parts": [], "part_sets": [], "findings": [],
         }))

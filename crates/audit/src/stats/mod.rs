@@ -15,7 +15,7 @@ use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::DATASET;
 use mateval_scene::open::Dataset;
 use mateval_scene::super_categories::SUPER_CATEGORIES;
-use mateval_scene::{Finding, FindingCount, SceneError, SceneId, Severity};
+use mateval_scene::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -69,8 +69,8 @@ pub struct CountedDataset {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceKindCount {
-    /// `bitterli` or `front3d`.
-    pub kind: String,
+    /// The kind of source.
+    pub kind: SourceKind,
     /// How many.
     pub scenes: usize,
 }
@@ -97,7 +97,7 @@ pub struct SceneStats {
     /// The scene.
     pub scene: SceneId,
     /// The kind of its source.
-    pub source_kind: String,
+    pub source_kind: SourceKind,
     /// Its house.
     pub house: String,
     /// What it holds.
@@ -108,12 +108,14 @@ pub struct SceneStats {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
-    /// Objects and surfaces.
+    /// Objects, architecture and others.
     pub instances: usize,
-    /// Instances that have a super-category: furniture.
+    /// Furniture and light fixtures.
     pub objects: usize,
-    /// Instances without a super-category: architecture, and every shape of a source that names none.
-    pub surfaces: usize,
+    /// Instances that belong to the building.
+    pub architecture: usize,
+    /// Instances of any other role: every shape of a source that does not state roles.
+    pub others: usize,
     /// Instances that a submission needs textures for.
     pub instances_with_atlas: usize,
     /// The benchmark's eight in their order, even where there is none of them; then any other word, sorted.
@@ -128,8 +130,8 @@ pub struct Counts {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuperCategoryCount {
-    /// As `scene.json` says it.
-    pub super_category: String,
+    /// As in `scene.json`; null for objects without one.
+    pub super_category: Option<String>,
     /// How many.
     pub objects: usize,
     /// Of all objects, 0 to 1; null where there are no objects.
@@ -140,9 +142,9 @@ pub struct SuperCategoryCount {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CategoryCount {
-    /// As `scene.json` says it.
-    pub super_category: String,
-    /// As `scene.json` says it; null where it says none.
+    /// As in `scene.json`; null for objects without one.
+    pub super_category: Option<String>,
+    /// As in `scene.json`; null for objects without one.
     pub category: Option<String>,
     /// How many.
     pub objects: usize,
@@ -166,9 +168,9 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, AuditError> {
         },
         scenes: scenes.len(),
         houses: scenes.iter().map(|scene| &scene.source.house).collect::<BTreeSet<_>>().len(),
-        source_kinds: tally(scenes.iter().map(|scene| scene.source.kind.as_str()))
+        source_kinds: tally(scenes.iter().map(|scene| scene.source.kind))
             .into_iter()
-            .map(|(kind, scenes)| SourceKindCount { kind: kind.to_owned(), scenes })
+            .map(|(kind, scenes)| SourceKindCount { kind, scenes })
             .collect(),
         objects_per_scene: spread(&per_scene, |counts| counts.objects),
         super_categories_per_scene: spread(&per_scene, Counts::different_super_categories),
@@ -179,10 +181,10 @@ pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, AuditError> {
 }
 
 impl SceneStats {
-    /// Whether the scene says what its objects are. 3D-FRONT does, so that a room without any is an empty one; the shapes
-    /// of a Bitterli scene have names only, unless somebody gave them super-categories.
+    /// Whether the scene states which instances are objects. Rooms of 3D-FRONT do, so that a room without objects counts as
+    /// empty. The shapes of a Bitterli scene have names only.
     pub fn knows_its_objects(&self) -> bool {
-        self.source_kind == "front3d" || self.counts.objects > 0
+        self.counts.others < self.counts.instances || self.counts.instances == 0
     }
 }
 
@@ -206,7 +208,7 @@ impl Counts {
 fn scene_stats(scene: &SceneFile) -> SceneStats {
     SceneStats {
         scene: scene.id.clone(),
-        source_kind: scene.source.kind.clone(),
+        source_kind: scene.source.kind,
         house: scene.source.house.clone(),
         counts: counts(std::slice::from_ref(scene)),
     }
@@ -214,13 +216,13 @@ fn scene_stats(scene: &SceneFile) -> SceneStats {
 
 fn counts(scenes: &[SceneFile]) -> Counts {
     let instances = || scenes.iter().flat_map(|scene| &scene.instances);
-    let objects: Vec<(&str, &Instance)> =
-        instances().filter_map(|instance| Some((instance.super_category.as_deref()?, instance))).collect();
+    let objects: Vec<&Instance> = instances().filter(|instance| instance.role.is_furniture()).collect();
     let findings = scenes.iter().flat_map(|scene| &scene.findings);
     Counts {
         instances: instances().count(),
         objects: objects.len(),
-        surfaces: instances().filter(|instance| instance.super_category.is_none()).count(),
+        architecture: instances().filter(|instance| instance.role.is_architecture()).count(),
+        others: instances().filter(|instance| matches!(instance.role, Role::Other {})).count(),
         instances_with_atlas: instances().filter(|instance| instance.atlas.is_some()).count(),
         super_categories: super_categories(&objects),
         categories: categories(&objects),
@@ -228,36 +230,38 @@ fn counts(scenes: &[SceneFile]) -> Counts {
     }
 }
 
-/// Where a super-category stands: the eight first.
-fn place(super_category: &str) -> usize {
-    SUPER_CATEGORIES.iter().position(|known| *known == super_category).unwrap_or(SUPER_CATEGORIES.len())
+/// The rank of a super-category: the eight first, then any other word, then none.
+fn place(super_category: Option<&str>) -> usize {
+    let after = SUPER_CATEGORIES.len();
+    super_category.map_or(after + 1, |word| SUPER_CATEGORIES.iter().position(|known| *known == word).unwrap_or(after))
 }
 
-fn super_categories(objects: &[(&str, &Instance)]) -> Vec<SuperCategoryCount> {
-    let mut found = tally(objects.iter().map(|(super_category, _)| *super_category));
+fn super_categories(objects: &[&Instance]) -> Vec<SuperCategoryCount> {
+    let mut found = tally(objects.iter().map(|instance| instance.super_category.as_deref()));
     for known in SUPER_CATEGORIES {
-        found.entry(known).or_insert(0);
+        found.entry(Some(known)).or_insert(0);
     }
     let share = |count| (!objects.is_empty()).then(|| count as f64 / objects.len() as f64);
-    let row = |(name, count): (&str, usize)| SuperCategoryCount {
-        super_category: name.to_owned(),
+    let row = |(name, count): (Option<&str>, usize)| SuperCategoryCount {
+        super_category: name.map(str::to_owned),
         objects: count,
         share: share(count),
     };
     let mut rows: Vec<SuperCategoryCount> = found.into_iter().map(row).collect();
     // The sort is stable, so that unknown words stay sorted.
-    rows.sort_by_key(|row| place(&row.super_category));
+    rows.sort_by_key(|row| place(row.super_category.as_deref()));
     rows
 }
 
-fn categories(objects: &[(&str, &Instance)]) -> Vec<CategoryCount> {
-    let found = tally(objects.iter().map(|(super_category, instance)| (*super_category, instance.category.as_deref())));
-    let mut rows: Vec<((&str, Option<&str>), usize)> = found.into_iter().collect();
+fn categories(objects: &[&Instance]) -> Vec<CategoryCount> {
+    let found =
+        tally(objects.iter().map(|instance| (instance.super_category.as_deref(), instance.category.as_deref())));
+    let mut rows: Vec<((Option<&str>, Option<&str>), usize)> = found.into_iter().collect();
     rows.sort_by_key(|((super_category, category), count)| {
-        (place(super_category), *super_category, std::cmp::Reverse(*count), *category)
+        (place(*super_category), *super_category, std::cmp::Reverse(*count), *category)
     });
-    let row = |((super_category, category), objects): ((&str, Option<&str>), usize)| CategoryCount {
-        super_category: super_category.to_owned(),
+    let row = |((super_category, category), objects): ((Option<&str>, Option<&str>), usize)| CategoryCount {
+        super_category: super_category.map(str::to_owned),
         category: category.map(str::to_owned),
         objects,
     };

@@ -148,7 +148,11 @@ fn category_rows(stats: &StatsFile, y: &mut f64) -> Vec<Row> {
             break;
         }
         *y += GROUP;
-        rows.push(text_row("group", *y, &shown(&group.super_category, LONGEST), group_value(group)));
+        let name = group
+            .super_category
+            .as_deref()
+            .map_or_else(|| "(no super-category)".to_owned(), |name| shown(name, LONGEST));
+        rows.push(text_row("group", *y, &name, group_value(group)));
         let of_group = total.categories.iter().filter(|found| found.super_category == group.super_category);
         for category in of_group.take(MOST_ROWS - rows.len()) {
             *y += BAR;

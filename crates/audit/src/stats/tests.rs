@@ -1,22 +1,23 @@
 //! Counts of hand-made scenes, what totals must keep, and pictures of names by strangers.
 
 use mateval_scene::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile};
-use mateval_scene::{InstanceId, InstanceIndex};
+use mateval_scene::{InstanceId, InstanceIndex, SceneLights};
 use proptest::prelude::*;
 
 use super::picture::picture;
 use super::text::text;
 use super::*;
 
-/// Super-category, category, and whether there is an atlas.
-type Thing<'a> = (Option<&'a str>, Option<&'a str>, bool);
+/// Role, super-category, category, and whether the instance has an atlas.
+type Thing<'a> = (Role, Option<&'a str>, Option<&'a str>, bool);
 
-fn instance(at: usize, (super_category, category, has_atlas): Thing<'_>) -> Instance {
+fn instance(at: usize, (role, super_category, category, has_atlas): &Thing<'_>) -> Instance {
     let atlas = Atlas { size: 64, charts: 1, coverage: 0.5, texel_m: 0.01, half_pixel_m: None };
     Instance {
         id: InstanceId::new(format!("thing-{at}")).unwrap(),
         index: InstanceIndex(std::num::NonZeroU16::new(at as u16 + 1).unwrap()),
         name: "thing".to_owned(),
+        role: role.clone(),
         category: category.map(str::to_owned),
         super_category: super_category.map(str::to_owned),
         triangles: 2,
@@ -24,14 +25,15 @@ fn instance(at: usize, (super_category, category, has_atlas): Thing<'_>) -> Inst
     }
 }
 
-fn scene(id: &str, kind: &str, house: &str, things: &[Thing<'_>]) -> SceneFile {
+fn scene(id: &str, kind: SourceKind, house: &str, things: &[Thing<'_>]) -> SceneFile {
     SceneFile {
         format: FORMAT.to_owned(),
         id: SceneId::new(id).unwrap(),
-        source: SceneSource { kind: kind.to_owned(), house: house.to_owned(), files: Vec::new() },
+        source: SceneSource { kind, house: house.to_owned(), files: Vec::new() },
+        lights: SceneLights::Own,
         exposure: 1.0,
         views: Vec::new(),
-        instances: things.iter().enumerate().map(|(at, thing)| instance(at, *thing)).collect(),
+        instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),
         parts: Vec::new(),
         part_sets: Vec::new(),
         findings: Vec::new(),
@@ -61,21 +63,21 @@ fn dataset(scenes: Vec<SceneFile>) -> Dataset {
     }
 }
 
-const SOFA: Thing<'_> = (Some("Sofa"), Some("Three-Seat / Multi-seat Sofa"), true);
-const LOVESEAT: Thing<'_> = (Some("Sofa"), Some("Loveseat Sofa"), true);
-const LAMP: Thing<'_> = (Some("Lighting"), Some("Pendant Lamp"), false);
-const STOOL: Thing<'_> = (Some("Pier/Stool"), None, true);
-const PIANO: Thing<'_> = (Some("Instrument"), Some("Piano"), true);
-const WALL: Thing<'_> = (None, Some("WallInner"), true);
-const SHAPE: Thing<'_> = (None, None, false);
+const SOFA: Thing<'_> = (Role::Furniture {}, Some("Sofa"), Some("Three-Seat / Multi-seat Sofa"), true);
+const LOVESEAT: Thing<'_> = (Role::Furniture {}, Some("Sofa"), Some("Loveseat Sofa"), true);
+const LAMP: Thing<'_> = (Role::LightFixture {}, Some("Lighting"), Some("Pendant Lamp"), false);
+const STOOL: Thing<'_> = (Role::Furniture {}, Some("Pier/Stool"), None, true);
+const PIANO: Thing<'_> = (Role::Furniture {}, Some("Instrument"), Some("Piano"), true);
+const WALL: Thing<'_> = (Role::Architecture { kind: String::new() }, None, None, true);
+const SHAPE: Thing<'_> = (Role::Other {}, None, None, false);
 
-/// Two rooms of one house and a Bitterli scene; 7 objects, 3 surfaces.
+/// Two rooms of one house and a Bitterli scene; 7 objects, 2 walls, 1 other shape.
 fn hand_made() -> Dataset {
-    let mut living = scene("living", "front3d", "h1", &[WALL, SOFA, LOVESEAT, LOVESEAT, LAMP, STOOL]);
+    let mut living = scene("living", SourceKind::Front3d, "h1", &[WALL, SOFA, LOVESEAT, LOVESEAT, LAMP, STOOL]);
     living.findings = vec![finding(Severity::Warning, "no_atlas"), finding(Severity::Note, "unmapped_triangles")];
-    let mut dining = scene("dining", "front3d", "h1", &[LAMP, PIANO, WALL]);
+    let mut dining = scene("dining", SourceKind::Front3d, "h1", &[LAMP, PIANO, WALL]);
     dining.findings = vec![finding(Severity::Warning, "no_atlas"), finding(Severity::Warning, "missing_file")];
-    dataset(vec![living, dining, scene("stairs", "bitterli", "stairs", &[SHAPE])])
+    dataset(vec![living, dining, scene("stairs", SourceKind::Bitterli, "stairs", &[SHAPE])])
 }
 
 fn counted(dataset: &Dataset) -> StatsFile {
@@ -88,17 +90,18 @@ fn counted(dataset: &Dataset) -> StatsFile {
 fn hand_made_scenes_are_counted_exactly() {
     let stats = counted(&hand_made());
     assert_eq!((stats.scenes, stats.houses), (3, 2));
-    let kinds: Vec<(&str, usize)> = stats.source_kinds.iter().map(|row| (row.kind.as_str(), row.scenes)).collect();
-    assert_eq!(kinds, [("bitterli", 1), ("front3d", 2)]);
+    let kinds: Vec<(SourceKind, usize)> = stats.source_kinds.iter().map(|row| (row.kind, row.scenes)).collect();
+    assert_eq!(kinds, [(SourceKind::Bitterli, 1), (SourceKind::Front3d, 2)]);
     assert_eq!(stats.objects_per_scene, Some(Spread { scenes: 2, mean: 3.5, min: 2, max: 5 }));
     let categories = Spread { scenes: 2, mean: 2.5, min: 2, max: 3 };
     assert_eq!(stats.super_categories_per_scene, Some(categories));
     assert_eq!(stats.categories_per_scene, Some(categories));
     let total = &stats.total;
-    assert_eq!((total.instances, total.objects, total.surfaces, total.instances_with_atlas), (10, 7, 3, 7));
+    assert_eq!((total.instances, total.objects, total.architecture, total.others), (10, 7, 2, 1));
+    assert_eq!(total.instances_with_atlas, 7);
     let of = |rows: &[SuperCategoryCount]| rows.iter().map(|row| row.objects).collect::<Vec<_>>();
     assert_eq!(of(&total.super_categories), [0, 3, 2, 0, 0, 0, 0, 1, 1]);
-    assert_eq!(total.super_categories[8].super_category, "Instrument");
+    assert_eq!(total.super_categories[8].super_category.as_deref(), Some("Instrument"));
     assert_eq!(total.super_categories[1].share, Some(0.428_571_428_571_428_55));
     let categories: Vec<(Option<&str>, usize)> =
         total.categories.iter().map(|row| (row.category.as_deref(), row.objects)).collect();
@@ -130,16 +133,17 @@ fn table_one_comes_first() {
     assert!(text.contains("\n  Pier/Stool      (none)                              1\n"), "{text}");
 }
 
-/// An empty room of 3D-FRONT has no objects and counts as such; a Bitterli scene with super-categories counts too.
+/// A room of walls alone has no objects and counts as such; a scene without roles takes no part.
 #[test]
 fn zero_is_a_number_only_where_it_is_known() {
-    let stats = |kind, things: &[Thing<'_>]| {
-        let rooms = vec![scene("a", "front3d", "a", &[SOFA, LAMP]), scene("b", kind, "b", things)];
-        counted(&dataset(rooms)).objects_per_scene.unwrap()
+    let stats = |things: &[Thing<'_>]| {
+        let rooms =
+            [("a", &[SOFA, LAMP][..]), ("b", things)].map(|(id, things)| scene(id, SourceKind::Front3d, id, things));
+        counted(&dataset(rooms.into())).objects_per_scene.unwrap()
     };
-    assert_eq!(stats("front3d", &[WALL]), Spread { scenes: 2, mean: 1.0, min: 0, max: 2 });
-    assert_eq!(stats("bitterli", &[WALL]), Spread { scenes: 1, mean: 2.0, min: 2, max: 2 });
-    assert_eq!(stats("bitterli", &[SOFA]), Spread { scenes: 2, mean: 1.5, min: 1, max: 2 });
+    assert_eq!(stats(&[WALL]), Spread { scenes: 2, mean: 1.0, min: 0, max: 2 });
+    assert_eq!(stats(&[SHAPE]), Spread { scenes: 1, mean: 2.0, min: 2, max: 2 });
+    assert_eq!(stats(&[SHAPE, SOFA]), Spread { scenes: 2, mean: 1.5, min: 1, max: 2 });
 }
 
 #[test]
@@ -202,8 +206,9 @@ fn bars_follow_counts() {
 fn names_of_strangers_are_escaped() {
     let hostile = "</text><script>alert(1)</script> & \"quoted\" 'too' ]]> {{ width }}";
     let steering = "\u{1b}[31m\0\u{202e}\u{ffff}\n";
-    let things = [(Some(hostile), Some(steering), true), (Some("Sofa"), Some(hostile), true)];
-    let mut made = dataset(vec![scene("a", steering, hostile, &things)]);
+    let piece = |group, category| (Role::Furniture {}, Some(group), Some(category), true);
+    let things = [piece(hostile, steering), piece("Sofa", hostile)];
+    let mut made = dataset(vec![scene("a", SourceKind::Front3d, hostile, &things)]);
     made.file.name = hostile.to_owned();
     let stats = counted(&made);
     let (texts, _) = read_picture(&picture(&stats));
@@ -219,8 +224,9 @@ fn names_of_strangers_are_escaped() {
 fn a_picture_has_an_end() {
     let long = "m".repeat(1 << 16);
     let names: Vec<String> = (0..1000).map(|at| format!("{at} {long}")).collect();
-    let things: Vec<Thing<'_>> = names.iter().map(|name| (Some("Sofa"), Some(name.as_str()), true)).collect();
-    let (texts, bars) = read_picture(&picture(&counted(&dataset(vec![scene("a", "front3d", "h", &things)]))));
+    let things: Vec<Thing<'_>> =
+        names.iter().map(|name| (Role::Furniture {}, Some("Sofa"), Some(name.as_str()), true)).collect();
+    let (texts, bars) = read_picture(&picture(&counted(&dataset(vec![scene("a", SourceKind::Front3d, "h", &things)]))));
     // 8 headings and the names; 200 rows, then the others' number; one column.
     assert_eq!(bars.len(), 198 + 1);
     assert!(texts.iter().any(|text| text == "and 808 rows more"), "{texts:?}");
@@ -229,15 +235,19 @@ fn a_picture_has_an_end() {
 
 const WORDS: [Option<&str>; 6] = [None, Some("Sofa"), Some("Bed"), Some("Pier/Stool"), Some("sofa"), Some("")];
 
+fn roles() -> [Role; 4] {
+    [Role::Architecture { kind: "Floor".to_owned() }, Role::Furniture {}, Role::LightFixture {}, Role::Other {}]
+}
+
 prop_compose! {
     fn any_scene()(
-        kind in prop::sample::select(vec!["bitterli", "front3d"]),
+        kind in prop::sample::select(vec![SourceKind::Bitterli, SourceKind::Front3d]),
         house in 0..3,
-        things in prop::collection::vec((0..6_usize, 0..6_usize, any::<bool>()), 0..30),
+        things in prop::collection::vec((0..4_usize, 0..6_usize, 0..6_usize, any::<bool>()), 0..30),
         codes in prop::collection::vec((0..3_usize, 0..3), 0..6),
     ) -> SceneFile {
         let things: Vec<Thing<'_>> =
-            things.into_iter().map(|(group, category, atlas)| (WORDS[group], WORDS[category], atlas)).collect();
+            things.into_iter().map(|(role, group, category, atlas)| (roles()[role].clone(), WORDS[group], WORDS[category], atlas)).collect();
         let severity = [Severity::Error, Severity::Warning, Severity::Note];
         let mut made = scene("a", kind, &format!("house-{house}"), &things);
         made.findings = codes.into_iter().map(|(at, code)| finding(severity[at], &format!("c{code}"))).collect();
@@ -259,7 +269,7 @@ proptest! {
         }
         let stats = counted(&dataset(scenes.clone()));
         let total = &stats.total;
-        prop_assert_eq!(total.instances, total.objects + total.surfaces);
+        prop_assert_eq!(total.instances, total.objects + total.architecture + total.others);
         prop_assert_eq!(total.super_categories.iter().map(|row| row.objects).sum::<usize>(), total.objects);
         prop_assert_eq!(total.categories.iter().map(|row| row.objects).sum::<usize>(), total.objects);
         prop_assert_eq!(stats.source_kinds.iter().map(|row| row.scenes).sum::<usize>(), stats.scenes);

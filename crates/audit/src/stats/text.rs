@@ -49,13 +49,12 @@ fn beside(stats: &StatsFile) -> Table {
     let total = &stats.total;
     let mut rows = vec![row(["", "", "min", "max", "scenes"]), row(["houses", &stats.houses.to_string()])];
     let kinds = stats.source_kinds.iter();
-    rows.extend(
-        kinds.map(|kind| row([&format!("scenes of {}", shown(&kind.kind, LONGEST)), &kind.scenes.to_string()])),
-    );
+    rows.extend(kinds.map(|kind| row([&format!("scenes of {}", kind.kind), &kind.scenes.to_string()])));
     rows.push(row(["instances", &total.instances.to_string()]));
     rows.push(row(["  with an atlas", &total.instances_with_atlas.to_string()]));
-    rows.push(row(["  objects: with a super-category", &total.objects.to_string()]));
-    rows.push(row(["  surfaces: without one", &total.surfaces.to_string()]));
+    rows.push(row(["  objects", &total.objects.to_string()]));
+    rows.push(row(["  architecture", &total.architecture.to_string()]));
+    rows.push(row(["  others", &total.others.to_string()]));
     rows.push(row(["different categories", &total.different_categories().to_string()]));
     rows.push(spread_row("  avg. of a scene", stats.categories_per_scene));
     Table { title: "Beside Table I".to_owned(), words: 1, rows }
@@ -65,9 +64,9 @@ fn super_categories(total: &Counts) -> Table {
     let mut rows = vec![row(["super-category", "objects", "share"])];
     rows.extend(total.super_categories.iter().map(|found| {
         let share = found.share.map_or_else(|| "none".to_owned(), |share| format!("{:.1} %", 100.0 * share));
-        let known = SUPER_CATEGORIES.contains(&found.super_category.as_str());
-        let mark = if known { "" } else { " (not of the eight)" };
-        row([&(shown(&found.super_category, LONGEST) + mark), &found.objects.to_string(), &share])
+        let other_word = found.super_category.as_deref().is_some_and(|word| !SUPER_CATEGORIES.contains(&word));
+        let mark = if other_word { " (not of the eight)" } else { "" };
+        row([&(word_or_none(&found.super_category) + mark), &found.objects.to_string(), &share])
     }));
     Table { title: "Objects by super-category".to_owned(), words: 1, rows }
 }
@@ -75,10 +74,15 @@ fn super_categories(total: &Counts) -> Table {
 fn categories(total: &Counts) -> Table {
     let mut rows = vec![row(["super-category", "category", "objects"])];
     rows.extend(total.categories.iter().map(|found| {
-        let category = found.category.as_ref().map_or_else(|| "(none)".to_owned(), |name| shown(name, LONGEST));
-        row([&shown(&found.super_category, LONGEST), &category, &found.objects.to_string()])
+        let words = [&found.super_category, &found.category].map(word_or_none);
+        row([&words[0], &words[1], &found.objects.to_string()])
     }));
     Table { title: "Objects by category".to_owned(), words: 2, rows }
+}
+
+/// A category or super-category, or `(none)`.
+fn word_or_none(word: &Option<String>) -> String {
+    word.as_ref().map_or_else(|| "(none)".to_owned(), |word| shown(word, LONGEST))
 }
 
 fn findings(total: &Counts) -> Table {
@@ -95,16 +99,19 @@ fn findings(total: &Counts) -> Table {
 }
 
 fn scenes(stats: &StatsFile) -> Table {
-    let head = ["scene", "source", "house", "objects", "super-categories", "categories", "surfaces", "atlases"];
+    let head =
+        ["scene", "source", "house", "objects", "super-categories", "categories", "architecture", "others", "atlases"];
     let mut rows = vec![row(head)];
     rows[0].extend(["errors", "warnings", "notes"].map(str::to_owned));
     rows.extend(stats.per_scene.iter().map(|scene| {
         let counts = &scene.counts;
-        let words = [scene.scene.as_str(), &scene.source_kind, &scene.house].map(|word| shown(word, LONGEST));
+        let words =
+            [scene.scene.as_str(), &scene.source_kind.to_string(), &scene.house].map(|word| shown(word, LONGEST));
         let objects = [counts.objects, counts.different_super_categories(), counts.different_categories()];
         let objects = objects.map(|number| known(scene, number));
         let numbers = [
-            counts.surfaces,
+            counts.architecture,
+            counts.others,
             counts.instances_with_atlas,
             counts.findings_of(Severity::Error),
             counts.findings_of(Severity::Warning),

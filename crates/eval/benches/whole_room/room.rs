@@ -10,7 +10,7 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::Emission;
-use mateval_scene::{Camera, RendererId, SceneId, TriangleMesh, glb, reference_io};
+use mateval_scene::{Camera, RendererId, SceneId, SceneLights, TriangleMesh, glb, reference_io};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::World;
 
@@ -65,7 +65,7 @@ impl Room {
 
     /// Whether a stage replaces the room's own lights in track `fitted`.
     pub fn is_staged(&self) -> bool {
-        self.scene.source.kind != "bitterli"
+        self.scene.lights == SceneLights::Stage
     }
 
     /// The stage, as scoring sets it up; empty where the scene's own lights are fitted.
@@ -73,10 +73,7 @@ impl Room {
         if !self.is_staged() {
             return Vec::new();
         }
-        let instances = self.scene.instances.iter().enumerate();
-        let architecture: Vec<usize> =
-            instances.filter(|(_, instance)| instance.category.is_none()).map(|(surface, _)| surface).collect();
-        light_stage::lights(&self.protocol.light.stage, &self.world, &architecture, &self.cameras())
+        light_stage::scene_lights(&self.protocol.light.stage, &self.scene, &self.world)
     }
 
     /// Surfaces that glow, and are hidden from the camera alone.

@@ -36,10 +36,7 @@ struct Staged {
 static STAGED: LazyLock<Staged> = LazyLock::new(|| {
     let scene = &dataset().scenes[0];
     let (world, atlases, prediction, truth) = read("living", scene);
-    let architecture: Vec<usize> =
-        (0..scene.instances.len()).filter(|&at| scene.instances[at].category.is_none()).collect();
-    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
-    let stage = light_stage::lights(&hasty().light.stage, &world, &architecture, &cameras);
+    let stage = light_stage::scene_lights(&hasty().light.stage, scene, &world);
     Staged { scene, world, atlases, prediction, truth, stage }
 });
 

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use glam::Vec2;
-use mateval_scene::Intrinsics;
+use mateval_scene::dataset::{FORMAT, Instance, SceneSource, View};
 use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
 
 use super::*;
 
@@ -108,6 +109,54 @@ fn what_is_hidden_or_small_takes_no_part() {
     assert_eq!(walls.len(), 3);
     assert!(walls.iter().all(|wall| wall.light.mesh.positions[0].y < 0.3));
     assert_eq!(walls.iter().filter(|wall| normal(&wall.light).x.abs() > 0.99).count(), 2);
+}
+
+/// The names of the lights in a room whose architecture is a piece of furniture or a wall that no view sees: a screen behind
+/// the camera, of the given role and without a category.
+fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
+    let screen = quad([0.5, 0.0, 5.8], [3.0, 0.0, 0.0], [0.0, 2.4, 0.0]);
+    let world = world(vec![screen]);
+    let wall = Role::Architecture { kind: "WallInner".to_owned() };
+    let roles = std::iter::repeat_n(&wall, 6).chain([role]);
+    let scene = SceneFile {
+        format: FORMAT.to_owned(),
+        id: SceneId::new("room").unwrap(),
+        source: SceneSource { kind: SourceKind::Front3d, house: "house".to_owned(), files: Vec::new() },
+        lights: SceneLights::Stage,
+        exposure: 1.0,
+        views: vec![View { id: ViewId::new("input").unwrap(), x_deg: 0.0, y_deg: 0.0, camera: camera() }],
+        instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),
+        parts: Vec::new(),
+        part_sets: Vec::new(),
+        findings: Vec::new(),
+    };
+    scene_lights(&rules(), &scene, &world)
+}
+
+fn instance(index: u16, role: &Role) -> Instance {
+    Instance {
+        id: InstanceId::new(format!("i{index}")).unwrap(),
+        index: InstanceIndex(index.try_into().unwrap()),
+        name: String::new(),
+        role: role.clone(),
+        category: None,
+        super_category: None,
+        triangles: 2,
+        atlas: None,
+    }
+}
+
+/// Furniture without a category is no wall: it gets no light, and hides the wall behind it, which then gets none either.
+#[test]
+fn only_architecture_gets_wall_lights() {
+    for role in [Role::Furniture {}, Role::LightFixture {}, Role::Other {}] {
+        let walls = named(&lights_with_screen(&role), "wall");
+        let at_the_screen = |wall: &NamedLight| wall.light.mesh.positions.iter().any(|p| (p.z - 5.8).abs() < 0.01);
+        assert!(!walls.iter().any(at_the_screen), "{role:?}: {walls:?}");
+    }
+    // The twin: the same quad as architecture.
+    let walls = named(&lights_with_screen(&Role::Architecture { kind: "Other".to_owned() }), "wall");
+    assert!(walls.iter().any(|wall| (wall.light.mesh.positions[0].z - 5.799).abs() < 1e-4), "{walls:?}");
 }
 
 #[test]

@@ -12,7 +12,7 @@ use mateval_scene::Camera;
 use mateval_scene::dataset::{Atlas, FORMAT, Instance, PartSet, SceneFile, SceneSource, SourceFile, View};
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::{Finding, Severity, ViewId, json, reference_io};
+use mateval_scene::{Finding, SceneLights, Severity, SourceKind, ViewId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::error::PrepError;
@@ -59,7 +59,8 @@ pub fn build(
     progress("read the source", 0, 1);
     let read = source::read(recipe, entry, source)?;
     let licence = read.licence.clone();
-    let (kind, house) = (read.kind.to_owned(), entry.house.clone().unwrap_or_else(|| read.house.clone()));
+    let house = entry.house.clone().unwrap_or_else(|| read.house.clone());
+    let (kind, lights) = (read.kind, read.lights);
     let (mut plan, absent) = plan(recipe, entry, source, read)?;
     check_inputs(entry, &plan.files)?;
     make_folders(folder, &plan)?;
@@ -77,7 +78,7 @@ pub fn build(
     plan.findings.extend(seen.findings);
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
-    write_scene_file(plan, entry, [kind, house], &atlases, folder)?;
+    write_scene_file(plan, entry, (kind, house, lights), &atlases, folder)?;
     Ok(Built { licence, absent })
 }
 
@@ -293,7 +294,7 @@ fn write_parts(shown: &Path, geometry: &GeometryPictures, parts: &[(String, Vec<
 fn write_scene_file(
     plan: Plan,
     entry: &RecipeScene,
-    [kind, house]: [String; 2],
+    (kind, house, lights): (SourceKind, String, SceneLights),
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
 ) -> Result<(), PrepError> {
@@ -303,6 +304,7 @@ fn write_scene_file(
             id: instance.id.clone(),
             index: instance.index,
             name: surface.name.clone(),
+            role: instance.role.clone(),
             category: instance.category.clone(),
             super_category: instance.super_category.clone(),
             triangles: surface.mesh.triangles.len(),
@@ -330,6 +332,7 @@ fn write_scene_file(
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
         source: SceneSource { kind, house, files },
+        lights,
         exposure: entry.exposure,
         views: plan.views,
         instances,

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::{SceneLights, SourceKind};
 
 use super::views_of;
 use crate::error::PrepError;
@@ -31,7 +32,8 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
     let read = bitterli::read(&root.join(xml), &bitterli::Limits::default())?;
     let folder = xml.parent().and_then(Path::file_name);
     Ok(SourceScene {
-        kind: "bitterli",
+        kind: SourceKind::Bitterli,
+        lights: SceneLights::Own,
         house: folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
         file: xml.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         origins: vec![InstanceOrigin::default(); read.scene.surfaces.len()],

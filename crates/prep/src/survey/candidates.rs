@@ -19,8 +19,8 @@ use super::rules::{Rejection, RoomFacts};
 use super::survey_file::{CandidateCamera, SurveyedRoom, THUMBNAILS};
 use crate::error::PrepError;
 use crate::recipe::Offset;
+use mateval_sources::front3d::FurnishedHouse;
 use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
-use mateval_sources::front3d::{FurnishedHouse, Role};
 
 /// A picture of sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;
@@ -126,7 +126,7 @@ impl RoomSearch<'_> {
         // Such a room is rejected anyway, and testing every pair of its pieces takes long.
         let too_many = furniture.len() > self.options.rules.max_objects;
         let pairs = if too_many { Vec::new() } else { intersecting_pairs(&meshes)? };
-        let complete = |k: &&usize| matches!(house.placed[**k].role, Role::Furniture { complete: true, .. });
+        let complete = |k: &&usize| house.placed[**k].model.as_ref().is_some_and(|model| model.complete);
         let kinds: BTreeSet<&str> =
             furniture.iter().filter_map(|&k| house.placed[k].origin.super_category.as_deref()).collect();
         Ok(RoomFacts {
@@ -141,13 +141,13 @@ impl RoomSearch<'_> {
 
     fn is_furniture_of(&self, surface: usize, room: usize) -> bool {
         let placed = &self.house.placed[surface];
-        placed.room == room && matches!(placed.role, Role::Furniture { .. })
+        placed.room == room && placed.origin.role.is_furniture()
     }
 
     fn size_m(&self, room: usize) -> [f64; 2] {
         let is_floor = |k: &usize| {
             let placed = &self.house.placed[*k];
-            placed.room == room && matches!(&placed.role, Role::Architecture { kind } if kind == "Floor")
+            placed.room == room && placed.origin.role.architecture_kind() == Some("Floor")
         };
         let floors = (0..self.house.placed.len()).filter(is_floor);
         let positions: Vec<glam::Vec3> =
@@ -162,10 +162,7 @@ impl RoomSearch<'_> {
         let lists = &self.options.lists;
         let jids: BTreeSet<&str> = (0..self.house.placed.len())
             .filter(|&k| self.house.placed[k].room == room)
-            .filter_map(|k| match &self.house.placed[k].role {
-                Role::Furniture { jid, .. } => Some(jid.as_str()),
-                Role::Architecture { .. } => None,
-            })
+            .filter_map(|k| self.house.placed[k].model.as_ref().map(|model| model.jid.as_str()))
             .collect();
         let ids = [self.house.house.rooms[room].id.as_str(), self.house.house.uid.as_str()];
         ids.into_iter().chain(jids).filter_map(|id| lists.reason(id)).collect()

@@ -39,7 +39,6 @@ use self::file::{EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};
 use self::kinds::{Explained, explained};
 use self::patch::{Patch, patches};
 use crate::error::ReportError;
-use mateval_eval::instance_errors::categories;
 use mateval_eval::open_scene::scored_views;
 use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
 
@@ -105,7 +104,7 @@ fn worst_first(
 ) -> Vec<(u16, InstanceExplanation)> {
     let told = |(index, found): &(u16, Explained)| {
         let instance = scene.instances.iter().find(|instance| instance.index.0.get() == *index)?;
-        Some((*index, instance_explanation(scene, views, instance, found, whole)))
+        Some((*index, instance_explanation(views, instance, found, whole)))
     };
     let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(told).collect();
     instances.sort_by(|(_, a), (_, b)| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
@@ -113,18 +112,16 @@ fn worst_first(
 }
 
 fn instance_explanation(
-    scene: &SceneFile,
     views: &[ViewId],
     instance: &Instance,
     found: &Explained,
     whole: &Explained,
 ) -> InstanceExplanation {
-    let (category, super_category) = categories(scene, instance);
     let shift = |shift: &shift::Shift| ViewShift { view: views[shift.view].clone(), pixels: shift.pixels };
     InstanceExplanation {
         instance: instance.id.clone(),
-        category,
-        super_category,
+        category: instance.listed_category().map(str::to_owned),
+        super_category: instance.listed_super_category().map(str::to_owned),
         pixels: found.pixels,
         mse: found.mse(),
         share: if whole.squared_error > 0.0 { found.squared_error / whole.squared_error } else { 0.0 },

@@ -12,7 +12,7 @@ use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
-use super::furnished_house::{FurnishedHouse, Role};
+use super::furnished_house::FurnishedHouse;
 
 /// The rules for a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -279,7 +279,7 @@ fn is_floor(house: &FurnishedHouse, surface: usize, room: usize) -> bool {
 }
 
 fn is_architecture(house: &FurnishedHouse, surface: usize, wanted: &str) -> bool {
-    matches!(&house.placed[surface].role, Role::Architecture { kind } if kind == wanted)
+    house.placed[surface].origin.role.architecture_kind() == Some(wanted)
 }
 
 fn nearest(seen: &[(usize, f64)]) -> f64 {
@@ -314,10 +314,9 @@ pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     let mut weighted = 0;
     for surface in seen.iter().flatten() {
-        let name = match &house.placed[*surface].role {
-            Role::Architecture { kind } => kind.to_lowercase(),
-            Role::Furniture { name, .. } => name.clone(),
-        };
+        let placed = &house.placed[*surface];
+        let kind = || placed.origin.role.architecture_kind().unwrap_or_default().to_lowercase();
+        let name = placed.model.as_ref().map_or_else(kind, |model| model.name.clone());
         weighted += if SPECIAL.iter().any(|special| name.contains(special)) { 10 } else { 1 };
         *kinds.entry(name).or_insert(0) += 1;
     }

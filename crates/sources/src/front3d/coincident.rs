@@ -12,7 +12,7 @@ use mateval_scene::reference::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use super::furnished_house::{Placed, Role};
+use super::furnished_house::PlacedSurface;
 use crate::log::Log;
 
 /// Sheets no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
@@ -32,7 +32,7 @@ const MOST_PAIRS: usize = 50_000_000;
 ///
 /// A sheet is the set of triangles of one source mesh that lie in one plane and face one way. Of two that overlap, the
 /// smaller is moved, since a decoration is smaller than its wall; of two of equal area, the later.
-pub(super) fn separate(surfaces: &mut [Surface], placed: &[Placed], log: &mut Log) {
+pub(super) fn separate(surfaces: &mut [Surface], placed: &[PlacedSurface], log: &mut Log) {
     // Which sheets overlap.
     let faces = faces(surfaces, placed);
     let Some(pairs) = overlapping_pairs(&faces) else {
@@ -89,9 +89,9 @@ impl Face {
     }
 }
 
-fn faces(surfaces: &[Surface], placed: &[Placed]) -> Vec<Face> {
-    let is_architecture = |placed: &Placed| matches!(placed.role, Role::Architecture { .. });
-    let of_architecture = surfaces.iter().zip(placed).enumerate().filter(|(_, (_, placed))| is_architecture(placed));
+fn faces(surfaces: &[Surface], placed: &[PlacedSurface]) -> Vec<Face> {
+    let of_architecture =
+        surfaces.iter().zip(placed).enumerate().filter(|(_, (_, placed))| placed.origin.role.is_architecture());
     let faces = of_architecture.flat_map(|(number, (surface, placed))| {
         (0..surface.mesh.triangles.len()).map(move |triangle| {
             let corners = surface.mesh.corners(triangle).map(|corner| corner.as_dvec3());
@@ -223,6 +223,7 @@ fn shift(mesh: &mut TriangleMesh, shift_of: &BTreeMap<usize, DVec3>) {
 #[cfg(test)]
 mod tests {
     use glam::{Vec2, Vec3};
+    use mateval_scene::Role;
     use mateval_scene::reference::MaterialIndex;
 
     use super::*;
@@ -246,12 +247,12 @@ mod tests {
 
     /// The meshes after [`separate`], and the codes of the findings.
     fn separated(meshes: Vec<TriangleMesh>, role: &Role) -> (Vec<TriangleMesh>, Vec<String>) {
-        let placed: Vec<Placed> = meshes
+        let placed: Vec<PlacedSurface> = meshes
             .iter()
             .map(|mesh| {
                 let part_of_triangle = Some(vec![0; mesh.triangles.len()]);
-                let origin = InstanceOrigin { part_of_triangle, ..InstanceOrigin::default() };
-                Placed { room: 0, role: role.clone(), origin, color: [1.0; 3] }
+                let origin = InstanceOrigin { role: role.clone(), part_of_triangle, ..InstanceOrigin::default() };
+                PlacedSurface { room: 0, origin, model: None, color: [1.0; 3] }
             })
             .collect();
         let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
@@ -300,9 +301,8 @@ mod tests {
         across.positions.iter_mut().for_each(|p| *p = Vec3::new(p.x, 0.5, p.y));
         let touching = vec![square(0.0, 1.0, true), square(1.0, 1.0, true), near, across];
         assert_eq!(separated(touching.clone(), &architecture()), (touching, vec![]));
-        let piece = Role::Furniture { jid: String::new(), name: String::new(), complete: true };
         let inside = vec![square(0.0, 3.0, true), square(1.0, 1.0, true)];
-        assert_eq!(separated(inside.clone(), &piece), (inside, vec![]));
+        assert_eq!(separated(inside.clone(), &Role::Furniture {}), (inside, vec![]));
     }
 
     /// Only the faces in the other sheet's plane are moved; the mesh's other faces and vertices stay.

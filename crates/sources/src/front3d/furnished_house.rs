@@ -8,34 +8,26 @@ use mateval_scene::reference::ReferenceScene;
 use super::house::{DesignerCamera, House};
 use crate::source_scene::InstanceOrigin;
 
-/// The role of a surface in the house.
+/// The model of a piece of furniture.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// Architecture of one room, one mesh type and one material.
-    Architecture {
-        /// The mesh type, as in `WallInner`.
-        kind: String,
-    },
-    /// A piece of furniture.
-    Furniture {
-        /// Its model's id.
-        jid: String,
-        /// The name that BlenderProc would give it, in lower case: category, else title.
-        name: String,
-        /// Whether both model and texture could be read.
-        complete: bool,
-    },
+pub struct PlacedModel {
+    /// The model's id.
+    pub jid: String,
+    /// The name that BlenderProc would give the piece, in lower case: category, else title.
+    pub name: String,
+    /// Whether both model and texture could be read.
+    pub complete: bool,
 }
 
-/// Facts about a surface besides its mesh.
+/// Facts about a surface of the house besides its mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
+pub struct PlacedSurface {
     /// Index in [`House::rooms`].
     pub room: usize,
-    /// Its role.
-    pub role: Role,
-    /// Categories and parts of its instance.
+    /// Role, categories and parts of its instance.
     pub origin: InstanceOrigin,
+    /// The model of a piece of furniture; none for architecture.
+    pub model: Option<PlacedModel>,
     /// Linear colour, in which a ceiling emits.
     pub color: [f32; 3],
 }
@@ -50,7 +42,7 @@ pub struct FurnishedHouse {
     /// All surfaces, room by room, without lights. It is shared with the [`World`](mateval_tracer::World) made of it.
     pub scene: Arc<ReferenceScene>,
     /// Facts about each surface, in the order of `scene.surfaces`.
-    pub placed: Vec<Placed>,
+    pub placed: Vec<PlacedSurface>,
     /// Designers' cameras by number, from the file beside the house or else from the JSON.
     pub cameras: Vec<DesignerCamera>,
     /// For each room the number of valid pieces that its children refer to, whether they could be placed or not.

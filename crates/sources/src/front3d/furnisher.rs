@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 
 use mateval_scene::reference::{ReferenceScene, Surface};
-use mateval_scene::{Severity, TriangleMesh};
+use mateval_scene::{Role, Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
 use super::coincident;
-use super::furnished_house::{Placed, Role};
+use super::furnished_house::{PlacedModel, PlacedSurface};
 use super::house::{Child, ChildKind, House, world_from_layout};
 use super::limits::Limits;
 use super::model::{self, Library, Model, is_folder_name};
@@ -21,6 +21,9 @@ use mateval_scene::findings::shortened;
 
 /// A piece with a smaller scale is left out. (ATISS drops rooms with such pieces.)
 const SMALLEST_SCALE: f64 = 1e-5;
+
+/// The super-category of lamps. (BlenderProc makes lamps also of pieces with "lamp" in their names.)
+const LIGHTING: &str = "Lighting";
 
 /// A house's scene under construction.
 pub(super) struct Furnisher<'a> {
@@ -36,7 +39,7 @@ pub(super) struct Furnisher<'a> {
     appearances: Appearances,
     triangles: usize,
     surfaces: Vec<Surface>,
-    placed: Vec<Placed>,
+    placed: Vec<PlacedSurface>,
 }
 
 /// The result of a [`Furnisher`].
@@ -44,7 +47,7 @@ pub(super) struct Furnished {
     /// The scene, without lights.
     pub(super) scene: ReferenceScene,
     /// Facts about each surface.
-    pub(super) placed: Vec<Placed>,
+    pub(super) placed: Vec<PlacedSurface>,
     pub(super) log: Log,
     /// The folders of models and textures, which know the hashes of the files read.
     pub(super) libraries: Vec<Library>,
@@ -128,10 +131,10 @@ impl<'a> Furnisher<'a> {
         for ((kind, material), merged) in groups {
             let (index, color) = self.appearances.of_layout(house, material, self.textures.as_mut(), &mut self.log);
             let parts = parts_of_labels(&merged.mesh, &merged.mesh_of_triangle);
-            let origin = InstanceOrigin { part_of_triangle: Some(parts), ..InstanceOrigin::default() };
             let role = Role::Architecture { kind: kind.to_owned() };
+            let origin = InstanceOrigin { role, part_of_triangle: Some(parts), ..InstanceOrigin::default() };
             self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });
-            self.placed.push(Placed { room, role, origin, color });
+            self.placed.push(PlacedSurface { room, origin, model: None, color });
         }
     }
 
@@ -191,11 +194,14 @@ impl<'a> Furnisher<'a> {
         let name = kind.category.clone().unwrap_or_else(|| kind.super_category.clone());
         let title = || record.title.as_deref().and_then(|title| title.split('/').next()).map(str::to_owned);
         let blenderproc_name = record.category.clone().or_else(title).unwrap_or_else(|| "others".to_owned());
+        let blenderproc_name = blenderproc_name.to_lowercase();
+        let gives_light = kind.super_category == LIGHTING || blenderproc_name.contains("lamp");
         self.surfaces.push(Surface { name, mesh, material });
-        self.placed.push(Placed {
+        self.placed.push(PlacedSurface {
             room,
-            role: Role::Furniture { jid: record.jid.clone(), name: blenderproc_name.to_lowercase(), complete },
+            model: Some(PlacedModel { jid: record.jid.clone(), name: blenderproc_name, complete }),
             origin: InstanceOrigin {
+                role: if gives_light { Role::LightFixture {} } else { Role::Furniture {} },
                 category: kind.category,
                 super_category: Some(kind.super_category),
                 part_of_triangle: Some(model.part_of_triangle.clone()),

@@ -1,10 +1,11 @@
 //! The lights of a room, as BlenderProc sets them: ceilings and lamps emit although the camera sees their ordinary
 //! surface, and a grey environment surrounds the house.
 
+use mateval_scene::Role;
 use mateval_scene::material::{ColorInput, MaterialModel};
 use mateval_scene::reference::{Emission, EmissionMap, LightGroup, ReferenceScene, SurfaceIndex};
 
-use super::furnished_house::{FurnishedHouse, Role};
+use super::furnished_house::FurnishedHouse;
 
 /// Radiance of ceilings, times their colour.
 const CEILING: f32 = 0.8;
@@ -26,15 +27,12 @@ enum Glow {
 
 fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
     let placed = &house.placed[surface];
-    match &placed.role {
+    match &placed.origin.role {
         Role::Architecture { kind } if kind.to_lowercase().contains("ceiling") => {
             Glow::Ceiling(placed.color.map(|v| v * CEILING))
         }
-        Role::Architecture { .. } => Glow::No,
-        Role::Furniture { name, .. } => {
-            let is_lighting = placed.origin.super_category.as_deref() == Some("Lighting");
-            if is_lighting || name.contains("lamp") { Glow::Lamp } else { Glow::No }
-        }
+        Role::LightFixture {} => Glow::Lamp,
+        Role::Architecture { .. } | Role::Furniture {} | Role::Other {} => Glow::No,
     }
 }
 

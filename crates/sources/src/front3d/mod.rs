@@ -34,7 +34,7 @@ pub mod room_scene;
 
 pub use error::HouseError;
 pub use furnish::{furnish, read_house};
-pub use furnished_house::{FurnishedHouse, Placed, Role};
+pub use furnished_house::{FurnishedHouse, PlacedModel, PlacedSurface};
 pub use house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
 };

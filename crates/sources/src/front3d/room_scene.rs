@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mateval_scene::Camera;
 use mateval_scene::ids::id_text_from;
 use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
+use mateval_scene::{Camera, SceneLights, SourceKind};
 use mateval_tracer::World;
 use mateval_tracer::aov::{hit_through, subpixels};
 use rayon::prelude::*;
 
-use super::furnished_house::{FurnishedHouse, Role};
+use super::furnished_house::FurnishedHouse;
 use super::lights;
 use crate::source_scene::SourceScene;
 
@@ -30,7 +30,8 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     }
     scene.lights = lights::groups(house, &kept, &scene);
     SourceScene {
-        kind: "front3d",
+        kind: SourceKind::Front3d,
+        lights: SceneLights::Stage,
         house: house.house.uid.clone(),
         file: house.file.clone(),
         scene,
@@ -62,7 +63,7 @@ fn kept(house: &FurnishedHouse, room: usize, seen: &BTreeSet<usize>) -> Vec<usiz
     let rooms: BTreeSet<usize> = seen.iter().map(|&surface| house.placed[surface].room).chain([room]).collect();
     let is_kept = |surface: &usize| {
         let placed = &house.placed[*surface];
-        let is_architecture = matches!(placed.role, Role::Architecture { .. });
+        let is_architecture = placed.origin.role.is_architecture();
         placed.room == room || seen.contains(surface) || is_architecture && rooms.contains(&placed.room)
     };
     (0..house.placed.len()).filter(is_kept).collect()

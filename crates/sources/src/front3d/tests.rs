@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec3, Vec3};
 use mateval_scene::reference::Surface;
-use mateval_scene::{Severity, TriangleMesh};
+use mateval_scene::{Role, Severity, TriangleMesh};
 use serde_json::{Value, json};
 
 use super::*;
@@ -115,7 +115,7 @@ fn warnings(house: &FurnishedHouse) -> Vec<String> {
 fn pieces_of(house: &FurnishedHouse, room: usize, number: u32) -> Vec<&Surface> {
     let wanted = jid(number);
     let is_it =
-        |placed: &Placed| placed.room == room && matches!(&placed.role, Role::Furniture { jid, .. } if *jid == wanted);
+        |placed: &PlacedSurface| placed.room == room && placed.model.as_ref().is_some_and(|model| model.jid == wanted);
     house.placed.iter().zip(&house.scene.surfaces).filter(|(placed, _)| is_it(placed)).map(|(_, s)| s).collect()
 }
 

@@ -24,8 +24,8 @@ fn real(uid: &str) -> Option<FurnishedHouse> {
     Some(furnish(&files, &Limits::default()).unwrap())
 }
 
-fn is_furniture(placed: &Placed) -> bool {
-    matches!(placed.role, Role::Furniture { .. })
+fn is_furniture(placed: &PlacedSurface) -> bool {
+    placed.origin.role.is_furniture()
 }
 
 /// Metres along y: the lowest and the highest of a surface's triangles.
@@ -81,7 +81,7 @@ fn assert_room(house: &FurnishedHouse, world: &World, room: usize) {
 /// On the floor, on another piece, or on a wall or ceiling as lamps, pictures and curtains are.
 fn assert_stands(house: &FurnishedHouse, surface: usize) {
     let placed = &house.placed[surface];
-    let hangs = |placed: &Placed| placed.origin.super_category.as_deref() == Some("Lighting");
+    let hangs = |placed: &PlacedSurface| placed.origin.super_category.as_deref() == Some("Lighting");
     if !is_furniture(placed) || hangs(placed) {
         return;
     }
@@ -116,7 +116,7 @@ fn a_truncated_picture_is_told() {
     for uid in [TWO_BEDROOMS, STORAGE] {
         let Some(house) = real(uid) else { return };
         let is_it =
-            |placed: &Placed| matches!(&placed.role, Role::Furniture { jid, .. } if jid.starts_with("6934dea0-"));
+            |placed: &PlacedSurface| placed.model.as_ref().is_some_and(|model| model.jid.starts_with("6934dea0-"));
         let pieces: Vec<usize> = (0..house.placed.len()).filter(|at| is_it(&house.placed[*at])).collect();
         let told = house.findings.iter().filter(|f| f.code == "unreadable_texture");
         let files: Vec<&str> = told.map(|finding| finding.file.as_str()).collect();

@@ -83,7 +83,7 @@ fn cameras_stand_free_in_their_room() {
     let mut seen = 0;
     for room in [LIVING, 1] {
         let floor =
-            house.placed.iter().position(|p| p.room == room && p.role == Role::Architecture { kind: "Floor".into() });
+            house.placed.iter().position(|p| p.room == room && p.origin.role.architecture_kind() == Some("Floor"));
         let [low, high] = bounds(&house.scene.surfaces[floor.unwrap()].mesh);
         for found in found(&world, room, &rules) {
             let at = found.camera.position();
@@ -159,8 +159,8 @@ fn rooms_without_a_camera_are_reported() {
     assert!(found.no_clearance > 0 && total(found) == 200, "{found:?}");
     // The room has no floor.
     for placed in &mut house.placed {
-        if placed.room == LIVING && placed.role == (Role::Architecture { kind: "Floor".into() }) {
-            placed.role = Role::Architecture { kind: "Other".into() };
+        if placed.room == LIVING && placed.origin.role.architecture_kind() == Some("Floor") {
+            placed.origin.role = Role::Architecture { kind: "Other".into() };
         }
     }
     let error = sample(&house, &rules, 1).unwrap_err();
@@ -173,9 +173,9 @@ fn rooms_without_a_camera_are_reported() {
 fn scores_are_those_of_the_formula() {
     let house = bare();
     let of_kind =
-        |kind: &str| house.placed.iter().position(|p| p.role == Role::Architecture { kind: kind.into() }).unwrap();
+        |kind: &str| house.placed.iter().position(|p| p.origin.role.architecture_kind() == Some(kind)).unwrap();
     let of_name = |word: &str| {
-        let is_it = |p: &Placed| matches!(&p.role, Role::Furniture { name, .. } if name.contains(word));
+        let is_it = |p: &PlacedSurface| p.model.as_ref().is_some_and(|model| model.name.contains(word));
         house.placed.iter().position(is_it).unwrap()
     };
     let rays = |all: &[(usize, usize)]| -> Vec<Option<usize>> {
@@ -192,14 +192,14 @@ fn scores_are_those_of_the_formula() {
     assert_eq!(score(house, &rays(&[(wall, 100)])), 0.0);
     // Two surfaces of one kind are one kind: 100 / 100 * 2 / 3 * 0.4 * 0.6.
     let walls: Vec<usize> = (0..house.placed.len())
-        .filter(|at| house.placed[*at].role == Role::Architecture { kind: "WallInner".into() })
+        .filter(|at| house.placed[*at].origin.role.architecture_kind() == Some("WallInner"))
         .collect();
     assert!(walls.len() > 1);
     let found = score(house, &rays(&[(walls[0], 30), (walls[1], 30), (floor, 40)]));
     assert!((found - 0.16).abs() < 1e-12, "{found}");
     let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     for placed in &house.placed {
-        if let Role::Furniture { name, .. } = &placed.role {
+        if let Some(PlacedModel { name, .. }) = &placed.model {
             assert_eq!(*name, name.to_lowercase());
             *names.entry(name).or_insert(0) += 1;
         }

@@ -87,9 +87,9 @@ fn every_fault_is_told_and_nothing_else() {
 fn silent_faults_have_their_effect() {
     let house = furnished();
     let origin = |number: u32| {
-        let of = |placed: &&Placed| matches!(&placed.role, Role::Furniture { jid: own, .. } if *own == jid(number));
+        let of = |placed: &&PlacedSurface| placed.model.as_ref().is_some_and(|model| model.jid == jid(number));
         let placed = house.placed.iter().rfind(of).unwrap();
-        let Role::Furniture { name, complete, .. } = &placed.role else { unreachable!() };
+        let PlacedModel { name, complete, .. } = placed.model.as_ref().unwrap();
         let [category, super_category] = [&placed.origin.category, &placed.origin.super_category];
         let text = |text: &Option<String>| text.clone().unwrap_or_default();
         (text(super_category), text(category), name.clone(), *complete)
@@ -108,8 +108,8 @@ fn silent_faults_have_their_effect() {
     assert_eq!((crate_box.0.as_str(), crate_box.3), ("Others", false));
     // Two that intersect are both there.
     assert_eq!(pieces_of(house, LIBRARY, 21).len(), 2);
-    assert!(house.placed.iter().any(|p| p.room == LIBRARY && p.role == Role::Architecture { kind: "Other".into() }));
-    let ceilings = house.placed.iter().filter(|p| p.role == Role::Architecture { kind: "Ceiling".into() });
+    assert!(house.placed.iter().any(|p| p.room == LIBRARY && p.origin.role.architecture_kind() == Some("Other")));
+    let ceilings = house.placed.iter().filter(|p| p.origin.role.architecture_kind() == Some("Ceiling"));
     assert_eq!(ceilings.map(|p| p.room).collect::<Vec<_>>(), [0, 1]);
 }
 

@@ -28,7 +28,7 @@ fn furnished_with(jid: &str, obj: &[u8]) -> FurnishedHouse {
 
 fn pieces(house: &FurnishedHouse) -> Vec<&TriangleMesh> {
     let all = house.placed.iter().zip(&house.scene.surfaces);
-    all.filter(|(placed, _)| matches!(placed.role, Role::Furniture { .. })).map(|(_, surface)| &surface.mesh).collect()
+    all.filter(|(placed, _)| placed.origin.role.is_furniture()).map(|(_, surface)| &surface.mesh).collect()
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn parts_are_by_group_and_then_by_what_hangs_together() {
     let corners: String = quads.iter().map(|(corners, _)| corners.as_str()).collect();
     let obj = format!("{corners}g one\n{}{}g two\n{}", quads[0].1, quads[1].1, quads[2].1);
     let house = furnished_with("x", obj.as_bytes());
-    let at = house.placed.iter().position(|placed| matches!(placed.role, Role::Furniture { .. })).unwrap();
+    let at = house.placed.iter().position(|placed| placed.origin.role.is_furniture()).unwrap();
     // Group two lies where the second quad of group one does, and is a part of its own.
     assert_eq!(house.placed[at].origin.part_of_triangle.as_deref(), Some(&[2, 2, 0, 0, 1, 1][..]));
 }

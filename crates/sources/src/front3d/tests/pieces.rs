@@ -28,8 +28,7 @@ fn all_valid_pieces_are_placed() {
     let house = furnished();
     assert_sound(house);
     assert_eq!(house.wanted_pieces, [11, 6, 12]);
-    let placed =
-        |room| house.placed.iter().filter(|p| p.room == room && matches!(p.role, Role::Furniture { .. })).count();
+    let placed = |room| house.placed.iter().filter(|p| p.room == room && p.origin.role.is_furniture()).count();
     assert_eq!([placed(0), placed(1), placed(2)], [11, 6, 10]);
     assert_eq!(house.house.lights, 3);
     assert_eq!(house.house.release, Release::R3);
@@ -72,8 +71,8 @@ fn closed_models_look_outwards() {
     let house = bare();
     let mut seen = 0;
     for (placed, surface) in house.placed.iter().zip(&house.scene.surfaces) {
-        let Role::Furniture { jid, .. } = &placed.role else { continue };
-        if placed.origin.super_category.as_deref() == Some("Lighting") {
+        let Some(PlacedModel { jid, .. }) = &placed.model else { continue };
+        if placed.origin.role == (Role::LightFixture {}) {
             continue;
         }
         let volume = signed_volume(&surface.mesh);

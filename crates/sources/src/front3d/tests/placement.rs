@@ -81,7 +81,7 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
         let at = house
             .placed
             .iter()
-            .position(|p| p.room == LIVING && p.role == Role::Architecture { kind: "WallInner".into() });
+            .position(|p| p.room == LIVING && p.origin.role.architecture_kind() == Some("WallInner"));
         house.scene.surfaces[at.unwrap()].mesh.clone()
     };
 

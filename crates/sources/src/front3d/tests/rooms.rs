@@ -60,7 +60,7 @@ fn of_other_rooms_only_what_is_seen() {
     let kept = in_house(&scene);
     assert_eq!(scene.origins.len(), kept.len());
     let met = met(&snapshot(1), 300);
-    let is_furniture = |at: &usize| matches!(house.placed[*at].role, Role::Furniture { .. });
+    let is_furniture = |at: &usize| house.placed[*at].origin.role.is_furniture();
     let of_room = |room: usize| (0..house.placed.len()).filter(move |at| house.placed[*at].room == room);
 
     // All of its own, all walls of the bedroom, nothing of the library.
@@ -124,11 +124,11 @@ fn lights_are_ceilings_lamps_and_the_world() {
     let mut lamps = Vec::new();
     for (at, own) in kept.iter().enumerate() {
         let placed = &house.placed[*own];
-        match &placed.role {
+        match &placed.origin.role {
             Role::Architecture { kind } if kind.contains("Ceiling") => {
                 ceilings.entry((placed.room, placed.color.map(f32::to_bits))).or_default().push(at);
             }
-            Role::Furniture { .. } if placed.origin.super_category.as_deref() == Some("Lighting") => lamps.push(at),
+            Role::LightFixture {} => lamps.push(at),
             _ => {}
         }
     }
