@@ -201,7 +201,11 @@ fn an_honest_twin_agrees() {
     let page = tempfile::tempdir().unwrap();
     let out = page.path().join("page");
     let found = run(compare(&LAMBERT, SAMPLES).arg("--out").arg(&out)).ends_with(0);
-    assert!(found.stdout.ends_with("\nblender agrees with our tracer: 75 of 75 checks agree\n"), "{}", found.stdout);
+    assert!(
+        found.stdout.ends_with("\nblender agrees with the built-in tracer: 75 of 75 checks agree\n"),
+        "{}",
+        found.stdout
+    );
     let file: CompareFile = mateval_scene::json::read(&out.join("compare.json")).unwrap();
     let scene = &file.scenes[0];
     assert_eq!((file.agrees, scene.tile_bound, scene.samples_each_half), (true, 0.01, SAMPLES));
@@ -212,7 +216,7 @@ fn an_honest_twin_agrees() {
     let mut again = compare(&LAMBERT, 1);
     run(again.arg("--out").arg(&out)).ends_with(2).says("add --force to overwrite it");
     let mut other = compare(&LAMBERT, 1);
-    run(other.arg("--force").arg("--out").arg(page.path())).ends_with(2).says("is no comparison");
+    run(other.arg("--force").arg("--out").arg(page.path())).ends_with(2).says("is not a comparison");
 }
 
 /// Every picture that the page shows is there, each is shown, and nothing is fetched from elsewhere.
@@ -253,7 +257,7 @@ fn other_materials_stand_apart_and_noise_is_no_pass() {
 /// Nothing to compare is an error that names the scene; a scene that is not there too; and a page within the dataset.
 #[test]
 fn what_cannot_be_compared() {
-    let nothing = "holds no pictures by Blender of scene 'room'; run `mateval prep render DATASET --renderer blender`";
+    let nothing = "has no pictures by blender of scene 'room'; run `mateval prep render DATASET --renderer blender`";
     run(&mut compare(dataset(), 1)).ends_with(2).says(nothing);
     run(compare(dataset(), 1).args(["--scene", "attic"])).ends_with(2).says("has no scene 'attic'");
     let copy = copied(&LAMBERT);

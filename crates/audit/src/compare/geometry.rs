@@ -1,4 +1,4 @@
-//! Pictures without light: base colours, ids, depths, normals.
+//! Compares the pictures without light: base colours, ids, depths, normals.
 
 use mateval_image::{ImageError, LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_metrics::{Psnr, mse};
@@ -22,7 +22,7 @@ pub(super) struct OurGeometry {
     pub(super) valid: Mask,
 }
 
-/// Theirs; what could not be read is not there.
+/// Blender's pictures of a view; none where a picture could not be read.
 #[derive(Default)]
 pub(super) struct TheirGeometry {
     pub(super) base_color: Option<Picture<LinearRgb>>,
@@ -33,7 +33,7 @@ pub(super) struct TheirGeometry {
 }
 
 impl OurGeometry {
-    /// Reads the view's pictures; base colours are looked up anew, at pixel centres as theirs are.
+    /// Reads the view's pictures. Base colours are looked up again, since Blender's are those at pixel centres.
     pub(super) fn read(folder: &SceneFolder, view: &View, world: &World) -> Result<Self, ImageError> {
         let shown = folder.view(&view.id);
         Ok(Self {
@@ -46,7 +46,7 @@ impl OurGeometry {
         })
     }
 
-    /// Whether all are of one size.
+    /// Whether all pictures have this width and height.
     pub(super) fn has_size(&self, (width, height): (usize, usize)) -> bool {
         let sizes = [
             (self.base_color.width(), self.base_color.height()),
@@ -61,7 +61,7 @@ impl OurGeometry {
 }
 
 impl TheirGeometry {
-    /// Reads what is there, and says what is not.
+    /// Reads the pictures; adds a check for each one that could not be read.
     pub(super) fn read(view: &TheirView, checks: &mut Vec<Check>) -> Self {
         Self {
             base_color: view.linear("base_color", "base_color.exr").map_err(|check| checks.push(check)).ok(),
@@ -73,7 +73,7 @@ impl TheirGeometry {
     }
 }
 
-/// A check of each picture that is there. All pictures must be of one size.
+/// A check of each picture that Blender made. All pictures must have the same size.
 pub(super) fn compare(ours: &OurGeometry, theirs: &TheirGeometry) -> Vec<Check> {
     let checks = [
         theirs.base_color.as_ref().map(|theirs| base_color(&ours.base_color, theirs, &ours.valid)),
@@ -87,7 +87,7 @@ pub(super) fn compare(ours: &OurGeometry, theirs: &TheirGeometry) -> Vec<Check> 
 
 fn base_color(ours: &Picture<LinearRgb>, theirs: &Picture<LinearRgb>, valid: &Mask) -> Check {
     let count = valid.pixels().iter().filter(|valid| **valid).count();
-    // Sizes are equal and numbers finite, since the files were read; so there is an error wherever a pixel is valid.
+    // This cannot fail: sizes were compared, and the files were read, so that all numbers are finite.
     let error = mse(theirs, ours, Some(valid)).ok().flatten();
     let psnr = error.and_then(|mse| Psnr::from_mse(mse).ok()).map(|psnr| psnr.db);
     let message = psnr.map_or("no pixel is valid".to_owned(), |db| {
@@ -103,7 +103,7 @@ fn ids(picture: &str, ours: &Picture<u16>, theirs: &Picture<u16>) -> Check {
     let count = pairs().count();
     let equal = pairs().filter(|((ours, theirs), _)| ours == theirs).count();
     let share = (count > 0).then(|| equal as f64 / count as f64);
-    let message = share.map_or("no pixel is away from edges".to_owned(), |share| {
+    let message = share.map_or("every pixel is at an edge".to_owned(), |share| {
         format!(
             "{:.2} % of {count} ids away from edges are equal, expected at least {} %",
             100.0 * share,
@@ -136,24 +136,25 @@ fn normals(ours: &OurGeometry, theirs: &Picture<Normal>, instance: Option<&Pictu
     check("normal", Quantity::MedianDeg, agrees, (off, NORMAL_MEDIAN_DEG), common.len(), message)
 }
 
-/// The angle between two normals of any length, degrees; 180 where one has none.
+/// The angle between two normals of any length, in degrees; 180 where one of them is zero.
 pub(super) fn angle_deg(a: Normal, b: Normal) -> f64 {
     let [a, b] = [a, b].map(|Normal(v)| glam::DVec3::from(v.map(f64::from)));
     if a.length_squared() * b.length_squared() == 0.0 {
         return 180.0;
     }
-    // The arc tangent, since the arc cosine knows no small angles.
+    // The arc tangent, since the arc cosine is inaccurate for small angles.
     libm::atan2(a.cross(b).length(), a.dot(b)).to_degrees()
 }
 
-/// Pixels that show the same instance, and not nothing; without their ids, all that show one in ours.
+/// Pixels in which both renderers show the same instance; where Blender's ids are missing, all pixels in which the dataset
+/// shows one.
 fn common(ours: &OurGeometry, theirs: Option<&Picture<u16>>) -> Vec<usize> {
     let same = |at: usize, id: u16| theirs.is_none_or(|theirs| theirs.pixels()[at] == id);
     let ids = ours.instance.pixels().iter().enumerate();
     ids.filter(|(at, id)| **id > 0 && same(*at, **id)).map(|(at, _)| at).collect()
 }
 
-/// Pixels whose id is that of all their neighbours, up to eight.
+/// For each pixel whether its id equals that of all of its neighbours, of which it has up to eight.
 pub(super) fn away_from_edges(ids: &Picture<u16>) -> Vec<bool> {
     let (width, height) = (ids.width(), ids.height());
     let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);

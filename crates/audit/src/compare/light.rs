@@ -1,4 +1,4 @@
-//! Pictures of light: RGB and each group of lights, by tiles and as wholes.
+//! Compares pictures of light, RGB and each light group: by tiles, and by their means.
 
 use std::collections::BTreeMap;
 
@@ -10,28 +10,28 @@ use super::kind::MaterialKind;
 use super::theirs::file_check;
 use super::tiles::{Difference, Halves, Tile, allowance, difference, median, tiles};
 
-/// What a view shows, as far as it matters for its light.
+/// The tiles of a view with the kinds of material that they show, and the pixels that count.
 pub(super) struct ShownKinds {
-    /// With the last kind, in their order, of all that the tile shows; none where it shows nothing.
+    /// Each tile with the last kind, in the order of [`MaterialKind`], that it shows; none where it shows only background.
     tiles: Vec<(Tile, Option<MaterialKind>)>,
-    /// Pixels whose mean is compared, and differences are relative to: the valid ones of the tiles that decide, or all of
-    /// these where none is valid. Lamps, sky and glass are not valid: a window that fills a tenth of the picture would
-    /// be most of the mean, and no light in the room could be off by more than a share of that.
+    /// Pixels whose mean is compared, and to which differences are relative: the valid pixels of the tiles that decide, or all
+    /// of their pixels where none is valid. Lamps, sky and glass are not valid. A window that fills a tenth of the picture
+    /// would otherwise dominate the mean, and no error within the room would be large in proportion to it.
     counted: Vec<(usize, usize)>,
 }
 
 impl ShownKinds {
-    /// Instance k of `instance` is of the kind `kinds[k - 1]`; a number beyond them, which no sound dataset holds, is none.
+    /// `kinds[k - 1]` is the kind of instance k. An index beyond the list, which no sound dataset contains, has no kind.
     pub(super) fn new(instance: &Picture<u16>, kinds: &[MaterialKind], valid: &Mask) -> Self {
         let kind_at = |x: usize, y: usize| kinds.get(usize::from(instance.get(x, y)).checked_sub(1)?).copied();
         let of = |tile: &Tile| tile.pixels().filter_map(|(x, y)| kind_at(x, y)).max();
         let tiles = tiles(instance.width(), instance.height());
         let tiles = tiles.into_iter().map(|tile| (tile.clone(), of(&tile))).collect();
         let mut shown = Self { tiles, counted: Vec::new() };
-        let all: Vec<(usize, usize)> = shown.deciding().into_iter().flat_map(Tile::pixels).collect();
-        shown.counted = all.iter().copied().filter(|&(x, y)| valid.get(x, y)).collect();
+        let deciding: Vec<(usize, usize)> = shown.deciding().into_iter().flat_map(Tile::pixels).collect();
+        shown.counted = deciding.iter().copied().filter(|&(x, y)| valid.get(x, y)).collect();
         if shown.counted.is_empty() {
-            shown.counted = all;
+            shown.counted = deciding;
         }
         shown
     }
@@ -56,7 +56,8 @@ impl ShownKinds {
     }
 }
 
-/// One picture by both renderers. Gives two checks, of its tiles and of its mean, and what stands behind them.
+/// Compares one picture of both renderers. Returns two checks, of its tiles and of its mean, and the measurements behind
+/// them.
 pub(super) fn compare(
     picture: &str,
     light: Option<String>,
@@ -125,7 +126,7 @@ fn largest(off: &Difference, scale: [f64; 3]) -> Option<f64> {
 fn relative(off: &Difference, bound: f64, scale: [f64; 3]) -> MeanDifference {
     let channel = off.worst_channel(bound, scale);
     let of = |value: f64| (scale[channel] > 0.0).then(|| value / scale[channel]);
-    // Black in both is no difference; black in ours alone has no share to tell.
+    // Where both are black the difference is 0; where only ours is black it cannot be expressed as a share.
     let is_black = off.mean[channel] == 0.0 && off.error[channel] == 0.0;
     let of = |value: f64| if is_black { Some(0.0) } else { of(value) };
     MeanDifference { channel, difference: of(off.mean[channel]), standard_error: of(off.error[channel]) }
@@ -147,7 +148,7 @@ fn tile_check(picture: &str, tiles: &TilesCompared, bound: f64) -> Check {
             percent(bound),
         ),
         _ => format!(
-            "{} of {} tiles are off by more than {} of the mean and {STANDARD_ERRORS} standard errors, expected at most {}{}",
+            "{} of {} tiles are off by more than {} of the mean plus {STANDARD_ERRORS} standard errors, expected at most {}{}",
             tiles.over,
             tiles.count,
             percent(bound),
@@ -168,8 +169,11 @@ fn tile_check(picture: &str, tiles: &TilesCompared, bound: f64) -> Check {
 }
 
 fn worst_text(worst: &WorstTile) -> String {
-    let off = worst.off.difference.map_or("not black as ours is".to_owned(), |off| format!("{:+.1} %", 100.0 * off));
-    format!("; the worst, at ({}, {}): {off}", worst.x, worst.y)
+    let (x, y) = (worst.x, worst.y);
+    match worst.off.difference {
+        Some(off) => format!("; the worst tile, at ({x}, {y}), is off by {:+.1} %", 100.0 * off),
+        None => format!("; the worst tile, at ({x}, {y}), is black only in the built-in tracer's picture"),
+    }
 }
 
 fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) -> Check {
@@ -185,22 +189,23 @@ fn mean_check(picture: &str, mean: &Difference, scale: [f64; 3], pixels: usize) 
     let message = match (worst.difference, bound) {
         _ if state == State::Undecided => "no tile is free of materials that are known to differ".to_owned(),
         (Some(off), Some(bound)) => {
-            let mend = if state == State::TooNoisy { "; render with more samples" } else { "" };
+            let hint = if state == State::TooNoisy { "; render with more samples" } else { "" };
             let error = worst.standard_error.map_or(0.0, |error| 100.0 * error);
             format!(
-                "the mean is off by {:+.2} %, expected at most {:.2} % (three standard errors of {error:.2} % in it){mend}",
+                "the mean is off by {:+.2} %, expected at most {:.2} %, which includes three standard errors of {error:.2} %{hint}",
                 100.0 * off,
                 100.0 * bound,
             )
         }
-        _ => "ours is black, theirs is not".to_owned(),
+        _ => "the built-in tracer's picture is black, the other is not".to_owned(),
     };
     let quantity = Quantity::MeanDifference;
     let (measured, bound) = if pixels > 0 { (worst.difference, bound) } else { (None, None) };
     Check { picture: picture.to_owned(), quantity, state, measured, bound, count: pixels, message }
 }
 
-/// A fault where both halves are one picture, and not black: then they tell of no noise.
+/// A check that differs where both halves are the same picture and not black: their difference then says nothing about the
+/// noise.
 pub(super) fn same_halves(picture: &str, halves: &Halves) -> Option<Check> {
     let is_black = |pixel: &LinearRgb| pixel.0 == [0.0; 3];
     let same = halves.a == halves.b && !halves.a.pixels().iter().all(is_black);
@@ -208,8 +213,8 @@ pub(super) fn same_halves(picture: &str, halves: &Halves) -> Option<Check> {
     same.then(|| file_check(picture, State::Differs, message))
 }
 
-/// Whether the groups of one half sum to it. Each pixel's difference is held against that pixel, since rounding goes with
-/// the value; and against the half's mean where the pixel is darker, since there it goes with what was added up.
+/// Whether the light groups of a half sum to it. A pixel's difference is relative to the pixel, since rounding grows with
+/// the value, or to the half's mean where the pixel is darker, since there rounding grows with the samples added up.
 pub(super) fn sum_check(picture: &str, half: &Picture<LinearRgb>, groups: &[&Picture<LinearRgb>]) -> Check {
     let values = half.pixels().iter().flat_map(|pixel| pixel.0).map(f64::from);
     let mean = values.sum::<f64>() / (3 * half.pixels().len().max(1)) as f64;
@@ -229,7 +234,7 @@ pub(super) fn sum_check(picture: &str, half: &Picture<LinearRgb>, groups: &[&Pic
     let agrees = off <= GROUP_SUM;
     let place = if agrees { String::new() } else { format!(", at pixel ({x}, {y})") };
     let message = format!(
-        "{} groups sum to it but for {off:.1e} of a pixel, expected at most {GROUP_SUM:.0e}{place}",
+        "the sum of {} groups differs by {off:.1e} of a pixel, expected at most {GROUP_SUM:.0e}{place}",
         groups.len()
     );
     Check {

@@ -8,7 +8,8 @@ use super::text;
 
 const TEMPLATE: &str = include_str!("page.j2");
 
-/// HTML that gives the verdict, what does not agree, and each view's pictures; `previews` holds a list a scene.
+/// HTML with the verdict, the checks that do not agree and the pictures of each view; `previews` contains one list per
+/// scene.
 pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String {
     let scenes: Vec<_> = file
         .scenes
@@ -40,5 +41,5 @@ pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String
             verdict => text::verdict(file), faults => text::faults(file), scenes,
         },
     );
-    text.expect("the template is ours, and all its values are there")
+    text.expect("the template uses only values that the context holds")
 }

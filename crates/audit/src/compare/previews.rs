@@ -1,4 +1,4 @@
-//! What people look at: both pictures and their difference as 8-bit PNG.
+//! Writes the page's pictures, 8-bit PNG: those of both renderers, and their difference.
 
 use std::path::{Path, PathBuf};
 
@@ -15,22 +15,23 @@ use super::light::ShownKinds;
 use super::tiles::{Halves, difference};
 use crate::error::AuditError;
 
-/// Ends of the difference's scale: a pixel of light, of its picture's mean over valid pixels that decide.
+/// Ends of the scale of differences. Of a pixel of light: relative to the picture's mean over valid pixels that decide.
 const LIGHT_PIXEL: f64 = 0.5;
-/// A tile of light, in bounds.
+/// Of a tile of light: a multiple of the bound.
 const LIGHT_TILE: f64 = 5.0;
-/// A base colour.
+/// Of a base colour.
 const BASE_COLOR: f64 = 0.1;
-/// A depth, metres.
+/// Of a depth, in metres.
 const DEPTH_M: f64 = 0.01;
-/// A normal, degrees.
+/// Of a normal, in degrees.
 const NORMAL_DEG: f64 = 5.0;
-/// What a group of lights is brightened to in its preview: linear, the same mean.
+/// The linear mean that the preview of a light group is scaled to.
 const GROUP_MEAN: f64 = 0.2;
 
-/// Theirs is darker, equal, brighter (ColorBrewer's RdBu, whose ends all people tell apart).
+/// Colours for darker, equal and brighter than the built-in tracer's: ColorBrewer's RdBu, whose ends are distinct for
+/// colour-blind readers too.
 const DIVERGING: [[u8; 3]; 3] = [[33, 102, 172], [247, 247, 247], [178, 24, 43]];
-/// Tiles that decide nothing, and pixels at edges.
+/// Colour of tiles that do not count for the verdict, and of pixels at edges.
 const APART: [u8; 3] = [150, 150, 150];
 
 /// The previews of a view.
@@ -45,11 +46,11 @@ pub(super) struct ViewPreviews {
     exposure: f64,
     /// The view.
     pub(super) view: String,
-    /// A row each.
+    /// One row per picture.
     rows: Vec<Row>,
 }
 
-/// One picture: files relative to the page.
+/// One picture; files are relative to the page.
 #[derive(Clone, Debug, Serialize)]
 struct Row {
     picture: String,
@@ -65,12 +66,12 @@ struct Row {
 struct DifferencePreview {
     file: String,
     title: String,
-    /// What the scale's ends mean.
+    /// The values at the ends of the scale.
     low: String,
     high: String,
 }
 
-/// A difference picture and the words of its scale.
+/// A picture of differences, and the labels of its scale.
 struct Shown {
     suffix: &'static str,
     title: String,
@@ -80,7 +81,7 @@ struct Shown {
 }
 
 impl ViewPreviews {
-    /// Makes the view's folder below `out`.
+    /// Creates the view's folder below `out`.
     pub(super) fn new(out: &Path, scene: &SceneFile, view: &ViewId) -> Result<Self, AuditError> {
         let folder = format!("pictures/{}/{view}", scene.id);
         let place = out.join(&folder);
@@ -89,7 +90,7 @@ impl ViewPreviews {
         Ok(Self { out, folder, exposure: scene.exposure, view, rows: Vec::new() })
     }
 
-    /// RGB, or a group of lights; what the halves' mean shows, not the denoised picture.
+    /// Adds RGB or a light group: the mean of the halves, not the denoised picture.
     pub(super) fn add_light(
         &mut self,
         light: &LightComparison,
@@ -106,10 +107,10 @@ impl ViewPreviews {
             if level > 0.0 { (b - a) / level / LIGHT_PIXEL } else { f64::from(a != b) }
         };
         let (width, height) = (means[0].width(), means[0].height());
-        let title = "theirs minus ours, of our mean";
+        let title = "theirs minus MatEval's, relative to MatEval's mean";
         let by_pixel = scaled("pixels", title, 100.0 * LIGHT_PIXEL, " %", signed(width, height, off));
         let title = format!(
-            "tiles, worst channel; dark frame: over the bound of {} %; grey frame: decides nothing",
+            "tiles, worst channel; dark frame: over the bound of {} %; grey frame: does not count for the verdict",
             100.0 * bound
         );
         let map = tile_map((width, height), [ours, theirs], kinds, bound, scale);
@@ -118,7 +119,7 @@ impl ViewPreviews {
         self.add(&light.picture, note, previews, vec![by_pixel, by_tile])
     }
 
-    /// What a picture of light is multiplied by in its preview, and the words for that.
+    /// The factor of a picture of light in its preview, and the note that states it.
     fn gain(&self, light: &LightComparison, level: f64) -> (f64, String) {
         match light.light.as_ref().map(|name| crate::stats::shown(name, 60)) {
             None => (self.exposure, "mean of both halves, with the scene's exposure".to_owned()),
@@ -127,7 +128,7 @@ impl ViewPreviews {
         }
     }
 
-    /// What both have without light.
+    /// Adds the pictures without light that Blender made.
     pub(super) fn add_geometry(&mut self, ours: &OurGeometry, theirs: &TheirGeometry) -> Result<(), AuditError> {
         if let Some(base_color) = &theirs.base_color {
             self.add_base_color(ours, base_color)?;
@@ -153,7 +154,7 @@ impl ViewPreviews {
             if ours.valid.pixels()[at] { (b - a) / BASE_COLOR } else { 0.0 }
         };
         let map = signed(theirs.width(), theirs.height(), off);
-        let shown = scaled("difference", "theirs minus ours, mean of channels, valid pixels", BASE_COLOR, "", map);
+        let shown = scaled("difference", "theirs minus MatEval's, mean of channels, valid pixels", BASE_COLOR, "", map);
         let previews = [&ours.base_color, theirs].map(|picture| to_bytes(picture, 1.0));
         self.add("base_color", "linear values, sRGB-encoded".to_owned(), previews, vec![shown])
     }
@@ -161,7 +162,7 @@ impl ViewPreviews {
     fn add_depth(&mut self, ours: &Picture<f32>, theirs: &Picture<f32>) -> Result<(), AuditError> {
         let off = |at: usize| f64::from(theirs.pixels()[at] - ours.pixels()[at]) / DEPTH_M;
         let map = signed(ours.width(), ours.height(), off);
-        let shown = scaled("difference", "theirs minus ours", 1e3 * DEPTH_M, " mm", map);
+        let shown = scaled("difference", "theirs minus MatEval's", 1e3 * DEPTH_M, " mm", map);
         let far = ours.pixels().iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         let previews = [ours, theirs].map(|picture| picture.map(|depth| [byte_from_unit(depth / far); 3]));
         self.add("depth", format!("white is {far:.2} m"), previews, vec![shown])
@@ -173,7 +174,7 @@ impl ViewPreviews {
             if a == b { 0.0 } else { angle_deg(a, b) / NORMAL_DEG }
         };
         let map = signed(ours.width(), ours.height(), off);
-        let mut shown = scaled("difference", "angle between them", NORMAL_DEG, " degrees", map);
+        let mut shown = scaled("difference", "angle between the normals", NORMAL_DEG, " degrees", map);
         shown.low = "0".to_owned();
         let previews = [ours, theirs].map(|p| p.map(|Normal(v)| v.map(|v| byte_from_unit(0.5 * v + 0.5))));
         self.add("normal", "world space, 0.5 + 0.5 n".to_owned(), previews, vec![shown])
@@ -188,11 +189,12 @@ impl ViewPreviews {
         };
         let width = ours.width();
         let picture = Picture::from_fn(width, ours.height(), |x, y| color(y * width + x));
-        let title = "red: another id; grey: another at an edge, where it does not count".to_owned();
+        let title = "red: ids differ; grey: ids differ at an edge, which does not count".to_owned();
         let shown = Shown { suffix: "difference", title, low: String::new(), high: String::new(), picture };
-        self.add(name, "a colour an id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
+        self.add(name, "one colour per id".to_owned(), [ours, theirs].map(|ids| ids.map(id_color)), vec![shown])
     }
 
+    /// Writes the files of a row and adds it.
     fn add(
         &mut self,
         picture: &str,
@@ -215,7 +217,7 @@ impl ViewPreviews {
     }
 }
 
-/// A picture whose scale ends at plus and minus `end`.
+/// A picture of differences whose scale ends at plus and minus `end`.
 fn scaled(suffix: &'static str, title: &str, end: f64, unit: &str, picture: Picture<[u8; 3]>) -> Shown {
     let (low, high) = (format!("-{end}{unit}"), format!("+{end}{unit}"));
     Shown { suffix, title: title.to_owned(), low, high, picture }
@@ -230,7 +232,7 @@ fn to_bytes(picture: &Picture<LinearRgb>, gain: f64) -> Picture<[u8; 3]> {
     brightened.to_srgb().map(|srgb| srgb.0.map(byte_from_unit))
 }
 
-/// The colour of -1 (or less) to 1 (or more).
+/// The colour of a number from -1 to 1; numbers beyond have the colour of the nearer end.
 fn diverging(value: f64) -> [u8; 3] {
     let share = value.abs().min(1.0);
     let end = if value < 0.0 { DIVERGING[0] } else { DIVERGING[2] };
@@ -244,7 +246,7 @@ fn signed(width: usize, height: usize, value: impl Fn(usize) -> f64) -> Picture<
     Picture::from_fn(width, height, |x, y| diverging(value(y * width + x)))
 }
 
-/// Each tile in one colour; those over the bound have a dark frame, those apart a grey one.
+/// Each tile in one colour. Tiles over the bound have a dark frame, tiles that do not count for the verdict a grey one.
 fn tile_map(
     (width, height): (usize, usize),
     [ours, theirs]: [&Halves; 2],
@@ -274,7 +276,7 @@ fn tile_map(
     map
 }
 
-/// Colours far apart for ids next to each other.
+/// A colour for each id; consecutive ids have very different colours.
 fn id_color(id: u16) -> [u8; 3] {
     if id == 0 {
         return [0; 3];

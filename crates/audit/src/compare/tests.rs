@@ -1,4 +1,4 @@
-//! Made-up pictures: how often noise alone is called a difference, what is found, and how a picture is cut.
+//! Synthetic pictures: how often noise alone counts as a difference, which differences are found, how pictures are divided.
 
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_scene::splitmix64;
@@ -11,12 +11,12 @@ use super::tiles::{Halves, difference, median, tiles};
 
 const SIZE: (usize, usize) = (96, 72);
 
-/// A deviate of mean 0 and variance 1, one-sided and long-tailed as light is: the exponential distribution less 1.
+/// A deviate of mean 0 and variance 1, one-sided and long-tailed as light is: the exponential distribution minus 1.
 fn deviate(seed: u64) -> f64 {
     -libm::log((splitmix64::number(0, seed) >> 11) as f64 / (1_u64 << 53) as f64 + 1e-300) - 1.0
 }
 
-/// Two halves of a gradient under relative noise of this deviation a pixel; `factor` multiplies what is expected.
+/// Two halves of a gradient with relative noise of this standard deviation per pixel; `factor` scales the expected value.
 fn halves(seed: u64, noise: f64, factor: impl Fn(usize, usize) -> f64) -> Halves {
     let half = |half: u64| {
         Picture::from_fn(SIZE.0, SIZE.1, |x, y| {
@@ -46,7 +46,7 @@ fn states(ours: &Halves, theirs: &Halves) -> [State; 2] {
 }
 
 #[test]
-fn a_picture_is_cut_without_gaps_and_slivers() {
+fn a_picture_is_divided_without_gaps_and_slivers() {
     for (width, height, expected) in
         [(96, 72, 30), (480, 270, 510), (103, 71, 24), (104, 72, 35), (5, 3, 1), (1, 40, 3)]
     {
@@ -63,7 +63,7 @@ fn a_picture_is_cut_without_gaps_and_slivers() {
     }
 }
 
-/// The standard error from the halves against the spread of 400 draws: equal to 5 %, in a tile and over the picture.
+/// The standard error computed from the halves equals the spread of 400 draws within 10 %, in a tile and over the picture.
 #[test]
 fn the_standard_error_is_the_spread() {
     let all = tiles(SIZE.0, SIZE.1);
@@ -72,18 +72,18 @@ fn the_standard_error_is_the_spread() {
         let drawn: Vec<_> =
             (0..400).map(|k| difference(&plain(2 * k, 0.3), &plain(2 * k + 1, 0.3), pixels.clone())).collect();
         let spread = (drawn.iter().map(|d| d.mean[1] * d.mean[1]).sum::<f64>() / 400.0).sqrt();
-        let told = (drawn.iter().map(|d| d.error[1] * d.error[1]).sum::<f64>() / 400.0).sqrt();
-        assert!((spread / told - 1.0).abs() < 0.1, "{spread} {told}");
+        let estimated = (drawn.iter().map(|d| d.error[1] * d.error[1]).sum::<f64>() / 400.0).sqrt();
+        assert!((spread / estimated - 1.0).abs() < 0.1, "{spread} {estimated}");
     }
 }
 
 /// Pure noise, 1000 pictures at each of three levels: three standard errors of a tile at 1, 4 and 20 times the bound. By
-/// tiles a picture is called different once in 1000 at most by design (5 of 1000 would be a probability of 6e-4); by its
-/// mean, where the bound counts for nothing any more, 8 times in 1000: three channels at three standard errors. 1 % of
-/// tiles alone, which is none of 30, would be 21 false alarms at the second level.
+/// design at most one picture in 1000 counts as different by its tiles (5 in 1000 would have a probability of 6e-4). By its
+/// mean, 8 in 1000 do where the bound is negligible: three channels at three standard errors. Allowing only 1 % of the
+/// tiles, which is none of 30, would give 21 false alarms at the second level.
 #[test]
-#[allow(clippy::print_stderr, reason = "how near it came")]
-fn noise_alone_is_rarely_called_a_difference() {
+#[allow(clippy::print_stderr, reason = "shows how close the counts are to their limits")]
+fn noise_alone_rarely_counts_as_a_difference() {
     for (noise, most_by_mean, is_noisy) in [(0.05, 0, false), (0.2, 0, false), (1.0, 20, true)] {
         let (mut by_tiles, mut by_mean, mut noisy, mut by_share_alone) = (0, 0, 0, 0);
         for draw in 0..1000 {
@@ -103,7 +103,8 @@ fn noise_alone_is_rarely_called_a_difference() {
     }
 }
 
-/// 3 % everywhere; 8 % in one tile of 30, where 1 % of tiles is none. The twin: 0.3 % and 1 % agree.
+/// An error of 3 % everywhere is found, and one of 8 % in one tile of 30, where 1 % of the tiles is none. The twins, errors
+/// of 0.3 % and 1 %, agree.
 #[test]
 fn planted_differences_are_found() {
     for draw in 0..100 {
@@ -118,16 +119,16 @@ fn planted_differences_are_found() {
 }
 
 #[test]
-fn so_much_noise_says_nothing_but_a_large_difference_is_one_all_the_same() {
+fn a_very_noisy_picture_can_only_differ() {
     let (ours, theirs) = (plain(1, 1.5), plain(2, 1.5));
     assert_eq!(states(&ours, &theirs)[0], State::TooNoisy);
     assert_eq!(states(&ours, &halves(2, 1.5, |_, _| 2.0)), [State::Differs; 2]);
-    // A picture of no noise at all that is the same.
+    // Equal pictures without any noise agree.
     assert_eq!(states(&plain(1, 0.0), &plain(2, 0.0)), [State::Agrees; 2]);
 }
 
-/// A window a hundred times as bright as the room, which is a tenth of the picture: the room's light is 3 % off, and found,
-/// since the window, which is not valid, is no part of the mean.
+/// A window fills a tenth of the picture and is a hundred times brighter than the room. An error of 3 % in the room's light
+/// is found, since the window is not valid and does not contribute to the mean.
 #[test]
 fn a_bright_window_hides_nothing() {
     let is_window = |x: usize, y: usize| x < 32 && y < 24;
@@ -139,9 +140,9 @@ fn a_bright_window_hides_nothing() {
         compare("rgb", None, [&ours, &theirs], &shown, LAMBERT_TILE).1.map(|check| check.state)
     };
     assert_eq!(states(&valid), [State::Differs; 2]);
-    // The twin: of the whole picture's mean it is a third of a percent.
+    // The twin: relative to the mean of the whole picture the error is a third of a percent.
     assert_eq!(states(&all_valid()), [State::Agrees; 2]);
-    // Where nothing is valid, all counts.
+    // Where no pixel is valid, all pixels count.
     assert_eq!(states(&Picture::filled(SIZE.0, SIZE.1, false)), [State::Agrees; 2]);
 }
 
@@ -151,7 +152,7 @@ fn black_is_black() {
     assert_eq!(states(&black(), &black()), [State::Agrees; 2]);
     assert_eq!(states(&black(), &plain(2, 0.1)), [State::Differs; 2]);
     assert_eq!(states(&plain(2, 0.1), &black()), [State::Differs; 2]);
-    // Red alone: nothing is divided by the mean of green.
+    // Red alone: no difference is divided by the mean of green, which is 0.
     let red = |seed| {
         let Halves { a, b } = plain(seed, 0.1);
         let [a, b] = [a, b].map(|half| half.map(|LinearRgb([r, _, _])| LinearRgb([r, 0.0, 0.0])));
@@ -161,9 +162,10 @@ fn black_is_black() {
     assert_eq!(states(&red(1), &plain(2, 0.1)), [State::Differs; 2]);
 }
 
-/// The left third shows glass, the middle a metal beside Lambert: they decide nothing, whatever they hold, and are counted.
+/// The left third shows glass, the middle a metal beside Lambert. These tiles do not count for the verdict, whatever they
+/// contain, and are reported apart.
 #[test]
-fn what_is_known_to_differ_stands_apart() {
+fn materials_that_are_known_to_differ_do_not_count() {
     let kinds = [MaterialKind::Lambert, MaterialKind::Conductor, MaterialKind::Dielectric];
     let instance = Picture::from_fn(SIZE.0, SIZE.1, |x, _| {
         if x < 32 {
@@ -182,15 +184,15 @@ fn what_is_known_to_differ_stands_apart() {
     assert_eq!(apart, [(MaterialKind::Conductor, 10, 0), (MaterialKind::Dielectric, 10, 10)]);
     assert_eq!(found.tiles.count, 10);
     assert!(found.apart[1].largest.is_some_and(|off| off > 0.2), "{:?}", found.apart);
-    // The twin: where they decide, they differ.
+    // The twin: where the same tiles count, the pictures differ.
     assert_eq!(states(&plain(1, 0.01), &theirs), [State::Differs; 2]);
-    // Where nothing decides, that is said.
+    // Where no tile counts, the state is `undecided`.
     let glass = ShownKinds::new(&Picture::filled(SIZE.0, SIZE.1, 3), &kinds, &all_valid());
     let (_, checks) = compare("rgb", None, [&plain(1, 0.01), &theirs], &glass, LAMBERT_TILE);
     assert_eq!(checks.map(|check| check.state), [State::Undecided; 2]);
 }
 
-/// Rounding passes in bright and in dark pixels; a thousandth of a pixel more does not.
+/// Rounding passes in bright and in dark pixels; a larger difference does not.
 #[test]
 fn sums_of_groups() {
     let half = Picture::from_fn(8, 8, |x, y| LinearRgb([if x == 0 { 500.0 } else { 1e-4 * (y + 1) as f32 }; 3]));
@@ -204,7 +206,7 @@ fn sums_of_groups() {
     assert_eq!([off(0.9 * GROUP_SUM as f32), off(1.1 * GROUP_SUM as f32)], [State::Agrees, State::Differs]);
 }
 
-/// Halves of one seed are told; two of two seeds, and black ones, are none.
+/// Halves rendered with the same seed are reported; halves of two seeds, and black halves, are not.
 #[test]
 fn halves_of_one_seed() {
     let twice = |Halves { a, .. }: Halves| Halves { a: a.clone(), b: a };

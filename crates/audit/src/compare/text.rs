@@ -1,4 +1,4 @@
-//! The comparison as tables for people: numbers are rounded here, the JSON has them whole.
+//! Prints the comparison as tables. Numbers are rounded here; the JSON has all digits.
 
 use mateval_scene::text_table::{Table, row};
 
@@ -12,13 +12,13 @@ pub fn text(file: &CompareFile) -> String {
     format!("{tables}{gap}{faults}\n{}\n", verdict(file))
 }
 
-/// A line for every check that does not agree.
+/// One line for every check that does not agree.
 pub fn faults(file: &CompareFile) -> Vec<String> {
     let faults = file.checks().filter(|(_, _, check)| check.state != State::Agrees);
     faults.map(|(scene, view, check)| format!("{scene} {view}: {check}")).collect()
 }
 
-/// In one line.
+/// The verdict in one line.
 pub fn verdict(file: &CompareFile) -> String {
     let count = |state: State| file.checks().filter(|(_, _, check)| check.state == state).count();
     let all = file.checks().count();
@@ -33,7 +33,11 @@ pub fn verdict(file: &CompareFile) -> String {
     let others: Vec<String> = others.map(|(count, word)| format!("{count} {word}")).collect();
     let rest = if others.is_empty() { String::new() } else { format!(", {}", others.join(", ")) };
     let verdict = if file.agrees { "agrees" } else { "does NOT agree" };
-    format!("{} {verdict} with our tracer: {} of {all} checks agree{rest}", file.renderer, count(State::Agrees))
+    format!(
+        "{} {verdict} with the built-in tracer: {} of {all} checks agree{rest}",
+        file.renderer,
+        count(State::Agrees)
+    )
 }
 
 fn views(file: &CompareFile) -> impl Iterator<Item = (&SceneComparison, &ViewComparison)> {
@@ -96,14 +100,14 @@ fn light(file: &CompareFile) -> Table {
     bounds.dedup();
     let bounds: Vec<String> = bounds.iter().map(|bound| format!("{} %", 100.0 * bound)).collect();
     let title = format!(
-        "Pictures of light: how far the mean is off, and its standard error; tiles over {} and 3 standard errors; \
-         tiles apart; noise: 3 standard errors of a tile over the bound",
+        "Pictures of light. mean off: difference of the means, error: its standard error; over: tiles off by more than {} \
+         plus 3 standard errors; apart: tiles that do not count; noise: 3 standard errors of a tile / bound",
         bounds.join(" or ")
     );
     Table { title, words: 4, rows }
 }
 
-/// The worse of the picture's two checks.
+/// The worse state of the picture's two checks.
 fn state(view: &ViewComparison, light: &LightComparison) -> State {
     let state = |quantity| view.check(&light.picture, quantity).map_or(State::Undecided, |check| check.state);
     let states = [state(Quantity::TilesOver), state(Quantity::MeanDifference)];
@@ -118,7 +122,7 @@ fn name(light: &LightComparison) -> String {
     }
 }
 
-/// Tiles that decide nothing, of RGB.
+/// The tiles of RGB that do not count for the verdict.
 fn apart(file: &CompareFile) -> Table {
     let mut rows = vec![row(["scene", "view", "kind", "tiles", "over", "median", "largest"])];
     for (scene, view) in views(file) {
@@ -135,7 +139,7 @@ fn apart(file: &CompareFile) -> Table {
         }
     }
     Table {
-        title: "Tiles of RGB apart: they show what is known to differ, and decide nothing".to_owned(),
+        title: "Tiles of RGB that show materials known to differ; they do not count for the verdict".to_owned(),
         words: 3,
         rows,
     }

@@ -1,7 +1,7 @@
-//! Differences of noisy pictures, tile by tile.
+//! Measures differences of noisy pictures, tile by tile.
 //!
-//! In: two halves of a picture from either renderer. A pixel's mean of halves a and b has the variance ((a - b) / 2)² on
-//! the average, whatever the distribution; over a tile's pixels these add up, and over both renderers.
+//! In: two halves of a picture from each renderer. The mean of a pixel's halves a and b has a variance whose expected value
+//! is that of ((a - b) / 2)², whatever the distribution. The variances of a tile's pixels and of both renderers add up.
 
 use std::ops::Range;
 
@@ -12,31 +12,31 @@ use super::bounds::{FALSE_ALARM, STANDARD_ERRORS, TILE_SHARE_OVER};
 /// Pixels along a tile's side.
 pub(super) const TILE: usize = 16;
 
-/// Two independent estimates of one picture, of one size.
+/// Two independent estimates of the same picture, of the same size.
 #[derive(Clone, Debug)]
 pub(super) struct Halves {
     pub(super) a: Picture<LinearRgb>,
     pub(super) b: Picture<LinearRgb>,
 }
 
-/// A rectangle of a picture.
+/// A rectangle of pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Tile {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,
 }
 
-/// How far the means over some pixels are apart, channel by channel: theirs minus ours.
+/// The difference of two pictures' means over some pixels, by channel: theirs minus ours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Difference {
-    /// Of the means.
+    /// The difference of the means.
     pub(super) mean: [f64; 3],
     /// Their standard errors.
     pub(super) error: [f64; 3],
 }
 
-/// The picture in tiles of 16x16 pixels. What remains at the right and lower edge is a tile of its own from 8 pixels on;
-/// less belongs to the neighbour, since the variance of a few pixels is not known well enough for a test.
+/// Divides a picture into tiles of 16x16 pixels. A remainder of at least 8 pixels at the right or lower edge is a tile of its
+/// own. A smaller one belongs to its neighbour, since the variance of a few pixels is not known well enough for a test.
 pub(super) fn tiles(width: usize, height: usize) -> Vec<Tile> {
     let columns = cuts(width);
     let rows = cuts(height);
@@ -51,14 +51,14 @@ fn cuts(length: usize) -> Vec<Range<usize>> {
 }
 
 impl Tile {
-    /// Columns and rows of its pixels, row by row.
+    /// Column and row of each of its pixels, row by row.
     pub(super) fn pixels(&self) -> impl Iterator<Item = (usize, usize)> {
         self.rows.clone().flat_map(|y| self.columns.clone().map(move |x| (x, y)))
     }
 }
 
 impl Halves {
-    /// The mean of each channel over some pixels; 0 over none.
+    /// The mean of each channel over these pixels; 0 where there are none.
     pub(super) fn means(&self, pixels: &[(usize, usize)]) -> [f64; 3] {
         let mut sum = [0.0_f64; 3];
         for &(x, y) in pixels {
@@ -70,7 +70,7 @@ impl Halves {
         sum.map(|sum| sum / pixels.len().max(1) as f64)
     }
 
-    /// The mean of both halves.
+    /// The mean of the two halves.
     pub(super) fn mean(&self) -> Picture<LinearRgb> {
         let pixel = |(a, b): (&LinearRgb, &LinearRgb)| LinearRgb([0, 1, 2].map(|c| (a.0[c] + b.0[c]) / 2.0));
         let pixels = self.a.pixels().iter().zip(self.b.pixels()).map(pixel).collect();
@@ -78,7 +78,7 @@ impl Halves {
     }
 }
 
-/// The difference of the means over some pixels.
+/// The difference of the two pictures' means over these pixels.
 pub(super) fn difference(
     ours: &Halves,
     theirs: &Halves,
@@ -98,8 +98,8 @@ pub(super) fn difference(
 }
 
 impl Difference {
-    /// How far it is off in each channel over what is allowed there: the bound, times `scale`, and three standard
-    /// errors. Above 1 it is over; a channel that is black in both is 0.
+    /// The difference in each channel divided by what is allowed there: the bound times `scale`, plus three standard errors.
+    /// Above 1 the channel is over the bound; a channel that is black in both pictures gives 0.
     pub(super) fn excess(&self, bound: f64, scale: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|c| match self.mean[c].abs() {
             0.0 => 0.0,
@@ -107,25 +107,25 @@ impl Difference {
         })
     }
 
-    /// The channel that is furthest off, by [`Self::excess`].
+    /// The channel with the largest [`Self::excess`].
     pub(super) fn worst_channel(&self, bound: f64, scale: [f64; 3]) -> usize {
         let excess = self.excess(bound, scale);
         (1..3).fold(0, |worst, c| if excess[c] > excess[worst] { c } else { worst })
     }
 
-    /// Whether it is over in any channel.
+    /// Whether any channel is over the bound.
     pub(super) fn is_over(&self, bound: f64, scale: [f64; 3]) -> bool {
         self.excess(bound, scale).iter().any(|excess| *excess > 1.0)
     }
 
-    /// Three standard errors over the bound, in the channel where that is most; none where nothing has a scale.
+    /// Three standard errors divided by the bound, in the channel where this is largest; none where `scale` is 0 in all.
     pub(super) fn noise(&self, bound: f64, scale: [f64; 3]) -> Option<f64> {
         let of = |c: usize| (scale[c] > 0.0).then(|| STANDARD_ERRORS * self.error[c] / (bound * scale[c]));
         (0..3).filter_map(of).max_by(f64::total_cmp)
     }
 
-    /// The chance (at most) that noise alone puts it over where the expectations are equal: two tails of a normal in
-    /// each channel.
+    /// An upper limit of the probability that noise alone puts it over the bound where the expected values are equal: two
+    /// tails of a normal distribution in each channel.
     fn false_alarm(&self, bound: f64, scale: [f64; 3]) -> f64 {
         let tails = |c: usize| {
             let errors = STANDARD_ERRORS + bound * scale[c] / self.error[c];
@@ -135,17 +135,17 @@ impl Difference {
     }
 }
 
-/// How many of the tiles may be over, and how many noise alone puts there on the average: 1 %, and as many as noise alone
-/// exceeds at most once in 1000 pictures. Where noise is small against the bound the latter is 0; where it is not, three
-/// channels at three standard errors would spend the 1 % on noise.
+/// How many of the tiles may be over the bound, and how many noise alone puts there on average. Allowed are 1 % of the tiles,
+/// plus the number that noise alone exceeds at most once in 1000 pictures. The latter is 0 where the noise is small compared
+/// with the bound. Where it is not, three channels at three standard errors would use up the 1 % for noise.
 pub(super) fn allowance(tiles: &[Difference], bound: f64, scale: [f64; 3]) -> (usize, f64) {
     let expected = tiles.iter().map(|tile| tile.false_alarm(bound, scale)).sum();
     ((TILE_SHARE_OVER * tiles.len() as f64) as usize + poisson_quantile(expected), expected)
 }
 
-/// The least k that a Poisson variable of this mean exceeds with a probability of at most [`FALSE_ALARM`].
+/// The smallest k that a Poisson variable of this mean exceeds with a probability of at most [`FALSE_ALARM`].
 fn poisson_quantile(mean: f64) -> usize {
-    // Far from 0 it is nearly normal, and 3.3 deviations are more than enough for its skewness.
+    // For a large mean the distribution is nearly normal, and 3.3 standard deviations cover its skewness as well.
     if mean > 100.0 {
         return (mean + 3.3 * mean.sqrt()).ceil() as usize;
     }
@@ -160,7 +160,7 @@ fn poisson_quantile(mean: f64) -> usize {
     k
 }
 
-/// The middle value, or the mean of the two middle ones; none of nothing.
+/// The middle value, or the mean of the two middle values; none of an empty list.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;

@@ -1,4 +1,4 @@
-//! Materials as Mitsuba's BSDF plugins.
+//! Writes materials as Mitsuba's BSDF plugins.
 
 use mateval_image::ImageError;
 use mateval_scene::material::{
@@ -9,7 +9,7 @@ use super::element::Element;
 use super::remarks::Remarks;
 use super::texture::TextureFiles;
 
-/// The material as a plugin; what Mitsuba cannot say goes to `remarks`.
+/// The material as a plugin. `remarks` receives what Mitsuba cannot express.
 pub(super) fn bsdf(
     material: &Material,
     place: &str,
@@ -21,9 +21,9 @@ pub(super) fn bsdf(
     let transmits = !material.has_appearance();
     let inner = if material.two_sided && !transmits { Element::plugin("bsdf", "twosided").child(inner) } else { inner };
     let inner = match &material.bump {
-        // The same height everywhere bends nothing.
+        // A constant height bends no normals.
         Some(bump) if matches!(bump.height, ScalarInput::Texture { .. }) => {
-            // Mitsuba's softer terminator and its repair of bent normals came after the scenes that this is for.
+            // Mitsuba's softened terminator and its correction of bent normals are newer than the source scenes.
             let around = Element::plugin("bsdf", "bumpmap")
                 .float("scale", bump.scale)
                 .boolean("use_shadowing_function", false)
@@ -34,8 +34,13 @@ pub(super) fn bsdf(
     };
     match &material.opacity {
         Some(opacity) => {
-            let text = "Mitsuba counts a passage through the surface as a scattering";
-            writer.remarks.note("mask_counts", place, text, "paths through many such surfaces end earlier there");
+            let text = "Mitsuba counts passing through the surface as a scattering";
+            writer.remarks.note(
+                "mask_counts",
+                place,
+                text,
+                "wrote it; paths through many such surfaces end earlier in Mitsuba",
+            );
             Ok(writer.files.scalar(Element::plugin("bsdf", "mask"), "opacity", opacity)?.child(inner))
         }
         None => Ok(inner),
@@ -97,19 +102,19 @@ impl Writer<'_, '_> {
             self.warn("blender_principled", "Mitsuba's `principled` is not Blender's", "wrote Mitsuba's");
         }
         if specular <= 0.0 || specular > 1.0 {
-            let message = format!("specular {specular}; Mitsuba takes numbers above 0 and up to 1");
+            let message = format!("specular is {specular}; Mitsuba takes numbers above 0 and up to 1");
             self.warn("specular", &message, "wrote it as it is");
         }
     }
 
     fn color(&mut self, bsdf: Element, name: &'static str, input: &ColorInput) -> Result<Element, ImageError> {
         let ColorInput::Constant(rgb) = input else { return self.files.color(bsdf, name, input) };
-        let held = rgb.map(|v| v.clamp(0.0, 1.0));
-        if held != *rgb {
-            let message = format!("{name} is {rgb:?}; Mitsuba takes 0 to 1");
-            self.warn("color_range", &message, "held it in that range");
+        let clamped = rgb.map(|v| v.clamp(0.0, 1.0));
+        if clamped != *rgb {
+            let message = format!("{name} is {rgb:?}; Mitsuba takes numbers from 0 to 1");
+            self.warn("color_range", &message, "clamped it to that range");
         }
-        Ok(bsdf.rgb(name, held))
+        Ok(bsdf.rgb(name, clamped))
     }
 
     fn microfacets(

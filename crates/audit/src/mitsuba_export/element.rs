@@ -1,8 +1,8 @@
-//! XML as Mitsuba 3 reads it: elements that are plugins, and their parameters.
+//! XML as Mitsuba 3 reads it: elements for plugins and their parameters.
 
 use std::fmt::Write as _;
 
-/// An XML element, or a remark between elements.
+/// An XML element.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Element {
     tag: &'static str,
@@ -28,7 +28,7 @@ impl Element {
         self
     }
 
-    /// The name under which the element is a parameter of its parent.
+    /// Sets the name under which the element is a parameter of its parent.
     pub(super) fn named(self, name: &'static str) -> Self {
         self.attribute("name", name)
     }
@@ -65,14 +65,15 @@ impl Element {
         self.child(Self::new("transform").named(name).child(Self::new("matrix").attribute("value", value)))
     }
 
-    /// A comment before the element that tells a source's name; what XML or a terminal could take amiss is replaced.
+    /// Sets a comment before the element that names what it was made from. Characters that could end the comment or control
+    /// a terminal are replaced.
     pub(super) fn remark(mut self, name: &str) -> Self {
         let plain = |c: char| if c.is_alphanumeric() || " ._/()".contains(c) { c } else { '_' };
         self.remark = Some(name.chars().take(100).map(plain).collect());
         self
     }
 
-    /// A document whose root this is.
+    /// The text of the document whose root is this element.
     pub(super) fn document(&self) -> String {
         let mut text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n".to_owned();
         self.write(&mut text, 0);
@@ -82,7 +83,7 @@ impl Element {
     fn write(&self, text: &mut String, depth: usize) {
         let indent = "    ".repeat(depth);
         if let Some(remark) = &self.remark {
-            // Writing to a String cannot fail, here and below.
+            // Writing to a String cannot fail, neither here nor below.
             let _ = writeln!(text, "{indent}<!-- {remark} -->");
         }
         let _ = write!(text, "{indent}<{}", self.tag);
@@ -103,7 +104,7 @@ fn value_element(tag: &'static str, name: &'static str, value: String) -> Elemen
     Element::new(tag).named(name).attribute("value", value)
 }
 
-/// The shortest decimal that reads back as the same number; single precision stays as short as it was.
+/// The shortest decimal that reads back as the same number; the shorter one where single precision suffices.
 fn number(value: f64) -> String {
     // Turns -0 into 0.
     let value = value + 0.0;
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn strange_values_stay_values() {
+    fn values_cannot_break_the_markup() {
         let value = "\"/><&evil;";
         let text = Element::new("scene").string("filename", value).document();
         let read = roxmltree::Document::parse(&text).unwrap();

@@ -1,4 +1,4 @@
-//! Lights: what surfaces glow with, and what shines from outside.
+//! Writes lights: surfaces that emit, and the light from outside.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,15 +14,16 @@ use super::remarks::Remarks;
 use super::texture;
 use super::unfolded::is_unfolded;
 
-/// What a surface glows with.
+/// The emission of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Glow {
-    /// The emitter of the shape; it glows on the shape's front.
+    /// The shape's emitter, which emits from the shape's front.
     pub(super) element: Element,
+    /// Whether the back emits too.
     pub(super) two_sided: bool,
 }
 
-/// Which surfaces glow, and with what; maps go to files below `folder`.
+/// The emission of every surface that emits. Emission maps are written to files below `folder`.
 pub(super) fn glows(
     folder: &Path,
     scene: &ReferenceScene,
@@ -33,15 +34,15 @@ pub(super) fn glows(
     for (index, group) in scene.lights.iter().enumerate() {
         let place = place(index, group);
         if !group.camera_visible {
-            let message = "Mitsuba cannot hide one light from the camera alone";
+            let message = "Mitsuba cannot hide a light from the camera alone";
             remarks.warn("camera_invisible", &place, message, "wrote it visible");
         }
         let Emission::Area { surfaces, radiance, map, two_sided } = &group.emission else { continue };
-        let bitmap = match map.filter(|map| differs(&textures[map.texture.0], radiance)) {
+        let bitmap = match map.filter(|map| needs_map(&textures[map.texture.0], radiance)) {
             Some(map) => Some(texture::radiance(folder, index, &textures[map.texture.0], &map.uv, *radiance)?),
             None => None,
         };
-        // Without uv the map is looked up at one place.
+        // A mesh without uv looks up the map at a single place.
         let constant = map.map_or(*radiance, |map| product(radiance, &map.at(textures, Vec2::ZERO)));
         for surface in surfaces {
             let Surface { mesh, material, .. } = &scene.surfaces[surface.0];
@@ -55,7 +56,7 @@ pub(super) fn glows(
             };
             glows.insert(*surface, Glow { element, two_sided: *two_sided });
             if scene.materials[material.0].opacity.is_some() {
-                let message = "a masked surface glows; in Mitsuba it glows where it is masked out too";
+                let message = "a masked surface emits; in Mitsuba its transparent places emit too";
                 remarks.warn("masked_light", &place, message, "wrote it as it is");
             }
         }
@@ -65,13 +66,13 @@ pub(super) fn glows(
 
 fn remark_folds(mesh: &TriangleMesh, place: &str, remarks: &mut Remarks) {
     if !is_unfolded(mesh) {
-        let message = "uv of a textured light overlap or leave 0..1; Mitsuba finds its places by their uv";
-        remarks.warn("folded_light", place, message, "wrote it as it is; Mitsuba's picture of it is wrong");
+        let message = "the uv of a textured light overlap or leave 0..1; Mitsuba finds places on the light by their uv";
+        remarks.warn("folded_light", place, message, "wrote it as it is; Mitsuba renders it wrongly");
     }
 }
 
-/// Whether the light is not the same all over, nor black, which Mitsuba could not sample.
-fn differs(texture: &Texture, radiance: &[f32; 3]) -> bool {
+/// Whether the light needs a map: it has several texels, and is not black, which Mitsuba could not sample.
+fn needs_map(texture: &Texture, radiance: &[f32; 3]) -> bool {
     let (width, height) = (texture.width(), texture.height());
     let mut texels = (0..width * height).map(|k| texture.texel(k % width, k / width));
     width * height > 1 && texels.any(|texel| product(radiance, &texel).iter().any(|v| *v > 0.0))
@@ -81,7 +82,7 @@ fn product(a: &[f32; 3], b: &[f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] * b[c])
 }
 
-/// The light from far outside: Mitsuba takes one.
+/// The light from infinitely far away, of which Mitsuba takes one.
 pub(super) fn distant(
     folder: &Path,
     scene: &ReferenceScene,
@@ -92,7 +93,7 @@ pub(super) fn distant(
     for (index, group) in scene.lights.iter().enumerate() {
         let is_area = matches!(group.emission, Emission::Area { .. });
         if !is_area && found.is_some() {
-            let message = "a second light from outside; Mitsuba takes one";
+            let message = "this is the second light from outside; Mitsuba takes one";
             remarks.warn("second_environment", &place(index, group), message, "left it out");
             continue;
         }
@@ -120,12 +121,13 @@ fn place(index: usize, group: &LightGroup) -> String {
     format!("light {index} '{}'", group.name)
 }
 
-/// The map as Mitsuba 3 looks it up. Its rows lie at i / (rows - 1) of the way from pole to pole, ours at
-/// (i + 0.5) / rows: with 2 * rows + 1 of them, ours are its odd ones, the even ones lie halfway between (at the poles,
-/// where ours are held, they repeat the nearest), and linear interpolation between them gives the same everywhere.
+/// The map resampled for Mitsuba 3, which looks it up in another way: its row i lies at i / (rows - 1) of the way from pole
+/// to pole, ours at (i + 0.5) / rows. With 2 * rows + 1 rows, ours become the odd ones. The even ones lie halfway between
+/// them, or repeat the nearest row at the poles, where our lookup clamps. Linear interpolation then gives the same values
+/// everywhere.
 fn stretched(texture: &Texture) -> Picture<LinearRgb> {
     let (width, height) = (texture.width(), texture.height());
-    // Mitsuba wants two columns at least.
+    // Mitsuba requires at least two columns.
     Picture::from_fn(width.max(2), 2 * height + 1, |x, y| {
         let x = x % width;
         let above = texture.texel(x, (y.max(1) - 1) / 2);
@@ -140,7 +142,7 @@ mod tests {
 
     use super::*;
 
-    /// Linear interpolation at every height gives the same from both pictures.
+    /// Linear interpolation gives the same value in both pictures at every height.
     #[test]
     fn stretching_changes_no_lookup() {
         let texture = Texture::new(1, 3, Texels::Grey(vec![1.0, 5.0, 2.0]), Wrap::Clamp).unwrap();

@@ -1,11 +1,12 @@
-//! A scene for Mitsuba 3, that means there what it means to our tracer.
+//! Writes a scene for Mitsuba 3 that means the same there as to the built-in tracer.
 //!
-//! In: a [`ReferenceScene`], a [`Camera`], [`RenderSettings`]; or a view of a dataset. Out: a folder with `scene.xml`
-//! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings: a warning for all that Mitsuba cannot say, which
-//! stands in the scene as the nearest that it can.
+//! In: a [`ReferenceScene`], a [`Camera`] and [`RenderSettings`], or a view of a dataset. Out: a folder with `scene.xml`
+//! (version 3.0.0), `meshes/*.ply` and `textures/*`; and findings, with a warning for everything that Mitsuba cannot express.
+//! The scene contains the nearest that it can.
 //!
-//! Between: `sensor` turns the camera, `ply` writes meshes, `bsdf` materials (with `texture`), `emitter` lights
-//! (with `texture` and `unfolded`), `element` the XML. Names of the source are remarks in the XML and nothing else, so they cannot lead anywhere.
+//! Between: `sensor` converts the camera, `ply` meshes, `bsdf` materials (with `texture`) and `emitter` lights (with
+//! `texture` and `unfolded`); `element` writes the XML. Names of the source appear in comments of the XML only, so that no
+//! name can become a path or markup.
 
 mod bsdf;
 mod element;
@@ -39,29 +40,29 @@ use ply::Sheet;
 use remarks::{Remarks, SCENE_FILE};
 use texture::TextureFiles;
 
-/// The second sheet of a lamp that glows on both sides lies this far behind the first, as a part of the mesh's extent.
+/// Distance of the second sheet of a lamp that emits on both sides behind the first, as a share of the mesh's extent.
 const SHEET_DISTANCE: f32 = 1e-4;
 
-/// A view of a dataset that is to be exported.
+/// The view of a dataset to export.
 #[derive(Clone, Debug)]
 pub struct ExportOptions {
-    /// The dataset's folder; its ground truth must be there.
+    /// The dataset's folder, which must contain the ground truth.
     pub dataset: PathBuf,
-    /// Which scene.
+    /// The scene.
     pub scene: SceneId,
-    /// Which view.
+    /// The view.
     pub view: ViewId,
-    /// Samples a pixel; the recipe's where absent.
+    /// Samples per pixel; the recipe's number where absent.
     pub samples: Option<u32>,
-    /// The folder to be made.
+    /// The folder to write.
     pub out: PathBuf,
-    /// Replace what is there.
+    /// Replace a folder that already exists.
     pub force: bool,
 }
 
-/// Writes a view of a dataset. Gives the findings of [`export`].
+/// Writes a view of a dataset. Returns the findings of [`export`].
 ///
-/// Fails where the dataset, the scene or the view is not there, or the output is.
+/// Fails where the dataset, the scene or the view does not exist, or the output does.
 pub fn export_view(options: &ExportOptions) -> Result<Vec<Finding>, AuditError> {
     check_free(&options.out, options.force, "folder")?;
     let dataset = Dataset::open(&options.dataset)?;
@@ -85,9 +86,9 @@ fn find_view<'d>(dataset: &'d Dataset, options: &ExportOptions) -> Result<&'d Vi
     })
 }
 
-/// Writes the scene into the folder `out`, which is there whole or not at all; one that is there is replaced.
+/// Writes the scene to the folder `out`, replacing one that exists. After a failure no partial folder is left.
 ///
-/// Of the settings it takes samples, seed and `max_bounces`. Warnings tell what means something else in Mitsuba. Fails
+/// Of the settings it uses samples, seed and `max_bounces`. A warning reports what means something else in Mitsuba. Fails
 /// where a file cannot be written.
 pub fn export(
     scene: &ReferenceScene,
@@ -135,7 +136,7 @@ fn write_scene(
     })
 }
 
-/// Materials that surfaces use, each under an id.
+/// The materials that surfaces use, each with an id.
 fn write_materials(
     scene: &ReferenceScene,
     folder: &Path,
@@ -157,7 +158,7 @@ fn material_id(index: usize) -> String {
     format!("material_{index}")
 }
 
-/// The surface's shape; two for one that glows on both sides, none where it has no triangles.
+/// The shapes of a surface: usually one, two where it emits on both sides, none where it has no triangles.
 fn write_surface(
     folder: &Path,
     index: usize,
@@ -172,18 +173,23 @@ fn write_surface(
     let bent = ply::bent_triangles(&surface.mesh);
     if bent > 0 && glow.is_none() {
         let message = format!("{bent} triangles have a vertex normal behind their front");
-        remarks.note("bent_normals", &place, &message, "wrote them; Mitsuba shades them otherwise near the edge");
+        remarks.note(
+            "bent_normals",
+            &place,
+            &message,
+            "wrote them; Mitsuba shades them differently near the silhouette",
+        );
     }
     let mut sheets = vec![(format!("meshes/{index}.ply"), if glow.is_some() { Sheet::Flat } else { Sheet::Whole })];
     if glow.is_some_and(|glow| glow.two_sided) {
         let distance = SHEET_DISTANCE * extent(surface);
-        let message = "the surface glows on both sides; Mitsuba's glow on one";
+        let message = "the surface emits on both sides; Mitsuba's surfaces emit on one";
         let action = format!("wrote a second sheet {distance} m behind it");
         remarks.note("two_sided_light", &place, message, &action);
         sheets.push((format!("meshes/{index}_back.ply"), Sheet::Behind(distance)));
     }
     if glow.is_some() && surface.mesh.normals.is_some() {
-        let message = "the surface glows; Mitsuba's emitters confuse vertex normals with the shape";
+        let message = "the surface emits; Mitsuba's emitters take vertex normals for those of the shape";
         remarks.note("flat_light", &place, message, "wrote it without vertex normals");
     }
     let mut shapes = Vec::new();
@@ -201,7 +207,7 @@ fn write_surface(
     Ok(shapes)
 }
 
-/// The diagonal of the box around the surface, in metres.
+/// The diagonal of the surface's bounding box, in metres.
 fn extent(surface: &Surface) -> f32 {
     let positions = || surface.mesh.positions.iter().copied();
     let low = positions().reduce(glam::Vec3::min).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Meshes as binary PLY, turned so that Mitsuba sees the same fronts as our tracer.
+//! Writes meshes as binary PLY, oriented so that Mitsuba takes the same side as the front as the built-in tracer does.
 
 use glam::Vec3;
 use mateval_scene::TriangleMesh;
@@ -6,7 +6,7 @@ use mateval_scene::TriangleMesh;
 /// How a mesh is written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Sheet {
-    /// As it is.
+    /// The mesh as it is.
     Whole,
     /// Without vertex normals.
     Flat,
@@ -14,10 +14,10 @@ pub(super) enum Sheet {
     Behind(f32),
 }
 
-/// The mesh as a PLY file, and whether it holds vertex normals.
+/// The mesh as a PLY file, and whether the file has vertex normals.
 ///
-/// Our tracer takes the side of the vertex normals as the front, Mitsuba that from which the corners run
-/// counter-clockwise: where they disagree the corners are turned round. uv are written as they are.
+/// The built-in tracer takes the side of the vertex normals as the front, Mitsuba the side from which the corners run
+/// counter-clockwise. Where the two disagree the order of the corners is reversed. uv are written as they are.
 pub(super) fn bytes(mesh: &TriangleMesh, sheet: Sheet) -> (Vec<u8>, bool) {
     let normals = mesh.normals.as_ref().filter(|_| sheet == Sheet::Whole);
     let mut vertices = Vec::new();
@@ -36,7 +36,7 @@ pub(super) fn bytes(mesh: &TriangleMesh, sheet: Sheet) -> (Vec<u8>, bool) {
         let mut corners = if front.turned { [triangle[0], triangle[2], triangle[1]] } else { *triangle };
         let needs_own = match sheet {
             Sheet::Behind(_) => true,
-            // Nothing to interpolate: our tracer takes the triangle's own normal.
+            // The vertex normals cancel out, and the built-in tracer takes the triangle's own normal.
             Sheet::Whole => normals.is_some() && front.sum == Vec3::ZERO,
             Sheet::Flat => false,
         };
@@ -73,9 +73,9 @@ pub(super) fn bent_triangles(mesh: &TriangleMesh) -> usize {
 
 /// The side of a triangle that counts as its front.
 struct Front {
-    /// Of the triangle itself, on its front.
+    /// Normal of the triangle itself, on its front.
     normal: Vec3,
-    /// Of the vertices.
+    /// Sum of the vertex normals.
     sum: Vec3,
     /// Whether the corners run clockwise, seen from the front.
     turned: bool,
@@ -95,8 +95,8 @@ fn put(bytes: &mut Vec<u8>, values: &[f32]) {
 }
 
 fn header(vertices: usize, faces: usize, normals: bool, uvs: bool) -> String {
-    let properties = |names: &str, there: bool| -> String {
-        names.split(' ').filter(|_| there).map(|name| format!("property float {name}\n")).collect()
+    let properties = |names: &str, present: bool| -> String {
+        names.split(' ').filter(|_| present).map(|name| format!("property float {name}\n")).collect()
     };
     format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {vertices}\n{}{}{}element face {faces}\n\
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_run_counter_clockwise_before_the_front() {
+    fn corners_run_counter_clockwise_seen_from_the_front() {
         let (bytes, normals) = bytes(&square(), Sheet::Whole);
         assert!(normals && corners(&bytes).into_iter().all(|face| normal(face) == -Vec3::Z));
         assert_eq!(bent_triangles(&square()), 0);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_without_sound_normals_gets_its_own() {
+    fn a_triangle_whose_vertex_normals_are_zero_gets_its_own() {
         let mut mesh = square();
         mesh.normals = Some(vec![Vec3::ZERO; 4]);
         let (bytes, _) = bytes(&mesh, Sheet::Whole);

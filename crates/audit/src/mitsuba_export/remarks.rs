@@ -1,26 +1,26 @@
-//! What Mitsuba cannot say, gathered on the way.
+//! Collects findings about what Mitsuba cannot express.
 
 use mateval_scene::{Finding, Severity};
 
-/// The file that findings name.
+/// The name of the exported scene's file, which all findings refer to.
 pub(super) const SCENE_FILE: &str = "scene.xml";
 
-/// Findings so far.
+/// The findings so far.
 #[derive(Default)]
 pub(super) struct Remarks(Vec<Finding>);
 
 impl Remarks {
-    /// The exported scene means something else here.
+    /// Adds a warning: this part of the exported scene means something else in Mitsuba.
     pub(super) fn warn(&mut self, code: &str, place: &str, message: &str, action: &str) {
         self.add(Severity::Warning, code, place, message, action);
     }
 
-    /// It means the same, or so nearly that only a very long render would tell.
+    /// Adds a note: this part means the same in Mitsuba, or differs so little that only a very long render would show it.
     pub(super) fn note(&mut self, code: &str, place: &str, message: &str, action: &str) {
         self.add(Severity::Note, code, place, message, action);
     }
 
-    /// All of them, sorted.
+    /// All findings, sorted and without duplicates.
     pub(super) fn sorted(mut self) -> Vec<Finding> {
         self.0.sort();
         self.0.dedup();

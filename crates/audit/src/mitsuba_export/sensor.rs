@@ -1,4 +1,4 @@
-//! The camera, its film and how light is followed.
+//! Writes the camera, its film and the integrator.
 
 use glam::DVec3;
 use mateval_scene::Camera;
@@ -8,12 +8,12 @@ use mateval_tracer::RenderSettings;
 use super::element::Element;
 use super::remarks::Remarks;
 
-/// Mitsuba's `max_depth` counts the camera's ray and the last piece of direct light too.
+/// The path tracer. Mitsuba's `max_depth` also counts the camera's ray and the last direct light, hence 2 more.
 pub(super) fn integrator(settings: &RenderSettings) -> Element {
     Element::plugin("integrator", "path").integer("max_depth", settings.max_bounces.saturating_add(2))
 }
 
-/// The camera with a box filter over pixels and independent samples.
+/// The camera, with a box filter over pixels and independent samples.
 pub(super) fn sensor(
     scene: &ReferenceScene,
     camera: &Camera,
@@ -23,7 +23,7 @@ pub(super) fn sensor(
     let k = &camera.intrinsics;
     if (k.fx / k.fy - 1.0).abs() > 1e-9 {
         let message = format!("focal lengths are {} and {} pixels; Mitsuba's pixels are square", k.fx, k.fy);
-        remarks.warn("square_pixels", "camera", &message, "wrote the first");
+        remarks.warn("square_pixels", "camera", &message, "wrote the first of them");
     }
     let (width, height) = (f64::from(k.width), f64::from(k.height));
     let fov = 2.0 * libm::atan(width / (2.0 * k.fx)).to_degrees();
@@ -51,12 +51,12 @@ pub(super) fn sensor(
         )
 }
 
-/// Mitsuba's camera looks along its +Z with +X to the left: x and z change sign.
+/// The camera's pose for Mitsuba, whose cameras look along +Z with +X to the left: x and z change sign.
 fn turned(camera: &Camera) -> [[f64; 4]; 4] {
     camera.world_from_camera.map(|[x, y, z, t]| [-x, y, -z, t])
 }
 
-/// The distance from the camera to the farthest corner of the box around the scene, in metres.
+/// The distance from the camera to the farthest corner of the scene's bounding box, in metres.
 fn reach(scene: &ReferenceScene, from: DVec3) -> f64 {
     let positions = || scene.surfaces.iter().flat_map(|surface| &surface.mesh.positions).map(|p| p.as_dvec3());
     let farthest = positions().map(|p| (p - from).abs()).reduce(DVec3::max).unwrap_or(DVec3::ONE);
@@ -69,8 +69,8 @@ mod tests {
 
     use super::*;
 
-    /// What Mitsuba does with its matrix and field of view (PEERS B3: +Z ahead, +X left), worked out here, sends the
-    /// picture's corner where our camera does.
+    /// The direction of the picture's corner, computed here from the matrix and field of view as Mitsuba does (PEERS B3: +Z
+    /// ahead, +X left), equals that of our camera.
     #[test]
     fn the_corner_pixel_looks_the_same_way() {
         let intrinsics = Intrinsics::from_fov_x(64, 48, 1.1);

@@ -1,4 +1,4 @@
-//! Whole exports: what is written, what is remarked, and that names lead nowhere.
+//! Whole exports: the files written, the findings, and that names of the source are harmless.
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_image::{LinearRgb, Texels, Wrap, exr_io};
@@ -46,7 +46,7 @@ fn camera() -> Camera {
     Camera::look_at(DVec3::Z * 3.0, DVec3::ZERO, DVec3::Y, Intrinsics::from_fov_x(8, 6, 1.0)).unwrap()
 }
 
-/// The codes of its findings and the text of its `scene.xml`; every file that this names must be there.
+/// The codes of an export's findings and the text of its `scene.xml`. Checks that every file that it refers to exists.
 fn exported(scene: &ReferenceScene) -> (Vec<(Severity, String)>, String) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
@@ -98,9 +98,9 @@ fn principled(flavour: PrincipledFlavour) -> Material {
     })
 }
 
-/// Each thing that Mitsuba cannot say is a warning of its own, and its twin that Mitsuba can say is none.
+/// Everything that Mitsuba cannot express gives a warning; the twin that it can express gives none.
 #[test]
-fn what_mitsuba_cannot_say_is_a_warning() {
+fn what_mitsuba_cannot_express_is_a_warning() {
     let changed = |change: &dyn Fn(&mut ReferenceScene)| {
         let mut scene = scene(vec![diffuse()]);
         change(&mut scene);
@@ -137,7 +137,8 @@ fn what_mitsuba_cannot_say_is_a_warning() {
     }
 }
 
-/// A lamp of both sides is two shapes, flat; another is one; a grey texture is written once for two uses.
+/// A lamp that emits on both sides becomes two flat shapes, any other surface one. A texture that is used twice is written
+/// once.
 #[test]
 fn shapes_and_files() {
     let mut scene = scene(vec![principled(PrincipledFlavour::Mitsuba), principled(PrincipledFlavour::Mitsuba)]);
@@ -152,7 +153,7 @@ fn shapes_and_files() {
     assert_eq!(exported(&ReferenceScene::default()).0, []);
 }
 
-/// The scene of one lamp of radiance (2, 3, 4) times the texture.
+/// A scene with one lamp, whose radiance is (2, 3, 4) times the texture.
 fn mapped_lamp() -> ReferenceScene {
     let mut scene = scene(vec![diffuse()]);
     let uv = UvTransform([[2.0, 0.0, 0.0], [0.0, 1.0, 0.25]]);
@@ -162,7 +163,7 @@ fn mapped_lamp() -> ReferenceScene {
     scene
 }
 
-/// A textured light is a bitmap of its radiance, in floats; a constant where nothing differs.
+/// A textured light becomes a bitmap of its radiance in floats, or a constant where all texels are equal.
 #[test]
 fn textured_lights() {
     let folder = tempfile::tempdir().unwrap();
@@ -203,9 +204,9 @@ fn textured_lights() {
     assert!(without_uv.contains("<rgb name=\"radiance\" value=\"0.8 1.2 1.6\"/>"), "{without_uv}");
 }
 
-/// Names that would leave a folder, an attribute or a comment, or paint a terminal.
+/// Names that try to leave a folder, an attribute or a comment, or to control a terminal.
 #[test]
-fn hostile_names_stay_remarks() {
+fn hostile_names_stay_comments() {
     let hostile =
         "../../etc/passwd --> <boom a=\"1\"/> <![CDATA[ &x; \u{1b}[31m\u{0}\n".to_owned() + &"long".repeat(9999);
     let mut scene = scene(vec![diffuse()]);
@@ -219,9 +220,9 @@ fn hostile_names_stay_remarks() {
     assert_eq!(document.descendants().filter(|node| node.has_tag_name("boom")).count(), 0);
 }
 
-/// What is there is replaced as a whole; a place that cannot be made is an error and leaves nothing.
+/// An existing folder is replaced as a whole. A folder that cannot be created is an error and leaves no files.
 #[test]
-fn the_folder_is_whole_or_not_there() {
+fn the_folder_is_complete_or_does_not_exist() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     std::fs::create_dir(&out).unwrap();

@@ -1,4 +1,4 @@
-//! Textures: files of their texels, and how they are looked up.
+//! Writes textures: files of their texels, and the parameters of their lookup.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,12 +9,12 @@ use mateval_scene::material::{ColorInput, ScalarInput, UvTransform};
 
 use super::element::Element;
 
-/// The textures of a scene, written to disk when they are first asked for.
+/// The textures of a scene. Each is written to disk when it is first used.
 pub(super) struct TextureFiles<'a> {
     /// The scene's folder.
     folder: &'a Path,
     textures: &'a [Texture],
-    /// The file of each texture and channel that was written; no channel for colours.
+    /// The file of each texture and channel that was written; the channel is none for colours.
     written: BTreeMap<(usize, Option<usize>), String>,
 }
 
@@ -78,8 +78,8 @@ impl<'a> TextureFiles<'a> {
     }
 }
 
-/// The texture times `radiance`, as the parameter of that name of the lights of group `group`; written below `folder`.
-/// Floats that are taken as they are: Mitsuba scales no texture, and takes those of a light for reflectances unless `raw`.
+/// The texture times `radiance`, as the parameter `radiance` of the lights of group `group`. It is written below `folder` as
+/// floats and marked `raw`: Mitsuba cannot scale a texture, and takes that of a light for a reflectance otherwise.
 pub(super) fn radiance(
     folder: &Path,
     group: usize,
@@ -89,7 +89,7 @@ pub(super) fn radiance(
 ) -> Result<Element, ImageError> {
     let (width, height) = (texture.width(), texture.height());
     let file = format!("textures/light_{group}.exr");
-    // Mitsuba wants two columns and two rows at least; a single one twice is looked up as the same.
+    // Mitsuba requires at least two columns and rows; repeating a single one does not change the lookup.
     let picture = Picture::from_fn(width.max(2), height.max(2), |x, y| {
         let texel = texture.texel(x % width, y % height);
         LinearRgb(std::array::from_fn(|c| radiance[c] * texel[c]))
@@ -113,14 +113,14 @@ fn bitmap(name: &'static str, file: String, raw: bool, wrap: Wrap, uv: &UvTransf
         .matrix("to_uv", rows_downwards(uv))
 }
 
-/// Mitsuba's v grows downwards in the picture, ours upwards; the mesh's uv are ours: v' = 1 - (ours).
+/// The transform for Mitsuba, whose v grows downwards in the picture. That of the mesh grows upwards, so v' = 1 - v.
 fn rows_downwards(uv: &UvTransform) -> [[f64; 4]; 4] {
     let [[a, b, c], [d, e, f]] = uv.0.map(|row| row.map(f64::from));
     [[a, b, 0.0, c], [-d, -e, 0.0, 1.0 - f], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Writes a texture's colours, or one of its channels, so that Mitsuba reads the very same numbers: bytes where they are
-/// encoded as Mitsuba decodes them, else floats. Gives the file's place below `folder`.
+/// Writes a texture's colours, or one of its channels, so that Mitsuba reads exactly the same numbers: as bytes where they
+/// are encoded as Mitsuba decodes them, otherwise as floats. Returns the file's path below `folder`.
 fn write(folder: &Path, texture: &Texture, index: usize, channel: Option<usize>) -> Result<String, ImageError> {
     let (width, height) = (texture.width(), texture.height());
     let stem = match channel {
@@ -159,7 +159,7 @@ fn write(folder: &Path, texture: &Texture, index: usize, channel: Option<usize>)
 mod tests {
     use super::*;
 
-    /// A point of the mesh's uv goes where our lookup reads it, counted from the picture's top.
+    /// The transform maps uv of the mesh to the place that our lookup reads, measured from the picture's top.
     #[test]
     fn the_transform_leads_to_the_same_texel() {
         let uv = UvTransform([[2.0, 0.5, 0.25], [-0.5, 3.0, 0.75]]);

@@ -1,13 +1,13 @@
-//! Whether a mesh's uv lead back to it: Mitsuba finds places on a textured light by their uv.
+//! Whether a mesh's uv are injective, as Mitsuba requires of a textured light: it finds places on the light by their uv.
 
 use glam::DVec2;
 use mateval_scene::TriangleMesh;
 
-/// What triangles may share by rounding, in uv.
+/// How far triangles may overlap by rounding, in uv.
 const SLACK: f64 = 1e-6;
 
-/// Whether every place of the mesh has a uv of its own within 0..1: triangles lie in the unit square, are no lines there,
-/// and overlap nowhere. Triangles without area in the world do not count.
+/// Whether every place of the mesh has its own uv within 0..1: triangles lie in the unit square, have area there, and do not
+/// overlap. Triangles without area in the world do not count.
 pub(super) fn is_unfolded(mesh: &TriangleMesh) -> bool {
     let Some(uvs) = &mesh.uvs else { return false };
     let has_area = |triangle: &usize| {
@@ -27,7 +27,7 @@ pub(super) fn is_unfolded(mesh: &TriangleMesh) -> bool {
     !charts.iter().enumerate().any(overlaps)
 }
 
-/// In the unit square, and no line.
+/// Whether the triangle lies in the unit square and has area.
 fn is_sound(chart: &[DVec2; 3]) -> bool {
     let inside = low(chart).min_element() >= -SLACK && high(chart).max_element() <= 1.0 + SLACK;
     let [a, b, c] = *chart;
@@ -42,7 +42,7 @@ fn high([a, b, c]: &[DVec2; 3]) -> DVec2 {
     a.max(*b).max(*c)
 }
 
-/// Whether no line along one of the six edges has the two triangles on its two sides.
+/// Whether the triangles overlap: no line along one of their six edges separates them.
 fn overlap(one: &[DVec2; 3], other: &[DVec2; 3]) -> bool {
     let apart = |edge: DVec2| {
         let along = |triangle: &[DVec2; 3]| triangle.map(|corner| corner.dot(edge.perp()));
@@ -60,7 +60,7 @@ mod tests {
 
     use super::*;
 
-    /// Two triangles that make a square, with uv from the square's own by `uv`.
+    /// Two triangles that form a square. `uv` maps a corner's position in the square to its uv.
     fn square(uv: impl Fn(Vec2) -> Vec2) -> TriangleMesh {
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y];
         TriangleMesh {
@@ -83,7 +83,7 @@ mod tests {
         assert!(!is_unfolded(&TriangleMesh { uvs: None, ..square(|uv| uv) }));
     }
 
-    /// A grid of many triangles; then one more on top of one of them, and one without area anywhere.
+    /// A grid of many triangles is unfolded. So it is with a triangle without area, but not with one on top of another.
     #[test]
     fn one_overlap_among_many_is_found() {
         let n = 20_u32;

@@ -1,4 +1,4 @@
-//! Meshes against `scene.json`, parts against instances, both against the reference; baked materials against atlases.
+//! Checks the dataset's meshes against the reference geometry, and baked materials against their atlases.
 
 use mateval_image::Wrap;
 use mateval_image::texture_io::{Encoding, read_texture};
@@ -11,12 +11,16 @@ use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::submission::Map;
 
-/// Whether the reference has the same triangles, to the last bit; if not, that is a fault.
-pub(super) fn is_reference(reference: &ReferenceScene, meshes: &Meshes, faults: &mut Faults) -> bool {
+/// Whether the reference has exactly the triangles of `instances.glb`. Every difference is reported as a fault.
+pub(super) fn matches_reference(reference: &ReferenceScene, meshes: &Meshes, faults: &mut Faults) -> bool {
     let before = faults.all.len();
     const FILE: &str = "ground_truth/reference/geometry.glb";
     if reference.surfaces.len() != meshes.instances.len() {
-        let message = format!("{} surfaces, {} instances", reference.surfaces.len(), meshes.instances.len());
+        let message = format!(
+            "{} surfaces, expected one for each of {} instances",
+            reference.surfaces.len(),
+            meshes.instances.len()
+        );
         faults.add("wrong_nodes", FILE, "", message);
         return false;
     }
@@ -25,14 +29,14 @@ pub(super) fn is_reference(reference: &ReferenceScene, meshes: &Meshes, faults: 
         let same = a.triangles.len() == b.triangles.len()
             && (0..a.triangles.len()).all(|triangle| a.corners(triangle) == b.corners(triangle));
         if !same {
-            let message = "its triangles are not those of instances.glb";
+            let message = "its triangles differ from those of instances.glb";
             faults.add("wrong_geometry", FILE, format!("node '{}'", node.name), message);
         }
     }
     faults.all.len() == before
 }
 
-/// Every atlas has its three baked maps, of its size.
+/// Checks that every atlas has its three baked maps, at the size of the atlas.
 pub(super) fn check_materials(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
     for instance in &scene.instances {
         let Some(atlas) = &instance.atlas else { continue };
@@ -43,14 +47,14 @@ pub(super) fn check_materials(folder: &SceneFolder, scene: &SceneFile, faults: &
             let Some(picture) = faults.read(&file, read) else { continue };
             let size = atlas.size as usize;
             if (picture.width(), picture.height()) != (size, size) {
-                let message = format!("{}x{} texels, expected {size}", picture.width(), picture.height());
+                let message = format!("{}x{} texels, expected {size}x{size}", picture.width(), picture.height());
                 faults.add("wrong_size", &file, "", message);
             }
         }
     }
 }
 
-/// The instances as opaque surfaces: what can be held against pictures where the ground truth is withheld.
+/// The instances as opaque surfaces, against which pictures are checked where the ground truth is withheld.
 pub(super) fn opaque(meshes: &Meshes) -> ReferenceScene {
     let material = Material {
         name: String::new(),

@@ -116,7 +116,7 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
             schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
             let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
             geometry::check_materials(folder, &scene, faults);
-            if !geometry::is_reference(&reference, &meshes, faults) {
+            if !geometry::matches_reference(&reference, &meshes, faults) {
                 return;
             }
             World::new(Arc::new(reference))

@@ -1,4 +1,4 @@
-//! The pictures of every view against meshes, ids and each other.
+//! Checks the pictures of every view against the meshes, the ids of `scene.json` and each other.
 
 use std::path::Path;
 
@@ -12,31 +12,32 @@ use mateval_prep::faults::Faults;
 use mateval_prep::scene_meshes::Meshes;
 use mateval_prep::views::{SeenTriangle, ViewPixel, ViewScene};
 
-/// Every so many-th column and row is traced again; prime, so that no pattern of the picture hides between.
+/// Distance between the columns and rows that are traced again. It is prime, so that no regular pattern escapes the check.
 const STRIDE: usize = 7;
-/// Share of its depth by which a pixel may miss its mesh: half a step of an f32 and what the ray's own rounding adds.
+/// Largest relative error of a depth: half a unit in the last place of an f32, and the rounding of the ray.
 const DEPTH_SLACK: f64 = 1e-5;
-/// Share of traced pixels that may differ in ids or depth (rays that graze an edge on another machine).
+/// Share of the traced pixels that may differ, since rays that graze an edge may differ between machines.
 const STRAYS: f64 = 0.002;
-/// How far a normal's length may be from one: half floats.
+/// Largest deviation of a normal's length from 1, and of its components: normals are stored as half floats.
 const NORMAL_SLACK: f32 = 2e-3;
 
-/// A view's pictures, all of one size.
+/// The pictures of a view, all of the same size.
 struct ViewPictures {
     depth: Picture<f32>,
     normal: Picture<Normal>,
     instance: Picture<u16>,
-    /// One a set of parts.
+    /// One picture per set of parts.
     parts: Vec<Picture<u16>>,
     valid: Mask,
     unobserved: Option<Mask>,
 }
 
+/// Checks the pictures of every view of the scene.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, meshes: &Meshes, world: &World, faults: &mut Faults) {
     let instances: Vec<u16> = scene.instances.iter().map(|instance| instance.index.0.get()).collect();
     let parts = part_sets(scene, meshes);
     let scored: Vec<bool> = scene.instances.iter().map(|instance| instance.atlas.is_some()).collect();
-    let made_anew = ViewScene::new(world.scene(), world, &instances, &scored);
+    let retraced = ViewScene::new(world.scene(), world, &instances, &scored);
     for view in &scene.views {
         let Some(pictures) = read(folder, scene, view, faults) else { continue };
         let at = |file: &str| format!("views/{}/{file}", view.id);
@@ -44,7 +45,7 @@ pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, meshes: &Meshes, wo
         check_masks(scene, &pictures, &at, faults);
         check_normals(&pictures, &at, faults);
         let truth = if folder.truth().is_dir() { check_truth(folder, view, &pictures, faults) } else { None };
-        let expected = Expected { scene: &made_anew, parts: &parts };
+        let expected = Expected { scene: &retraced, parts: &parts };
         check_against_meshes(&expected, [view, &scene.views[0]], &pictures, truth.as_ref(), &at, faults);
     }
 }
@@ -94,14 +95,14 @@ fn has_size(
     let before = faults.all.len();
     for (file, size) in sizes {
         if size != expected {
-            let message = format!("{}x{} pixels, its camera has {}x{}", size.0, size.1, expected.0, expected.1);
+            let message = format!("{}x{} pixels, but its camera has {}x{}", size.0, size.1, expected.0, expected.1);
             faults.add("wrong_size", &at(file), "", message);
         }
     }
     faults.all.len() == before
 }
 
-/// The first pixel that breaks a rule, and how many do, as one fault.
+/// Reports the pixels that break a rule as one fault, which names the first of them and their number.
 fn first_of(
     faults: &mut Faults,
     code: &str,
@@ -123,15 +124,15 @@ fn check_ids(scene: &SceneFile, pictures: &ViewPictures, at: &dyn Fn(&str) -> St
     let size = (pictures.depth.width(), pictures.depth.height());
     let (instance, depth) = (pictures.instance.pixels(), pictures.depth.pixels());
     let instances = scene.instances.len();
-    first_of(faults, "bad_id", &at("instance.png"), size, &format!("an id must be 0 to {instances}"), |p| {
+    first_of(faults, "bad_id", &at("instance.png"), size, &format!("an instance id must be 0 to {instances}"), |p| {
         usize::from(instance[p]) > instances
     });
     for ((set, parts), picture) in scene.all_part_sets().zip(&pictures.parts) {
         let (file, part, count) = (at(&part_picture(set)), picture.pixels(), parts.len());
-        first_of(faults, "bad_id", &file, size, &format!("an id must be 0 to {count}"), |p| {
+        first_of(faults, "bad_id", &file, size, &format!("a part id must be 0 to {count}"), |p| {
             usize::from(part[p]) > count
         });
-        first_of(faults, "bad_id", &file, size, "a part must be one of the pixel's instance", |p| {
+        first_of(faults, "bad_id", &file, size, "a part must belong to the instance of its pixel", |p| {
             let of_part = usize::from(part[p]).checked_sub(1).and_then(|place| parts.get(place)).map(|p| &p.instance);
             let of_pixel =
                 usize::from(instance[p]).checked_sub(1).and_then(|place| scene.instances.get(place)).map(|i| &i.id);
@@ -143,7 +144,7 @@ fn check_ids(scene: &SceneFile, pictures: &ViewPictures, at: &dyn Fn(&str) -> St
         "bad_depth",
         &at("depth.exr"),
         size,
-        "depth must be above 0 where there is an instance, else 0",
+        "a depth must be above 0 where the pixel shows an instance, and 0 elsewhere",
         |p| {
             if instance[p] == 0 { depth[p] != 0.0 } else { depth[p] <= 0.0 }
         },
@@ -168,14 +169,14 @@ fn check_masks(scene: &SceneFile, pictures: &ViewPictures, at: &dyn Fn(&str) -> 
 fn check_normals(pictures: &ViewPictures, at: &dyn Fn(&str) -> String, faults: &mut Faults) {
     let size = (pictures.depth.width(), pictures.depth.height());
     let (instance, normal) = (pictures.instance.pixels(), pictures.normal.pixels());
-    let rule = "a normal must be of unit length where there is an instance, else 0";
+    let rule = "a normal must have unit length where the pixel shows an instance, and be 0 elsewhere";
     first_of(faults, "bad_normal", &at("normal.exr"), size, rule, |p| {
         let expected = if instance[p] == 0 { 0.0 } else { 1.0 };
         (glam::Vec3::from_array(normal[p].0).length() - expected).abs() > NORMAL_SLACK
     });
 }
 
-/// A view made anew at a grid of pixels must be what the pictures hold.
+/// Traces a grid of the view's pixels again and compares them with the pictures.
 fn check_against_meshes(
     expected: &Expected<'_>,
     [view, input]: [&View; 2],
@@ -191,9 +192,9 @@ fn check_against_meshes(
         .collect();
     let pixel = |(x, y): &(usize, usize)| expected.scene.pixel(&view.camera, &input.camera, *x, *y);
     let pixels: Vec<ViewPixel> = places.par_iter().map(pixel).collect();
-    let mut tell = |count: usize, file: String, what: &str| {
+    let mut report = |count: usize, file: String, what: &str| {
         if count as f64 > STRAYS * places.len() as f64 {
-            let message = format!("{count} of {} {what} are not what the camera sees of the meshes", places.len());
+            let message = format!("{count} of {} {what} differ from what the camera sees of the meshes", places.len());
             faults.add("not_reprojected", &file, "", message);
         }
     };
@@ -201,20 +202,20 @@ fn check_against_meshes(
         pixels.iter().zip(&places).map(|(pixel, (x, y))| strays(pixel, pictures, truth, *x, *y)).collect();
     for (which, (file, what)) in NAMES.into_iter().enumerate() {
         let file = if which < GEOMETRY { at(file) } else { format!("ground_truth/{}", at(file)) };
-        tell(strays.iter().filter(|stray| stray[which]).count(), file, what);
+        report(strays.iter().filter(|stray| stray[which]).count(), file, what);
     }
     for ((file, values), picture) in expected.parts.iter().zip(&pictures.parts) {
         let differs = |(pixel, (x, y)): &(&ViewPixel, &(usize, usize))| {
             SeenTriangle::value_in(pixel.triangle, values) != picture.get(*x, *y)
         };
-        tell(pixels.iter().zip(&places).filter(differs).count(), at(file), "part ids");
+        report(pixels.iter().zip(&places).filter(differs).count(), at(file), "part ids");
     }
 }
 
-/// What the pictures are held against.
+/// What the pictures are compared with.
 struct Expected<'a> {
     scene: &'a ViewScene<'a>,
-    /// The file of each set of parts, and its value for every triangle of every instance.
+    /// For each set of parts its file, and the part's value for every triangle of every instance.
     parts: &'a [(String, Vec<Vec<u16>>)],
 }
 
@@ -228,20 +229,20 @@ fn part_sets(scene: &SceneFile, meshes: &Meshes) -> Vec<(String, Vec<Vec<u16>>)>
     sets
 }
 
-/// The pictures that are made anew, parts apart: those of geometry, then those of the ground truth.
+/// The pictures that are traced again, except those of parts: first those of geometry, then those of the ground truth.
 const NAMES: [(&str, &str); 6] = [
     ("instance.png", "instance ids"),
     ("depth.exr", "depths"),
     ("normal.exr", "normals"),
-    ("valid.png", "valid marks"),
-    ("unobserved.png", "unobserved marks"),
+    ("valid.png", "marks of valid pixels"),
+    ("unobserved.png", "marks of unobserved pixels"),
     ("albedo.exr", "albedos"),
 ];
-/// How many of them are not of the ground truth.
+/// The number of pictures of geometry among them.
 const GEOMETRY: usize = 5;
 
-/// Which of the pictures differ from the pixel made anew. What depends on materials is held against them only where the
-/// ground truth is there.
+/// Which of the pictures differ from the pixel traced again. Those that depend on materials are compared only where the
+/// ground truth exists.
 fn strays(
     expected: &ViewPixel,
     pictures: &ViewPictures,
@@ -264,12 +265,13 @@ fn strays(
     ]
 }
 
-/// How far a channel of the albedo may be off.
+/// Largest error of a channel of the albedo.
 const ALBEDO_SLACK: f32 = 1e-4;
 
 type TruthAlbedo = Picture<LinearRgb>;
 
-/// The truth's pictures are there, of the same size, in range; gives the albedo if it is.
+/// Checks that the pictures of the ground truth exist, have the same size and are in range. Returns the albedo where it
+/// could be read.
 fn check_truth(folder: &SceneFolder, view: &View, pictures: &ViewPictures, faults: &mut Faults) -> Option<TruthAlbedo> {
     let mut albedo = None;
     let hidden = folder.truth_view(&view.id);

@@ -1,4 +1,4 @@
-//! `scene.json` against itself: numbers, references, cameras.
+//! Checks that `scene.json` is consistent: indices, references, cameras.
 
 use std::collections::BTreeSet;
 
@@ -9,9 +9,10 @@ use mateval_scene::layout::INPUT;
 use mateval_prep::faults::Faults;
 
 const FILE: &str = "scene.json";
-/// How far a camera's rotation may be from one, and a view's camera from the turned input camera.
+/// Largest deviation of a camera's rotation from orthonormality, and of a view's camera from the turned input camera.
 const CAMERA_SLACK: f64 = 1e-9;
 
+/// Checks the format's version, the views, and the instances with their parts.
 pub(super) fn check(scene: &SceneFile, faults: &mut Faults) {
     if scene.format != FORMAT {
         faults.add("wrong_format", FILE, "/format", format!("'{}', expected '{FORMAT}'", scene.format));
@@ -29,23 +30,28 @@ fn check_views(scene: &SceneFile, faults: &mut Faults) {
     for (at, view) in scene.views.iter().enumerate() {
         let place = format!("/views/{at}/camera");
         if !ids.insert(&view.id) {
-            faults.add("bad_view", FILE, format!("/views/{at}/id"), format!("'{}' is there twice", view.id));
+            faults.add("bad_view", FILE, format!("/views/{at}/id"), format!("'{}' is listed twice", view.id));
         }
         let rotation = view.camera.rotation();
         let turned_back = rotation.transpose() * rotation;
         let is_rotation = turned_back.abs_diff_eq(DMat3::IDENTITY, CAMERA_SLACK) && rotation.determinant() > 0.0;
         if !is_rotation || view.camera.world_from_camera[3] != [0.0, 0.0, 0.0, 1.0] {
-            faults.add("bad_camera", FILE, &place, "world_from_camera is no rotation and translation");
+            faults.add("bad_camera", FILE, &place, "world_from_camera is not a rotation and a translation");
         }
         let k = view.camera.intrinsics;
-        let sound = k.fx > 0.0 && k.fy > 0.0 && k.cx.is_finite() && k.cy.is_finite() && k.width > 0 && k.height > 0;
-        if !sound {
-            faults.add("bad_camera", FILE, format!("{place}/intrinsics"), "expected focal lengths and a size above 0");
+        let is_valid = k.fx > 0.0 && k.fy > 0.0 && k.cx.is_finite() && k.cy.is_finite() && k.width > 0 && k.height > 0;
+        if !is_valid {
+            faults.add(
+                "bad_camera",
+                FILE,
+                format!("{place}/intrinsics"),
+                "expected focal lengths and a size above 0, and a finite principal point",
+            );
         }
         let expected = input.camera.turned(view.x_deg, view.y_deg);
         let same_place = view.camera.matrix().abs_diff_eq(expected.matrix(), CAMERA_SLACK);
         if !same_place || view.camera.intrinsics != input.camera.intrinsics {
-            let message = format!("not the input camera turned by {} and {} degrees", view.x_deg, view.y_deg);
+            let message = format!("differs from the input camera turned by {} and {} degrees", view.x_deg, view.y_deg);
             faults.add("bad_camera", FILE, &place, message);
         }
     }
@@ -58,20 +64,25 @@ fn check_numbers(scene: &SceneFile, faults: &mut Faults) {
             faults.add("bad_index", FILE, format!("/instances/{at}/index"), format!("expected {}", at + 1));
         }
         if !ids.insert(&instance.id) {
-            faults.add("duplicate_id", FILE, format!("/instances/{at}/id"), format!("'{}'", instance.id));
+            faults.add(
+                "duplicate_id",
+                FILE,
+                format!("/instances/{at}/id"),
+                format!("'{}' is listed twice", instance.id),
+            );
         }
     }
     check_parts(scene, &scene.parts, "/parts", faults);
     let mut sets = BTreeSet::new();
     for (at, set) in scene.part_sets.iter().enumerate() {
         if !sets.insert(&set.id) {
-            faults.add("duplicate_id", FILE, format!("/part_sets/{at}/id"), format!("'{}'", set.id));
+            faults.add("duplicate_id", FILE, format!("/part_sets/{at}/id"), format!("'{}' is listed twice", set.id));
         }
         check_parts(scene, &set.parts, &format!("/part_sets/{at}/parts"), faults);
     }
 }
 
-/// One set of parts, which is at `pointer`.
+/// Checks one set of parts, whose JSON pointer is `pointer`.
 fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Faults) {
     let instances: BTreeSet<_> = scene.instances.iter().map(|instance| &instance.id).collect();
     let mut ids = BTreeSet::new();
@@ -80,17 +91,17 @@ fn check_parts(scene: &SceneFile, parts: &[Part], pointer: &str, faults: &mut Fa
             faults.add("bad_index", FILE, format!("{pointer}/{at}/index"), format!("expected {}", at + 1));
         }
         if !ids.insert(&part.id) {
-            faults.add("duplicate_id", FILE, format!("{pointer}/{at}/id"), format!("'{}'", part.id));
+            faults.add("duplicate_id", FILE, format!("{pointer}/{at}/id"), format!("'{}' is listed twice", part.id));
         }
         if !instances.contains(&part.instance) {
-            let message = format!("there is no instance '{}'", part.instance);
+            let message = format!("the scene has no instance '{}'", part.instance);
             faults.add("dangling_reference", FILE, format!("{pointer}/{at}/instance"), message);
         }
     }
     for (at, instance) in scene.instances.iter().enumerate() {
         let of_parts: usize = parts.iter().filter(|part| part.instance == instance.id).map(|part| part.triangles).sum();
         if of_parts != instance.triangles {
-            let message = format!("{} triangles, its parts have {of_parts} in {pointer}", instance.triangles);
+            let message = format!("{} triangles, but its parts in {pointer} have {of_parts}", instance.triangles);
             faults.add("bad_parts", FILE, format!("/instances/{at}"), message);
         }
     }

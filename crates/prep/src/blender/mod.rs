@@ -1,7 +1,7 @@
-//! Blender's Cycles as a renderer: a job goes out, pictures come back.
+//! Renders with Blender's Cycles.
 //!
-//! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes what Blender needs into a
-//! folder, `scripts` puts `blender_scripts` beside it, `process` runs Blender and watches it, `view_files` reads what it made.
+//! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes a folder with the scene, `scripts`
+//! copies `blender_scripts` into it, `process` runs Blender and enforces limits, `view_files` reads the pictures.
 
 pub mod job;
 mod process;
@@ -17,24 +17,25 @@ pub use job::{BlenderJob, BlenderResult, JobPlan, JobView};
 pub use process::{BlenderLimits, BlenderProgram, Ended, tail};
 pub use view_files::{BlenderView, LightPictures};
 
-/// A job in its folder, ready to be run.
+/// The folder of a job that is ready to run.
 #[derive(Debug)]
 pub struct Workplace {
     folder: PathBuf,
     script: PathBuf,
+    /// Number of light groups of the scene.
     groups: usize,
 }
 
-/// What is heard of a running Blender.
+/// An event of a running Blender.
 pub enum News<'a> {
-    /// A line that it printed.
+    /// Blender printed a line.
     Line(&'a str),
-    /// A view is whole.
+    /// The pictures of a view are complete.
     View(&'a job::ResultView, &'a BlenderResult, Box<BlenderView>),
 }
 
 impl Workplace {
-    /// Writes the job into the folder, which is made if it is not there.
+    /// Writes the job into the folder, which is created if it does not exist.
     pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
         std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
         job::write(folder, plan)?;
@@ -42,7 +43,7 @@ impl Workplace {
         Ok(Self { folder: folder.to_owned(), script, groups: plan.reference.lights.len() })
     }
 
-    /// What Blender prints.
+    /// The file of everything that Blender prints.
     pub fn log(&self) -> PathBuf {
         self.folder.join("blender.log")
     }
@@ -51,14 +52,15 @@ impl Workplace {
         self.folder.join("job.json")
     }
 
-    /// The command that carries the job out, for a person to repeat it.
+    /// The command that runs the job, as text that a user can repeat in a shell.
     pub fn command_text(&self, program: &BlenderProgram) -> String {
         let command = program.command(&self.script, &self.job());
         let words = std::iter::once(command.get_program()).chain(command.get_args());
         words.map(|word| format!("'{}'", word.to_string_lossy())).collect::<Vec<_>>().join(" ")
     }
 
-    /// Runs Blender until it ends, and tells of each view as soon as that is whole.
+    /// Runs Blender until it ends, and calls `hear` for every line that it prints and for each view as soon as its pictures
+    /// are complete.
     pub fn run(
         &self,
         program: &BlenderProgram,
@@ -72,22 +74,22 @@ impl Workplace {
             }
             _ => {}
         }
-        let mut told = 0;
+        let mut heard = 0;
         process::run(program.command(&self.script, &self.job()), &self.log(), limits, &mut |line| match line {
             Some(line) => hear(News::Line(line)),
             None => {
                 let Some(result) = self.result()? else { return Ok(()) };
-                for view in result.views.iter().skip(told) {
+                for view in result.views.iter().skip(heard) {
                     let pictures = view_files::read(&self.folder.join(view.id.as_str()), self.groups)?;
                     hear(News::View(view, &result, Box::new(pictures)))?;
-                    told += 1;
+                    heard += 1;
                 }
                 Ok(())
             }
         })
     }
 
-    /// What the script has told so far.
+    /// What the script has recorded so far; none before it has written its first result.
     pub fn result(&self) -> Result<Option<BlenderResult>, PrepError> {
         let path = self.folder.join("result.json");
         if !path.is_file() {

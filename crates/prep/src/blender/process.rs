@@ -1,4 +1,4 @@
-//! Blender as a process of its own: started, watched, ended when it takes too long or too much.
+//! Runs Blender as a process, and kills it when it exceeds a limit of time or memory.
 
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
@@ -8,38 +8,38 @@ use std::time::{Duration, Instant};
 
 use crate::error::PrepError;
 
-/// How often a running Blender is looked at.
-const LOOK: Duration = Duration::from_millis(100);
+/// Time between two looks at the running process.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// A Blender, or a Python that has the `bpy` module.
+/// The path of Blender, or of a Python that has the `bpy` module.
 #[derive(Clone, Debug)]
 pub struct BlenderProgram(pub PathBuf);
 
-/// What a Blender may take.
+/// Limits of one run.
 #[derive(Clone, Copy, Debug)]
 pub struct BlenderLimits {
-    /// Time for one scene.
+    /// Longest time for one scene.
     pub time: Duration,
-    /// Time without a line of output, after which it counts as hanging.
+    /// Longest time without a line of output, after which the process counts as hanging.
     pub silence: Duration,
-    /// Resident memory in bytes.
+    /// Most resident memory, in bytes.
     pub memory_bytes: u64,
 }
 
-/// How a Blender ended.
+/// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ended {
-    /// By itself.
+    /// The process ended by itself.
     Itself(ExitStatus),
-    /// It took longer than this, which it may, and was ended.
+    /// The process was killed, since it took longer than this limit.
     TooLong(Duration),
-    /// It said nothing for longer than this, which it may, and was ended.
+    /// The process was killed, since it printed nothing for longer than this limit.
     Silent(Duration),
-    /// It took so many bytes of memory, more than it may, and was ended.
+    /// The process was killed, since it took too much memory.
     TooMuchMemory {
-        /// What it took.
+        /// The memory that it took, in bytes.
         bytes: u64,
-        /// What it may take.
+        /// The limit, in bytes.
         most: u64,
     },
 }
@@ -47,27 +47,32 @@ pub enum Ended {
 impl std::fmt::Display for Ended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Itself(status) => write!(f, "it ended with {status}"),
-            Self::TooLong(most) => write!(f, "it took longer than {} s and was ended", most.as_secs()),
-            Self::Silent(most) => write!(f, "it said nothing for {} s and was ended", most.as_secs()),
+            Self::Itself(status) => write!(f, "the process ended with {status}"),
+            Self::TooLong(most) => write!(f, "the process took longer than {} s and was killed", most.as_secs()),
+            Self::Silent(most) => write!(f, "the process printed nothing for {} s and was killed", most.as_secs()),
             Self::TooMuchMemory { bytes, most } => {
-                write!(f, "it took {} MiB of memory, more than {} MiB, and was ended", bytes >> 20, most >> 20)
+                write!(
+                    f,
+                    "the process took {} MiB of memory, more than {} MiB, and was killed",
+                    bytes >> 20,
+                    most >> 20
+                )
             }
         }
     }
 }
 
 impl BlenderProgram {
-    /// A Python by its name; anything else is a Blender.
+    /// Whether the program is a Python, by its name. Any other program is taken for Blender.
     fn is_python(&self) -> bool {
         self.0.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python"))
     }
 
-    /// What is run for a job.
+    /// The command that runs `script` on `job`.
     pub fn command(&self, script: &Path, job: &Path) -> Command {
         let mut command = Command::new(&self.0);
         match self.is_python() {
-            // Isolated: nothing but the script's folder and the module's is imported from.
+            // Isolated mode imports only from Python's own folders; the script adds its folder itself.
             true => command.args(["-I", "-B", "-u"]).arg(script).arg(job),
             false => command.args(["--background", "--factory-startup", "--python"]).arg(script).arg("--").arg(job),
         };
@@ -76,8 +81,8 @@ impl BlenderProgram {
     }
 }
 
-/// Runs the command until it ends or breaks a limit. All that it prints goes to `log`, and line by line to `hear`, which
-/// is also called with nothing now and then.
+/// Runs the command until it ends or exceeds a limit. Its output goes to the file `log`, and line by line to `hear`, which is
+/// also called with `None` after every look at the process.
 pub fn run(
     mut command: Command,
     log: &Path,
@@ -95,7 +100,7 @@ pub fn run(
     let mut last_line = start;
     loop {
         let ended = child.0.try_wait().map_err(io("wait for the process of"))?;
-        for line in lines.new_ones().map_err(io("read"))? {
+        for line in lines.read_new().map_err(io("read"))? {
             last_line = Instant::now();
             hear(Some(&line))?;
         }
@@ -113,32 +118,34 @@ pub fn run(
         if let Some(bytes) = resident_bytes(child.0.id()).filter(|bytes| *bytes > most) {
             return Ok(Ended::TooMuchMemory { bytes, most });
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }
 
-/// A process that does not outlive its owner.
+/// A process that is killed when this value is dropped.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // One that has ended cannot be killed, which is as well.
+        // Killing fails where the process has ended already, which is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// A file's lines as it grows.
+/// The lines of a file that is still being written.
 struct Lines {
     file: File,
+    /// The start of a line whose end has not been written yet.
     rest: String,
 }
 
-/// A line longer than this is not kept: Blender's own are short.
+/// A longer line is discarded; those that Blender prints are short.
 const MAX_LINE_BYTES: usize = 1 << 16;
 
 impl Lines {
-    fn new_ones(&mut self) -> std::io::Result<Vec<String>> {
+    /// The lines written since the last call.
+    fn read_new(&mut self) -> std::io::Result<Vec<String>> {
         let mut bytes = Vec::new();
         self.file.read_to_end(&mut bytes)?;
         self.rest.push_str(&String::from_utf8_lossy(&bytes));
@@ -151,14 +158,14 @@ impl Lines {
     }
 }
 
-/// Resident memory of a process; none where the system does not tell.
+/// Resident memory of a process, in bytes; none where the system does not report it.
 fn resident_bytes(process: u32) -> Option<u64> {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? << 10)
 }
 
-/// The last lines of a log, at most `bytes` of them.
+/// The last lines of a log, at most `bytes` bytes.
 pub fn tail(log: &Path, bytes: u64) -> String {
     let read = || -> std::io::Result<String> {
         let mut file = File::open(log)?;
@@ -167,7 +174,7 @@ pub fn tail(log: &Path, bytes: u64) -> String {
         let mut text = Vec::new();
         file.read_to_end(&mut text)?;
         let text = String::from_utf8_lossy(&text).into_owned();
-        // The first line is most likely cut.
+        // The first line is probably incomplete.
         Ok(if length > bytes { text.split_once('\n').map_or(String::new(), |(_, rest)| rest.to_owned()) } else { text })
     };
     read().unwrap_or_else(|error| format!("(the log cannot be read: {error})"))

@@ -1,4 +1,4 @@
-//! What Blender runs, as it was when this program was built.
+//! The scripts that Blender runs, embedded when this program was built.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ macro_rules! script {
     };
 }
 
-/// The files of `blender_scripts`; the first is the one to run.
+/// The files of `blender_scripts`. The first one is run.
 const SCRIPTS: [(&str, &str); 13] = [
     script!("render.py"),
     script!("mateval/__init__.py"),
@@ -27,10 +27,10 @@ const SCRIPTS: [(&str, &str); 13] = [
     script!("mateval/denoise.py"),
 ];
 
-/// The folder of all but the first.
+/// The folder of all files but the first.
 const PACKAGE: &str = "mateval";
 
-/// Writes them into `folder/scripts`. Gives the one to run.
+/// Writes the scripts into `folder/scripts` and returns the path of the one to run.
 pub fn write(folder: &Path) -> Result<PathBuf, PrepError> {
     let scripts = folder.join("scripts");
     let package = scripts.join(PACKAGE);
@@ -46,9 +46,9 @@ pub fn write(folder: &Path) -> Result<PathBuf, PrepError> {
 mod tests {
     use super::*;
 
-    /// A script that is not in the list would be missing where the program runs.
+    /// A script that is not in the list would be missing when Blender runs.
     #[test]
-    fn every_script_is_there() {
+    fn every_script_is_embedded() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../blender_scripts");
         let mut found = Vec::new();
         for below in ["", PACKAGE] {

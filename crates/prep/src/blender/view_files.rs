@@ -1,39 +1,39 @@
-//! What Blender made of a view, read from its multi-layer EXR files.
+//! Reads the pictures that Blender made of a view from its multi-layer EXR files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use mateval_image::{ImageError, LinearRgb, Normal, Picture, exr_io};
 
-/// A picture of light: all of it, and what each group of lights gives.
+/// Pictures of light: under all lights together, and under each light group alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightPictures {
-    /// Linear radiance.
+    /// Linear radiance under all lights.
     pub rgb: Picture<LinearRgb>,
-    /// One a group of `lights.json`; they add up to `rgb`, save where they were denoised apart.
+    /// One picture per group of `lights.json`. They add up to `rgb`, except where each was denoised on its own.
     pub groups: Vec<Picture<LinearRgb>>,
 }
 
-/// A view as Blender sees it.
+/// The pictures that Blender makes of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BlenderView {
-    /// Metres along the camera's axis at pixel centres; 0 where there is nothing.
+    /// Distance along the camera's axis at pixel centres, in metres; 0 for the background.
     pub depth: Picture<f32>,
-    /// World-space shading normal at pixel centres; 0 where there is nothing.
+    /// World-space shading normal at pixel centres; 0 for the background.
     pub normal: Picture<Normal>,
-    /// Instance index at pixel centres; 0 where there is nothing.
+    /// Instance index at pixel centres; 0 for the background.
     pub instance: Picture<u16>,
-    /// Part index at pixel centres; 0 where there is nothing.
+    /// Part index at pixel centres; 0 for the background.
     pub part: Picture<u16>,
-    /// base_color at pixel centres, linear, of the very materials that are lit; 0 where there is none.
+    /// base_color at pixel centres, linear, taken from the materials that are lit; 0 where a material has none.
     pub base_color: Picture<LinearRgb>,
-    /// Two independent halves.
+    /// Two halves, rendered independently.
     pub halves: [LightPictures; 2],
-    /// Their mean, denoised.
+    /// The mean of the halves, denoised.
     pub denoised: LightPictures,
 }
 
-/// Reads the files in the view's folder. Every number must be finite.
+/// Reads the files in the view's folder. Fails where a number is not finite.
 pub fn read(folder: &Path, groups: usize) -> Result<BlenderView, ImageError> {
     let geometry = Passes::read(folder.join("geometry.exr"))?;
     let [a, b] = ["a.exr", "b.exr"].map(|name| Passes::read(folder.join(name)));
@@ -41,8 +41,8 @@ pub fn read(folder: &Path, groups: usize) -> Result<BlenderView, ImageError> {
     let denoised = Passes::read(folder.join("denoised.exr"))?;
     let instance = geometry.ids("instance")?;
     Ok(BlenderView {
-        depth: where_something_is(&geometry.number("Depth")?, &instance),
-        normal: where_something_is(&geometry.triple("Normal", ["X", "Y", "Z"])?, &instance).map(Normal),
+        depth: without_background(&geometry.number("Depth")?, &instance),
+        normal: without_background(&geometry.triple("Normal", ["X", "Y", "Z"])?, &instance).map(Normal),
         part: geometry.ids("part")?,
         instance,
         base_color: Passes::read(folder.join("centre.exr"))?.color("base_color")?,
@@ -51,8 +51,8 @@ pub fn read(folder: &Path, groups: usize) -> Result<BlenderView, ImageError> {
     })
 }
 
-/// Blender's background has a depth of 10^10.
-fn where_something_is<T: Copy + Default>(picture: &Picture<T>, instance: &Picture<u16>) -> Picture<T> {
+/// The picture with 0 for the background, where Blender's depth is 10^10.
+fn without_background<T: Copy + Default>(picture: &Picture<T>, instance: &Picture<u16>) -> Picture<T> {
     Picture::from_fn(picture.width(), picture.height(), |x, y| match instance.get(x, y) {
         0 => T::default(),
         _ => picture.get(x, y),
@@ -71,7 +71,7 @@ impl Passes {
         Ok(Self { path, channels })
     }
 
-    /// A channel of a pass; the name of the view layer may stand before it.
+    /// A channel of a pass. Its name in the file may be prefixed with that of the view layer.
     fn channel(&self, pass: &str, channel: &str) -> Result<&Picture<f32>, ImageError> {
         let wanted = format!("{pass}.{channel}");
         let is_it = |name: &str| name == wanted || name.strip_suffix(&wanted).is_some_and(|rest| rest.ends_with('.'));
@@ -100,7 +100,7 @@ impl Passes {
         Ok(self.triple(pass, ["R", "G", "B"])?.map(LinearRgb))
     }
 
-    /// A pass of one number: its channel is named by what it holds, `V` or `Z` or `X`.
+    /// A pass with one channel. Its name depends on the kind of pass: `V`, `Z` or `X`.
     fn number(&self, pass: &str) -> Result<Picture<f32>, ImageError> {
         let first = self.channel(pass, "V");
         let found =
@@ -109,7 +109,7 @@ impl Passes {
     }
 
     fn ids(&self, pass: &str) -> Result<Picture<u16>, ImageError> {
-        // Whole numbers of 16 bits are exact as floats; a cast of anything else is held within 16 bits.
+        // Integers of 16 bits are exact as floats; the cast clamps any other number to 16 bits.
         Ok(self.number(pass)?.map(|value| value.round() as u16))
     }
 
