@@ -40,7 +40,7 @@ def main() -> None:
     }
     code = 1
     try:
-        carry_out_or_tell(path=path, result=result)
+        carry_out_or_record(path=path, result=result)
         code = 0 if result["error"] is None else 1
         sys.stdout.flush()
         sys.stderr.flush()
@@ -49,7 +49,7 @@ def main() -> None:
         os._exit(code)
 
 
-def carry_out_or_tell(*, path: Path, result: Job) -> None:
+def carry_out_or_record(*, path: Path, result: Job) -> None:
     """Runs the job and records every error in the result."""
     try:
         carry_out(path=path, result=result)
@@ -73,13 +73,13 @@ def carry_out(*, path: Path, result: Job) -> None:
     if bpy.app.version[:2] != VERSION:
         raise RuntimeError(f"expected Blender {VERSION[0]}.{VERSION[1]}, found {bpy.app.version_string}")
     job, folder = read_job(path=path), path.parent
-    tell("scene")
+    report("scene")
     built = BuiltScene(job=job, folder=folder)
     result["approximations"] = built.approximations
     set_up(scene=built.scene, job=job)
     built.show_geometry()
     for view in job["views"]:
-        tell(f"view {view['id']} geometry")
+        report(f"view {view['id']} geometry")
         (folder / view["id"]).mkdir(exist_ok=True)
         built.look_from(camera=view["camera"])
         render_to(scene=built.scene, path=folder / view["id"] / "geometry.exr", samples=1, seed=0)
@@ -99,18 +99,18 @@ def render_view(*, built: BuiltScene, job: Job, view: Job, folder: Path) -> dict
     seconds = {}
     halves = (place / "a.exr", place / "b.exr")
     for half, seed in zip(halves, view["seeds"], strict=True):
-        tell(f"view {view['id']} half {half.stem}")
+        report(f"view {view['id']} half {half.stem}")
         start = time.monotonic()
         render_to(scene=built.scene, path=half, samples=job["samples_each_half"], seed=seed)
         seconds[half.stem] = round(time.monotonic() - start, 3)
-    tell(f"view {view['id']} denoise")
+    report(f"view {view['id']} denoise")
     start = time.monotonic()
     denoise_to(scene=built.scene, halves=halves, passes=light_passes(job=job), path=place / "denoised.exr")
     seconds["denoise"] = round(time.monotonic() - start, 3)
     return seconds
 
 
-def tell(text: str) -> None:
+def report(text: str) -> None:
     """Prints a line of progress."""
     print(f"mateval: {text}", flush=True)
 

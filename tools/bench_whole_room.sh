@@ -1,8 +1,8 @@
 #!/bin/sh
-# Measures what scoring a room costs, with MatEval and with other projects' parts (Mitsuba, scikit-image, lpips).
-# Installs those into target/peers_score (2.9 GB to download, 5.8 GB on disk), makes a dataset of two real rooms and a
-# submission, and runs the bench. MATEVAL_DATA is the folder of the rooms; by default it is ../shared/data. Arguments
-# are passed to the bench: `full` times every iteration of the fit.
+# Measures the cost of scoring a room, with MatEval and with other projects' software (Mitsuba, scikit-image, lpips).
+# Installs the latter into target/peers_score (2.9 GB to download, 5.8 GB on disk), builds a dataset of two real rooms
+# and a submission, and runs the bench. MATEVAL_DATA is the folder of the rooms; by default it is ../shared/data.
+# Arguments are passed to the bench: `full` times every iteration of the fit.
 set -eu
 cd "$(dirname "$0")/.."
 tools/setup.sh

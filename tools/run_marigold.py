@@ -267,7 +267,7 @@ def run(*, words: argparse.Namespace) -> None:
         try:
             seed = scene_seed(seed=words.seed, scene=scene)
             prediction = predict(pipe=pipe, picture=path, seed=seed, asked=asked)
-        except (OSError, ValueError, RuntimeError) as problem:  # torch raises RuntimeError for want of memory
+        except (OSError, ValueError, RuntimeError) as problem:  # torch raises RuntimeError if memory is short
             raise RunError(f"cannot run the model on '{path}': {first_line(problem)}") from problem
         albedo, material = pictures(prediction=prediction, where=where)
         write_scene(folder=words.out / scene, albedo=albedo, material=material)

@@ -1,10 +1,10 @@
 #!/bin/sh
 # Installs what MatEval needs besides Rust and Python on Debian-like systems: a C++ compiler, libclang, the LPIPS
-# weights and Blender. Does nothing where all of them are installed.
+# weights and Blender. Does nothing if all of them are installed.
 set -eu
 cd "$(dirname "$0")/.."
 
-# libclang-cpp, which graphics drivers install, is another library.
+# libclang-cpp, which graphics drivers install, is a different library.
 have_libclang() { ldconfig -p 2>/dev/null | grep -q 'libclang[-.0-9]*\.so' || ls /usr/lib/llvm-*/lib/libclang.so* /usr/lib/llvm-*/lib/libclang-[0-9]*.so* 2>/dev/null | grep -q .; }
 
 missing=""

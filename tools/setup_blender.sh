@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs Blender 4.5 LTS as a Python module (800 MB) where `mateval` searches for it: $MATEVAL_CACHE/blender, else
-# $XDG_CACHE_HOME/mateval/blender, else ~/.cache/mateval/blender. Does nothing where it is installed. Its wheels are for
+# $XDG_CACHE_HOME/mateval/blender, else ~/.cache/mateval/blender. Does nothing if it is installed. Its wheels are for
 # Python 3.11 only.
 set -eu
 cd "$(dirname "$0")/.."

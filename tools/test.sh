@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs all tests: those of the Python tools, then those of every crate, which continue after a failure.
+# Runs all tests: those of the Python tools, then those of every crate. A failing crate does not stop the others.
 set -eu
 cd "$(dirname "$0")/.."
 python3 tools/test_fetch_lpips_weights.py

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Checks that the optimised build and the tests' build make the same bytes: dataset, pictures, submission and score of
-# the sample.
+# Checks that the optimised build and the tests' build write the same bytes for the sample: dataset, pictures,
+# submission and score.
 set -eu
 cd "$(dirname "$0")/.."
 # Builds the command with the tests' profile; nothing is compiled that the tests have not compiled.
@@ -26,4 +26,4 @@ for file in dataset/MANIFEST.sha256 RESULT.json; do
         exit 1
     }
 done
-echo "test_builds: both builds make the same dataset and the same score"
+echo "test_builds: both builds write the same dataset and the same score"

@@ -30,12 +30,12 @@ LITTLE_ENDIAN_F4 += b"(K\x03X\x01\x00\x00\x00<NNNJ\xff\xff\xff\xffJ\xff\xff\xff\
 
 
 def integer(value: int) -> bytes:
-    """The pickle opcode for a small whole number."""
+    """The pickle opcode for a small integer."""
     return b"J" + struct.pack("<i", value)
 
 
 def array_opcodes(*, shape: tuple[int, ...], data: bytes, dtype: bytes = LITTLE_ENDIAN_F4) -> bytes:
-    """The opcodes numpy 1 writes for an array (protocol 3), made by hand."""
+    """The opcodes numpy 1 writes for an array (protocol 3), written out here."""
     empty = b"cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(K\x00tC\x01btR"
     dimensions = b"(" + b"".join(integer(n) for n in shape) + b"t"
     return empty + b"(K\x01" + dimensions + dtype + b"\x89B" + struct.pack("<I", len(data)) + data + b"tb"
@@ -137,7 +137,7 @@ class Layout(unittest.TestCase):
 
 
 def tiny_net(*, sha256: str) -> tool.Net:
-    """A network of one 1x1 convolution, in place of the real ones."""
+    """A network of one 1x1 convolution, which replaces the real ones."""
     return tool.Net("tiny", "weights/tiny.ckpt", "Trunk_0", ((1, 3, 2),), (2,), "tiny.safetensors", sha256)
 
 

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Tests tools/run_marigold.py on a tiny model. Installs Debian's torch (0.7 GB) and, into target/marigold, the other
-# requirements (0.3 GB). Where all of tools/requirements_marigold.txt is installed, run tools/test_run_marigold.py
+# requirements (0.3 GB). If all of tools/requirements_marigold.txt is installed, run tools/test_run_marigold.py
 # instead.
 set -eu
 cd "$(dirname "$0")/.."

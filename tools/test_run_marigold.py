@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of run_marigold.py. Those of the pipeline build a tiny one with random weights; nothing is fetched.
+"""Tests of run_marigold.py. Tests of the pipeline build a tiny one with random weights; nothing is downloaded.
 
 tools/test.sh runs what needs nothing but Python, tools/test_marigold.sh everything.
 """
@@ -34,24 +34,24 @@ SIZES = {"attic": (40, 24), "cellar": (24, 33)}  # width, height; neither is a m
 
 
 def attention(query: Any, key: Any, value: Any, **_words: Any) -> Any:
-    """Attention without masks, as torch has it from 2.0 (Vaswani and others 2017, equation 1)."""
+    """Attention without masks, as in torch 2.0 and later (Vaswani and others 2017, equation 1)."""
     weights = (query @ key.transpose(-2, -1) / query.shape[-1] ** 0.5).softmax(-1)
     return weights @ value
 
 
 def complete_torch() -> None:
-    """Gives torch before 2.1, which is Debian 12's, what diffusers asks it for on its way to the pipeline."""
+    """Adds to torch before 2.1 (Debian 12 has such a version) the names that diffusers needs to load the pipeline."""
     import torch
 
     if not hasattr(torch, "compiler"):
         torch.float8_e4m3fn = torch.float8_e5m2 = None
         torch.compiler = types.SimpleNamespace(disable=lambda f=None: f or (lambda g: g), is_compiling=lambda: False)
-        # What diffusers takes in its place, `baddbmm` with beta = 0, lets NaN through from memory that nobody wrote.
+        # The replacement in diffusers, `baddbmm` with beta = 0, passes on NaN from uninitialised memory.
         torch.nn.functional.scaled_dot_product_attention = attention
 
 
 def missing(*names: str) -> Any:
-    """Skips what needs these packages where one is not there."""
+    """Skips a test that needs these packages if one is missing."""
     absent = [name for name in names if importlib.util.find_spec(name) is None]
     return unittest.skipIf(absent, f"SKIPPED: this Python has no {', '.join(absent)}; run tools/test_marigold.sh")
 
@@ -125,7 +125,7 @@ class Plan(unittest.TestCase):
         expected = {"base_color": ("{scene}/albedo.png", None)}
         expected |= {"roughness": ("{scene}/material.png", "r"), "metallic": ("{scene}/material.png", "g")}
         self.assertEqual(found, expected)
-        # The power that the model's authors encode its targets by, and that `pictures` encodes a linear albedo by.
+        # The power by which the model's authors encode its targets, and `pictures` a linear albedo.
         self.assertEqual({adapter[key]["encoding"] for key in expected}, {"gamma22"})
 
     def test_a_folder_of_other_pictures_is_refused(self) -> None:
@@ -147,7 +147,7 @@ class Plan(unittest.TestCase):
 @missing("numpy")
 class Mapping(unittest.TestCase):
     def pictures(self, *, properties: dict[str, Any]) -> tuple[Any, Any]:
-        """Of a prediction whose numbers tell target and channel: 0.1, 0.2, 0.3 and 0.4, 0.5, 0.6."""
+        """Pictures of a prediction whose values identify target and channel: 0.1, 0.2, 0.3 and 0.4, 0.5, 0.6."""
         import numpy as np
 
         prediction = np.broadcast_to(np.arange(1, 7, dtype=np.float32).reshape(2, 1, 1, 3) / 10, (2, 4, 5, 3))
@@ -171,7 +171,7 @@ class Mapping(unittest.TestCase):
 
     def test_a_linear_albedo_is_encoded(self) -> None:
         albedo, material = self.pictures(properties=APPEARANCE | {"albedo": {"prediction_space": "linear"}})
-        # By bc: 255*e(l(0.1)/2.2) = 89.5, then 122.7 and 147.5.
+        # Computed with bc: 255*e(l(0.1)/2.2) = 89.5, then 122.7 and 147.5.
         self.check(picture=albedo, expected=[90, 123, 148])
         self.check(picture=material, expected=[102, 128, 0])
 
@@ -186,7 +186,7 @@ class Mapping(unittest.TestCase):
 
 
 def tiny_tokenizer(*, folder: Path) -> Any:
-    """A tokenizer that knows where a text begins and ends, which is all an empty one needs."""
+    """A tokenizer with only the marks for begin and end of a text, which suffice for an empty text."""
     from transformers import CLIPTokenizer
 
     write_json(path=folder / "vocab.json", value={"<|startoftext|>": 0, "<|endoftext|>": 1, "a</w>": 2})
@@ -195,7 +195,7 @@ def tiny_tokenizer(*, folder: Path) -> Any:
 
 
 def tiny_networks() -> dict[str, Any]:
-    """Networks of a few thousand random weights that fit each other as the real ones do."""
+    """Networks of a few thousand random weights, with the same interfaces as the real ones."""
     import torch
     from diffusers import AutoencoderKL, UNet2DConditionModel
     from transformers import CLIPTextConfig, CLIPTextModel
@@ -203,7 +203,7 @@ def tiny_networks() -> dict[str, Any]:
     torch.manual_seed(7)
     width = 8
     unet = UNet2DConditionModel(
-        in_channels=12,  # the picture's latent and two targets', of four channels each
+        in_channels=12,  # the latents of the picture and of two targets, with four channels each
         out_channels=8,
         block_out_channels=(width, 2 * width),
         down_block_types=("CrossAttnDownBlock2D", "DownBlock2D"),
@@ -227,7 +227,7 @@ def tiny_networks() -> dict[str, Any]:
 
 
 def write_tiny_model(*, folder: Path, properties: dict[str, Any] = APPEARANCE) -> None:
-    """Saves a pipeline of the real kind."""
+    """Saves a pipeline of the real class."""
     from diffusers import DDIMScheduler, MarigoldIntrinsicsPipeline
 
     MarigoldIntrinsicsPipeline(
@@ -242,7 +242,7 @@ def write_tiny_model(*, folder: Path, properties: dict[str, Any] = APPEARANCE) -
 
 
 def write_tiny_dataset(*, folder: Path) -> None:
-    """As much of a dataset as the tool reads: a list of scenes, a picture of each."""
+    """The parts of a dataset that the tool reads: a list of scenes, and a picture of each."""
     from PIL import Image
 
     value = {"format": "mateval/1", "scenes": list(SIZES), "manifest_sha256": "d" * 64}
@@ -266,12 +266,12 @@ class Pipeline(unittest.TestCase):
         write_tiny_model(folder=cls.root / "model")
         write_tiny_dataset(folder=cls.root / "dataset")
         cls.first = cls.root / "first"
-        cls.told = cls.run_tool(out=cls.first)
+        cls.first_run = cls.run_tool(out=cls.first)
 
     @classmethod
     def run_tool(cls, *words: str, out: Path, dataset: str = "dataset") -> subprocess.CompletedProcess:
-        """The tool as a process of its own, which must not reach for the network."""
-        # This file hands on to the tool, once torch is complete.
+        """Runs the tool in its own process, which must not access the network."""
+        # This file calls the tool after it has completed torch.
         command = [sys.executable, __file__, "--as-tool", str(cls.root / dataset), str(out)]
         command += [*([] if "--model" in words else ["--model", str(cls.root / "model")]), *words]
         environment = os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(cls.root / "hub")}
@@ -294,8 +294,8 @@ class Pipeline(unittest.TestCase):
     def test_every_scene_has_both_pictures_of_its_size(self) -> None:
         from PIL import Image
 
-        self.check_done(self.told)
-        self.assertEqual(self.told.stdout, "".join(f"{self.first / scene}\n" for scene in SIZES))
+        self.check_done(self.first_run)
+        self.assertEqual(self.first_run.stdout, "".join(f"{self.first / scene}\n" for scene in SIZES))
         names = [f"{scene}/{file}" for scene in SIZES for file in ("albedo.png", "material.png")]
         self.assertEqual(sorted(content(folder=self.first)), sorted([*names, "run.json"]))
         for scene, size in SIZES.items():
@@ -326,7 +326,7 @@ class Pipeline(unittest.TestCase):
         expected |= {"ensemble": 1, "resolution": 32, "device": "cpu", "half": False}
         self.assertEqual({key: run[key] for key in expected}, expected)
         self.assertEqual(run["dataset_manifest_sha256"], "d" * 64)
-        # Two networks of one name are told apart.
+        # Two networks with the same name have different hashes.
         self.assertEqual(run["weights_sha256"], tool.weights_sha256(folder=self.root / "model"))
         self.assertNotEqual(run["weights_sha256"], tool.weights_sha256(folder=self.root / "dataset"))
         hashes = {"dataset_manifest_sha256", "weights_sha256"}
@@ -352,7 +352,7 @@ class Pipeline(unittest.TestCase):
     def test_a_run_resumes_and_force_starts_over(self) -> None:
         out, whole = self.fresh("out"), content(folder=self.first)
         self.check_done(self.run_tool("--scene", "attic", out=out))
-        # As if killed within the second scene.
+        # The state after a kill during the second scene.
         (out / ".cellar.partial").mkdir()
         (out / ".cellar.partial/albedo.png").touch()
         (out / "attic/albedo.png").write_bytes(b"seen")
@@ -364,7 +364,7 @@ class Pipeline(unittest.TestCase):
         self.check_done(done)
         self.assertEqual((done.stdout, "2 of 2 scenes" in done.stderr), ("", True))
         self.check_refused("--seed", "1", expected="made with seed 0, not 1; give --force", out=out)
-        # Force that fails leaves nothing behind that was made with seed 0.
+        # A forced run that fails leaves no pictures made with seed 0.
         spoilt = self.fresh("spoilt")
         write_tiny_dataset(folder=spoilt)
         (spoilt / "scenes/attic/views/input/rgb.png").write_bytes(b"no picture")
@@ -402,7 +402,7 @@ class Pipeline(unittest.TestCase):
 
 
 def content(*, folder: Path) -> dict[str, bytes]:
-    """All files below a folder, by their paths in it."""
+    """All files below a folder, by relative path."""
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 

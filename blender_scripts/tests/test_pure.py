@@ -39,8 +39,8 @@ class JobFiles(unittest.TestCase):
         (path.parent / "t").touch()
         with self.assertRaises(JobError) as caught:
             read_job(path=path)
-        for name, told in (("'x.exr'", True), ("'p'", True), ("'k'", True), ("'t'", False)):
-            self.assertEqual(name in str(caught.exception), told, name)
+        for name, is_named in (("'x.exr'", True), ("'p'", True), ("'k'", True), ("'t'", False)):
+            self.assertEqual(name in str(caught.exception), is_named, name)
         for name in ("x.exr", "p", "k"):
             (path.parent / name).touch()
         self.assertEqual(read_job(path=path), job)

@@ -1,8 +1,9 @@
-"""Scores one of the shared bench scenes the way it is done with Mitsuba: fit radiances, then render five views.
+"""Scores one of the shared bench scenes as one would with Mitsuba: fits radiances, then renders five views.
 
 Reads one job file (JSON), writes pictures and one result file into the job's folder. Emitter radiances are fitted with
-`prb` and Adam by L1 on linear RGB, a logarithm a channel; then each view is rendered by `path`. Every stage is timed, CPU
-(all threads) and wall. `scalar_rgb` cannot differentiate: it renders only.
+`prb` and Adam by L1 on linear RGB, as one logarithm for each channel; then each view is rendered by `path`. CPU time
+(of all threads) and wall time of every stage are measured. `scalar_rgb` cannot differentiate and therefore only
+renders.
 
 Usage: five_views_mitsuba.py JOB.json
 """
@@ -21,7 +22,7 @@ import numpy as np
 
 
 def main() -> None:
-    """Carries out the job named on the command line."""
+    """Runs the job that the command line names."""
     job = json.loads(Path(sys.argv[1]).read_text())
     mi.set_variant(job["variant"])
     stages: list[dict] = []
@@ -40,7 +41,7 @@ def main() -> None:
 
 @contextmanager
 def timed(stages: list[dict], *, name: str, samples: int):
-    """Adds a stage with its CPU and wall seconds."""
+    """Adds a stage with its CPU and wall times in seconds."""
     cpu, wall = sum(os.times()[:2]), time.perf_counter()
     yield
     spent = {"cpu": sum(os.times()[:2]) - cpu, "wall": time.perf_counter() - wall}
@@ -66,7 +67,7 @@ def scene_dict(*, folder: Path, work: Path) -> dict:
 
 
 def texture_id(file: str) -> str:
-    """The name of a texture in the scene, which may hold no dot; parts share textures, as they do in our reader."""
+    """The name of a texture in the scene, which may hold no dot. Parts share textures, as in our reader."""
     return "texture_" + file.replace(".", "_").replace("/", "_")
 
 
@@ -107,7 +108,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def write_ply(*, path: Path, vertices: np.ndarray, triangles: np.ndarray) -> None:
-    """Writes what `read_ply` reads."""
+    """Writes a PLY that `read_ply` can read."""
     properties = "".join(f"property float {name}\n" for name in VERTEX.names)
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n{properties}"
@@ -119,7 +120,7 @@ def write_ply(*, path: Path, vertices: np.ndarray, triangles: np.ndarray) -> Non
 
 
 def sensor(*, camera: dict, size: list[int], fov_x_deg: float) -> mi.Sensor:
-    """A pinhole; our cameras look along -Z, Mitsuba's along +Z with +X to the left."""
+    """A pinhole camera. Our cameras look along -Z, Mitsuba's along +Z with +X to the left."""
     turned = np.array(camera) @ np.diag([-1.0, 1.0, -1.0, 1.0])
     film = {
         "type": "hdrfilm",
@@ -151,7 +152,7 @@ def render_views(*, scene: mi.Scene, integrator: mi.Integrator, job: dict, sampl
 
 
 def fit(*, scene: mi.Scene, job: dict) -> dict:
-    """Fits all emitters' radiances from one common grey; says how far off they are, relative to the scene's own."""
+    """Fits all emitters' radiances, starting from one common grey; returns their errors relative to the scene's own."""
     import drjit as dr
 
     plan = job["fit"]

@@ -1,7 +1,8 @@
-"""Times Mitsuba's path tracer on the shared scene `bench/dense`, on one thread, at its caller's pace.
+"""Times Mitsuba's path tracer on the shared scene `bench/dense`, on one thread, whenever its caller requests it.
 
-Usage: path_speed_mitsuba.py VARIANT SCENE_FOLDER SIZE MAX_DEPTH. Each line on standard input is a number of samples a pixel;
-each is answered by a line with the CPU seconds of that render. No roulette. The first answer counts compilation.
+Usage: path_speed_mitsuba.py VARIANT SCENE_FOLDER SIZE MAX_DEPTH. Each line on standard input is a number of samples a
+pixel; the answer is a line with the CPU seconds of that render. There is no roulette. The first answer includes
+compilation.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import mitsuba as mi
 
 
 def main() -> None:
-    """Serves renders until the input ends."""
+    """Renders on request until the input ends."""
     variant, folder, size, max_depth = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)

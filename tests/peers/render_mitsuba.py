@@ -1,8 +1,9 @@
-"""Renders a scene by Mitsuba 3, several times with seeds of their own.
+"""Renders scenes with Mitsuba 3, several times each with different seeds.
 
-Job (JSON): `scenes`: a list of `scene` (the XML), `out` (where to write), `seeds` (a list), `samples` (a pixel and seed);
-and `variant`. Out: each `out` holds the pictures one after another as little-endian floats, row by row from the top, red,
-green, blue; and beside the job `result.json` with `seconds` of each scene's renders.
+The job (JSON) holds `variant` and `scenes`, a list of objects with `scene` (the XML), `out` (the file to write),
+`seeds` (a list) and `samples` (a pixel and seed). Each `out` then holds the pictures one after another as little-endian
+floats, row by row from the top, red, green, blue. `result.json` beside the job holds the `seconds` of each scene's
+renders.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ import numpy as np
 
 
 def render(*, scene_file: Path, out: Path, seeds: list[int], samples: int) -> float:
-    """Writes one picture a seed; gives the seconds that rendering took."""
+    """Writes one picture for each seed and returns the seconds that rendering took."""
     import mitsuba as mi
 
-    # Shapes keep their own ids and materials: merging would gain nothing here.
+    # Shapes are not merged: it would not be faster here.
     scene = mi.load_file(str(scene_file), optimize=False)
     started = time.monotonic()
     with out.open("wb") as file:
@@ -31,7 +32,7 @@ def render(*, scene_file: Path, out: Path, seeds: list[int], samples: int) -> fl
 
 
 def main(job_file: Path) -> None:
-    """Carries the job out."""
+    """Runs the job."""
     import mitsuba as mi
 
     job = json.loads(job_file.read_text(encoding="utf-8"))
@@ -48,7 +49,7 @@ def main(job_file: Path) -> None:
     ]
     result = job_file.with_name("result.json")
     result.write_text(json.dumps({"seconds": seconds, "version": mi.__version__}), encoding="utf-8")
-    # Mitsuba's own shutdown has nothing left to do; leaving at once saves seconds.
+    # Skips Mitsuba's shutdown, which has nothing left to do and takes seconds.
     sys.stdout.flush()
     os._exit(0)
 

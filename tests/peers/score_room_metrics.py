@@ -1,8 +1,9 @@
-"""MSE, PSNR and SSIM by scikit-image, LPIPS by the `lpips` package: what `score_room_mitsuba.py` compares pictures with.
+"""MSE, PSNR and SSIM by scikit-image, LPIPS by the `lpips` package, for `score_room_mitsuba.py`.
 
-The rules of protocol `mateval-1` as far as these packages go: light and colours for SSIM and LPIPS clipped and
-sRGB-encoded, albedo's MSE and PSNR linear; SSIM over the windows that lie inside the mask; LPIPS of the prediction with
-the truth's pixels outside the mask, the sum of the map over the mask's pixels. Pictures are compared as they are, noise and all.
+Follows the rules of protocol `mateval-1` as far as these packages allow: light and colours for SSIM and LPIPS clipped
+and sRGB-encoded, albedo's MSE and PSNR linear; SSIM over the windows that lie inside the mask; LPIPS of the prediction
+with the truth's pixels outside the mask, the sum of the map over the mask's pixels. Noise is not removed from the
+pictures.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ WINDOW = 11
 
 
 def network(weights: str | None) -> lpips.LPIPS:
-    """AlexNet with the weights of `tools/fetch_lpips_weights.py`; without a file random ones, which take as long."""
+    """AlexNet with the weights of `tools/fetch_lpips_weights.py`; without a file random ones, as fast."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         net = lpips.LPIPS(net="alex", version="0.1", pretrained=False, pnet_rand=True, spatial=True, verbose=False)
@@ -35,7 +36,7 @@ def network(weights: str | None) -> lpips.LPIPS:
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """Clipped to 0..1 and sRGB-encoded."""
+    """Returns the picture clipped to 0..1 and sRGB-encoded."""
     held = np.clip(linear, 0.0, 1.0)
     return np.where(held <= 0.0031308, 12.92 * held, 1.055 * held ** (1.0 / 2.4) - 0.055).astype(np.float32)
 
@@ -48,7 +49,7 @@ class Scores:
         self.network, self.exposure, self.stages, self.timed = network, exposure, stages, timed
 
     def view(self, *, truth: dict, pictures: dict, view: int) -> list[dict]:
-        """All values of a view: of both tracks and of albedo as it is and aligned, by region."""
+        """All values of a view by region: of both tracks, and of albedo unaligned and aligned."""
         light = srgb(self.exposure * truth["rgb"])
         values = []
         for track in ("true", "fitted"):
@@ -89,7 +90,7 @@ class Scores:
             return self.network(*tensors, normalize=True)[0, 0].numpy()
 
     def whole_lpips(self, *, prediction: np.ndarray, truth: np.ndarray) -> float:
-        """LPIPS as it is published, over whole pictures of linear light: means of the stages' own maps, summed."""
+        """LPIPS as published, over whole pictures of linear light: the sum of the means of the stages' own maps."""
         tensors = [torch.from_numpy(srgb(picture).transpose(2, 0, 1)[None]) for picture in (prediction, truth)]
         self.network.spatial = False
         with torch.inference_mode():
@@ -99,13 +100,13 @@ class Scores:
 
 
 def scales(*, prediction: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """One scale a channel that brings the prediction nearest to the truth over the mask; 1 where it is black."""
+    """The scale for each channel that brings the prediction nearest to the truth over the mask; 1 if it is black."""
     squares = (prediction[mask] ** 2).sum(axis=0)
     return np.where(squares > 0.0, (truth[mask] * prediction[mask]).sum(axis=0) / np.maximum(squares, 1e-30), 1.0)
 
 
 def ssim_map(prediction: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """SSIM around every pixel, a mean of the channels."""
+    """SSIM around every pixel, as the mean over the channels."""
     _, full = structural_similarity(
         truth,
         prediction,

@@ -1,9 +1,10 @@
-"""Scores one submission in one room the way it is done with other projects' parts: Mitsuba, scikit-image, lpips.
+"""Scores one submission in one room with other projects' software: Mitsuba, scikit-image, lpips.
 
 Reads one job file (JSON), writes pictures and one result file into the job's folder. Emitter radiances are fitted as in
 `five_views_mitsuba.py`; each track's views are rendered by the integrator that its scene names; albedo comes from the
-`aov` integrator; `score_room_metrics.py` compares. Every stage is timed, CPU (all threads) and wall. Importing modules and
-compiling kernels (a short render of everything that follows) is not: it is a stage of its own, `uncounted`.
+`aov` integrator; `score_room_metrics.py` compares the pictures. CPU time (of all threads) and wall time of every stage
+are measured. Importing modules and compiling kernels (by a short render of everything that follows) is the separate
+stage `uncounted`.
 
 Usage: score_room_mitsuba.py JOB.json
 """
@@ -20,16 +21,16 @@ import numpy as np
 
 TRACKS = ("true", "fitted")
 ALBEDO_SAMPLES = 16
-# Mitsuba gathers samples otherwise below four.
+# Below four samples Mitsuba accumulates them in a different way.
 WARM_UP_SAMPLES = 4
 
 
 def main() -> None:
-    """Carries out the job named on the command line."""
+    """Runs the job that the command line names."""
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     mi.set_variant(job["variant"])
     mi.set_log_level(mi.LogLevel.Error)
-    # Both want a variant.
+    # Both need a variant to be set.
     import five_views_mitsuba as five_views
     import score_room_metrics as metrics
 
@@ -69,13 +70,13 @@ def main() -> None:
         for picture, shown in zip(pictures["true"], truth)
     ]
     Path(job["out"], "result.json").write_text(json.dumps(result), encoding="utf-8")
-    # Mitsuba's own shutdown has nothing left to do; leaving at once saves seconds.
+    # Skips Mitsuba's shutdown, which has nothing left to do and takes seconds.
     sys.stdout.flush()
     os._exit(0)
 
 
 def warm_up(*, scenes: dict, job: dict, five_views) -> None:
-    """Has everything compiled that the job will use."""
+    """Compiles everything that the job will use."""
     view = sensors(job=job, five_views=five_views)[0]
     for scene in scenes.values():
         render(scene=scene, view=view, samples=WARM_UP_SAMPLES, seed=0)
@@ -94,18 +95,18 @@ def sensors(*, job: dict, five_views) -> list[mi.Sensor]:
 
 
 def render(*, scene: mi.Scene, view: mi.Sensor, samples: int, seed: int) -> np.ndarray:
-    """A picture by the scene's own integrator, linear RGB."""
+    """Renders a picture with the scene's own integrator, linear RGB."""
     return np.array(mi.render(scene, sensor=view, spp=samples, seed=seed))[:, :, :3]
 
 
 def albedo(*, scene: mi.Scene, view: mi.Sensor) -> np.ndarray:
-    """Base colours as the camera sees them, linear; the channels that follow the picture's own."""
+    """Base colours as the camera sees them, linear: the channels that follow those of the picture."""
     integrator = mi.load_dict({"type": "aov", "aovs": "albedo:albedo"})
     return np.array(mi.render(scene, sensor=view, integrator=integrator, spp=ALBEDO_SAMPLES, seed=0))[:, :, -3:]
 
 
 def read_truth(view: dict) -> dict:
-    """A view's true pictures, linear, and its masks by region."""
+    """The reference pictures of a view, linear, and its masks by region."""
     picture = lambda path: np.array(mi.Bitmap(path).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
     mask = lambda path: np.array(mi.Bitmap(path)).reshape(-1, view["size"][0]) > 0
     masks = {name: mask(path) for name, path in view["masks"].items()}

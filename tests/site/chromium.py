@@ -1,4 +1,4 @@
-"""Headless Chromium, told what to do over its DevTools pipe: nothing to install beside the browser itself.
+"""Headless Chromium, controlled through its DevTools pipe, so that only the browser itself must be installed.
 
 The protocol is https://chromedevtools.github.io/devtools-protocol/; messages are JSON, each ended by a zero byte.
 """
@@ -24,8 +24,8 @@ class Page:
         self._read, from_browser = os.pipe()
         words = ["chromium", "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu",
                  "--hide-scrollbars", "--no-first-run", "--disable-dev-shm-usage", f"--user-data-dir={self._profile}"]
-        # The browser reads from descriptor 3 and writes to 4. A shell may know descriptors under 10 only: two pages at once are
-        # too many.
+        # The browser reads from descriptor 3 and writes to 4. Some shells support only descriptors under 10, which do
+        # not suffice for two pages at once.
         self._process = subprocess.Popen(
             ["sh", "-c", f'exec "$0" "$@" 3<&{to_browser} 4>&{from_browser}', *words, "about:blank"],
             pass_fds=(to_browser, from_browser), stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -34,7 +34,7 @@ class Page:
         self._buffer = b""
         self._number = 0
         self._session = None
-        #: What pages wrote to their console as a fault, and files that could not be loaded.
+        #: Errors that pages wrote to their console, and files that could not be loaded.
         self.faults: list[str] = []
         self._loaded = False
         target = self.send("Target.createTarget", url="about:blank")["targetId"]
@@ -53,7 +53,7 @@ class Page:
         shutil.rmtree(self._profile, ignore_errors=True)
 
     def send(self, method: str, **params: object) -> dict:
-        """Sends a command and gives its result."""
+        """Sends a command and returns its result."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": params}
         if self._session:
@@ -95,10 +95,10 @@ class Page:
                 self.faults.append(f"asked for {url}")
 
     def open(self, url: str) -> float:
-        """Opens a page; gives the seconds until it was loaded."""
+        """Opens a page and returns the seconds until it was loaded."""
         self._loaded = False
         start = time.monotonic()
-        # A blank page between: a change behind the # alone would load nothing.
+        # Opens a blank page first, because an address that differs only after the # would load nothing.
         self.send("Page.navigate", url="about:blank")
         self._wait_for_load()
         self._loaded = False
@@ -112,14 +112,14 @@ class Page:
             self._next()
 
     def run(self, script: str) -> object:
-        """What a script gives; promises are waited for."""
+        """Returns the value of a script, after waiting for promises."""
         answer = self.send("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         if "exceptionDetails" in answer:
             raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
         return answer["result"].get("value")
 
     def key(self, key: str) -> None:
-        """Presses a key and lets it go."""
+        """Presses and releases a key."""
         code = {"ArrowRight": 39, "ArrowLeft": 37, "Tab": 9, "Enter": 13, " ": 32}[key]
         text = {"Enter": "\r", " ": " "}.get(key)
         down = {"type": "keyDown" if text else "rawKeyDown", "key": key, "windowsVirtualKeyCode": code}
@@ -127,12 +127,12 @@ class Page:
         self.send("Input.dispatchKeyEvent", type="keyUp", key=key, windowsVirtualKeyCode=code)
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Moves the mouse with its button down."""
+        """Moves the mouse with its button pressed."""
         for kind, (x, y) in [("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)]:
             self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def picture(self, path: str, *, whole: bool = False) -> None:
-        """A screenshot of what is seen, or of the whole page."""
+        """Writes a screenshot of the visible part, or of the whole page."""
         data = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=whole)["data"]
         with open(path, "wb") as file:
             file.write(base64.b64decode(data))

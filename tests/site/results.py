@@ -1,4 +1,4 @@
-"""Synthetic results and pictures: what a leaderboard is made of, without a dataset. All of it is CC0."""
+"""Synthetic results and pictures, from which a leaderboard can be made without a dataset. All of it is CC0."""
 
 import hashlib
 import json
@@ -29,7 +29,7 @@ CATEGORIES = [("Sofa", "Seat"), ("Dining Table", "Table"), ("WallInner", "Archit
 
 
 def pretty(value: object) -> str:
-    """As MatEval writes JSON."""
+    """JSON as MatEval writes it."""
     return json.dumps(value, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -75,7 +75,7 @@ def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: ob
     chance = random.Random(seed)
     values = {}
     for at, scene in enumerate(scenes):
-        # Scenes are hard or easy for all methods alike.
+        # A scene is equally hard or easy for all methods.
         ease = random.Random(f"scene {at}").gauss(0, 2)
         values[scene] = scene_values(psnr=psnr + ease, chance=chance)
     keys = values[scenes[0]]
@@ -99,7 +99,7 @@ def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: ob
 
 
 def write_verification(path: Path, *, confirmed: bool) -> None:
-    """What `eval verify` leaves beside a result."""
+    """Writes the file that `eval verify` writes beside a result."""
     found = json.loads(path.read_text())
     path.with_suffix(".verified.json").write_text(pretty({
         "format": "mateval-verification/1", "tool": "mateval 0.1.0", "result_sha256": sha256(path.read_text()),
@@ -109,7 +109,7 @@ def write_verification(path: Path, *, confirmed: bool) -> None:
 
 
 def write_png(path: Path, *, width: int, height: int, color) -> None:
-    """An 8-bit RGB PNG; `color` gives the bytes of a pixel."""
+    """Writes an 8-bit RGB PNG; `color` returns the bytes of a pixel."""
     rows = b"".join(b"\0" + bytes(v for x in range(width) for v in color(x, y)) for y in range(height))
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
@@ -118,7 +118,7 @@ def write_png(path: Path, *, width: int, height: int, color) -> None:
 
 
 def write_pictures(folder: Path, *, methods: dict[str, float], scenes: list[str], width: int = 96, height: int = 54) -> None:
-    """A floor and a wall for each scene; methods miss their colours by a share. `methods` are ids."""
+    """Draws a floor and a wall for each scene. `methods` holds, by id, the share by which a method's colours are wrong."""
     def room(scene: int, view: int, miss: float):
         base = [60 + 40 * ((scene + c) % 4) for c in range(3)]
         horizon = height * (0.45 + 0.05 * view)

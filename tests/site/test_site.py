@@ -1,6 +1,6 @@
-"""Drives the leaderboard's site in headless Chromium: at two widths, light and dark, by mouse and by keyboard.
+"""Tests the leaderboard's site in headless Chromium: at two widths, light and dark, by mouse and by keyboard.
 
-`tools/test_site.sh` installs the browser, builds `mateval` and runs this. With MATEVAL_TEST_PICTURES=DIR it leaves
+`tools/test_site.sh` installs the browser, builds `mateval` and runs this. With MATEVAL_TEST_PICTURES=DIR it writes
 screenshots there.
 """
 
@@ -22,7 +22,7 @@ MATEVAL = os.environ.get("MATEVAL", str(Path(__file__).parents[2] / "target/debu
 PICTURES = os.environ.get("MATEVAL_TEST_PICTURES")
 EVIL = "<script>document.title='broken in'</script>"
 
-#: Name, id, PSNR, seed and what each says of itself. Two are copies of one method, one breaks in if it can.
+#: Name, id, PSNR, seed and further keys of each method. Two are copies of one method; one attempts to inject a script.
 METHODS = [
     ("TrueTexture", "truetexture", 33.0, 1, {"licence": "MIT", "url": "https://example.org/true",
                                              "cost": {"seconds_a_scene": 12.5, "hardware": "one laptop"}}),
@@ -47,7 +47,7 @@ def make_small(folder: Path) -> Path:
     results.write_verification(paths[5], confirmed=False)
     misses = {method: 0.1 * at for at, (_, method, *_) in enumerate(METHODS)}
     results.write_pictures(folder / "pictures", methods=misses, scenes=SCENES[:6], width=64, height=36)
-    entry = {"date": "2026-03-01", "title": "A lamp was missing", "text": "room-002 was rendered anew.", "affects": ["room-002"]}
+    entry = {"date": "2026-03-01", "title": "A lamp was missing", "text": "room-002 was rendered again.", "affects": ["room-002"]}
     (folder / "errata.json").write_text(results.pretty({"format": "mateval-errata/1", "entries": [entry]}))
     site = folder / "site"
     subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures",
@@ -81,7 +81,7 @@ def tearDownModule() -> None:
 
 
 class Links(HTMLParser):
-    """What a page leads to."""
+    """The addresses that a page refers to."""
 
     def __init__(self, text: str):
         super().__init__()
@@ -93,7 +93,7 @@ class Links(HTMLParser):
 
 
 def broken_links(site: Path) -> tuple[int, list[str]]:
-    """How many links there are, and those that lead nowhere."""
+    """Returns the number of links, and the links whose target does not exist."""
     seen, broken = 0, []
     for page in site.rglob("*.html"):
         for link in Links(page.read_text()).found:
@@ -108,7 +108,7 @@ def broken_links(site: Path) -> tuple[int, list[str]]:
     return seen, broken
 
 
-#: Texts whose colours are too near to each other for reading (WCAG 2: 4.5 to 1), and boxes wider than the window.
+#: Finds text whose contrast is too low to read (WCAG 2: 4.5 to 1), and boxes wider than the window.
 LOOK = """(() => {
   const channel = (v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
   const parse = (color) => {
@@ -158,8 +158,8 @@ class TestLooks(unittest.TestCase):
                     self.assertEqual(page.faults, [])
         self.assertEqual(looked_at, 28)
 
-    def test_faults_of_looks_are_found(self) -> None:
-        """The twin: faint text, a wide box, a script that fails, and a picture from elsewhere."""
+    def test_faults_of_appearance_are_found(self) -> None:
+        """The twin: text of low contrast, a wide box, a script that fails, and a picture from another site."""
         page = Page(width=400, height=800, dark=True)
         self.addCleanup(page.close)
         page.open((small / "index.html").as_uri())
@@ -174,7 +174,7 @@ class TestLooks(unittest.TestCase):
 
 
 class TestLinks(unittest.TestCase):
-    def test_all_lead_somewhere(self) -> None:
+    def test_all_targets_exist(self) -> None:
         seen, broken = broken_links(small)
         self.assertGreater(seen, 500)
         self.assertEqual(broken, [])
@@ -201,7 +201,7 @@ class TestLinks(unittest.TestCase):
         with open(small / "methods/grey.csv", newline="") as file:
             self.assertEqual([row["scene"] for row in csv.DictReader(file)], SCENES)
 
-    def test_nothing_of_strangers_runs(self) -> None:
+    def test_scripts_in_results_do_not_run(self) -> None:
         for page in small.rglob("*.html"):
             text = page.read_text()
             self.assertNotIn(EVIL, text, page)
@@ -240,7 +240,7 @@ class TestBoard(unittest.TestCase):
         self.assertEqual(self.names()[0], "grey")
         self.assertEqual(self.page.run("document.querySelector('[aria-sort]').dataset.key"), "albedo.novel.psnr")
         self.assertIn("Albedo, novel views PSNR", self.page.run("document.getElementById('status').textContent"))
-        # Less is better: the first press brings the least; those that say nothing come last, either way.
+        # Less is better: the first press sorts the smallest first. Methods without a value are always last.
         for expected in [["A method", "TrueTexture", "CopyA"], ["CopyA", "TrueTexture", "A method"]]:
             self.press("cost")
             self.assertEqual([name[: len(word)] for name, word in zip(self.names(), expected)], expected)
@@ -260,7 +260,7 @@ class TestBoard(unittest.TestCase):
         self.tick("picture", "rgb_true")
         self.tick("views", "input")
         self.assertEqual(self.heads()[2:-2], ["albedo.novel.psnr", "albedo.novel.ssim"])
-        # Cells go with their heads.
+        # Cells are hidden together with their heads.
         hidden = "[...document.querySelectorAll('#board tr')].map((row) => [...row.cells].filter((c) => !c.hidden).length)"
         self.assertEqual(set(self.page.run(hidden)), {6})
         self.tick("verified", "1")
@@ -270,7 +270,7 @@ class TestBoard(unittest.TestCase):
                          box.dispatchEvent(new Event('input', { bubbles: true })); })()""")
         self.assertEqual(self.names(), ["CopyA", "CopyB"])
         self.assertIn("2 of 6 methods", self.page.run("document.getElementById('status').textContent"))
-        # The address holds all of it.
+        # The address holds the complete state.
         address = self.page.run("location.href")
         self.page.open(address)
         self.assertEqual((self.names(), self.heads()[2:-2]), (["CopyA", "CopyB"], ["albedo.novel.psnr", "albedo.novel.ssim"]))
@@ -297,9 +297,9 @@ class TestBoard(unittest.TestCase):
             self.page.open((small / name).as_uri())
             nodes = self.page.send("Accessibility.getFullAXTree")["nodes"]
             roles = {"button", "checkbox", "radio", "slider", "combobox", "link", "searchbox", "image", "region"}
-            told = [node for node in nodes if node.get("role", {}).get("value") in roles and not node.get("ignored")]
-            nameless = [node for node in told if not node.get("name", {}).get("value")]
-            self.assertGreater(len(told), 20)
+            exposed = [node for node in nodes if node.get("role", {}).get("value") in roles and not node.get("ignored")]
+            nameless = [node for node in exposed if not node.get("name", {}).get("value")]
+            self.assertGreater(len(exposed), 20)
             self.assertEqual(nameless, [], name)
 
 
@@ -329,7 +329,7 @@ class TestScene(unittest.TestCase):
         middle = box["y"] + box["height"] / 2
         self.page.drag((box["x"] + 0.51 * box["width"], middle), (box["x"] + 0.2 * box["width"], middle))
         self.assertLess(abs(float(at().strip("%")) - 20), 3)
-        # The truth is what is left of it.
+        # The truth is shown to the left of the slider.
         self.assertIn("clip-path", self.page.run("document.querySelector('#truth').computedStyleMap().has('clip-path') ? 'clip-path' : ''"))
 
     def test_pictures_are_those_chosen(self) -> None:
@@ -339,11 +339,11 @@ class TestScene(unittest.TestCase):
         self.assertEqual(self.source("prediction"), "grey/room-002/up_left/albedo.png")
         self.assertEqual(self.source("truth"), "_truth/room-002/up_left/albedo.png")
         self.assertEqual(self.source("error"), "grey/room-002/up_left/albedo-error.png")
-        # There is no heat map of this kind.
+        # This kind has no heat map.
         self.choose("kind", "rgb_true")
         self.assertEqual(self.source("prediction"), "grey/room-002/up_left/rgb_true.png")
         self.assertTrue(self.page.run("document.getElementById('heat').hidden"))
-        # A press on a small picture chooses it.
+        # A click on a small picture selects it.
         self.page.run("document.querySelector('.pick[data-method=copya][data-view=input]').click()")
         self.assertEqual(self.source("prediction"), "copya/room-002/input/rgb_true.png")
         self.assertEqual(self.page.run("document.querySelectorAll('.pick[aria-pressed=true]').length"), 1)
@@ -374,7 +374,7 @@ class TestLarge(unittest.TestCase):
             print(f"50 x 184: opened in {seconds:.2f} s, sorted in {sorting:.0f} ms, {columns} columns", flush=True)
             if PICTURES:
                 page.picture(f"{PICTURES}/large.png")
-            # Pictures that are far below are not loaded before they are seen.
+            # Pictures far below are not loaded until they are visible.
             page.open((site / "scenes/room-000.html").as_uri())
             loaded = "document.querySelectorAll('.gallery img').length - [...document.querySelectorAll('.gallery img')].filter((i) => !i.complete).length"
             self.assertLess(page.run(loaded), 200)
