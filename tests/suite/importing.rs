@@ -272,7 +272,7 @@ fn distances_and_what_finds_nothing_are_told() {
     std::fs::write(files.join("rom/red.obj"), "").unwrap();
     std::fs::write(files.join("textures/red.png"), "").unwrap();
     let misspelt = import(&dataset, &files, &folder.path().join("misspelt"), &[]).ends_with(0);
-    let misspelt = misspelt.says("'room/rde.obj' is for no scene").says("'rom/' is for no scene");
+    let misspelt = misspelt.says("'room/rde.obj' matches no scene").says("'rom/' matches no scene");
     assert!(!misspelt.stderr.contains("textures"), "{}", misspelt.stderr);
     let strict = told("strict", &["--max-distance", "0.001"]);
     let share = strict["texels_without"].as_f64().unwrap() / strict["texels"].as_f64().unwrap();

@@ -18,7 +18,7 @@ pub enum BaselineError {
         source: std::io::Error,
     },
     /// The output exists and is never replaced.
-    #[error("'{}' is already there; choose another --out", .0.display())]
+    #[error("'{}' already exists; choose another --out", .0.display())]
     InTheWay(PathBuf),
     /// The output would lie in the dataset's folder.
     #[error("'{}' lies in the dataset, which must hold nothing else; choose another --out", .0.display())]

@@ -75,7 +75,7 @@ struct Plan {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.out.as_path();
     if out.exists() && !args.force {
-        bail!("'{}' is already there; choose another --out, or add --force to replace what a demo left", out.display());
+        bail!("'{}' already exists; choose another --out, or add --force to replace what a demo left", out.display());
     }
     args.by.checked()?;
     let plan = plan(args)?;

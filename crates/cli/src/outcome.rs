@@ -5,7 +5,7 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use mateval_scene::{Finding, Severity};
 
-/// How a command ended that could do its work.
+/// How a command that did its work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit code 0: the answer is good, or the command asks no question.
@@ -14,7 +14,8 @@ pub enum Outcome {
     No,
 }
 
-/// Prints a result to stdout. That the reader has closed the pipe is no error; that the disk behind it is full is one.
+/// Prints a result to stdout. Fails if it cannot be written, for example to a full disk, but not if the reader has
+/// closed the pipe.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

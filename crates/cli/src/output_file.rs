@@ -14,7 +14,7 @@ pub fn check_output_file(path: &Path, flag: &str, kind: &str, force: bool) -> an
         bail!("'{shown}' is a folder; expected the name of a {kind} file");
     }
     if path.exists() && !force {
-        bail!("'{shown}' is already there; choose another {flag}, or add --force to replace it");
+        bail!("'{shown}' already exists; choose another {flag}, or add --force to overwrite it");
     }
     Ok(())
 }

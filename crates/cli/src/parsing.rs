@@ -20,7 +20,7 @@ pub fn parse_subcommand<C: clap::Subcommand>(words: &[OsString]) -> anyhow::Resu
     Ok(C::from_arg_matches(&matches)?)
 }
 
-/// `--NAME=PATH`: a path that begins with a hyphen is a value all the same.
+/// `--NAME=PATH`, so that a path that begins with a hyphen is still read as a value.
 pub fn path_option(name: &str, path: &Path) -> OsString {
     let mut word = OsString::from(format!("--{name}="));
     word.push(path);

@@ -17,7 +17,7 @@ use crate::outcome::Outcome;
 pub enum Command {
     /// Converts the scenes that a recipe lists into a dataset. A build that was killed resumes when it is run again.
     Build(build::BuildArgs),
-    /// Searches 3D-FRONT houses for rooms that could become scenes, and writes a page to pick from and a recipe.
+    /// Searches 3D-FRONT houses for rooms that could become scenes, and writes a page to choose from and a recipe.
     Survey(survey::SurveyArgs),
     /// Renders the dataset's RGB pictures.
     Render(render::RenderArgs),

@@ -19,7 +19,7 @@ pub struct Args {
 /// Writes the sample and prints the path of its recipe.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.exists() && !args.force {
-        bail!("'{}' is already there; choose another folder, or add --force to write into it", args.out.display());
+        bail!("'{}' already exists; choose another folder, or add --force to write into it", args.out.display());
     }
     mateval_sample::write(&args.out).context("cannot write the sample")?;
     print(&format!("{}\n", args.out.join("recipe.toml").display()))?;

@@ -37,7 +37,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let schemas = schemas().map(|(name, schema)| (args.out.join(name).with_extension("schema.json"), schema));
     if let Some((path, _)) = schemas.iter().find(|(path, _)| path.exists() && !args.force) {
-        bail!("'{}' is already there; choose another folder, or add --force to replace it", path.display());
+        bail!("'{}' already exists; choose another folder, or add --force to overwrite it", path.display());
     }
     std::fs::create_dir_all(&args.out).with_context(|| format!("cannot create '{}'", args.out.display()))?;
     for (path, schema) in &schemas {

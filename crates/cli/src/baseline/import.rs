@@ -53,7 +53,7 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Outcome> {
         import::write(&dataset, &args.folder, &places.out, places.force, &method, &options, progress)
     })?;
     for file in &report.unused {
-        say(&format!("warning: '{file}' is for no scene or instance of the dataset; it was not read"));
+        say(&format!("warning: '{file}' matches no scene or instance of the dataset; it was not read"));
     }
     match args.format {
         Format::Json => print(&json::to_text(&report))?,
@@ -85,7 +85,7 @@ fn text(report: &ImportReport) -> String {
     text
 }
 
-/// What is missing of an instance, and how it will score.
+/// What an instance lacks, and how it will be scored.
 fn shortfall(instance: &ImportedInstance) -> String {
     match &instance.file {
         None => "no file describes it; it has no maps and will score as grey".to_owned(),

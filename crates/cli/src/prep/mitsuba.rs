@@ -22,7 +22,7 @@ pub struct MitsubaArgs {
     /// Folder that scene.xml, meshes and textures are written to.
     #[arg(long)]
     out: PathBuf,
-    /// Samples per pixel [default: as the recipe says].
+    /// Samples per pixel [default: the recipe's].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     samples: Option<u32>,
     /// Replace a folder that already exists.

@@ -42,7 +42,7 @@ pub fn run(args: &PublishArgs) -> anyhow::Result<Outcome> {
     }
     for place in [&args.public, &args.private] {
         if place.exists() && !args.force {
-            bail!("'{}' is already there; choose another folder, or add --force to replace it", place.display());
+            bail!("'{}' already exists; choose another folder, or add --force to overwrite it", place.display());
         }
     }
     let found = with_progress(|progress| publish(&args.dataset, &args.public, &args.private, progress))

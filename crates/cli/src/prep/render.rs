@@ -18,7 +18,7 @@ pub struct RenderArgs {
     dataset: PathBuf,
     #[command(flatten)]
     pub by: RendererArgs,
-    /// Samples per pixel of each of the two halves of a picture [default: as the recipe says].
+    /// Samples per pixel of each of the two halves of a picture [default: the recipe's].
     #[arg(long)]
     samples: Option<u32>,
     /// Render this scene only; may be given several times.
