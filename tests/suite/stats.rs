@@ -52,7 +52,7 @@ Table I of the paper, for sample 0.1.0
   Avg. Objects/Scene     unknown
   Avg. Categories/Scene  unknown
 
-Beside Table I
+Further counts
                                              min  max  scenes
   houses                                  1
   scenes of bitterli                      1
@@ -62,7 +62,7 @@ Beside Table I
     architecture                          0
     others                               24
   different categories                    0
-    avg. of a scene                 unknown
+    avg. per scene                  unknown
 
 Objects by super-category
   super-category      objects  share
@@ -103,7 +103,7 @@ Table I of the paper, for sample 0.1.0
   Avg. Objects/Scene     5.0    5    5       1
   Avg. Categories/Scene  3.0    3    3       1
 
-Beside Table I
+Further counts
                                          min  max  scenes
   houses                              1
   scenes of bitterli                  1
@@ -113,7 +113,7 @@ Beside Table I
     architecture                      0
     others                           19
   different categories                3
-    avg. of a scene                 3.0    3    3       1
+    avg. per scene                  3.0    3    3       1
 
 Objects by super-category
   super-category                 objects   share
@@ -264,7 +264,7 @@ fn hostile_json() {
     }
 }
 
-/// Faults of several files are told together.
+/// Faults of several files are reported together.
 #[test]
 fn every_fault_at_once() {
     let copy = copied_dataset();
@@ -282,8 +282,8 @@ fn every_fault_at_once() {
     let copy = copied_dataset();
     Room::of(copy.path()).edit_scene(|scene| scene["instances"][0]["category"] = Value::from("Sofa"));
     run(&mut stats(copy.path())).ends_with(2).says("changed_file");
-    // A scene that is there twice would be counted twice.
+    // A scene that is listed twice would be counted twice.
     edit_json(&copy.path().join("dataset.json"), |file| file["scenes"] = serde_json::json!(["room", "room"]));
     rehash(copy.path());
-    run(&mut stats(copy.path())).ends_with(2).says("[duplicate_id] 'dataset.json' /scenes/1: 'room' is there already");
+    run(&mut stats(copy.path())).ends_with(2).says("[duplicate_id] 'dataset.json' /scenes/1: 'room' is listed twice");
 }

@@ -1,7 +1,7 @@
-//! What a dataset holds, counted: the paper's Table I, and what stands behind it.
+//! Counts what a dataset contains: the numbers of the paper's Table I, and those behind them.
 //!
-//! In: an open dataset; of its files only `dataset.json` and every `scene.json` are counted. Out: [`StatsFile`], which
-//! [`text`] sets in tables and [`picture`] draws.
+//! In: an open dataset, of which only `dataset.json` and every `scene.json` are counted. Out: [`StatsFile`], which [`text`]
+//! prints as tables and [`picture`] draws as a chart.
 
 pub mod picture;
 pub mod text;
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::AuditError;
 
-/// The word for this version of the statistics.
+/// The value of `format` in this version of the statistics.
 pub const STATS_FORMAT: &str = "mateval-stats/1";
 
 /// What `mateval prep stats --format json` prints: counts of a dataset.
@@ -30,26 +30,26 @@ pub const STATS_FORMAT: &str = "mateval-stats/1";
 pub struct StatsFile {
     /// Always `mateval-stats/1`.
     pub format: String,
-    /// What counted, as in `mateval 0.1.0`.
+    /// The program that counted and its version, as in `mateval 0.1.0`.
     pub tool: String,
-    /// What was counted.
+    /// The dataset that was counted.
     pub dataset: CountedDataset,
-    /// Table I, "Number of scenes".
+    /// Number of scenes ("Number of scenes" of Table I).
     pub scenes: usize,
-    /// Houses that the scenes are of; scenes of one house are not independent of each other.
+    /// Number of different houses. Scenes of one house are not independent of each other.
     pub houses: usize,
-    /// Scenes by the kind of their source, sorted by it.
+    /// Number of scenes of each kind of source, sorted by kind.
     pub source_kinds: Vec<SourceKindCount>,
-    /// Table I, "Avg. Objects/Scene"; null where no scene says what its objects are.
+    /// Number of objects per scene ("Avg. Objects/Scene" of Table I); null where no scene states which instances are objects.
     pub objects_per_scene: Option<Spread>,
-    /// Table I, "Avg. Categories/Scene": different super-categories, as the paper's categories are the eight; null as
-    /// above.
+    /// Number of different super-categories per scene ("Avg. Categories/Scene" of Table I, whose categories are the eight
+    /// super-categories); null as above.
     pub super_categories_per_scene: Option<Spread>,
-    /// Different categories of objects that have one; null as above.
+    /// Number of different categories per scene, of the objects that have a category; null as above.
     pub categories_per_scene: Option<Spread>,
-    /// All scenes together.
+    /// Counts of all scenes together.
     pub total: Counts,
-    /// Each scene, in the dataset's order.
+    /// Counts of each scene, in the dataset's order.
     pub per_scene: Vec<SceneStats>,
 }
 
@@ -61,98 +61,98 @@ pub struct CountedDataset {
     pub name: String,
     /// Its version.
     pub version: String,
-    /// SHA-256 of its manifest, hex.
+    /// SHA-256 of its manifest, in hexadecimal.
     pub manifest_sha256: String,
 }
 
-/// Scenes from one kind of source.
+/// The number of scenes from one kind of source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SourceKindCount {
     /// The kind of source.
     pub kind: SourceKind,
-    /// How many.
+    /// Number of scenes.
     pub scenes: usize,
 }
 
-/// A number that each scene has one of. Scenes that do not say what their objects are take no part: zero would be wrong
-/// for them.
+/// The distribution over scenes of a number that each scene has. Scenes that do not state which instances are objects are
+/// not included, since their number is unknown and not zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Spread {
-    /// Scenes that take part.
+    /// Number of scenes that were included.
     pub scenes: usize,
-    /// Its mean over scenes.
+    /// Mean over these scenes.
     pub mean: f64,
-    /// Its least.
+    /// Smallest value.
     pub min: usize,
-    /// Its largest.
+    /// Largest value.
     pub max: usize,
 }
 
-/// One scene's counts.
+/// The counts of one scene, and where it comes from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneStats {
     /// The scene.
     pub scene: SceneId,
-    /// The kind of its source.
+    /// The kind of its source: `bitterli` or `front3d`.
     pub source_kind: SourceKind,
     /// Its house.
     pub house: String,
-    /// What it holds.
+    /// The counts.
     pub counts: Counts,
 }
 
-/// What a scene, or all scenes together, hold.
+/// The counts of a scene, or of all scenes together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Counts {
-    /// Objects, architecture and others.
+    /// Number of all instances: objects, architecture and others.
     pub instances: usize,
-    /// Furniture and light fixtures.
+    /// Number of objects: furniture and light fixtures.
     pub objects: usize,
-    /// Instances that belong to the building.
+    /// Number of instances that belong to the building.
     pub architecture: usize,
-    /// Instances of any other role: every shape of a source that does not state roles.
+    /// Number of instances with any other role, as have all shapes of a source that does not state roles.
     pub others: usize,
-    /// Instances that a submission needs textures for.
+    /// Number of instances with an atlas, for which a submission needs textures.
     pub instances_with_atlas: usize,
-    /// The benchmark's eight in their order, even where there is none of them; then any other word, sorted.
+    /// The benchmark's eight super-categories in their order, with zero where no object has one; then all others, sorted.
     pub super_categories: Vec<SuperCategoryCount>,
-    /// Those that are there, in the order of their super-categories, the most frequent first.
+    /// The categories found, in the order of their super-categories and within each by decreasing number.
     pub categories: Vec<CategoryCount>,
-    /// What was wrong with the sources, by severity and code.
+    /// Faults of the sources, counted by severity and code.
     pub findings: Vec<FindingCount>,
 }
 
-/// Objects of one super-category.
+/// The number of objects in one super-category.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuperCategoryCount {
-    /// As in `scene.json`; null for objects without one.
+    /// The super-category, as in `scene.json`; null for objects without one.
     pub super_category: Option<String>,
-    /// How many.
+    /// Number of objects.
     pub objects: usize,
-    /// Of all objects, 0 to 1; null where there are no objects.
+    /// Share of all objects, 0 to 1; null where there are no objects.
     pub share: Option<f64>,
 }
 
-/// Objects of one category. A category is a name within its super-category.
+/// The number of objects in one category. A category is a name within its super-category.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CategoryCount {
-    /// As in `scene.json`; null for objects without one.
+    /// The super-category, as in `scene.json`; null for objects without one.
     pub super_category: Option<String>,
-    /// As in `scene.json`; null for objects without one.
+    /// The category, as in `scene.json`; null for objects without one.
     pub category: Option<String>,
-    /// How many.
+    /// Number of objects.
     pub objects: usize,
 }
 
-/// Counts the dataset. Fails where a scene or an instance is listed twice, and then names all of these.
+/// Counts the dataset. Fails where scenes or instances are listed twice, and reports all of them.
 pub fn count(dataset: &Dataset, tool: &str) -> Result<StatsFile, AuditError> {
-    let findings = doubles(dataset);
+    let findings = duplicates(dataset);
     if !findings.is_empty() {
         return Err(SceneError::Invalid { path: dataset.root.clone(), findings }.into());
     }
@@ -189,17 +189,17 @@ impl SceneStats {
 }
 
 impl Counts {
-    /// Super-categories that at least one object is of.
+    /// Number of super-categories that have at least one object.
     pub fn different_super_categories(&self) -> usize {
         self.super_categories.iter().filter(|row| row.objects > 0).count()
     }
 
-    /// Categories that at least one object is of.
+    /// Number of categories that have at least one object.
     pub fn different_categories(&self) -> usize {
         self.categories.iter().filter(|row| row.category.is_some()).count()
     }
 
-    /// Findings of this severity, whatever their code.
+    /// Number of findings of this severity, whatever their code.
     pub fn findings_of(&self, severity: Severity) -> usize {
         self.findings.iter().filter(|row| row.severity == severity).map(|row| row.count).sum()
     }
@@ -230,8 +230,8 @@ fn counts(scenes: &[SceneFile]) -> Counts {
     }
 }
 
-/// The rank of a super-category: the eight first, then any other word, then none.
-fn place(super_category: Option<&str>) -> usize {
+/// The position of a super-category in tables: the eight come first, then all others, then objects without one.
+fn rank(super_category: Option<&str>) -> usize {
     let after = SUPER_CATEGORIES.len();
     super_category.map_or(after + 1, |word| SUPER_CATEGORIES.iter().position(|known| *known == word).unwrap_or(after))
 }
@@ -248,8 +248,8 @@ fn super_categories(objects: &[&Instance]) -> Vec<SuperCategoryCount> {
         share: share(count),
     };
     let mut rows: Vec<SuperCategoryCount> = found.into_iter().map(row).collect();
-    // The sort is stable, so that unknown words stay sorted.
-    rows.sort_by_key(|row| place(row.super_category.as_deref()));
+    // The sort is stable, so that unknown super-categories stay sorted by name.
+    rows.sort_by_key(|row| rank(row.super_category.as_deref()));
     rows
 }
 
@@ -258,7 +258,7 @@ fn categories(objects: &[&Instance]) -> Vec<CategoryCount> {
         tally(objects.iter().map(|instance| (instance.super_category.as_deref(), instance.category.as_deref())));
     let mut rows: Vec<((Option<&str>, Option<&str>), usize)> = found.into_iter().collect();
     rows.sort_by_key(|((super_category, category), count)| {
-        (place(*super_category), *super_category, std::cmp::Reverse(*count), *category)
+        (rank(*super_category), *super_category, std::cmp::Reverse(*count), *category)
     });
     let row = |((super_category, category), objects): ((Option<&str>, Option<&str>), usize)| CategoryCount {
         super_category: super_category.map(str::to_owned),
@@ -268,7 +268,7 @@ fn categories(objects: &[&Instance]) -> Vec<CategoryCount> {
     rows.into_iter().map(row).collect()
 }
 
-/// How often each is there, sorted.
+/// How often each value occurs, sorted by value.
 fn tally<T: Ord>(all: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
     all.fold(BTreeMap::new(), |mut found, one| {
         *found.entry(one).or_insert(0) += 1;
@@ -283,8 +283,8 @@ fn spread(scenes: &[SceneStats], of: impl Fn(&Counts) -> usize) -> Option<Spread
     Some(Spread { scenes: values.len(), mean: values.iter().sum::<usize>() as f64 / values.len() as f64, min, max })
 }
 
-/// Scenes of a dataset and instances of a scene that are there twice: they would be counted twice.
-fn doubles(dataset: &Dataset) -> Vec<Finding> {
+/// A finding for each scene and instance that is listed twice, since it would be counted twice.
+fn duplicates(dataset: &Dataset) -> Vec<Finding> {
     let mut findings = repeats(DATASET, "scenes", "", dataset.file.scenes.iter().map(|id| id.as_str()));
     for scene in &dataset.scenes {
         let file = format!("scenes/{}/scene.json", scene.id);
@@ -300,6 +300,7 @@ fn doubles(dataset: &Dataset) -> Vec<Finding> {
     findings
 }
 
+/// A finding for each id that occurs earlier in the list.
 fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a str>) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     ids.enumerate()
@@ -309,21 +310,21 @@ fn repeats<'a>(file: &str, list: &str, key: &str, ids: impl Iterator<Item = &'a 
             code: "duplicate_id".to_owned(),
             file: file.to_owned(),
             place: format!("/{list}/{at}{key}"),
-            message: format!("'{id}' is there already"),
-            action: "get the dataset anew, or build it again".to_owned(),
+            message: format!("'{id}' is listed twice"),
+            action: "download the dataset again, or build it again".to_owned(),
         })
         .collect()
 }
 
-/// A name of a stranger for people to read: one line without characters that steer a terminal or turn the text around,
-/// at most `most` characters.
+/// An untrusted name, made safe to print: one line of at most `most` characters, without characters that control a terminal
+/// or reverse the direction of the text.
 pub(crate) fn shown(name: &str, most: usize) -> String {
-    let steers = |c: char| {
+    let is_control = |c: char| {
         c.is_control()
             || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
             || (c as u32) & 0xfffe == 0xfffe
     };
-    let whole: Vec<char> = name.chars().take(most + 1).map(|c| if steers(c) { '\u{fffd}' } else { c }).collect();
+    let whole: Vec<char> = name.chars().take(most + 1).map(|c| if is_control(c) { '\u{fffd}' } else { c }).collect();
     match whole.len() > most {
         true => whole[..most - 1].iter().collect::<String>() + "…",
         false => whole.into_iter().collect(),

@@ -1,7 +1,7 @@
-//! The counts as an SVG picture: a bar a category, grouped by super-category, and how many scenes have how many
-//! objects.
+//! Draws the counts as an SVG chart: one bar per category, grouped by super-category, and a histogram of the number of
+//! objects per scene.
 //!
-//! Places and texts are settled here; the template `picture.j2` turns them into markup and escapes every name. The same
+//! Positions and texts are computed here; the template `picture.j2` turns them into markup and escapes every name. The same
 //! counts give the same bytes.
 
 use minijinja::value::Serde;
@@ -12,24 +12,24 @@ use super::{CategoryCount, Spread, StatsFile, SuperCategoryCount, shown};
 
 const TEMPLATE: &str = include_str!("picture.j2");
 
-/// Most rows that are drawn; only a made-up dataset has more.
+/// Largest number of rows drawn. No real dataset needs more.
 const MOST_ROWS: usize = 200;
-/// Most columns of the histogram.
+/// Largest number of columns of the histogram.
 const MOST_COLUMNS: usize = 10;
-/// Longest name that fits in a line, in characters.
+/// Length of the longest name that fits on a line, in characters.
 const LONGEST: usize = 50;
 
-// Lengths in the picture's units: pixels where it is shown at its own size.
+// Lengths are in the chart's units, which are pixels where it is shown at its natural size.
 const WIDTH: f64 = 480.0;
 const MARGIN: f64 = 20.0;
 const INNER: f64 = WIDTH - 2.0 * MARGIN;
-/// From a line to the heading of the next group.
+/// Distance from a line to the heading of the next group.
 const GROUP: f64 = 40.0;
-/// From a heading to a bar's line, and from that to the next.
+/// Distance from a heading or a bar to the next bar.
 const BAR: f64 = 30.0;
 const COLUMNS_HEIGHT: f64 = 90.0;
 
-/// All that the template needs; lengths are texts, so that their digits are settled.
+/// All values that the template needs. Lengths are text, so that their digits are fixed.
 #[derive(Serialize)]
 struct Drawing {
     width: String,
@@ -41,11 +41,11 @@ struct Drawing {
     subtitle: String,
     rows: Vec<Row>,
     columns: Vec<Column>,
-    /// Where the histogram stands; none where there is none.
+    /// Position of the histogram's axis; none where there is no histogram.
     axis_y: Option<String>,
 }
 
-/// A line of text; for a category with a bar beneath it.
+/// A line of text, with a bar beneath it where it shows a category.
 #[derive(Serialize)]
 struct Row {
     class: &'static str,
@@ -61,7 +61,7 @@ struct Bar {
     length: String,
 }
 
-/// Scenes that have as many objects as the label says.
+/// A column of the histogram: the number of scenes whose number of objects is in the label's range.
 #[derive(Serialize)]
 struct Column {
     x: String,
@@ -75,15 +75,15 @@ struct Column {
     value: String,
 }
 
-/// The picture as SVG. It draws its own ground, in light or dark as its reader prefers.
+/// The chart as SVG. It has its own background, light or dark as the reader's system prefers.
 pub fn picture(stats: &StatsFile) -> String {
     let drawing = drawing(stats);
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    // The name's ending turns escaping on. The template is our own and its words are all in `Drawing`.
+    // The extension `.xml` turns escaping on.
     environment
         .render_named_str("picture.xml", TEMPLATE, Serde(&drawing))
-        .expect("the template only uses what a drawing has")
+        .expect("the template uses only values that `Drawing` has")
 }
 
 fn drawing(stats: &StatsFile) -> Drawing {
@@ -123,13 +123,13 @@ fn mean_text(stats: &StatsFile) -> String {
 
 fn histogram_subtitle(stats: &StatsFile) -> String {
     let Some(Spread { scenes, .. }) = stats.objects_per_scene else {
-        return "no scene says what its objects are".to_owned();
+        return "no scene states which instances are objects".to_owned();
     };
     let known = several(scenes, "scene", "scenes");
     match stats.scenes - scenes {
         0 => format!("{known} by number of objects"),
-        1 => format!("{known} by number of objects; 1 more does not say"),
-        more => format!("{known} by number of objects; {more} more do not say"),
+        1 => format!("{known} by number of objects; unknown for 1 more"),
+        more => format!("{known} by number of objects; unknown for {more} more"),
     }
 }
 
@@ -137,8 +137,8 @@ fn several(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
 
-/// A heading for each super-category, and beneath it its categories; rows that are too many are only counted. `y` is
-/// moved to the last row.
+/// A heading for each super-category, and its categories beneath it. Rows beyond the limit are only counted. Moves `y` to
+/// the last row.
 fn category_rows(stats: &StatsFile, y: &mut f64) -> Vec<Row> {
     let total = &stats.total;
     let most = total.categories.iter().map(|found| found.objects).max().unwrap_or(1);
@@ -162,7 +162,7 @@ fn category_rows(stats: &StatsFile, y: &mut f64) -> Vec<Row> {
     let left_out = total.super_categories.len() + total.categories.len() - rows.len();
     if left_out > 0 {
         *y += BAR;
-        rows.push(text_row("quiet", *y, &format!("and {left_out} rows more"), String::new()));
+        rows.push(text_row("quiet", *y, &format!("and {left_out} more rows"), String::new()));
     }
     rows
 }
@@ -185,12 +185,12 @@ fn bar_row(y: f64, category: &CategoryCount, most: usize) -> Row {
     Row { bar, ..text_row("name", y, &name, category.objects.to_string()) }
 }
 
-/// The histogram, standing on `axis_y`.
+/// The histogram, whose columns stand on `axis_y`.
 fn columns(objects: &[usize], axis_y: f64) -> Vec<Column> {
     let bins = bins(objects);
     let most = bins.iter().map(|bin| bin.scenes).max().unwrap_or(1).max(1);
     let pitch = INNER / MOST_COLUMNS as f64;
-    // Few columns stand in the middle, as wide as many.
+    // A few columns are centred and as narrow as many.
     let start = MARGIN + (INNER - pitch * bins.len() as f64) / 2.0;
     let column = |(at, bin): (usize, &Bin)| {
         let x = start + pitch * at as f64;
@@ -210,7 +210,7 @@ fn columns(objects: &[usize], axis_y: f64) -> Vec<Column> {
     bins.iter().enumerate().map(column).collect()
 }
 
-/// Scenes with `first` to `last` objects.
+/// The number of scenes with `first` to `last` objects.
 #[derive(Debug, PartialEq, Eq)]
 struct Bin {
     first: usize,
@@ -224,8 +224,8 @@ impl Bin {
     }
 }
 
-/// Bins from the least to the largest value, each 1, 2, 5, 10, 20, ... wide: the narrowest that need no more columns
-/// than there is room for.
+/// Bins from the smallest to the largest value. Their width is the smallest of 1, 2, 5, 10, 20, ... that needs no more than
+/// [`MOST_COLUMNS`] bins.
 fn bins(values: &[usize]) -> Vec<Bin> {
     let (Some(min), Some(max)) = (values.iter().min(), values.iter().max()) else { return Vec::new() };
     let widths = (0..u32::MAX).flat_map(|power| [1, 2, 5].map(|digit| digit * 10_usize.saturating_pow(power)));
@@ -240,7 +240,7 @@ fn bins(values: &[usize]) -> Vec<Bin> {
         .collect()
 }
 
-/// A length with at most one digit after the point.
+/// A length as text, with at most one digit after the point.
 fn number(value: f64) -> String {
     let text = format!("{value:.1}");
     text.strip_suffix(".0").map_or_else(|| text.clone(), str::to_owned)
@@ -251,7 +251,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bins_hold_every_value_once() {
+    fn every_value_is_in_one_bin() {
         for largest in [0, 1, 9, 10, 19, 20, 137, 99_999] {
             let values: Vec<usize> = (0..50).map(|k| largest * k / 49).collect();
             let bins = bins(&values);
@@ -262,9 +262,9 @@ mod tests {
         assert_eq!(bins(&[]), []);
     }
 
-    /// 3 to 21 objects, as in ATISS' rooms: bins of two.
+    /// 3 to 21 objects, as in the rooms of ATISS: bins of two.
     #[test]
-    fn bins_are_as_narrow_as_they_may() {
+    fn bins_are_as_narrow_as_possible() {
         let bins = bins(&[3, 7, 8, 21]);
         let [first, last] = [&bins[0], &bins[bins.len() - 1]].map(|bin| (bin.first, bin.last, bin.scenes));
         assert_eq!((bins.len(), first, last), (10, (2, 3, 1), (20, 21, 1)));

@@ -1,4 +1,4 @@
-//! Counts of hand-made scenes, what totals must keep, and pictures of names by strangers.
+//! Counts of hand-made scenes, properties of totals, and charts with untrusted names.
 
 use mateval_scene::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile};
 use mateval_scene::{InstanceId, InstanceIndex, SceneLights};
@@ -84,8 +84,8 @@ fn counted(dataset: &Dataset) -> StatsFile {
     count(dataset, "mateval test").unwrap()
 }
 
-/// All expected numbers were counted by hand in the list above; the means are 7 / 2, 5 / 2 and 5 / 2:
-/// the Bitterli scene does not say what its shapes are.
+/// All expected numbers were counted by hand in the list above. The means are 7 / 2, 5 / 2 and 5 / 2, since the Bitterli
+/// scene does not state which of its shapes are objects.
 #[test]
 fn hand_made_scenes_are_counted_exactly() {
     let stats = counted(&hand_made());
@@ -118,7 +118,7 @@ fn hand_made_scenes_are_counted_exactly() {
     assert_ne!(counted(&changed).total.super_categories, stats.total.super_categories);
 }
 
-/// The words of Table I stand before our numbers, rounded as the paper rounds.
+/// Table I has the paper's headings and rounds as the paper does.
 #[test]
 fn table_one_comes_first() {
     let text = text(&counted(&hand_made()));
@@ -133,9 +133,9 @@ fn table_one_comes_first() {
     assert!(text.contains("\n  Pier/Stool      (none)                              1\n"), "{text}");
 }
 
-/// A room of walls alone has no objects and counts as such; a scene without roles takes no part.
+/// A room of walls alone has zero objects, which counts; a scene without roles is not included.
 #[test]
-fn zero_is_a_number_only_where_it_is_known() {
+fn unknown_counts_are_not_zero() {
     let stats = |things: &[Thing<'_>]| {
         let rooms =
             [("a", &[SOFA, LAMP][..]), ("b", things)].map(|(id, things)| scene(id, SourceKind::Front3d, id, things));
@@ -147,7 +147,7 @@ fn zero_is_a_number_only_where_it_is_known() {
 }
 
 #[test]
-fn nothing_has_no_mean() {
+fn an_empty_dataset_has_no_mean() {
     let stats = counted(&dataset(Vec::new()));
     assert_eq!((stats.scenes, stats.objects_per_scene, stats.total.super_categories[0].share), (0, None, None));
     assert!(text(&stats).contains("Avg. Objects/Scene     unknown"));
@@ -155,7 +155,7 @@ fn nothing_has_no_mean() {
 }
 
 #[test]
-fn whatever_is_there_twice_is_named_at_once() {
+fn all_duplicates_are_reported_together() {
     let mut twice = hand_made();
     let again = twice.scenes[0].instances[0].clone();
     twice.scenes[0].instances.push(again);
@@ -166,7 +166,7 @@ fn whatever_is_there_twice_is_named_at_once() {
     assert!(error.contains("'dataset.json' /scenes/3: ") && error.contains("/instances/6/id: "), "{error}");
 }
 
-/// Every text and rectangle of a picture, as an XML reader understands them.
+/// The texts of a chart and the lengths of its bars, as an XML parser reads them.
 fn read_picture(svg: &str) -> (Vec<String>, Vec<f64>) {
     let document = roxmltree::Document::parse(svg).unwrap();
     let nodes = || document.descendants().filter(|node| node.is_element());
@@ -178,9 +178,9 @@ fn read_picture(svg: &str) -> (Vec<String>, Vec<f64>) {
     (texts.map(|node| node.text().unwrap_or_default().to_owned()).collect(), bars.map(length).collect())
 }
 
-/// Bars are as long as their counts are high, and the counts are written beside them.
+/// Bars are proportional to their counts, which are written beside them.
 #[test]
-fn bars_follow_counts() {
+fn bars_are_proportional_to_counts() {
     let stats = counted(&hand_made());
     let (texts, bars) = read_picture(&picture(&stats));
     assert_eq!(bars[..5], [440.0, 220.0, 440.0, 220.0, 220.0]);
@@ -190,7 +190,7 @@ fn bars_follow_counts() {
         "3 · 42.9 %",
         "Piano",
         "mean 3.5",
-        "2 scenes by number of objects; 1 more does not say",
+        "2 scenes by number of objects; unknown for 1 more",
     ] {
         assert!(texts.iter().any(|text| text == expected), "{expected} not in {texts:?}");
     }
@@ -201,9 +201,9 @@ fn bars_follow_counts() {
     assert_ne!(picture(&stats), picture(&counted(&changed)));
 }
 
-/// A name stays a name: it adds no element, no script and no line, however it is written.
+/// A hostile name adds no element, no script and no line.
 #[test]
-fn names_of_strangers_are_escaped() {
+fn untrusted_names_are_escaped() {
     let hostile = "</text><script>alert(1)</script> & \"quoted\" 'too' ]]> {{ width }}";
     let steering = "\u{1b}[31m\0\u{202e}\u{ffff}\n";
     let piece = |group, category| (Role::Furniture {}, Some(group), Some(category), true);
@@ -215,21 +215,21 @@ fn names_of_strangers_are_escaped() {
     assert!(texts.iter().any(|text| text.starts_with("</text><script>alert(1)</script> & \"quoted\"")), "{texts:?}");
     let tables = text(&stats);
     assert!(!tables.contains(['\u{1b}', '\0', '\u{202e}']), "{tables:?}");
-    // The twin: what a reader of XML makes of such a name where nobody escapes it.
+    // The twin: without escaping, such a name breaks the XML.
     assert!(roxmltree::Document::parse(&format!("<text>{hostile}</text>")).is_err());
 }
 
-/// However many and long the names, a picture has an end, and says what it left out.
+/// The size of a chart is limited, however many and long the names are. It states how many rows it left out.
 #[test]
-fn a_picture_has_an_end() {
+fn the_size_of_a_chart_is_limited() {
     let long = "m".repeat(1 << 16);
     let names: Vec<String> = (0..1000).map(|at| format!("{at} {long}")).collect();
     let things: Vec<Thing<'_>> =
         names.iter().map(|name| (Role::Furniture {}, Some("Sofa"), Some(name.as_str()), true)).collect();
     let (texts, bars) = read_picture(&picture(&counted(&dataset(vec![scene("a", SourceKind::Front3d, "h", &things)]))));
-    // 8 headings and the names; 200 rows, then the others' number; one column.
+    // 200 rows, of which 2 are headings without a bar, and one column of the histogram.
     assert_eq!(bars.len(), 198 + 1);
-    assert!(texts.iter().any(|text| text == "and 808 rows more"), "{texts:?}");
+    assert!(texts.iter().any(|text| text == "and 808 more rows"), "{texts:?}");
     assert!(texts.iter().all(|text| text.chars().count() <= 50));
 }
 
@@ -255,13 +255,13 @@ prop_compose! {
     }
 }
 
-/// The sum over scenes of what `of` finds there.
+/// The sum over all scenes of what `of` returns for their counts.
 fn sum(stats: &StatsFile, of: impl Fn(&Counts) -> usize) -> usize {
     stats.per_scene.iter().map(|scene| of(&scene.counts)).sum()
 }
 
 proptest! {
-    /// Totals are the sums over scenes and over every division of them, whatever the order of scenes.
+    /// Totals equal the sums over scenes and over each classification, whatever the order of the scenes.
     #[test]
     fn totals_are_sums(mut scenes in prop::collection::vec(any_scene(), 0..8)) {
         for (at, scene) in scenes.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! The counts as tables for people: numbers are rounded here, the JSON has them whole.
+//! Prints the counts as tables. Numbers are rounded here; the JSON has all digits.
 
 use mateval_scene::Severity;
 use mateval_scene::text_table::{Table, row};
@@ -7,13 +7,13 @@ use mateval_scene::super_categories::SUPER_CATEGORIES;
 
 use super::{Counts, SceneStats, Spread, StatsFile, shown};
 
-/// Longest name that is written whole.
+/// Length of the longest name that is printed in full, in characters.
 const LONGEST: usize = 60;
 
-/// Heads of the eight super-categories' columns, in their order.
+/// Headings of the columns of the eight super-categories, in their order.
 const HEADS: [&str; 8] = ["cabinet", "sofa", "lighting", "chair", "others", "bed", "table", "stool"];
 
-/// All tables. Table I comes first, in the paper's words.
+/// All tables. Table I comes first, with the paper's headings.
 pub fn text(stats: &StatsFile) -> String {
     let tables = [
         table_one(stats),
@@ -56,8 +56,8 @@ fn beside(stats: &StatsFile) -> Table {
     rows.push(row(["  architecture", &total.architecture.to_string()]));
     rows.push(row(["  others", &total.others.to_string()]));
     rows.push(row(["different categories", &total.different_categories().to_string()]));
-    rows.push(spread_row("  avg. of a scene", stats.categories_per_scene));
-    Table { title: "Beside Table I".to_owned(), words: 1, rows }
+    rows.push(spread_row("  avg. per scene", stats.categories_per_scene));
+    Table { title: "Further counts".to_owned(), words: 1, rows }
 }
 
 fn super_categories(total: &Counts) -> Table {
@@ -122,7 +122,8 @@ fn scenes(stats: &StatsFile) -> Table {
     Table { title: "Scenes".to_owned(), words: 3, rows }
 }
 
-/// A column for each of the eight; all other words share a last one, which is there only where it is needed.
+/// One column for each of the eight super-categories. All other objects share a last column, which exists only where there
+/// are any.
 fn scenes_by_super_category(stats: &StatsFile) -> Table {
     let has_more = stats.total.super_categories.len() > SUPER_CATEGORIES.len();
     let mut rows = vec![row(["scene"])];
@@ -138,7 +139,7 @@ fn scenes_by_super_category(stats: &StatsFile) -> Table {
     Table { title: "Objects by scene and super-category".to_owned(), words: 1, rows }
 }
 
-/// A number of objects, or of their kinds, where the scene says what they are.
+/// A number of objects or of their categories; `?` where the scene does not state which instances are objects.
 fn known(scene: &SceneStats, number: usize) -> String {
     if scene.knows_its_objects() { number.to_string() } else { "?".to_owned() }
 }
