@@ -184,7 +184,8 @@ pub struct PictureValue {
     pub lighting: Option<LightingName>,
     /// Which pixels count.
     pub region: Region,
-    /// By which metric.
+    /// The metric, by the last word of its keys.
+    #[schemars(with = "String", regex(pattern = "^[a-z0-9_]+$"))]
     pub metric: Metric,
     /// Null where no pixel or window counts.
     pub value: Option<f64>,

@@ -1,4 +1,4 @@
-//! The board itself: a row a method, a column a number.
+//! The board itself: one row for each method, one column for each number and each fact.
 
 use std::collections::BTreeMap;
 
@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::board::Board;
 use super::columns::{Choices, Column, choices};
+use super::facts::{FACTS, Fact, FactColumn, facts};
 use super::heads::{Cell, MethodHead, rank_text, standing};
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
@@ -18,6 +19,7 @@ use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
 #[derive(Serialize)]
 struct BoardPage<'a> {
     columns: &'a [Column],
+    facts: [FactColumn; FACTS.len()],
     choices: Choices,
     first: &'a Column,
     rows: Vec<Row<'a>>,
@@ -30,22 +32,24 @@ struct Row<'a> {
     method: &'a MethodHead,
     rank: String,
     cells: Vec<Option<Cell>>,
+    facts: Vec<Option<Fact>>,
     #[serde(skip)]
     value: Option<f64>,
 }
 
-/// `index.html`, and for each number who beats whom.
+/// Writes `index.html`, and one script for each number with the comparison of all pairs of methods.
 pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let Some(first) = board.first() else {
         let protocol = board.ranking().protocol.clone();
         return Err(ReportError::NothingToShow { protocol, output: "a leaderboard" });
     };
-    let mut rows: Vec<Row<'_>> = board.heads.iter().map(|head| row(board, head, first)).collect();
+    let mut rows: Vec<Row<'_>> = (0..board.heads.len()).map(|at| row(board, at, first)).collect();
     let order = |row: &Row<'_>| row.value.map_or(f64::INFINITY, |value| -first.better.sign() * value);
     rows.sort_by(|a, b| order(a).total_cmp(&order(b)));
     let standings = || board.ranking().keys.values().flat_map(|key| &key.standings);
     let page = BoardPage {
         columns: &board.columns,
+        facts: FACTS,
         choices: choices(&board.columns),
         first,
         rows,
@@ -67,7 +71,9 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     Ok(())
 }
 
-fn row<'a>(board: &'a Board<'_>, head: &'a MethodHead, first: &Column) -> Row<'a> {
+/// The row of the method at place `at`.
+fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column) -> Row<'a> {
+    let head = &board.heads[at];
     let of = |column: &Column| standing(board.ranking(), column.key, &head.id);
     let cells = board.columns.iter().map(|column| of(column).map(|standing| Cell::new(column, standing)));
     let first = of(first);
@@ -75,11 +81,13 @@ fn row<'a>(board: &'a Board<'_>, head: &'a MethodHead, first: &Column) -> Row<'a
         method: head,
         rank: first.map_or_else(String::new, |standing| rank_text(standing.rank)),
         cells: cells.collect(),
+        facts: facts(&board.file.methods[at], board.scores[at]),
         value: first.map(|standing| standing.value),
     }
 }
 
-/// Shares in percent, and 1 where the row's method is surely better, -1 where it is surely worse.
+/// All pairs of methods by one number, row against column: the share of draws that the row's method wins, in percent, and 1
+/// if it is significantly better, -1 if it is significantly worse.
 #[derive(Serialize)]
 struct Wins<'a> {
     names: Vec<&'a str>,
@@ -87,14 +95,14 @@ struct Wins<'a> {
     sure: Vec<Vec<i32>>,
 }
 
-/// A script that hands the page who beats whom, the best first.
+/// A script that hands the comparison of all pairs to the page, the best method first.
 fn wins(key: ResultKey, ranking: &KeyRanking, methods: &[RankedMethod]) -> String {
     let mut standings: Vec<&Standing> = ranking.standings.iter().collect();
     standings.sort_by(|a, b| (ranking.better.sign() * b.value).total_cmp(&(ranking.better.sign() * a.value)));
     let ids: Vec<&str> = standings.iter().map(|standing| standing.method.as_str()).collect();
     let known: BTreeMap<&str, &str> =
         methods.iter().map(|method| (method.id.as_str(), method.method.as_str())).collect();
-    let mut told = Wins {
+    let mut table = Wins {
         names: ids.iter().map(|id| known.get(id).copied().unwrap_or(id)).collect(),
         wins: vec![vec![None; ids.len()]; ids.len()],
         sure: vec![vec![0; ids.len()]; ids.len()],
@@ -103,14 +111,14 @@ fn wins(key: ResultKey, ranking: &KeyRanking, methods: &[RankedMethod]) -> Strin
     for pair in &ranking.pairs {
         let (Some(a), Some(b), Some(win)) = (place(&pair.first), place(&pair.second), pair.win) else { continue };
         let percent = (100.0 * win).round() as u32;
-        told.wins[a][b] = Some(percent);
-        told.wins[b][a] = Some(100 - percent);
+        table.wins[a][b] = Some(percent);
+        table.wins[b][a] = Some(100 - percent);
         if pair.is_sure() {
             let sign = if win > 0.5 { 1 } else { -1 };
-            told.sure[a][b] = sign;
-            told.sure[b][a] = -sign;
+            table.sure[a][b] = sign;
+            table.sure[b][a] = -sign;
         }
     }
-    // JSON is JavaScript.
-    format!("boardWins({}, {});\n", serde_json::json!(key), serde_json::json!(told))
+    // JSON is also valid JavaScript.
+    format!("boardWins({}, {});\n", serde_json::json!(key), serde_json::json!(table))
 }

@@ -11,6 +11,7 @@ mod board_page;
 mod columns;
 mod downloads;
 pub mod errata;
+mod facts;
 pub mod file;
 mod heads;
 mod method_page;

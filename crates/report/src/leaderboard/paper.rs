@@ -1,6 +1,6 @@
 //! The paper's own Tables II to V. They were measured on other pictures and are never ranked with ours.
 
-use mateval_eval::metric::Metric;
+use mateval_eval::metric::{Better, Metric};
 use mateval_eval::result_key::{PictureKind, Views};
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,8 @@ pub(super) struct PaperPage {
 #[derive(Serialize)]
 struct PaperTable {
     title: &'static str,
+    /// The heads of a block's columns.
+    metrics: [String; 4],
     blocks: Vec<&'static str>,
     rows: Vec<ShownRow>,
 }
@@ -82,11 +84,23 @@ const LAYOUT: [Words; 4] = [
     ),
 ];
 
+/// The columns of a block.
+const METRICS: [Metric; 4] = [Metric::Mse, Metric::Psnr, Metric::Ssim, Metric::LpipsAlex];
+
+fn head(metric: Metric) -> String {
+    let arrow = match metric.better() {
+        Better::Lower => "↓",
+        Better::Higher => "↑",
+    };
+    format!("{} {arrow}", metric.style().title)
+}
+
 /// The tables, ready to be shown.
 pub(super) fn page() -> PaperPage {
     let tables: PaperTables = serde_json::from_str(TABLES).expect("a test reads the file");
     let table = |(title, blocks): Words| PaperTable {
         title,
+        metrics: METRICS.map(head),
         blocks: blocks.iter().map(|(title, ..)| *title).collect(),
         rows: tables.rows.iter().filter_map(|row| shown(row, blocks)).collect(),
     };
@@ -98,13 +112,9 @@ fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
     let cells = |(_, picture, views): &Block| -> [Option<String>; 4] {
         let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
         let text = |metric: Metric, value: f64| Some(format!("{value:.*}", metric.style().digits));
-        found.map_or([const { None }; 4], |scores| {
-            [
-                text(Metric::Mse, scores.mse),
-                text(Metric::Psnr, scores.psnr),
-                text(Metric::Ssim, scores.ssim),
-                text(Metric::LpipsAlex, scores.lpips),
-            ]
+        found.map_or([const { None }; 4], |PaperScores { mse, psnr, ssim, lpips, .. }| {
+            let values = [mse, psnr, ssim, lpips];
+            std::array::from_fn(|at| text(METRICS[at], *values[at]))
         })
     };
     let cells: Vec<Option<String>> = blocks.iter().flat_map(cells).collect();

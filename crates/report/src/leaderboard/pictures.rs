@@ -1,4 +1,4 @@
-//! The pictures of a site: taken from a folder, or made from the dataset and the submissions.
+//! The pictures of a site: copied from a folder, or drawn from the dataset and the submissions.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::strips::StripPlan;
 use mateval_eval::result_key::PictureKind;
 use mateval_submission::hashed_submission::hashed_submission;
 
-/// Puts all pictures into `folder`, and tells which there are.
+/// Puts all pictures into `folder`, and lists them.
 pub(super) fn gather(
     plan: &LeaderboardPlan<'_>,
     ranking: &Ranking,
@@ -50,7 +50,7 @@ fn make(from: &Submissions<'_>, ranking: &Ranking, folder: &Path, progress: Prog
     Ok(())
 }
 
-/// The method of each submission, by the hash of what was scored.
+/// Each submission with the ids of its methods, which have its hash. Fails for a submission that belongs to none.
 fn name_submissions<'a>(
     dataset: &Dataset,
     submissions: &'a [PathBuf],
@@ -77,23 +77,24 @@ fn name_submissions<'a>(
 /// A kind of picture that a page offers.
 #[derive(Serialize)]
 pub(super) struct Kind {
+    /// The stem of its files.
     word: String,
     title: String,
-    is_error: bool,
+    /// The stem of the files that show its errors; none for errors themselves.
+    error: Option<String>,
 }
 
-/// Known kinds first, each with its errors behind it.
+/// The kinds of pictures with these words as stems: those that results have first, each followed by its errors.
 pub(super) fn kinds_in_order(words: BTreeSet<&str>) -> Vec<Kind> {
-    let known = |stem: &str| PictureKind::ALL.iter().position(|kind| kind.word() == stem);
+    let place = |kind: PictureKind| PictureKind::ALL.iter().position(|known| *known == kind);
     let kind = |word: &str| {
         let stem = word.strip_suffix(ERROR).unwrap_or(word);
-        let title = known(stem).map_or_else(|| stem.replace('_', " "), |at| PictureKind::ALL[at].title().to_owned());
+        let known = stem.parse::<PictureKind>().ok();
+        let title = known.map_or_else(|| stem.replace('_', " "), |kind| kind.title().to_owned());
         let is_error = stem != word;
-        let order = (known(stem).unwrap_or(PictureKind::ALL.len()), stem.to_owned(), is_error);
-        (
-            order,
-            Kind { word: word.to_owned(), title: if is_error { format!("{title}: error") } else { title }, is_error },
-        )
+        let order = (known.and_then(place).unwrap_or(PictureKind::ALL.len()), stem.to_owned(), is_error);
+        let title = if is_error { format!("{title}: error") } else { title };
+        (order, Kind { word: word.to_owned(), title, error: (!is_error).then(|| format!("{word}{ERROR}")) })
     };
     let mut kinds: Vec<_> = words.into_iter().map(kind).collect();
     kinds.sort_by(|a, b| a.0.cmp(&b.0));

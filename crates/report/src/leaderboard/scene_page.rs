@@ -16,6 +16,7 @@ use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::picture_set::{TRUTH, png_size};
 use crate::strips::WHITE_ERROR;
+use mateval_eval::result_key::PictureKind;
 
 #[derive(Serialize)]
 struct ScenePage<'a> {
@@ -117,7 +118,8 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
 pub(super) fn write_list<'a>(board: &'a Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let card = |scene: &'a SceneId| {
         let kinds = board.pictures.kinds(TRUTH, scene, INPUT);
-        let kind = kinds.iter().find(|kind| kind.starts_with("rgb")).or(kinds.first());
+        let is_light = |kind: &&&str| kind.parse().is_ok_and(PictureKind::is_light);
+        let kind = kinds.iter().find(is_light).or(kinds.first());
         let thumbnail = kind.map(|kind| format!("pictures/{TRUTH}/{scene}/{INPUT}/{kind}.png"));
         let [width, height] = size(site, thumbnail.clone());
         let (id, house) = (scene.as_str(), house(board, scene));

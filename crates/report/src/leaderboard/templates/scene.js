@@ -1,9 +1,8 @@
 "use strict";
-// A scene's pictures: the slider between prediction and truth, and which kind of picture the gallery shows.
+// The pictures of a scene: the slider between prediction and truth, and the kind of picture that the gallery shows.
 
 const form = document.getElementById("compare-form");
 const kinds = document.getElementById("kinds");
-const ERROR = "-error";
 
 if (form) {
   const split = document.getElementById("split");
@@ -14,7 +13,7 @@ if (form) {
   const thumbnail = (method, view) =>
     [...document.querySelectorAll(".pick")].find((pick) => pick.dataset.method === method && pick.dataset.view === view);
 
-  // The picture of a kind, or nothing where there is none.
+  // The address of a picture of this kind; null if there is none.
   const picture = (pick, kind) => {
     const image = pick && pick.querySelector("img");
     return image && image.dataset.kinds.split(" ").includes(kind) ? `${image.dataset.base}${kind}.png` : null;
@@ -33,7 +32,7 @@ if (form) {
     const truth = picture(document.querySelector(`.gallery tbody tr .pick[data-view="${view}"]`), kind);
     show(document.getElementById("prediction"), picture(pick, kind), `Prediction of ${name}, ${view}`);
     show(document.getElementById("truth"), truth, `Truth, ${view}`);
-    const error = picture(pick, kind + ERROR);
+    const error = picture(pick, form.elements.kind.selectedOptions[0].dataset.error);
     document.getElementById("heat").hidden = !error;
     show(document.getElementById("error"), error, `Error of ${name}, ${view}`);
     document.querySelectorAll(".pick").forEach((other) => other.setAttribute("aria-pressed", other === pick));
