@@ -1,5 +1,5 @@
-//! Everything that crosses crates: the command `mateval` run on the sample that it makes itself, on planted faults, and
-//! on the real scenes where they are there. One concept a module, one binary for all.
+//! Tests that cross crates: the command `mateval` runs on the built-in sample, on planted faults, and on the real
+//! scenes if these exist. Each module holds one concept; all are one binary.
 
 #![allow(
     clippy::unwrap_used,

@@ -1,10 +1,10 @@
-//! The crates' arrows (one way, no others) and everybody's licences, as `cargo metadata` tells them.
+//! The dependencies between the crates (one way, no others) and the licences of all packages, from `cargo metadata`.
 
 use std::collections::BTreeSet;
 
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
-/// Which of our crates each may use, from user to used; names without `mateval-`.
+/// The crates of ours that each crate may use; names without `mateval-`.
 pub const ARROWS: [(&str, &[&str]); 14] = [
     ("mateval-image", &[]),
     ("mateval-scene", &["image"]),
@@ -39,10 +39,10 @@ pub const ARROWS: [(&str, &[&str]); 14] = [
     ),
 ];
 
-/// What only tests and benchmarks use.
+/// Crates that only tests and benchmarks may use.
 const FOR_TESTS: &str = "mateval-testkit";
 
-/// What may be linked into a program that is itself MIT or Apache-2.0.
+/// Licences of code that may be linked into a program that is itself MIT or Apache-2.0.
 const LICENCES: [&str; 13] = [
     "MIT",
     "MIT-0",
@@ -59,7 +59,7 @@ const LICENCES: [&str; 13] = [
     "Unlicense",
 ];
 
-/// Packages as they are for this machine; others' are not fetched for it.
+/// The packages for this machine's platform; those for other platforms are not downloaded.
 fn metadata() -> Metadata {
     let version = std::process::Command::new("rustc").arg("-vV").output().unwrap();
     let text = String::from_utf8(version.stdout).unwrap();
@@ -72,7 +72,7 @@ fn metadata() -> Metadata {
         .unwrap()
 }
 
-/// The arrows of a package that nobody allowed.
+/// The dependencies of a package that are not allowed.
 fn forbidden(package: &str, used: &[&str]) -> Vec<String> {
     let allowed = ARROWS.iter().find(|(name, _)| *name == package).map(|(_, allowed)| *allowed);
     let Some(allowed) = allowed else { return vec![format!("'{package}' is a crate that DESIGN does not know")] };
@@ -80,7 +80,7 @@ fn forbidden(package: &str, used: &[&str]) -> Vec<String> {
     wrong.map(|name| format!("{package} -> {name}")).collect()
 }
 
-/// What the package uses of ours when it is built (not when it is tested).
+/// The crates of ours that the package uses when it is built (not when it is tested).
 fn uses(package: &Package) -> Vec<&str> {
     let used = package.dependencies.iter().filter(|dependency| dependency.kind != DependencyKind::Development);
     used.map(|dependency| dependency.name.as_str()).filter(|name| name.starts_with("mateval")).collect()
@@ -99,7 +99,7 @@ fn the_arrows_are_those_of_the_design() {
     assert!(all > 40, "only {all} arrows seen");
 }
 
-/// The twin: arrows that point back.
+/// The twin: dependencies in the opposite direction.
 #[test]
 fn an_arrow_back_is_found() {
     assert_eq!(forbidden("mateval-image", &["mateval-scene"]), ["mateval-image -> mateval-scene"]);
@@ -146,14 +146,14 @@ fn licence_expressions_are_understood() {
     }
 }
 
-/// Whether an SPDX expression can be met with [`LICENCES`] alone. What does not read as one cannot.
+/// Whether an SPDX expression can be satisfied with [`LICENCES`] alone. A text that is no such expression cannot.
 fn offers(expression: &str) -> bool {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
     matches!(any_of(&words), Some((true, [])))
 }
 
-/// `a OR b ...`: whether it can be met, and the words after it.
+/// `a OR b ...`: whether it can be satisfied, and the words after it.
 fn any_of<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
     let (mut met, mut rest) = all_of(words)?;
     while let ["OR", after @ ..] = rest {
@@ -173,7 +173,7 @@ fn all_of<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
     Some((met, rest))
 }
 
-/// A licence (an exception to it only gives more), or an expression in brackets.
+/// A licence (an exception only grants more), or an expression in brackets.
 fn one<'a>(words: &'a [&'a str]) -> Option<(bool, &'a [&'a str])> {
     match words {
         ["(", rest @ ..] => match any_of(rest)? {

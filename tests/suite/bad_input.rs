@@ -1,5 +1,5 @@
-//! Bad input: a clear error with the path and exit code 2 where the job cannot be done, a finding where it can; never a
-//! crash, and never something half-written where a finished file should be.
+//! Bad input: an error with the path and exit code 2 if the job cannot be done, a finding if it can. The program never
+//! crashes and never leaves a half-written file in the place of a finished one.
 
 use std::path::{Path, PathBuf};
 
@@ -9,10 +9,10 @@ use mateval_image::{LinearRgb, Picture};
 use super::command::{Run, baseline, build, mateval, render, run, score, stats, verify};
 use super::sample::{copied_dataset, dataset, files_below, json, write_source};
 
-/// The input view alone, as small as may be.
+/// The head of a recipe with the input view alone and the smallest sizes.
 const TINY: &str = "resolution = [32, 24]\natlas_size = 64\nviews = []";
 
-/// The sample's source, to be damaged, and where its dataset should come.
+/// A copy of the sample's source for a test to damage, and the place of its dataset.
 struct Source {
     folder: tempfile::TempDir,
     recipe: PathBuf,
@@ -44,7 +44,7 @@ impl Source {
         run(&mut build(&self.recipe, &self.out()))
     }
 
-    /// The dataset is made and sound, and says what was wrong: on stderr and in scene.json, with code and file.
+    /// Expects a sound dataset with a finding on stderr and in scene.json that has this code and file.
     #[track_caller]
     fn gives_finding(&self, code: &str, file: &str, message: &str) {
         let told = format!("room: warning [{code}] '{file}'");
@@ -55,7 +55,7 @@ impl Source {
         run(&mut verify(&self.out())).ends_with(0);
     }
 
-    /// Nothing is made, and the error names the path.
+    /// Expects that nothing is made and that the error names the path.
     #[track_caller]
     fn gives_error(&self, parts: &[&str]) {
         let refused = self.build().ends_with(2);
@@ -67,7 +67,7 @@ impl Source {
     }
 }
 
-/// The twin of all below: what is not damaged has no warnings.
+/// The twin of all tests below: an undamaged source has no warnings.
 #[test]
 fn the_whole_sample_has_no_findings() {
     let built = Source::new().build().ends_with(0);
@@ -146,11 +146,11 @@ fn xml_that_ends_early_is_none_or_is_binary() {
 }
 
 #[test]
-fn a_recipe_that_names_a_scene_that_is_not_there() {
+fn a_recipe_that_names_a_missing_scene() {
     let source = Source::new();
     std::fs::remove_file(source.file("scene.xml")).unwrap();
     source.gives_error(&["recipe.toml", "scene 'room': there is no file", "room/scene.xml", "--source"]);
-    assert!(!source.out().exists(), "whatever can fail early must");
+    assert!(!source.out().exists(), "an early failure must leave no output");
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn a_folder_that_is_no_dataset() {
     assert_eq!(files_below(folder.path()), [Path::new("none/notes.txt")]);
 }
 
-/// The room seen by a camera of its own; the views are those of the text.
+/// Builds the room with this camera and these views.
 fn built_from(camera: &str, views: &str) -> Run {
     let source = Source::new();
     let text = std::fs::read_to_string(&source.recipe).unwrap();
@@ -201,7 +201,7 @@ fn built_from(camera: &str, views: &str) -> Run {
     built
 }
 
-/// An input view without anything to score makes no scene; another view is told.
+/// If the input view shows nothing to score, the scene is refused; for another view it is a finding.
 #[test]
 fn cameras_that_see_nothing() {
     let away = "{ position = [2.0, 1.5, 20.0], target = [2.0, 1.5, 30.0], fov_y_deg = 40.0 }";
@@ -227,9 +227,9 @@ fn a_camera_that_is_too_near() {
     assert!(!built_from(&above(0.1), "views = []").ends_with(0).stderr.contains("camera_too_near"));
 }
 
-/// Nothing is overwritten without `--force`, and even with it nothing that is not what would be made.
+/// Nothing is overwritten without `--force`; with it, only outputs of the same kind are.
 #[test]
-fn outputs_that_are_there() {
+fn outputs_that_exist() {
     let source = Source::new();
     std::fs::create_dir(source.out()).unwrap();
     std::fs::write(source.out().join("notes.txt"), "mine").unwrap();
@@ -252,7 +252,7 @@ fn outputs_that_are_there() {
     assert!(json(&result).is_object());
 }
 
-/// A damaged dataset cannot be scored on: the error names the file, and there is no result.
+/// Scoring on a damaged dataset fails: the error names the file, and no result is written.
 #[test]
 fn a_dataset_with_a_truncated_picture() {
     let copy = copied_dataset();

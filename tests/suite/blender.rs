@@ -1,5 +1,5 @@
-//! `prep render --renderer blender`: with the Blender that tools/setup.sh installs, and with programs that stand for one
-//! that fails.
+//! `prep render --renderer blender`: with the Blender that tools/setup.sh installs, and with programs that stand in for
+//! a failing Blender.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -23,14 +23,14 @@ static UNRENDERED: LazyLock<PathBuf> = LazyLock::new(|| {
     folder.join("dataset")
 });
 
-/// A copy of the dataset that nothing has rendered.
+/// A copy of the dataset without renders.
 fn unrendered() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     super::sample::copy_folder(&UNRENDERED, folder.path());
     folder
 }
 
-/// The Python that has `bpy`, and the turn: Blender takes every processor. Where there is none that is said.
+/// The Python that has `bpy`, and a lock, because Blender uses every processor. Prints a message if there is none.
 pub fn blender() -> Option<(PathBuf, MutexGuard<'static, ()>)> {
     static TURN: Mutex<()> = Mutex::new(());
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
@@ -51,7 +51,7 @@ fn by_blender(dataset: &Path, program: &Path, words: &[&str]) -> Command {
     command
 }
 
-/// A program that stands for a Blender: `$JOB` is the job's folder.
+/// A program that stands in for Blender: `$JOB` is the job's folder.
 fn stand_in(folder: &Path, body: &str) -> PathBuf {
     let path = folder.join("stand-in.sh");
     let text = format!("#!/bin/sh\nfor word; do :; done\nJOB=$(dirname \"$word\")\n{body}\n");
@@ -87,14 +87,14 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     assert_eq!(json(&dataset.join("dataset.json"))["scored_renderer"], "blender");
     assert!(!dataset.join(".render").exists());
     let first = manifest(dataset);
-    // What is there is kept; asked for again it is the same.
+    // Existing renders are kept; a forced second render is the same.
     run(&mut by_blender(dataset, Path::new("/nowhere"), &[])).ends_with(2).says("which does not exist");
     let kept = run(&mut by_blender(dataset, &python, &[])).ends_with(0);
     assert!(kept.stdout.contains("0 views rendered, 2 kept"), "{}", kept.stdout);
     run(&mut by_blender(dataset, &python, &["--force"])).ends_with(0);
     assert!(manifest(dataset) == first);
 
-    // The groups add up, the halves are two, and the photo is the denoised picture.
+    // The groups add up, the halves differ, and the input picture is the denoised one.
     let lights = json(&dataset.join("scenes/room/ground_truth/lights.json"))["groups"].as_array().unwrap().len();
     let groups: Vec<_> = (0..lights).map(|k| light(dataset, &format!("input/group_{k:02}_a.exr"))).collect();
     let (a, b) = (light(dataset, "input/rgb_a.exr"), light(dataset, "input/rgb_b.exr"));
@@ -105,11 +105,11 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     assert!(a != b && lights > 2);
     let photo = exr_io::read_linear(&dataset.join("scenes/room/views/input/rgb.exr")).unwrap();
     assert!(photo == light(dataset, "input/rgb.exr") && photo != a);
-    let told = json(&renders(dataset).join("input/render.json"));
-    assert!(told["noise"]["mean_of_halves_mse"].as_f64().unwrap() > 0.0, "{told}");
-    assert!(told["approximations"].as_array().unwrap().iter().any(|line| line.as_str().unwrap().contains("plastic")));
+    let record = json(&renders(dataset).join("input/render.json"));
+    assert!(record["noise"]["mean_of_halves_mse"].as_f64().unwrap() > 0.0, "{record}");
+    assert!(record["approximations"].as_array().unwrap().iter().any(|line| line.as_str().unwrap().contains("plastic")));
 
-    // Ids and depth are those of our own tracer; so are not those of the turned view.
+    // Ids and depth are those of our own tracer; those of the turned view differ.
     let agree = |ours: &str, theirs: &str| {
         let read = |path: PathBuf| png_io::read_ids(&path.join("instance.png")).unwrap();
         let ours = read(dataset.join("scenes/room/views").join(ours));
@@ -126,9 +126,9 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     run(&mut verify(dataset)).ends_with(0);
 }
 
-/// It is ended after its first view; the next call renders the other.
+/// Blender is killed after its first view; the next run renders the other.
 #[test]
-fn a_killed_blender_is_a_finding_and_the_next_call_goes_on() {
+fn a_killed_blender_is_a_finding_and_the_next_run_resumes() {
     let Some((python, _turn)) = blender() else { return };
     let copy = unrendered();
     let tools = tempfile::tempdir().unwrap();
@@ -148,7 +148,7 @@ fn a_killed_blender_is_a_finding_and_the_next_call_goes_on() {
 }
 
 #[test]
-fn what_hangs_swells_or_crashes_is_ended_and_told() {
+fn a_hanging_growing_or_crashing_blender_is_ended_and_reported() {
     let tools = tempfile::tempdir().unwrap();
     let copy = unrendered();
     let before = manifest(copy.path());
@@ -158,7 +158,7 @@ fn what_hangs_swells_or_crashes_is_ended_and_told() {
         try_body("echo here I sleep; exec sleep 600", &["--time-limit", "1"]),
         &["took longer than 1 s", "here I sleep"],
     );
-    // A shell that is ended must not leave its Blender behind, which would hold the test's pipes.
+    // When the shell is ended, its child must end too, because it would keep the test's pipes open.
     assert!(start.elapsed().as_secs() < 60);
     let swell =
         "exec python3 -c 'import time; x = bytearray(3 << 29); x[::4096] = b\"1\" * len(x[::4096]); time.sleep(600)'";
@@ -170,9 +170,9 @@ fn what_hangs_swells_or_crashes_is_ended_and_told() {
     assert_eq!(files_below(&renders(copy.path())), [""; 0].map(PathBuf::from));
 }
 
-/// A scene that fails is tried again, and costs nothing but itself.
+/// A scene that fails is tried again and does not affect the others.
 #[test]
-fn attempts_are_counted_and_other_scenes_go_on() {
+fn attempts_are_counted_and_other_scenes_are_rendered() {
     let Some((python, _turn)) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let recipe = write_source(&folder.path().join("source"), &TINY.replace("[{", "[] #"), &["one", "two"]);
@@ -191,9 +191,9 @@ fn attempts_are_counted_and_other_scenes_go_on() {
     assert!(whole.stdout.contains("1 views rendered, 1 kept"), "{}", whole.stdout);
 }
 
-/// A texture that goes missing or is no picture, and files that cannot be written.
+/// A texture that is missing or no picture, and files that cannot be written.
 #[test]
-fn blenders_own_faults_are_told() {
+fn blenders_own_errors_are_reported() {
     let Some((python, _turn)) = blender() else { return };
     let copy = unrendered();
     let tools = tempfile::tempdir().unwrap();

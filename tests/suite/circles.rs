@@ -1,7 +1,8 @@
 //! No source file imports another in a circle, parents and their children included.
 //!
-//! An edge leads from a file to each file whose items it names by a path: in `use`, in code, in macros. A `pub use` is a
-//! signpost and no edge; who follows it has an edge to what it points at. Tests inside the files are left out.
+//! An edge leads from a file to each file whose items it names by a path: in `use`, in code, in macros. A `pub use` is
+//! not an edge but a signpost: a file that uses the re-exported name has an edge to the file that defines it. Tests
+//! inside the files are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -12,12 +13,12 @@ use syn::visit::{self, Visit};
 /// Segments of a module's path below its crate's root; empty for the root.
 type Module = Vec<String>;
 
-/// What one file names.
+/// The names that one file uses and re-exports.
 #[derive(Default)]
 struct Names {
     /// Absolute paths, from the crate's root.
     used: Vec<Vec<String>>,
-    /// Names that the file passes on by `pub use`, with what each stands for.
+    /// Names that the file re-exports by `pub use`, each with the path that it stands for.
     passed_on: BTreeMap<String, Vec<String>>,
 }
 
@@ -71,7 +72,7 @@ impl Walk<'_> {
         }
     }
 
-    /// Paths in a macro's words, which are no syntax tree.
+    /// Notes paths in a macro's tokens, which are not a syntax tree.
     fn tokens(&mut self, tokens: TokenStream) {
         let mut path: Vec<String> = Vec::new();
         for token in tokens {
@@ -124,7 +125,7 @@ impl<'ast> Visit<'ast> for Walk<'_> {
         visit::visit_path(self, path);
     }
 
-    /// `pub(super)` and `pub(crate)` say who may use an item; they use nothing.
+    /// `pub(super)` and `pub(crate)` restrict the use of an item; they use nothing themselves.
     fn visit_visibility(&mut self, _: &'ast syn::Visibility) {}
 
     fn visit_macro(&mut self, item: &'ast syn::Macro) {
@@ -149,7 +150,7 @@ fn edges(files: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>>
     names.iter().map(|(module, found)| (module.clone(), targets(module, found))).collect()
 }
 
-/// The file that holds the item at an absolute path, behind as many signposts as there are.
+/// The file that defines the item at an absolute path, after following all signposts.
 fn file_of(path: &[String], names: &BTreeMap<Module, Names>) -> Option<Module> {
     let mut path = path.to_vec();
     // A circle of signposts does not compile; the bound is for broken fixtures.
@@ -164,7 +165,7 @@ fn file_of(path: &[String], names: &BTreeMap<Module, Names>) -> Option<Module> {
     None
 }
 
-/// Files from which a way leads back to them, as `a -> b -> a`: one way each.
+/// One circle for each file that lies on any, as `a -> b -> a`.
 fn circles(edges: &BTreeMap<Module, BTreeSet<Module>>) -> Vec<String> {
     let way_back = |start: &Module| -> Option<Vec<Module>> {
         let mut seen = BTreeSet::new();
@@ -225,7 +226,7 @@ fn no_files_import_each_other_in_a_circle() {
     assert_eq!(found, Vec::<String>::new(), "{} files lie on circles", found.len());
 }
 
-/// The twin: every way in which files can name each other.
+/// The twin: every kind of reference between files.
 #[test]
 fn circles_are_found() {
     let of = |files: &[(&str, &str)]| {

@@ -1,4 +1,4 @@
-//! The command, run as a user runs it.
+//! Runs the command as a user would.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 /// How a run ended and what it printed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Run {
-    /// Its exit code; none where a signal ended it.
+    /// The exit code; none if a signal ended the process.
     pub code: Option<i32>,
     /// All of stdout.
     pub stdout: String,
@@ -15,52 +15,52 @@ pub struct Run {
     pub stderr: String,
 }
 
-/// `mateval`, still to be given its words.
+/// `mateval`, without arguments.
 pub fn mateval() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mateval"));
     command.stdin(std::process::Stdio::null());
     command
 }
 
-/// Runs what was put together.
+/// Runs the command and captures its output.
 pub fn run(command: &mut Command) -> Run {
     Run::of(command.output().unwrap())
 }
 
-/// `mateval` with these words.
+/// Runs `mateval` with these arguments.
 pub fn run_words<W: AsRef<OsStr>>(words: impl IntoIterator<Item = W>) -> Run {
     run(mateval().args(words))
 }
 
 impl Run {
-    /// What a process left.
+    /// The run of a process that has ended.
     pub fn of(Output { status, stdout, stderr }: Output) -> Self {
         let text = |bytes| String::from_utf8(bytes).unwrap();
         Self { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
     }
 
-    /// Panics with all that was printed where the exit code is another one.
+    /// Panics with the complete output if the exit code differs.
     #[track_caller]
     pub fn ends_with(self, code: i32) -> Self {
         assert_eq!(self.code, Some(code), "stdout:\n{}\nstderr:\n{}", self.stdout, self.stderr);
         self
     }
 
-    /// Panics where stderr does not hold the text.
+    /// Panics if stderr does not contain the text.
     #[track_caller]
     pub fn says(self, text: &str) -> Self {
         assert!(self.stderr.contains(text), "expected '{text}' in stderr:\n{}", self.stderr);
         self
     }
 
-    /// Panics where stdout does not hold the text.
+    /// Panics if stdout does not contain the text.
     #[track_caller]
     pub fn prints(self, text: &str) -> Self {
         assert!(self.stdout.contains(text), "expected '{text}' in stdout:\n{}", self.stdout);
         self
     }
 
-    /// The one line of stderr that starts with `error:` (and all that follows it); empty where there is none.
+    /// The line of stderr that starts with `error:`, with everything after it; empty if there is none.
     pub fn error(&self) -> &str {
         self.stderr.find("error:").map_or("", |at| &self.stderr[at..])
     }

@@ -1,5 +1,5 @@
-//! `prep compare`: a twin of the sample's pictures by our own tracer, under other seeds, agrees; each of what can go wrong
-//! with another renderer's pictures is found, by its name.
+//! `prep compare`: a twin of the sample's pictures, rendered by our own tracer with other seeds, agrees; every fault
+//! that another renderer's pictures may have is found and named.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,12 +23,12 @@ use super::kept_folder::kept_folder;
 use super::planted::{rehash, roll};
 use super::sample::{copied_dataset, copy_folder, dataset, files_below};
 
-/// Samples a pixel of each half, theirs and ours. At 96x72 pixels three standard errors of a tile are then two to four
-/// times the bound of 1 %, those of a picture's mean 0.5 to 0.8 % (of the lamp alone 1.5 to 2.2 %): of means, faults of
-/// 1.5 % are seen under the ceiling's light; of single tiles, faults of 5 %.
+/// Samples a pixel of each half, theirs and ours. At 96x72 pixels, three standard errors of a tile are then two to four
+/// times the bound of 1 %, and those of a picture's mean are 0.5 to 0.8 % (under the lamp alone 1.5 to 2.2 %). The
+/// tests can therefore detect faults of 1.5 % in means under the ceiling's light, and of 5 % in single tiles.
 const SAMPLES: u32 = 64;
 
-/// So few that the lamp is lost in noise.
+/// So few samples that the lamp's light is lost in noise.
 const FEW_SAMPLES: u32 = 16;
 
 /// `mateval prep compare DATASET`.
@@ -51,7 +51,7 @@ fn their_folder(dataset: &Path, view: &str) -> PathBuf {
     room(dataset).render(&RendererId::new("blender").unwrap(), &view)
 }
 
-/// A copy of the sample: every material is Lambert of its base colour where `lambert`, else as it is.
+/// A copy of the sample. With `lambert`, every material is replaced by Lambert with its base colour.
 fn own_copy(lambert: bool) -> tempfile::TempDir {
     let copy = copied_dataset();
     if lambert {
@@ -86,7 +86,7 @@ fn parts(dataset: &Path, scene: &ViewScene<'_>) -> BTreeMap<(usize, usize), u16>
     parts
 }
 
-/// Writes what `prep render --renderer blender` writes, by our own tracer: `scene` as `cameras` see it.
+/// Writes the files of `prep render --renderer blender`, rendered by our own tracer: `scene` as `cameras` see it.
 fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: u32) {
     let reference = Arc::new(scene);
     let world = World::new(reference.clone()).unwrap();
@@ -151,7 +151,7 @@ fn with_twin(name: &str, lambert: bool) -> PathBuf {
     kept
 }
 
-/// All Lambert, with an honest twin; nobody writes to it.
+/// A Lambert copy with a correct twin; tests must not write to it.
 static LAMBERT: LazyLock<PathBuf> = LazyLock::new(|| with_twin("compare-lambert", true));
 
 /// The sample's own materials, likewise.
@@ -163,13 +163,13 @@ fn copied(dataset: &Path) -> tempfile::TempDir {
     folder
 }
 
-/// What `--format json` prints.
+/// The output of `--format json`.
 fn found(dataset: &Path, samples: u32, code: i32) -> CompareFile {
     let run = run(compare(dataset, samples).args(["--format", "json"])).ends_with(code);
     serde_json::from_str(&run.stdout).unwrap()
 }
 
-/// What does not agree in a view: picture and quantity, in the order of the checks.
+/// The checks of a view that do not agree: picture and quantity, in the order of the checks.
 fn faults(file: &CompareFile, view: &str) -> Vec<String> {
     let checks = file.checks().filter(|(_, of, check)| of.as_str() == view && check.state == State::Differs);
     checks.map(|(_, _, check)| format!("{} {:?}", check.picture, check.quantity)).collect()
@@ -197,7 +197,7 @@ fn times(LinearRgb(rgb): LinearRgb, factor: f32) -> LinearRgb {
 }
 
 #[test]
-fn an_honest_twin_agrees() {
+fn a_correct_twin_agrees() {
     let page = tempfile::tempdir().unwrap();
     let out = page.path().join("page");
     let found = run(compare(&LAMBERT, SAMPLES).arg("--out").arg(&out)).ends_with(0);
@@ -212,14 +212,14 @@ fn an_honest_twin_agrees() {
     let lights = || scene.views.iter().flat_map(|view| &view.light);
     assert!(lights().count() == 20 && lights().all(|light| light.tiles.count == 30 && light.apart.is_empty()));
     check_page(&out, &file);
-    // It is not replaced unasked, and nothing else ever is.
+    // A comparison is replaced only with --force, and other files never.
     let mut again = compare(&LAMBERT, 1);
     run(again.arg("--out").arg(&out)).ends_with(2).says("add --force to overwrite it");
     let mut other = compare(&LAMBERT, 1);
     run(other.arg("--force").arg("--out").arg(page.path())).ends_with(2).says("is not a comparison");
 }
 
-/// Every picture that the page shows is there, each is shown, and nothing is fetched from elsewhere.
+/// Every picture of the page exists, each existing picture is shown, and the page loads nothing from other sites.
 fn check_page(out: &Path, file: &CompareFile) {
     let html = std::fs::read_to_string(out.join("index.html")).unwrap().replace("&#x2f;", "/");
     let shown: Vec<PathBuf> =
@@ -234,10 +234,10 @@ fn check_page(out: &Path, file: &CompareFile) {
     assert!(!html.contains("http") && html.contains(&mateval_audit::compare::text::verdict(file)));
 }
 
-/// The sample's own materials: tiles with plastic and glass stand apart; of what is left the lamp is too noisy to tell,
-/// which is no pass.
+/// The sample's own materials: tiles with plastic and glass do not decide; in the others the lamp is too noisy, which
+/// does not pass.
 #[test]
-fn other_materials_stand_apart_and_noise_is_no_pass() {
+fn other_materials_do_not_decide_and_noise_does_not_pass() {
     let file = found(&MIXED, FEW_SAMPLES, 1);
     let scene = &file.scenes[0];
     assert_eq!(scene.tile_bound, 0.02);
@@ -254,7 +254,7 @@ fn other_materials_stand_apart_and_noise_is_no_pass() {
     assert_eq!(state("group_00", Quantity::MeanDifference), State::TooNoisy);
 }
 
-/// Nothing to compare is an error that names the scene; a scene that is not there too; and a page within the dataset.
+/// Errors that name the cause: nothing to compare, a missing scene, a page inside the dataset.
 #[test]
 fn what_cannot_be_compared() {
     let nothing = "has no pictures by blender of scene 'room'; run `mateval prep render DATASET --renderer blender`";
@@ -273,7 +273,7 @@ fn what_cannot_be_compared() {
 fn other_pictures_are_found() {
     let copy = copied(&LAMBERT);
     let (dataset, views) = (copy.path(), views(&LAMBERT));
-    // `input`: the materials' textures are mirrored.
+    // `input`: the textures of the materials are mirrored.
     write_twin(dataset, mirrored(reference_io::read(&room(dataset)).unwrap()), &views[..1], SAMPLES);
     // `up_left` and `up_right` are swapped.
     let [left, right] = ["up_left", "up_right"].map(|view| their_folder(dataset, view));
@@ -286,7 +286,7 @@ fn other_pictures_are_found() {
     roll(&mut rolled, 1.0);
     let rolled: View = serde_json::from_value(rolled).unwrap();
     write_twin(dataset, reference_io::read(&room(dataset)).unwrap(), &[rolled], SAMPLES);
-    // `down_right`: a tone curve, as Filmic's; the groups are as they were.
+    // `down_right`: a tone curve like Filmic's; the groups are unchanged.
     for file in ["rgb_a.exr", "rgb_b.exr", "rgb.exr"] {
         edit_light(dataset, "down_right", file, |_, LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * 1.1 / (v + 0.3))));
     }
@@ -305,7 +305,7 @@ fn other_pictures_are_found() {
     );
 }
 
-/// Every texture of a material runs the other way; the environment's stays.
+/// Mirrors every texture of a material, but not that of the environment.
 fn mirrored(mut scene: ReferenceScene) -> ReferenceScene {
     let used: Vec<usize> = scene.materials.iter().flat_map(|m| m.lookups()).map(|lookup| lookup.texture.0).collect();
     assert!(used.len() > 2);
@@ -325,7 +325,7 @@ fn wrong_lights_are_found() {
     let copy = copied(&LAMBERT);
     let dataset = copy.path();
     let group = |view: &str, file: &str| exr_io::read_linear(&their_folder(dataset, view).join(file)).unwrap();
-    // `input`: RGB lacks the lamp, which has a group all the same.
+    // `input`: RGB lacks the lamp, although it has a group.
     for half in ["_a", "_b", ""] {
         let lamp = group("input", &format!("group_00{half}.exr"));
         edit_light(dataset, "input", &format!("rgb{half}.exr"), |at, LinearRgb(rgb)| {
@@ -340,7 +340,7 @@ fn wrong_lights_are_found() {
             LinearRgb([0, 1, 2].map(|c| rgb[c] - 0.03 * ceiling.pixels()[at].0[c]))
         });
     }
-    // `down_left`: one file is gone, one is cut short, one of another size.
+    // `down_left`: one file is missing, one is truncated, one has another size.
     let folder = their_folder(dataset, "down_left");
     std::fs::remove_file(folder.join("group_00_b.exr")).unwrap();
     let bytes = std::fs::read(folder.join("depth.exr")).unwrap();

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::command::{Run, baseline, build, render, run, score};
 use super::sample::{self, SMALL, manifest, write_source};
 
-/// Runs the command on so many threads.
+/// Runs the command on this number of threads.
 fn on_threads(threads: usize, command: &mut std::process::Command) -> Run {
     run(command.env("RAYON_NUM_THREADS", threads.to_string())).ends_with(0)
 }
@@ -33,7 +33,7 @@ fn a_second_build_and_render_give_the_same_manifest() {
     assert!(one[0].lines().count() > 100 && one[1].lines().count() > one[0].lines().count());
 }
 
-/// The twin: what must not be the same.
+/// The twin: manifests that must differ.
 #[test]
 fn another_recipe_and_other_samples_give_another_manifest() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,6 @@
-//! A disk that is full or refuses: exit code 2, the path and the reason, and nothing half-written at a finished file's
-//! place. A limit on file sizes (`ulimit -f`) stands for the disk: writes beyond it fail just the same.
+//! A disk that is full or refuses writes: exit code 2, the path and the reason, and no half-written file in the place
+//! of a finished one. A limit on file sizes (`ulimit -f`) stands in for the disk, because writes beyond it fail
+//! likewise.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -7,8 +8,8 @@ use std::process::{Command, Stdio};
 use super::command::{Run, baseline, build, mateval, render, run, score, verify};
 use super::sample::{SMALL, copied_dataset, dataset, files_below, manifest, write_source};
 
-/// The command with every file limited to so many blocks of 512 bytes; the signal that would tell is ignored, so that the
-/// write fails.
+/// Runs the command with every file limited to this number of blocks of 512 bytes. The signal for a larger file is
+/// ignored, so that the write fails instead.
 fn limited(blocks: usize, command: &Command) -> Run {
     let mut shell = Command::new("sh");
     shell.args(["-c", "trap '' XFSZ; ulimit -f \"$0\" && exec \"$@\"", &blocks.to_string()]);
@@ -16,14 +17,14 @@ fn limited(blocks: usize, command: &Command) -> Run {
     run(&mut shell)
 }
 
-/// What a failed write leaves: nothing under a name that ends in `.partial`, be it only hidden.
+/// Partial files below the folder, hidden ones included. A failed write must leave none.
 fn partial_files(root: &Path) -> Vec<String> {
     let names = files_below(root).into_iter().map(|file| file.display().to_string());
     names.filter(|name| name.ends_with(".partial")).collect()
 }
 
 #[test]
-fn a_build_fails_cleanly_and_goes_on_when_there_is_room() {
+fn a_build_fails_cleanly_and_resumes_when_the_disk_has_space() {
     let folder = tempfile::tempdir().unwrap();
     let recipe = write_source(&folder.path().join("source"), SMALL, &["room"]);
     let whole = folder.path().join("whole");
@@ -39,12 +40,12 @@ fn a_build_fails_cleanly_and_goes_on_when_there_is_room() {
     }
     run(&mut build(&recipe, &out)).ends_with(0);
     assert!(manifest(&out) == manifest(&whole));
-    // The twin: a limit that everything fits into is none.
+    // The twin: under a sufficient limit it succeeds.
     assert_eq!(limited(1 << 20, &build(&recipe, &folder.path().join("roomy"))).code, Some(0));
 }
 
 #[test]
-fn a_render_fails_cleanly_and_goes_on() {
+fn a_render_fails_cleanly_and_resumes() {
     let copy = copied_dataset();
     std::fs::remove_dir_all(copy.path().join("scenes/room/ground_truth/renders")).unwrap();
     let failed = limited(8, &render(copy.path(), 1)).ends_with(2);
@@ -55,7 +56,7 @@ fn a_render_fails_cleanly_and_goes_on() {
 }
 
 #[test]
-fn submissions_and_results_are_whole_or_not_there() {
+fn submissions_and_results_are_complete_or_absent() {
     let folder = tempfile::tempdir().unwrap();
     let (submission, result) = (folder.path().join("gt"), folder.path().join("RESULT.json"));
     let failed = limited(0, &baseline("gt", dataset(), &submission)).ends_with(2);
@@ -68,7 +69,7 @@ fn submissions_and_results_are_whole_or_not_there() {
     assert_eq!(partial_files(folder.path()), [""; 0]);
 }
 
-/// A place below a file can be written to by nobody, not even by root.
+/// Nobody can write to a path below a file, not even root.
 #[test]
 fn a_place_that_cannot_be_written_to() {
     let folder = tempfile::tempdir().unwrap();
@@ -85,7 +86,7 @@ fn a_place_that_cannot_be_written_to() {
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
 }
 
-/// A result that could not be printed is not done; a reader that has gone away is no error.
+/// A result that cannot be printed is an error; a reader that has closed the pipe is not.
 #[test]
 fn a_full_stdout() {
     let words = ["eval", "image", "--format", "json"];

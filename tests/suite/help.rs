@@ -1,14 +1,15 @@
-//! What a user reads: exit code, stdout and stderr of short runs, whole.
+//! Complete output of short runs: exit code, stdout and stderr.
 
 use super::command::{Run, mateval, run};
 
-/// Runs the command in a folder of its own and holds all that it gives against `expected`; nothing may be left there.
+/// Runs the command in an empty folder and compares its complete output with the expected one; no file may remain
+/// there.
 #[track_caller]
 fn check(words: &[&str], code: i32, stdout: &str, stderr: &str) {
     let folder = tempfile::tempdir().unwrap();
     let found = run(mateval().current_dir(folder.path()).args(words));
     assert_eq!(found, Run { code: Some(code), stdout: stdout.to_owned(), stderr: stderr.to_owned() }, "{words:?}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{words:?} left something");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "{words:?} left files behind");
 }
 
 #[test]
@@ -17,7 +18,7 @@ fn the_version() {
 }
 
 #[test]
-fn what_is_not_there() {
+fn inputs_that_do_not_exist() {
     let not_there = "No such file or directory (os error 2)\n";
     let cases: [(&[&str], &str); 10] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
@@ -49,14 +50,14 @@ fn what_is_not_there() {
 }
 
 #[test]
-fn what_is_no_dataset() {
+fn a_folder_that_is_no_dataset() {
     let error = "error: cannot verify 'nowhere': 'nowhere' holds no dataset.json: no dataset, or an unfinished \
                  `prep build` (run it again)\n";
     check(&["prep", "verify", "nowhere"], 2, "", error);
 }
 
 #[test]
-fn words_that_are_not_known() {
+fn unknown_arguments() {
     let error = "error: unrecognized subcommand 'gray'\n\n  tip: a similar subcommand exists: 'grey'\n\n\
                  Usage: mateval baseline <COMMAND>\n\nFor more information, try '--help'.\n";
     check(&["baseline", "gray", "--dataset", "d", "--out", "o"], 2, "", error);
@@ -66,14 +67,14 @@ fn words_that_are_not_known() {
 }
 
 #[test]
-fn words_that_are_missing() {
+fn missing_arguments() {
     let error = "error: the following required arguments were not provided:\n  --dataset <DATASET>\n  --out <OUT>\n  \
                  <SUBMISSION>...\n\nUsage: mateval eval score --dataset <DATASET> --out <OUT> <SUBMISSION>...\n\n\
                  For more information, try '--help'.\n";
     check(&["eval", "score"], 2, "", error);
 }
 
-/// Every subcommand can say what it is for.
+/// Every subcommand has a help text.
 #[test]
 fn every_subcommand_has_help() {
     let subcommands: [&[&str]; 17] = [

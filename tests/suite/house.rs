@@ -1,5 +1,5 @@
-//! The built-in 3D-FRONT house from survey to score: rooms offered and rejected, a recipe with hashes, a dataset, its
-//! ceiling and its floor.
+//! The built-in 3D-FRONT house from survey to score: accepted and rejected rooms, a recipe with hashes, a dataset, and
+//! the scores of its ceiling and floor baselines.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,7 +11,7 @@ use super::command::{Run, baseline, build, mateval, run, run_words, score, stats
 use super::kept_folder::kept_folder;
 use super::sample::json;
 
-/// The sample's source and what a survey of its house gives.
+/// The sample's source and the survey of its house.
 struct Surveyed {
     source: PathBuf,
     survey: PathBuf,
@@ -50,7 +50,7 @@ fn build_from(recipe: &Path, source: &Path, dataset: &Path) -> Run {
 }
 
 #[test]
-fn sound_rooms_are_offered_and_the_faulty_one_is_rejected_with_reasons() {
+fn sound_rooms_are_accepted_and_the_faulty_one_is_rejected_with_reasons() {
     let offered: Vec<Value> =
         rooms().iter().filter(|r| r["cameras"][0].is_object()).map(|r| r["room"].clone()).collect();
     assert_eq!(offered, ["LivingDiningRoom-101", "MasterBedroom-102"]);
@@ -77,7 +77,7 @@ fn the_page_shows_every_candidate_and_every_rejection() {
 }
 
 #[test]
-fn a_list_rejects_with_its_reason_and_a_survey_is_repeated_to_the_byte() {
+fn a_list_rejects_with_its_reason_and_a_survey_is_reproducible_to_the_byte() {
     let folder = tempfile::tempdir().unwrap();
     let (list, out) = (folder.path().join("bad.csv"), folder.path().join("survey"));
     std::fs::write(&list, "MasterBedroom-102,the bed is made\n").unwrap();
@@ -98,9 +98,9 @@ fn a_list_rejects_with_its_reason_and_a_survey_is_repeated_to_the_byte() {
     }
 }
 
-/// From the recipe to scores: sound, counted, its truth far better than grey.
+/// From the recipe to scores: the dataset is sound and can be counted, and its truth scores far better than grey.
 #[test]
-fn offered_rooms_become_a_dataset_that_can_be_scored() {
+fn accepted_rooms_become_a_dataset_that_can_be_scored() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = folder.path().join("dataset");
     build_from(&recipe(folder.path()), &SURVEYED.source, &dataset).ends_with(0);
@@ -139,9 +139,9 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     build_from(&recipe, &source, &dataset).ends_with(0);
 }
 
-/// A designer's camera 2 mm from a wall: half its picture would be that wall's noise.
+/// A designer's camera 2 mm from a wall, which would be noise in half of the picture.
 #[test]
-fn cameras_in_a_wall_are_not_offered() {
+fn cameras_in_a_wall_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("source");
     super::sample::copy_folder(&SURVEYED.source, &source);
@@ -167,7 +167,8 @@ fn cameras_in_a_wall_are_not_offered() {
     assert_eq!(both, ["designer 7", "seed 1"]);
 }
 
-/// What is rejected for its number of pieces is not searched for pairs that intersect: with thousands that takes minutes.
+/// A room that is rejected for its number of pieces is not searched for pairs that intersect, which takes minutes for
+/// thousands of pieces.
 #[test]
 fn crowded_rooms_are_not_searched() {
     let folder = tempfile::tempdir().unwrap();
@@ -181,7 +182,7 @@ fn crowded_rooms_are_not_searched() {
     }
 }
 
-/// Where things are on a machine is no part of a dataset: absolute paths are made relative, or refused.
+/// A dataset does not depend on locations on a machine: absolute paths are made relative or refused.
 #[test]
 fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     let folder = tempfile::tempdir().unwrap();
@@ -190,7 +191,7 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     let survey = |out: &str, more: &[&Path]| {
         let mut command = mateval();
         command.args(["prep", "survey", "--cameras-per-room", "1", "--resolution", "96", "72", "--out"]);
-        // Elsewhere: where all paths lie below the current folder, that is the source.
+        // If all paths lie below the current folder, that folder is the source.
         command.current_dir(folder.path());
         run(command.arg(folder.path().join(out)).arg(&houses).arg("--models").arg(&models).args(more))
     };
@@ -205,7 +206,7 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     assert!(text.contains("models = \"house/3D-FUTURE-model\""), "{text}");
     survey("elsewhere", &[Path::new("--source"), &houses]).ends_with(2).says("with --source");
 
-    // A recipe by hand: what lies below the source is told relative to it, the rest is refused.
+    // In a hand-written recipe, paths below the source are made relative to it and others are refused.
     let text = std::fs::read_to_string(&recipe).unwrap();
     let first = text.find("[scene.inputs]").unwrap();
     let absolute = format!("atlas_size = 256\nviews = []\n{}", &text[..first])
@@ -219,9 +220,9 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
     assert!(!holds_place(&dataset.join("scenes").join(scene).join("scene.json")));
 }
 
-/// What every house needs is looked for first; a house named twice is surveyed once.
+/// Folders that every house needs are checked first; a house named twice is surveyed once.
 #[test]
-fn a_survey_refuses_folders_that_are_not_there() {
+fn a_survey_refuses_folders_that_do_not_exist() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("survey");
     let with = |words: &[&str]| {
@@ -229,8 +230,10 @@ fn a_survey_refuses_folders_that_are_not_there() {
         command.args(["prep", "survey", "--source"]).arg(&SURVEYED.source).arg("--out").arg(&out);
         run(command.args(["--cameras-per-room", "0"]).args(words))
     };
-    with(&["house/3D-FRONT", "--models", "house/3D-FUTURE-modell"]).ends_with(2).says("3D-FUTURE-modell' is not there");
-    with(&["house/3D-FRUNT", "--models", "house/3D-FUTURE-model"]).ends_with(2).says("3D-FRUNT' is not there");
+    with(&["house/3D-FRONT", "--models", "house/3D-FUTURE-modell"])
+        .ends_with(2)
+        .says("3D-FUTURE-modell' does not exist");
+    with(&["house/3D-FRUNT", "--models", "house/3D-FUTURE-model"]).ends_with(2).says("3D-FRUNT' does not exist");
     assert!(!out.exists());
     let house = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
     with(&["house/3D-FRONT", house, "--models", "house/3D-FUTURE-model"]);

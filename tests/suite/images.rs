@@ -1,5 +1,5 @@
-//! `eval image` against the values of scikit-image and lpips: `metrics/expected.json` of the real inputs, which says how
-//! they were made.
+//! `eval image` against the values of scikit-image and lpips in `metrics/expected.json` of the real inputs, which
+//! states how they were computed.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::command::{mateval, run};
 use super::sample::json;
 
-/// Keys of expected.json, and where `eval image` prints the same.
+/// Keys of expected.json, and the path of the same value in the output of `eval image`.
 const PLAIN: [(&str, &str); 3] = [("mse", "/mse"), ("psnr", "/psnr"), ("ssim", "/ssim")];
 const MASKED: [(&str, &str); 5] = [
     ("masked_mse", "/masked/mse"),
@@ -19,14 +19,14 @@ const MASKED: [(&str, &str); 5] = [
     ("valid_windows", "/masked/ssim_windows"),
     ("blackfill_ssim", "/masked/ssim_black_fill"),
 ];
-/// The network's name comes after these keys; there is one network a run.
+/// Keys that are followed by the network's name; each run has one network.
 const NETS: [(&str, &str); 3] = [
     ("lpips", "/lpips/0"),
     ("masked_lpips", "/masked/lpips_inside/0"),
     ("blackfill_lpips", "/masked/lpips_black_fill/0"),
 ];
 
-/// `eval image`'s values for a prediction, or none where LPIPS' weights are not there (which is said).
+/// The values of `eval image` for a prediction; none if the weights of LPIPS are missing, which is then printed.
 fn values(folder: &Path, prediction: &str, case: &Value, mask: Option<&str>, net: &str) -> Option<Value> {
     let mut command = mateval();
     command.args(["eval", "image", "--format", "json", "--net", net]);
@@ -42,7 +42,7 @@ fn values(folder: &Path, prediction: &str, case: &Value, mask: Option<&str>, net
     Some(printed["values"].clone())
 }
 
-/// The values of a case that are not what they should be, and how many were compared.
+/// The values of a case that differ from the expected ones, and the number of compared values.
 fn compare(found: &Value, case: &Value, net: &str) -> (Vec<String>, usize) {
     let relative = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b.abs();
     let near = |slack: f64| move |a: f64, b: f64| (a - b).abs() <= slack;
@@ -73,7 +73,7 @@ fn cases() -> Option<(std::path::PathBuf, Vec<Value>)> {
     Some((file.parent().unwrap().to_owned(), cases))
 }
 
-/// All that differs over these cases, and how many values were compared.
+/// All differences over these cases, and the number of compared values.
 fn check_cases(folder: &Path, cases: &[Value], net: &str) -> Option<(Vec<String>, usize)> {
     let (mut wrong, mut count) = (Vec::new(), 0);
     for case in cases {
@@ -87,7 +87,7 @@ fn check_cases(folder: &Path, cases: &[Value], net: &str) -> Option<(Vec<String>
 }
 
 #[test]
-fn every_value_of_the_reference_is_met() {
+fn every_value_of_the_reference_is_reproduced() {
     let Some((folder, cases)) = cases() else { return };
     let Some((wrong, count)) = check_cases(&folder, &cases, "alex") else { return };
     assert_eq!(wrong, [""; 0]);
@@ -95,9 +95,9 @@ fn every_value_of_the_reference_is_met() {
     assert_eq!(count, 10 * 11 + 2);
 }
 
-/// VGG takes seconds a picture here; the crate's own tests meet all of its values.
+/// VGG takes seconds a picture here; the crate's own tests check all of its values.
 #[test]
-fn vgg_is_met_on_three_cases() {
+fn vgg_is_reproduced_on_three_cases() {
     let Some((folder, cases)) = cases() else { return };
     let three = [&cases[0], &cases[8], &cases[10]].map(Value::clone);
     let Some((wrong, count)) = check_cases(&folder, &three, "vgg") else { return };
@@ -105,7 +105,7 @@ fn vgg_is_met_on_three_cases() {
     assert_eq!(count, 2 * 11 + 1);
 }
 
-/// The twin: another prediction meets nothing, another mask nothing that is masked.
+/// The twin: with another prediction every value differs, with another mask every masked value.
 #[test]
 fn another_prediction_or_mask_fails() {
     let Some((folder, cases)) = cases() else { return };
@@ -113,7 +113,7 @@ fn another_prediction_or_mask_fails() {
     let mask = case["mask"].as_str();
     let Some(swapped) = values(&folder, other["prediction"].as_str().unwrap(), case, mask, "alex") else { return };
     let (wrong, count) = compare(&swapped, case, "alex");
-    // The number of windows is the mask's alone.
+    // The number of windows depends on the mask alone.
     assert_eq!((wrong.len(), count), (10, 11), "{wrong:?}");
 
     let halved = tempfile::tempdir().unwrap();
@@ -128,7 +128,7 @@ fn another_prediction_or_mask_fails() {
     assert!(wrong.len() == 7 && !wrong.iter().any(plain), "{wrong:?}");
 }
 
-/// What needs no real input: a picture is itself, and pictures of two sizes are refused.
+/// Tests without real inputs: a picture equals itself, and pictures of two sizes are refused.
 #[test]
 fn the_same_picture_twice() {
     let folder = tempfile::tempdir().unwrap();

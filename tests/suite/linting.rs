@@ -114,8 +114,8 @@ fn watched(command: &mut Command) -> (Run, Cost) {
     (Run::of(child.wait_with_output().unwrap()), Cost { cpu_seconds, peak_mib: peak_kib / 1024.0 })
 }
 
-/// 10 MB of zip from which 100 GB would come, three ways: entries that share their bytes, entries that say to be that large, and
-/// entries that say to be small.
+/// 10 MB of zip from which 100 GB would come, three ways: entries that share their bytes, entries that say to be that
+/// large, and entries that say to be small.
 fn zip_bombs() -> Vec<(&'static str, Vec<u8>)> {
     let zeros = ZipEntry::new("0", &vec![0; 500 << 20]);
     let filler = ZipEntry::stored("filler", &vec![7; (10 << 20) - zeros.data.len()]);
@@ -129,8 +129,8 @@ fn zip_bombs() -> Vec<(&'static str, Vec<u8>)> {
     vec![("overlapping_entries", sharing), ("archive_too_large", boasting), ("wrong_size", modest)]
 }
 
-/// The same as a stream, of which no more than a thousandth is packed: ten gigabytes of a file, of what is passed over, and a file that
-/// says to be of 8 GB.
+/// The same as a stream, of which no more than a thousandth is packed: ten gigabytes of a file, of what is passed over,
+/// and a file that says to be of 8 GB.
 fn tar_bombs() -> Vec<(&'static str, Vec<u8>)> {
     let zeros = gzip(&vec![0; 64 << 20]);
     let body = zeros.repeat((10 << 20) / zeros.len());

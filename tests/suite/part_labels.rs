@@ -114,5 +114,5 @@ fn labels_that_do_not_fit_are_refused_all_at_once() {
     refused.clone().says(&format!("sofa.npy' has {} labels; expected {sofa}", sofa - 1));
     refused.says(&format!("table.npy' has {} labels; expected {table}", table + 1));
     std::fs::remove_dir_all(labelled.folder.path().join("source/room/labels")).unwrap();
-    labelled.build().ends_with(2).says("mend `part_labels`");
+    labelled.build().ends_with(2).says("correct `part_labels`");
 }

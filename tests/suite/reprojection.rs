@@ -1,6 +1,6 @@
 //! One camera matrix for every picture: points of the meshes, projected by a few lines that share nothing with
-//! `mateval_scene::Camera`, find in each view the depth, the ids, the normal, the masks and the colours that its pictures
-//! hold. A camera rolled by three degrees must not.
+//! `mateval_scene::Camera`, find in each view the depth, the ids, the normal, the masks and the colours that its
+//! pictures hold. A camera rolled by three degrees must not.
 
 use std::path::Path;
 
@@ -21,8 +21,8 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// A camera read from `scene.json` as FORMAT tells it: axes and place in the columns of `world_from_camera`, it looks along
-/// its -Z, +Y is up, pixels count from the top left.
+/// A camera read from `scene.json` as FORMAT tells it: axes and place in the columns of `world_from_camera`, it looks
+/// along its -Z, +Y is up, pixels count from the top left.
 struct Eye {
     axes: [Point; 3],
     place: Point,
@@ -159,8 +159,8 @@ struct Tally {
     wrong_normals: usize,
 }
 
-/// How far a mark may be from the tangent plane of a pixel that shows it, over its depth: what a bowl bends away within a
-/// pixel and a half.
+/// How far a mark may be from the tangent plane of a pixel that shows it, over its depth: what a bowl bends away within
+/// a pixel and a half.
 const OFF_PLANE: f64 = 0.004;
 
 fn tally(seen: &Seen, marks: &[Mark]) -> Tally {
@@ -205,8 +205,8 @@ fn tallies(rolled_deg: f64) -> Vec<Tally> {
     views.iter().map(|view| tally(&Seen::read(&room, view), &marks)).collect()
 }
 
-/// Of the marks within a picture at least 55 of 100 are seen (the backs of things hide the rest), and no more than two of
-/// a thousand are neither seen nor behind something (what is thinner than a pixel falls between pixel centres).
+/// Of the marks within a picture at least 55 of 100 are seen (the backs of things hide the rest), and no more than two
+/// of a thousand are neither seen nor behind something (what is thinner than a pixel falls between pixel centres).
 fn agrees(tally: &Tally) -> bool {
     let all = tally.seen + tally.hidden + tally.wrong;
     tally.seen * 100 >= all * 55 && tally.wrong * 1000 <= all * 2

@@ -92,7 +92,8 @@ fn half_written_scenes_are_made_again() {
     assert!(manifest(&out) == WHOLE.manifest);
 }
 
-/// A file that was missing when the scene was made is there now: the scene is made again, as a fresh build would make it.
+/// A file that was missing when the scene was made is there now: the scene is made again, as a fresh build would make
+/// it.
 #[test]
 fn what_has_come_since_is_taken_in() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! The documents say what the program does: schemas, examples and worked numbers of `dataset_spec/`, the map of `crates/`.
+//! The documents say what the program does: schemas, examples and worked numbers of `dataset_spec/`, the map of
+//! `crates/`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! `eval score` on the sample: the truth scores high, grey scores its pinned values, tables keep what cannot be compared
-//! apart, and what is missing is said.
+//! `eval score` on the sample: the truth scores high, grey scores its pinned values, tables keep what cannot be
+//! compared apart, and what is missing is said.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -13,8 +13,8 @@ use super::command::{baseline, build, mateval, run, score};
 use super::kept_folder::kept_folder;
 use super::sample::{dataset, json, write_source};
 
-/// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen by the
-/// tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
+/// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen
+/// by the tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.
 static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("scores");
     let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
@@ -41,11 +41,11 @@ fn value(summary: &Value, key: &str) -> f64 {
     summary[key].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
 }
 
-/// What grey scores under `mateval-1` and under `paper`. Computed once by a script that shares nothing with this project:
-/// albedo.exr, valid.png and unobserved.png of each view read with OpenEXR 3 and scikit-image 0.26, the prediction a
-/// picture of the one colour that sRGB byte 188 stands for, SSIM by `skimage.metrics.structural_similarity`
-/// (gaussian_weights, sigma 1.5, population covariance; its full map averaged over windows wholly inside for `mateval-1`,
-/// both pictures black outside for `paper`), means over the views.
+/// What grey scores under `mateval-1` and under `paper`. Computed once by a script that shares nothing with this
+/// project: albedo.exr, valid.png and unobserved.png of each view read with OpenEXR 3 and scikit-image 0.26, the
+/// prediction a picture of the one colour that sRGB byte 188 stands for, SSIM by
+/// `skimage.metrics.structural_similarity` (gaussian_weights, sigma 1.5, population covariance; its full map averaged
+/// over windows wholly inside for `mateval-1`, both pictures black outside for `paper`), means over the views.
 #[rustfmt::skip]
 const GREY: [(&str, f64, f64); 18] = [
     ("albedo.input.mse", 0.106457114, 0.094882721),

@@ -141,7 +141,7 @@ fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<String> {
     let fault = |(key, path, is_folder): (&str, PathBuf, bool)| {
         let there = if is_folder { path.is_dir() } else { path.is_file() };
         let kind = if is_folder { "folder" } else { "file" };
-        let hint = format!("mend `{key}`, or name the folder with --source");
+        let hint = format!("correct `{key}`, or name the folder with --source");
         (!there).then(|| format!("scene '{}': there is no {kind} '{}'; {hint}", scene.id, path.display()))
     };
     wanted.into_iter().filter_map(fault).collect()
