@@ -1,10 +1,11 @@
-//! The tracer against other renderers: the same scenes, made by the same code, rendered by both.
+//! Compares the tracer with other renderers on the same scenes, which are made by the same code.
 //!
-//! `tools/test_peers.sh` installs the renderers, sets `MATEVAL_PEERS_PYTHON` and `MATEVAL_PEERS_BLENDER` to the Pythons that have them, and runs this.
+//! `tools/test_peers.sh` installs the renderers, sets `MATEVAL_PEERS_PYTHON` and `MATEVAL_PEERS_BLENDER` to the Python
+//! interpreters that have them, and runs these tests.
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
-#![allow(clippy::print_stderr, reason = "what was measured is told, and what is left out")]
-#![allow(dead_code, reason = "the tracer's own tests use more of the shared modules than these do")]
+#![allow(clippy::print_stderr, reason = "measurements and skipped cases are printed")]
+#![allow(dead_code, reason = "the tracer's own tests use more of the shared modules")]
 
 #[path = "../crates/tracer/tests/suite/bench_scene.rs"]
 mod bench_scene;

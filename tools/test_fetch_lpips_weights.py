@@ -114,7 +114,7 @@ class ReadPickle(unittest.TestCase):
 
 
 class Layout(unittest.TestCase):
-    def test_every_weight_lands_where_its_indices_say(self) -> None:
+    def test_every_weight_is_stored_at_its_indices(self) -> None:
         height, width, channels_in, channels_out = 2, 3, 4, 5
         order = [(y, x, i, o) for y in range(height) for x in range(width) for i in range(4) for o in range(5)]
         kernel = array.array("f", [1000 * o + 100 * i + 10 * y + x for y, x, i, o in order])
@@ -190,7 +190,7 @@ class WholeRun(unittest.TestCase):
             code = tool.main(["--out", str(self.folder / "out"), *words])
         return code, out.getvalue(), err.getvalue()
 
-    def test_writes_once_and_then_leaves_alone(self) -> None:
+    def test_an_existing_file_is_not_written_again(self) -> None:
         code, out, err = self.run_tool("--sdist", str(self.sdist))
         path = self.folder / "out" / "tiny.safetensors"
         self.assertEqual((code, err), (0, ""))
@@ -234,7 +234,7 @@ class WholeRun(unittest.TestCase):
         self.patch("NETS", (tiny_net(sha256="0" * 64),))
         self.check_refused(expected="came out with SHA-256", sdist=self.sdist)
 
-    def test_a_failing_pip_is_told(self) -> None:
+    def test_a_failing_pip_is_reported(self) -> None:
         failed = mock.Mock(returncode=1)
         with mock.patch.object(tool.subprocess, "run", return_value=failed) as run:
             code, out, err = self.run_tool()
@@ -279,7 +279,7 @@ class Download(unittest.TestCase):
             with mock.patch.object(sys, "stderr", log):
                 return tool.download(folder=self.folder / "to")
 
-    def test_the_archive_comes_without_running_it(self) -> None:
+    def test_the_archive_is_fetched_without_running_it(self) -> None:
         path = self.download(sha256=self.sha256)
         self.assertEqual(hashlib.sha256(path.read_bytes()).hexdigest(), self.sha256)
         self.assertFalse(self.mark.exists())

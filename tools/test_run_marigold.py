@@ -81,7 +81,7 @@ class Plan(unittest.TestCase):
             self.assertEqual(list(found), expected)
         self.assertEqual(found["a"], self.folder / "scenes/a/views/input/rgb.png")
 
-    def test_what_is_no_dataset_is_refused(self) -> None:
+    def test_a_folder_that_is_no_dataset_is_refused(self) -> None:
         self.refused("no scene 'c'; it has b, a", tool.input_pictures, dataset=self.folder, wanted=["c"])
         (self.folder / "scenes/a/views/input/rgb.png").unlink()
         self.refused(r"a/views/input/rgb.png' does not exist \(1 ", tool.input_pictures, dataset=self.folder, wanted=None)
@@ -162,7 +162,7 @@ class Mapping(unittest.TestCase):
         self.check(picture=albedo, expected=[26, 51, 77])  # 255 times 0.1, 0.2, 0.3: as predicted
         self.check(picture=material, expected=[102, 128, 0])  # roughness 0.4, metallic 0.5
 
-    def test_names_decide_not_places(self) -> None:
+    def test_names_decide_and_not_positions(self) -> None:
         stacked = {"sub_target_names": [None, "metallicity", "roughness"]}
         turned = APPEARANCE | {"target_names": ["material", "albedo"], "material": stacked}
         albedo, material = self.pictures(properties=turned)
@@ -175,7 +175,7 @@ class Mapping(unittest.TestCase):
         self.check(picture=albedo, expected=[90, 123, 148])
         self.check(picture=material, expected=[102, 128, 0])
 
-    def test_what_is_not_finite_is_refused(self) -> None:
+    def test_values_that_are_not_finite_are_refused(self) -> None:
         import numpy as np
 
         for bad in (np.nan, np.inf):
@@ -320,7 +320,7 @@ class Pipeline(unittest.TestCase):
                 # A number near a half may be rounded either way.
                 self.assertLess(abs(values.reshape(-1) - list(picture.tobytes())).max(), 0.51, name)
 
-    def test_run_json_says_how(self) -> None:
+    def test_run_json_records_the_settings(self) -> None:
         run = json.loads((self.first / "run.json").read_text(encoding="utf-8"))
         expected = {"model": "model", "revision": None, "target_properties": APPEARANCE, "seed": 0, "steps": 2}
         expected |= {"ensemble": 1, "resolution": 32, "device": "cpu", "half": False}
@@ -332,7 +332,7 @@ class Pipeline(unittest.TestCase):
         hashes = {"dataset_manifest_sha256", "weights_sha256"}
         self.assertEqual(set(run) - set(expected), set(tool.NEEDED) | hashes)
 
-    def test_the_same_seed_gives_the_same_bytes_alone_too(self) -> None:
+    def test_the_same_seed_gives_the_same_bytes_for_a_single_scene_too(self) -> None:
         whole, out = content(folder=self.first), self.fresh("alone")
         self.check_done(self.run_tool("--scene", "cellar", out=out))
         alone = content(folder=out)
@@ -374,7 +374,7 @@ class Pipeline(unittest.TestCase):
         self.assertEqual(content(folder=out), whole)
         self.check_refused("--force", "--seed", "1", "--scene", "attic", expected="'cellar' would stay so", out=out)
 
-    def test_what_is_not_there_is_told(self) -> None:
+    def test_missing_inputs_are_reported(self) -> None:
         self.check_refused("--scene", "garret", expected="no scene 'garret'; it has attic, cellar")
         self.check_refused(dataset="nowhere", expected="cannot read '.*nowhere/dataset.json'")
         self.check_refused("--model", "./nowhere", expected="no model './nowhere'")
@@ -382,7 +382,7 @@ class Pipeline(unittest.TestCase):
         self.check_refused("--model", str(self.root / "dataset"), expected="cannot read '.*/model_index.json'")
         self.check_refused("--half", expected="--half is for graphics cards")
 
-    def test_a_spoilt_model_or_picture_is_told(self) -> None:
+    def test_a_damaged_model_or_picture_is_reported(self) -> None:
         spoilt = self.fresh("model")
         write_tiny_model(folder=spoilt, properties=APPEARANCE | {"target_names": ["albedo", "shading"]})
         self.check_refused("--model", str(spoilt), expected="expected albedo and material")

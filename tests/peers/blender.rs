@@ -1,7 +1,8 @@
-//! Blender 4.5 (Cycles) renders scenes that are made here, and so does the tracer: they must agree tile by tile.
+//! Blender 4.5 (Cycles) and the tracer render scenes that are made here; the pictures must agree tile by tile.
 //!
-//! Samples are set so that the noise of a tile, of both renderers together, is under a third of what all tiles but one may
-//! differ by. Each comparison is made again with something slightly wrong, and then has to fail by more than its noise.
+//! The samples are chosen so that the noise of a tile, of both renderers together, is under a third of the difference
+//! allowed for all tiles but one. Each comparison is repeated with a slightly wrong scene, and must then fail by more
+//! than its noise.
 
 use std::sync::Arc;
 
@@ -15,7 +16,7 @@ use super::blender_job::{self, BOUNCES, SEEDS, SIZE, Shot};
 use super::tiles::{Agreement, Tiles, agreement};
 use crate::scenes::{Builder, camera, grey, material, quad, room, sphere};
 
-/// What may differ, relative: the means of all tiles but one (that one by twice as much), and those of whole pictures.
+/// Allowed relative differences: of the means of all tiles but one (that one by twice as much), and of whole pictures.
 #[derive(Clone, Copy)]
 struct Bounds {
     tiles: f64,
@@ -27,7 +28,7 @@ impl Bounds {
         found.most <= self.tiles && found.worst <= 2.0 * self.tiles && found.whole.abs() <= self.whole
     }
 
-    /// Whether noise cannot be why they do not hold.
+    /// Whether the bounds are exceeded by more than noise can explain.
     fn fail_clearly(&self, found: &Agreement) -> bool {
         found.most > self.tiles + 3.0 * found.noise || found.whole.abs() > self.whole + 3.0 * found.whole_error
     }
@@ -45,7 +46,7 @@ fn trace(shot: &Shot) -> Tiles {
     Tiles::of(&(0..SEEDS).map(one).collect::<Vec<_>>())
 }
 
-/// The shot agrees, the noise is small enough to tell, and none of the twins agrees.
+/// Asserts that the shot agrees, that the noise is small enough to decide this, and that none of the twins agrees.
 fn assert_agrees(shot: &Shot, theirs: &Tiles, bounds: Bounds, twins: &[Twin]) {
     let found = agreement(&trace(shot), theirs);
     eprintln!("{}: {found:.4?}", shot.name);
@@ -58,7 +59,7 @@ fn assert_agrees(shot: &Shot, theirs: &Tiles, bounds: Bounds, twins: &[Twin]) {
     }
 }
 
-/// What may be wrong. To tell takes a quarter of the samples.
+/// Faults of a twin. A quarter of the samples suffices to detect them.
 #[derive(Clone, Copy, Debug)]
 enum Twin {
     /// The other flavour of principled.
@@ -116,7 +117,7 @@ fn lambert_material(color: [f32; 3]) -> Material {
     material(MaterialModel::Diffuse { reflectance: ColorInput::Constant(color), alpha: None })
 }
 
-/// The scene with lamps that glow on both sides, as Blender's do.
+/// The scene with lamps that emit on both sides, as Blender's do.
 fn on_both_sides(mut scene: ReferenceScene) -> ReferenceScene {
     for light in &mut scene.lights {
         if let Emission::Area { two_sided, .. } = &mut light.emission {
@@ -126,7 +127,7 @@ fn on_both_sides(mut scene: ReferenceScene) -> ReferenceScene {
     scene
 }
 
-/// A ball between a warm lamp, a cool one and dim light from all around.
+/// A ball between a warm lamp and a cool one, with dim light from all directions.
 fn ball(roughness: f32, metallic: f32) -> Shot {
     let warm = quad(Vec3::new(-3.0, 1.5, 0.5), Vec3::Z * 2.0, Vec3::new(1.0, 1.5, 0.0));
     let cool = quad(Vec3::new(2.5, -1.0, -1.0), Vec3::Z * 2.0, Vec3::Y * 2.0);
@@ -141,12 +142,12 @@ fn ball(roughness: f32, metallic: f32) -> Shot {
         name: format!("ball, roughness {roughness}, metallic {metallic}"),
         scene: on_both_sides(builder.scene()),
         camera: camera([0.0, 0.5, 5.0], [0.0; 3], SIZE as u32, 26.0),
-        // The lamps in smooth metal are noisier.
+        // Reflections of the lamps in smooth metal are noisier.
         samples: if metallic == 1.0 { 448 } else { 192 },
     }
 }
 
-/// A closed room with a shelf and a ball in it and a lamp in mid-air, of materials that differ in colour alone.
+/// A closed room with a shelf, a ball and a floating lamp, whose materials differ only in colour.
 fn furnished(name: String, samples: u32, made_of: impl Fn([f32; 3]) -> Material) -> Shot {
     let colors = [[0.7, 0.6, 0.5], [0.8; 3], [0.7, 0.3, 0.2], [0.3, 0.6, 0.3], [0.7; 3], [0.6, 0.7, 0.8]];
     let walls = room().into_iter().zip(colors);
@@ -171,7 +172,7 @@ fn principled_room(roughness: f32, metallic: f32, samples: u32) -> Shot {
     furnished(name, samples, |color| principled(color, roughness, metallic))
 }
 
-/// Lambert everywhere: that the scenes, cameras, lamps and bounces mean the same to both.
+/// Lambert everywhere: scenes, cameras, lamps and bounces have the same meaning in both renderers.
 #[test]
 fn lambert_everywhere() {
     let shot = furnished("Lambert".into(), 768, lambert_material);
@@ -179,17 +180,17 @@ fn lambert_everywhere() {
     assert_agrees(&shot, &theirs[0], Bounds { tiles: 0.01, whole: 0.001 }, &[Twin::Brighter]);
 }
 
-/// One bounce, mostly: 0.5 %, of dielectrics and metals.
+/// Dielectrics and metals with mostly one bounce: 0.5 %.
 #[test]
 fn balls() {
     use Twin::{Mitsuba, Rougher};
     let looks: [(f32, f32, &[Twin]); 7] = [
-        // Here and at 0.9, 0.05 more roughness change hardly a tile by 1 %; the same facets in metal show it.
+        // Here and at 0.9, 0.05 more roughness changes hardly any tile by 1 %; the same facets in metal show it.
         (0.1, 0.0, &[Mitsuba]),
         (0.5, 0.0, &[Mitsuba, Rougher]),
         (0.9, 0.0, &[Mitsuba]),
         (0.3, 0.5, &[Mitsuba, Rougher]),
-        // Smooth metal loses nothing between its facets and has no base: there the flavours are one.
+        // Smooth metal loses no energy between its facets and has no base, so the flavours are the same.
         (0.1, 1.0, &[Rougher]),
         (0.5, 1.0, &[Mitsuba, Rougher]),
         (0.9, 1.0, &[Mitsuba, Rougher]),
@@ -201,7 +202,7 @@ fn balls() {
     }
 }
 
-/// Sixteen bounces, dielectric: 1 %.
+/// Dielectrics with sixteen bounces: 1 %.
 #[test]
 fn dielectric_rooms() {
     let shots = [0.1, 0.5, 0.9].map(|roughness| principled_room(roughness, 0.0, 512));
@@ -210,7 +211,7 @@ fn dielectric_rooms() {
     }
 }
 
-/// Sixteen bounces, metal: 3 %.
+/// Metals with sixteen bounces: 3 %.
 #[test]
 fn metal_rooms() {
     let shots = [(0.1, 256), (0.5, 128), (0.9, 128)].map(|(roughness, n)| principled_room(roughness, 1.0, n));
@@ -219,7 +220,7 @@ fn metal_rooms() {
     }
 }
 
-/// A lamp as BlenderProc makes them: the camera sees a surface, every other ray sees light and nothing else.
+/// A lamp as BlenderProc makes them: camera rays see a surface, all other rays see only light.
 #[test]
 fn lamp_hidden_from_the_camera() {
     let mut shot = principled_room(0.5, 0.0, 512);
@@ -230,7 +231,8 @@ fn lamp_hidden_from_the_camera() {
     assert_agrees(&shot, &theirs[0], Bounds { tiles: 0.01, whole: 0.002 }, &[Twin::Seen]);
 }
 
-/// A lamp of many colours, of both kinds: as BlenderProc's, whose radiance is a factor times a texture, and seen.
+/// A lamp of many colours whose radiance is a factor times a texture, hidden from the camera as BlenderProc's, and
+/// visible.
 #[test]
 fn lamps_with_a_map() {
     let shots = [true, false].map(|hidden| {

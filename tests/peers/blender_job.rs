@@ -1,4 +1,4 @@
-//! Scenes rendered by Blender, as `prep render` has them rendered.
+//! Renders scenes with Blender in the same way as `prep render`.
 
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -11,14 +11,14 @@ use mateval_scene::{Camera, SceneId, ViewId};
 
 use super::tiles::Tiles;
 
-/// Pixels a side of every picture: what a tile's noise needs is samples, not more tiles.
+/// Pixels a side of every picture. To reduce a tile's noise, samples are needed and not more tiles.
 pub const SIZE: usize = 48;
 /// Renders of each picture, by either renderer: two halves of every other view.
 pub const SEEDS: u64 = 4;
 /// Blender's "max bounces", of every kind.
 pub const BOUNCES: u32 = 16;
 
-/// A scene, where it is seen from and how many samples a pixel and seed it gets.
+/// A scene, its camera, and the samples for each pixel and seed.
 pub struct Shot {
     pub name: String,
     pub scene: ReferenceScene,
@@ -28,7 +28,7 @@ pub struct Shot {
 
 /// Blender's renders of all shots, one after the other.
 pub fn render(shots: &[Shot]) -> Vec<Tiles> {
-    // Blender uses every processor: two at once would only take more memory.
+    // Blender uses every processor, so two at once would only need more memory.
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock();
     shots.iter().map(|shot| Tiles::of(&pictures(shot))).collect()

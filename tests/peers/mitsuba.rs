@@ -1,7 +1,7 @@
-//! The tracer against Mitsuba 3: scenes exported by `mateval_audit::mitsuba_export`, rendered by both.
+//! Compares the tracer with Mitsuba 3 on scenes exported by `mateval_audit::mitsuba_export`.
 //!
-//! What was measured is told, a line a scene. With `MATEVAL_TEST_PICTURES` naming a folder, both pictures of each scene
-//! are written there side by side, with their difference (grey where there is none).
+//! Each measurement is printed on a line. If `MATEVAL_TEST_PICTURES` names a folder, both pictures of each scene are
+//! written there side by side, with their difference (grey where they are equal).
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -16,13 +16,13 @@ use mateval_tracer::{RenderSettings, World, render};
 use super::python;
 use super::z_test::{Agreement, Renders, compare};
 
-/// Renders of each side.
+/// Number of renders of each side.
 const RENDERS: u32 = 16;
 
 /// One measurement at a time: both sides use all cores.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// A scene that both render.
+/// A scene that both renderers render.
 #[derive(Clone)]
 pub struct Case {
     pub name: String,
@@ -39,7 +39,7 @@ pub struct Rendered {
     seconds: f64,
 }
 
-/// Has Mitsuba render all cases, in one go: what it compiles serves them all.
+/// Renders all cases with Mitsuba in one process, so that kernels are compiled only once.
 pub fn by_mitsuba(cases: Vec<Case>) -> Vec<Rendered> {
     let _alone = ALONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();
@@ -67,7 +67,7 @@ pub fn by_mitsuba(cases: Vec<Case>) -> Vec<Rendered> {
     cases.into_iter().enumerate().map(rendered).collect()
 }
 
-/// Nothing that Mitsuba cannot say may be in the scene.
+/// Exports the scene, which must not contain anything that Mitsuba cannot represent.
 fn export_whole(case: &Case, folder: &Path) {
     let settings = RenderSettings { samples: case.samples, ..Default::default() };
     let findings = export(&case.scene, &case.camera, &settings, folder).unwrap();
@@ -88,7 +88,8 @@ fn read_renders(path: &Path, camera: &Camera) -> Renders {
 }
 
 impl Rendered {
-    /// Our pictures of `scene` from the same camera against Mitsuba's of the case, told under `name`.
+    /// Compares our pictures of `scene` from the same camera with Mitsuba's of the case; prints the result under
+    /// `name`.
     pub fn against(&self, name: &str, scene: ReferenceScene) -> Agreement {
         let _alone = ALONE.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         let started = Instant::now();
@@ -118,8 +119,8 @@ impl Rendered {
         self.against(&self.case.name, self.case.scene.clone()).holds()
     }
 
-    /// The twin: whether our pictures of the scene after `change` are told from Mitsuba's of the scene before.
-    pub fn tells(&self, what: &str, change: impl FnOnce(&mut ReferenceScene)) -> bool {
+    /// The twin: whether our pictures of the changed scene are found to differ from Mitsuba's of the original one.
+    pub fn detects(&self, what: &str, change: impl FnOnce(&mut ReferenceScene)) -> bool {
         let mut scene = self.case.scene.clone();
         change(&mut scene);
         assert!(scene != self.case.scene, "{what} changes nothing");

@@ -14,13 +14,13 @@ fn case(name: &str, scene: ReferenceScene, camera: Camera, samples: u32) -> Case
     Case { name: name.to_owned(), scene, camera, samples }
 }
 
-/// A Mitsuba scene by our reader, its picture `width` pixels wide.
+/// A Mitsuba scene, read by our reader, with a picture `width` pixels wide.
 fn source(name: &str, xml: &Path, width: u32, samples: u32) -> Case {
     let read = bitterli::read(xml, &Limits::default()).unwrap();
     let mut camera = read.camera;
     let scale = f64::from(width) / f64::from(camera.intrinsics.width);
     let k = &mut camera.intrinsics;
-    // Whole pixels, and the same focal length along both: the picture may lose part of a row.
+    // Whole pixels and equal focal lengths along both axes; the picture may lose part of a row.
     (k.width, k.height) = (width, (f64::from(k.height) * scale) as u32);
     (k.fx, k.fy, k.cx, k.cy) = (k.fx * scale, k.fy * scale, k.cx * scale, k.cy * scale);
     case(name, read.scene, camera, samples)

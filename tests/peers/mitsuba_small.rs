@@ -1,4 +1,4 @@
-//! Small scenes, one for each kind of material and of light.
+//! Small scenes, one for each kind of material and light.
 
 use glam::Vec3;
 use mateval_image::{Texels, Texture, Wrap};
@@ -15,7 +15,7 @@ use crate::scenes::{Builder, grey, material, quad, sphere};
 const WHITE: ColorInput = ColorInput::Constant([1.0; 3]);
 const BROWN: ColorInput = ColorInput::Constant([0.8, 0.4, 0.1]);
 
-/// Four balls of flat faces in a row over a grey floor, a large lamp above them and dim light all round.
+/// Four balls of flat faces in a row over a grey floor, with a large lamp above them and dim light from all directions.
 fn balls(name: &str, materials: [Material; 4]) -> Case {
     let mut builder = stage();
     for (k, material) in materials.into_iter().enumerate() {
@@ -123,7 +123,7 @@ fn transparent_materials() {
     ]);
 }
 
-/// Four upright squares in a row before the same floor, tilted, with uv from 0 to 1, textures as given.
+/// Four upright, tilted squares in a row in front of the same floor, with uv from 0 to 1 and the given textures.
 fn squares(name: &str, textures: Vec<Texture>, materials: [Material; 4]) -> Case {
     let mut builder = stage();
     for (k, material) in materials.into_iter().enumerate() {
@@ -136,7 +136,7 @@ fn squares(name: &str, textures: Vec<Texture>, materials: [Material; 4]) -> Case
     case(name, scene)
 }
 
-/// Texels that differ from each other without a pattern.
+/// Texels without a pattern.
 fn texels(width: usize, height: usize) -> Vec<[u8; 3]> {
     (0..width * height).map(|k| [40 + 53 * k % 199, 40 + 71 * k % 211, 30 + 97 * k % 223].map(|v| v as u8)).collect()
 }
@@ -197,8 +197,8 @@ fn scalar_textures() -> Case {
     squares("number textures, mask", textures, materials)
 }
 
-/// Slopes of up to a quarter. With three times as much some bent normals point away from the viewer: our tracer turns them
-/// back, Mitsuba makes them black, and pictures differ by 0.2 %.
+/// Slopes of up to a quarter. With three times this slope some bent normals point away from the viewer: our tracer
+/// turns them back, Mitsuba renders them black, and pictures differ by 0.2 %.
 fn bumps() -> Case {
     let greys = texels(5, 4).iter().map(|rgb| f32::from(rgb[2]) / 255.0).collect();
     let textures = vec![Texture::new(5, 4, Texels::Grey(greys), Wrap::Repeat).unwrap()];
@@ -225,8 +225,8 @@ fn bumped_surfaces() {
     all_agree(vec![bumps()]);
 }
 
-/// Balls with interpolated normals: what the shading frame does at the edge, where a facet seen from before has a normal
-/// that points away.
+/// Balls with interpolated normals. They test the shading frame at the silhouette, where the normal of a front-facing
+/// facet points away from the viewer.
 #[test]
 fn smooth_normals() {
     let smooth = |rings: u32, materials: [Material; 4]| {
@@ -246,12 +246,12 @@ fn smooth_normals() {
 fn lit(name: &str, textures: Vec<Texture>, lights: impl FnOnce(Builder) -> Builder) -> Case {
     let floor = quad(Vec3::new(-6.0, -0.52, -6.0), Vec3::Z * 12.0, Vec3::X * 12.0);
     let mut builder = Builder::default().surface(floor, grey(0.5)).surface(ball(1), principled(0.3, 0.8));
-    // Seen from its black side too.
+    // Its black side is visible too.
     let sheet = quad(Vec3::new(0.2, -0.5, -0.5), Vec3::new(0.3, 0.0, 0.9), Vec3::Y * 0.8);
     builder = builder.surface(sheet, Material { two_sided: false, ..grey(0.7) });
     let mut scene = lights(builder).scene();
     let source = |texture| SourceTexture { name: String::new(), sha256: None, texture };
-    // A lamp's map is there already; an environment's would have to be the first, and no case has both.
+    // A lamp's map is already in the list; an environment's would have to be the first, and no case has both.
     scene.textures.extend(textures.into_iter().map(source));
     case(name, scene)
 }
@@ -259,13 +259,13 @@ fn lit(name: &str, textures: Vec<Texture>, lights: impl FnOnce(Builder) -> Build
 fn environment(scale: f32) -> Emission {
     let (sin, cos) = libm::sincosf(0.7);
     let (sin_t, cos_t) = libm::sincosf(0.4);
-    // A turn about y, then one about x.
+    // A rotation about y, then one about x.
     let world_from_environment =
         [[cos, 0.0, sin], [sin_t * sin, cos_t, -sin_t * cos], [-cos_t * sin, sin_t, cos_t * cos]];
     Emission::Environment { texture: TextureIndex(0), scale, world_from_environment }
 }
 
-/// Dim texels that differ, rows at the poles bright, and one texel far brighter.
+/// Varying dim texels, bright rows at the poles, and one texel that is far brighter.
 fn sky() -> Texture {
     let value = |k: usize| match (k, k / 12) {
         (28, _) => [90.0, 80.0, 60.0],
@@ -312,7 +312,8 @@ fn lights() {
     ]);
 }
 
-/// A glossy floor that shows a narrow upright lamp: its width there is the roughness; and a grey wall beside it.
+/// A glossy floor with the reflection of a narrow upright lamp, whose width depends on the roughness, and a grey wall
+/// beside it.
 fn glossy(roughness: f32) -> Case {
     let floor = quad(Vec3::new(-6.0, -0.52, -6.0), Vec3::Z * 12.0, Vec3::X * 12.0);
     let lamp = quad(Vec3::new(-0.9, -0.5, -1.5), Vec3::X * 0.2, Vec3::Y * 1.4);
@@ -323,32 +324,32 @@ fn glossy(roughness: f32) -> Case {
     case(&format!("roughness {roughness}"), scene)
 }
 
-/// Roughness off by 0.02, albedo off by 1 %, a light off by 1 %: each is told from Mitsuba's pictures of what is right.
+/// Roughness off by 0.02 and albedo off by 1 % are detected in comparison with Mitsuba's pictures of the right scene.
 #[test]
-fn small_faults_are_told() {
+fn small_faults_are_detected() {
     let values = [0.1, 0.3, 0.5];
     let rendered = all_agree(values.map(glossy).to_vec());
     for (case, roughness) in rendered.iter().zip(values) {
         for wrong in [roughness - 0.02, roughness + 0.02] {
-            let told = case.tells(&format!("roughness {wrong:.2}"), |scene| {
+            let detected = case.detects(&format!("roughness {wrong:.2}"), |scene| {
                 scene.materials[0] = principled(wrong, 1.0);
             });
-            assert!(told, "{wrong} passes for {roughness}");
+            assert!(detected, "{wrong} passes for {roughness}");
         }
     }
     let case = &rendered[1];
-    let told = case.tells("base color 1 % more", |scene| {
+    let detected = case.detects("base color 1 % more", |scene| {
         if let MaterialModel::Principled { base_color, .. } = &mut scene.materials[0].model {
             *base_color = ColorInput::Constant([0.808, 0.404, 0.101]);
         }
     });
-    assert!(told, "base color");
-    assert!(case.tells("albedo of the wall 1 % more", |scene| scene.materials[1] = grey(0.505)), "albedo");
+    assert!(detected, "base color");
+    assert!(case.detects("albedo of the wall 1 % more", |scene| scene.materials[1] = grey(0.505)), "albedo");
 }
 
-/// A light off by 1 %, for each kind.
+/// A light off by 1 % is detected, for each kind of light.
 #[test]
-fn slightly_wrong_lights_are_told() {
+fn slightly_wrong_lights_are_detected() {
     let panel = || quad(Vec3::new(-1.1, 1.5, -0.5), Vec3::X, Vec3::Z);
     let lamp =
         |radiance: f32| lit("lamp", vec![], |builder| builder.surface(panel(), grey(0.3)).glowing([radiance; 3])).scene;
@@ -368,6 +369,6 @@ fn slightly_wrong_lights_are_told() {
     ];
     let rendered = all_agree(pairs.iter().map(|(name, right, _)| case(name, right.clone())).collect());
     for (case, (name, _, wrong)) in rendered.iter().zip(pairs) {
-        assert!(case.tells(&format!("{name} 1 % more"), |scene| *scene = wrong), "{name}");
+        assert!(case.detects(&format!("{name} 1 % more"), |scene| *scene = wrong), "{name}");
     }
 }

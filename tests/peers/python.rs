@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-/// Runs `tests/peers/<script>` with one job file; its output is shown when it fails.
+/// Runs `tests/peers/<script>` with one job file; prints its output if it fails.
 pub fn run(script: &str, job: &Path) {
     let python = std::env::var_os("MATEVAL_PEERS_PYTHON")
         .expect("MATEVAL_PEERS_PYTHON names no Python with mitsuba: run tools/test_peers.sh, which installs it");

@@ -1,6 +1,6 @@
-//! Whether two renderers' pictures agree, tile by tile.
+//! Tests whether two renderers' pictures agree, tile by tile.
 //!
-//! Every picture is rendered with several seeds, which say how noisy it is.
+//! Every picture is rendered with several seeds, from which its noise is estimated.
 
 use mateval_image::{LinearRgb, Picture};
 
@@ -18,7 +18,7 @@ pub struct Agreement {
     pub whole_error: f64,
     /// Root of the mean square of the tiles' standard errors.
     pub noise: f64,
-    /// The second largest difference of a tile: what all but one stay within.
+    /// The second largest difference of a tile, which all but one do not exceed.
     pub most: f64,
     /// The largest.
     pub worst: f64,
@@ -52,7 +52,7 @@ fn tile_mean(picture: &Picture<LinearRgb>, (left, top): (usize, usize)) -> f64 {
     pixels.flatten().map(f64::from).sum::<f64>() / (3 * TILE * TILE) as f64
 }
 
-/// How far `ours` is from `theirs`.
+/// Compares `ours` with `theirs`.
 pub fn agreement(ours: &Tiles, theirs: &Tiles) -> Agreement {
     let (ours, theirs) = (ours.estimates(), theirs.estimates());
     let count = ours.len() as f64;

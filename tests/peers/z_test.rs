@@ -1,19 +1,21 @@
-//! Whether two renderers' pictures of one scene agree, at the scale of pixels, of 8x8 tiles and of the whole picture.
+//! Tests whether two renderers' pictures of one scene agree, at the scale of pixels, of 8x8 tiles and of the whole
+//! picture.
 //!
-//! Each side gives K independent renders. Their spread gives the variance of each pixel's mean, so no noise model is
-//! needed; pixels have random numbers of their own in both renderers, so the variances of tiles and of the whole picture
-//! are sums of those. For each channel there are five tests, each with a p-value:
+//! Each side has K independent renders. Their spread gives the variance of each pixel's mean, so no noise model is
+//! needed. In both renderers each pixel has its own random numbers, so the variances of tiles and of the whole picture
+//! are sums of those of pixels. For each channel there are five tests, each with a p-value:
 //!
 //! - whole: the difference of the means, normal;
-//! - tiles: the sum of the squared z, chi-square with a degree of freedom a tile; and the worst z, normal, with
+//! - tiles: the sum of the squared z, chi-square with one degree of freedom for each tile; and the worst z, normal, with
 //!   Bonferroni's factor;
-//! - pixels: the mean of squared differences over the tile's mean variance, which is 1 whatever the distribution of a
-//!   pixel (the tile's variance rests on 64 times 2 (K - 1) values), against its own standard error; and the worst
-//!   Student's t with K - 1 degrees of freedom (fewer than Welch's, so kind), of the pixel's variance or its tile's,
-//!   whichever is the larger, with Bonferroni's factor.
+//! - pixels: the mean of squared differences divided by the tile's mean variance, which is 1 for any distribution of a
+//!   pixel (the tile's variance is estimated from 64 times 2 (K - 1) values), against its own standard error; and the
+//!   worst Student's t with K - 1 degrees of freedom (fewer than Welch's, which favours agreement), computed with the
+//!   larger of the pixel's and its tile's variance, with Bonferroni's factor.
 //!
-//! One scene makes 15 tests. Below [`FALSE_ALARM`] a test fails, so a scene that agrees fails with a probability of at
-//! most 1.5e-4 as far as those distributions hold: heavy tails within a render are evened out by its samples.
+//! One scene makes 15 tests. A test fails if its p-value is below [`FALSE_ALARM`], so a scene that agrees fails with a
+//! probability of at most 1.5e-4 as far as those distributions hold: heavy tails within a render are averaged over its
+//! samples.
 
 use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
@@ -21,7 +23,7 @@ use mateval_image::{LinearRgb, Picture};
 
 use crate::statistics::chi_square_z;
 
-/// A test that comes out with a p-value below this fails.
+/// A test with a p-value below this fails.
 pub const FALSE_ALARM: f64 = 1e-5;
 
 const TILE: usize = 8;
@@ -29,10 +31,10 @@ const TILE: usize = 8;
 /// Independent renders of one view.
 pub type Renders = Vec<Picture<LinearRgb>>;
 
-/// How one channel, or the worst of all three, compares.
+/// The comparison of one channel, or of the worst of all three.
 #[derive(Clone, Copy, Debug)]
 pub struct Agreement {
-    /// The first side's mean over the second's.
+    /// The first side's mean divided by the second's.
     pub ratio: f64,
     /// Standard error of the ratio.
     pub error: f64,
@@ -55,7 +57,7 @@ impl Agreement {
     }
 }
 
-/// All channels' comparison, that of the smallest p-value first.
+/// The comparison of the channel with the smallest p-value.
 pub fn compare(ours: &Renders, theirs: &Renders) -> Agreement {
     let channels = (0..3).map(|channel| compare_channel(&Side::new(ours, channel), &Side::new(theirs, channel)));
     channels.min_by(|a, b| a.p.total_cmp(&b.p)).unwrap()
@@ -88,7 +90,7 @@ impl Side {
 fn compare_channel(ours: &Side, theirs: &Side) -> Agreement {
     assert_eq!((ours.width, ours.height, ours.renders), (theirs.width, theirs.height, theirs.renders));
     let difference: Vec<f64> = ours.mean.iter().zip(&theirs.mean).map(|(a, b)| a - b).collect();
-    // Where nothing is random, rounding to f32 is what remains: a part in a million of the value.
+    // Without randomness, an error of rounding to f32 remains: a millionth of the value.
     let rounding = |k: usize| (1e-6 * theirs.mean[k]).powi(2).max(1e-24);
     let variance: Vec<f64> =
         (0..difference.len()).map(|k| ours.variance[k] + theirs.variance[k] + rounding(k)).collect();
@@ -162,7 +164,7 @@ fn student(t: f64, freedom: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Renders of 64x48 pixels that hold a gradient; noise by 12 hashed numbers, nearly normal.
+    /// Renders of 64x48 pixels of a gradient, with nearly normal noise from sums of 12 hashed numbers.
     fn renders(seed: u32, level: impl Fn(usize, usize) -> f32) -> Renders {
         let hash = |a: u32| {
             let mut h = a.wrapping_mul(0x9e37_79b9) ^ 0x85eb_ca6b;
@@ -195,20 +197,21 @@ mod tests {
         }
     }
 
-    /// The twins: everything 0.5 % brighter; one tile 4 % brighter; one pixel twice as bright; signs that alternate over pixels.
+    /// The twins: everything 0.5 % brighter; one tile 4 % brighter; one pixel twice as bright; signs that alternate
+    /// over pixels.
     #[test]
     fn each_scale_finds_its_fault() {
         let truth = renders(90, gradient);
-        let told_by = |factor: &dyn Fn(usize, usize) -> f32| {
+        let found_by = |factor: &dyn Fn(usize, usize) -> f32| {
             let found = compare(&renders(91, |x, y| gradient(x, y) * factor(x, y)), &truth);
             assert!(!found.holds(), "the twin passes: {found:?}");
             found.test
         };
-        assert_eq!(told_by(&|_, _| 1.005), "whole");
-        assert_eq!(told_by(&|x, y| if x / 8 == 2 && y / 8 == 3 { 1.04 } else { 1.0 }), "worst tile");
-        assert_eq!(told_by(&|x, y| if (x, y) == (9, 9) { 2.0 } else { 1.0 }), "worst pixel");
-        assert_eq!(told_by(&|x, y| if (x + y) % 2 == 0 { 1.02 } else { 0.98 }), "pixels");
-        assert_eq!(told_by(&|x, y| if (x / 8 + y / 8) % 2 == 0 { 1.008 } else { 0.992 }), "tiles");
+        assert_eq!(found_by(&|_, _| 1.005), "whole");
+        assert_eq!(found_by(&|x, y| if x / 8 == 2 && y / 8 == 3 { 1.04 } else { 1.0 }), "worst tile");
+        assert_eq!(found_by(&|x, y| if (x, y) == (9, 9) { 2.0 } else { 1.0 }), "worst pixel");
+        assert_eq!(found_by(&|x, y| if (x + y) % 2 == 0 { 1.02 } else { 0.98 }), "pixels");
+        assert_eq!(found_by(&|x, y| if (x / 8 + y / 8) % 2 == 0 { 1.008 } else { 0.992 }), "tiles");
     }
 
     /// Tables: t of 15 degrees of freedom beyond 2.131 has 5 %, beyond 4.073 0.1 %; a normal beyond 1.96 has 5 %.

@@ -47,8 +47,8 @@ impl Source {
     /// Expects a sound dataset with a finding on stderr and in scene.json that has this code and file.
     #[track_caller]
     fn gives_finding(&self, code: &str, file: &str, message: &str) {
-        let told = format!("room: warning [{code}] '{file}'");
-        self.build().ends_with(0).says(&told).says(message);
+        let warning = format!("room: warning [{code}] '{file}'");
+        self.build().ends_with(0).says(&warning).says(message);
         let scene = json(&self.out().join("scenes/room/scene.json"));
         let findings = scene["findings"].as_array().unwrap();
         assert!(findings.iter().any(|finding| finding["code"] == code && finding["file"] == file), "{findings:?}");
@@ -210,8 +210,8 @@ fn cameras_that_see_nothing() {
     let towards = "{ position = [2.0, 1.5, 20.0], target = [2.0, 1.5, 2.0], fov_y_deg = 40.0 }";
     let turned = "views = [{ id = \"behind\", x_deg = 0.0, y_deg = 180.0 }]";
     let built = built_from(towards, turned).ends_with(0);
-    let told = "warning [nothing_seen] 'scene.xml' view 'behind': the camera sees nothing that is scored";
-    built.says(told);
+    let warning = "warning [nothing_seen] 'scene.xml' view 'behind': the camera sees nothing that is scored";
+    built.says(warning);
     // The twin.
     assert!(!built_from(towards, "views = []").ends_with(0).stderr.contains("nothing_seen"));
 }

@@ -196,9 +196,9 @@ fn no_absolute_path_ends_in_a_survey_or_a_dataset() {
         run(command.arg(folder.path().join(out)).arg(&houses).arg("--models").arg(&models).args(more))
     };
     let holds_place = |path: &Path| std::fs::read_to_string(path).unwrap().contains(source.to_str().unwrap());
-    let told = survey("absolute", &[]).ends_with(0);
+    let surveyed = survey("absolute", &[]).ends_with(0);
     let common = source.join("house").canonicalize().unwrap();
-    told.says(&format!("build with --source '{}'", common.display()));
+    surveyed.says(&format!("build with --source '{}'", common.display()));
     let [recipe, surveyed] = ["recipe.toml", "survey.json"].map(|name| folder.path().join("absolute").join(name));
     assert!(!holds_place(&recipe) && !holds_place(&surveyed));
     survey("named", &[Path::new("--source"), source]).ends_with(0);

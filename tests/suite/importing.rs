@@ -1,4 +1,4 @@
-//! `baseline import`: meshes with uv of their own, textured glTF and OBJ, one material a part.
+//! `baseline import`: meshes with their own uv, textured glTF and OBJ, and one material for each part.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn mesh_of(dataset: &Path, id: &str) -> TriangleMesh {
     nodes(dataset).into_iter().find(|node| node.name == id).unwrap().mesh
 }
 
-/// An OBJ of the mesh, its places moved and its uv changed, its triangles in the other order.
+/// An OBJ of the mesh with moved positions, changed uv and reversed order of triangles.
 fn obj(mesh: &TriangleMesh, moved: [f32; 3], uv: impl Fn([f32; 2]) -> [f32; 2]) -> String {
     let mut text = "mtllib it.mtl\nusemtl it\n".to_owned();
     for p in &mesh.positions {
@@ -43,7 +43,7 @@ fn obj(mesh: &TriangleMesh, moved: [f32; 3], uv: impl Fn([f32; 2]) -> [f32; 2]) 
     text
 }
 
-/// The truth's atlas in a quarter of a larger picture, the rest of it magenta.
+/// Writes the truth's atlas into a quarter of a larger picture, whose rest is magenta.
 fn write_quarter(from: &Path, to: &Path) {
     let atlas = read_texture(from, Encoding::Linear, Wrap::Clamp).unwrap();
     let size = atlas.width();
@@ -118,7 +118,7 @@ fn write_gltf(dataset: &Path, files: &Path, names: [&str; 2]) {
         let mesh = mesh_of(dataset, id);
         let count = mesh.positions.len();
         let first = accessors.len();
-        // The parent has it back: x mirrored, one metre up.
+        // The parent node undoes it: x mirrored, one metre up.
         let places = floats(&mut mesh.positions.iter().flat_map(|p| [-p.x, p.y - 1.0, p.z]));
         let (low, high) = ([-9.0, -9.0, -9.0], [9.0, 9.0, 9.0]);
         accessors.push(json!({ "bufferView": view(&mut bytes, places), "componentType": 5126, "count": count, "type": "VEC3", "min": low, "max": high }));
@@ -156,7 +156,7 @@ fn write_gltf(dataset: &Path, files: &Path, names: [&str; 2]) {
     png_io::write_rgb_bytes(&files.join("the picture.png"), &picture).unwrap();
 }
 
-/// Whether all of a map is one byte.
+/// Whether all texels of a map have this byte.
 fn is_byte(submission: &Path, instance: &str, map: &str, byte: u8) -> bool {
     let path = submission.join("scenes/room").join(instance).join(map).with_extension("png");
     let map = read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap();
@@ -168,7 +168,7 @@ fn srgb(bytes: [u8; 3]) -> [f32; 3] {
     bytes.map(mateval_image::transfer::linear_from_srgb_byte)
 }
 
-/// Slivers of a few texels' width, under a texture four times as fine as the atlas: each texel finds its place.
+/// Slivers a few texels wide, under a texture four times as fine as the atlas: every texel finds a point of the mesh.
 #[test]
 fn no_texel_is_lost_under_a_finer_texture() {
     let folder = tempfile::tempdir().unwrap();
@@ -191,8 +191,8 @@ fn no_texel_is_lost_under_a_finer_texture() {
     let report: Value = serde_json::from_str(&done.stdout).unwrap();
     for id in ids {
         let instances = report["scenes"][0]["instances"].as_array().unwrap();
-        let told = instances.iter().find(|instance| instance["instance"] == id).unwrap();
-        assert!(told["texels"].as_u64().unwrap() > 1000 && told["texels_without"] == 0, "{told}");
+        let reported = instances.iter().find(|instance| instance["instance"] == id).unwrap();
+        assert!(reported["texels"].as_u64().unwrap() > 1000 && reported["texels_without"] == 0, "{reported}");
         let read = |root: &Path| {
             let path = root.join("scenes/room").join(id).join("base_color.png");
             read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap()
@@ -223,15 +223,15 @@ fn a_textured_gltf_is_rebaked_node_by_node() {
         assert_eq!((&of(id)["file"], &of(id)["texels_without"]), (&json!("room.gltf"), &json!(0)));
         assert!(of(id)["max_distance_m"].as_f64().unwrap() < 1e-6);
     }
-    // The boxes touch, and nothing goes from one to the other.
+    // The boxes touch, and no colour is transferred from one to the other.
     assert!(is_all(&dataset, &out, "red", srgb([188, 10, 99])));
     assert!(is_all(&dataset, &out, "green", [0.0, 128.0 / 255.0, 1.0]));
     assert!(is_byte(&out, "red", "roughness", 64) && is_byte(&out, "red", "metallic", 191));
-    // Nobody tells of the mirror: it has no maps, and the report says so.
+    // No file describes the mirror: it has no maps, and the report states it.
     assert!(of("mirror")["file"].is_null() && !out.join("scenes/room/mirror").exists());
     import(&dataset, &files, &out, &[]).ends_with(2).says("--force");
 
-    // Twin: without names the faces that touch cannot be told apart.
+    // Twin: without names the faces that touch cannot be distinguished.
     write_gltf(&dataset, &files, ["Cube.001", "Cube.002"]);
     let unnamed = folder.path().join("unnamed");
     import(&dataset, &files, &unnamed, &[])
@@ -244,27 +244,27 @@ fn a_textured_gltf_is_rebaked_node_by_node() {
 }
 
 #[test]
-fn distances_and_what_finds_nothing_are_told() {
+fn distances_and_texels_without_a_match_are_reported() {
     let (folder, dataset) = boxes();
     let files = folder.path().join("files");
     std::fs::create_dir_all(files.join("room")).unwrap();
     std::fs::write(files.join("room/it.mtl"), "newmtl it\nKd 0.2 0.4 0.6\nPr 0.3\n").unwrap();
     let red = mesh_of(&dataset, "red");
     let write = |moved| std::fs::write(files.join("room/red.obj"), obj(&red, moved, |uv| uv)).unwrap();
-    let told = |name: &str, words: &[&str]| {
+    let report_of_red = |name: &str, words: &[&str]| {
         let words = [&["--format", "json"], words].concat();
         let done = import(&dataset, &files, &folder.path().join(name), &words).ends_with(0);
         let report: Value = serde_json::from_str(&done.stdout).unwrap();
         report["scenes"][0]["instances"].as_array().unwrap().iter().find(|i| i["instance"] == "red").unwrap().clone()
     };
     write([0.003, 0.0, 0.0]);
-    let moved = told("moved", &[]);
+    let moved = report_of_red("moved", &[]);
     let max = moved["max_distance_m"].as_f64().unwrap();
     assert!((max - 0.003).abs() < 1e-5 && moved["texels_without"] == 0, "{moved}");
     assert!(is_all(&dataset, &folder.path().join("moved"), "red", [0.2, 0.4, 0.6]));
-    // MTL says no metallic: no map.
+    // The MTL states no metallic: no map.
     assert!(!folder.path().join("moved/scenes/room/red/metallic.png").exists());
-    // Two of six sides lie further away than a millimetre.
+    // Two of six sides are further away than a millimetre.
     std::fs::write(files.join("room/rde.obj"), "").unwrap();
     for folder in ["rom", "textures"] {
         std::fs::create_dir(files.join(folder)).unwrap();
@@ -274,7 +274,7 @@ fn distances_and_what_finds_nothing_are_told() {
     let misspelt = import(&dataset, &files, &folder.path().join("misspelt"), &[]).ends_with(0);
     let misspelt = misspelt.says("'room/rde.obj' matches no scene").says("'rom/' matches no scene");
     assert!(!misspelt.stderr.contains("textures"), "{}", misspelt.stderr);
-    let strict = told("strict", &["--max-distance", "0.001"]);
+    let strict = report_of_red("strict", &["--max-distance", "0.001"]);
     let share = strict["texels_without"].as_f64().unwrap() / strict["texels"].as_f64().unwrap();
     assert!((0.28..0.4).contains(&share), "{strict}");
     write([5.0, 0.0, 0.0]);
@@ -293,17 +293,17 @@ fn one_material_a_part() {
     let out = folder.path().join("out");
     import(&dataset, &files, &out, &[]).ends_with(0).prints("2 of").prints("green: no file describes it");
     assert!(is_all(&dataset, &out, "red", [0.1, 0.2, 0.3]) && is_all(&dataset, &out, "blue", [1.0, 1.0, 0.0]));
-    // By part, which goes before its instance.
+    // By part, which takes precedence over its instance.
     let scene: Value = super::sample::json(&dataset.join("scenes/room/scene.json"));
     let part = scene["parts"].as_array().unwrap().iter().find(|part| part["instance"] == "red").unwrap()["id"].clone();
     write(json!({ "red": { "base_color": [0, 0, 0] }, part.as_str().unwrap(): { "base_color": [0.7, 0.2, 0.3] } }));
     let by_part = folder.path().join("by_part");
     import(&dataset, &files, &by_part, &[]).ends_with(0);
     assert!(is_all(&dataset, &by_part, "red", [0.7, 0.2, 0.3]));
-    // A file that names nothing.
+    // A file without any known name.
     write(json!({}));
     import(&dataset, &files, &folder.path().join("empty"), &[]).ends_with(2).says("name no part or instance");
-    // All that is wrong at once.
+    // All faults are reported at once.
     write(json!({ "no-such": { "base_color": [0, 0, 0] }, "red": { "base_color": [0, 0, 2] } }));
     let bad = import(&dataset, &files, &folder.path().join("bad"), &[]).ends_with(2);
     bad.says("/no-such: expected the id of a part").says("/red: expected numbers from 0 to 1");

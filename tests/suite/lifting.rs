@@ -1,6 +1,5 @@
-//! `baseline nn`, `median`, `median-part`: what is lifted is what is seen, no colour goes where it does not belong, and
-//! the
-//! encodings of estimates mean what they say.
+//! `baseline nn`, `median`, `median-part`: seen texels get the colours of the estimate, no colour is transferred to
+//! another instance, and the encodings of estimates are decoded correctly.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -42,7 +41,7 @@ fn truth(dataset: &Path) -> Picture<LinearRgb> {
     exr_io::read_linear(&dataset.join("scenes/room/ground_truth/views/input/albedo.exr")).unwrap()
 }
 
-/// A folder with an adapter `a.toml` and one picture of the room, as it reads them.
+/// A folder with an adapter `a.toml` and one picture of the room that it describes.
 fn estimate(encoding: &str, picture: &Picture<LinearRgb>) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let adapter = format!("name = \"a\"\n[base_color]\nfiles = [\"{{scene}}.exr\"]\nencoding = \"{encoding}\"\n");
@@ -63,11 +62,11 @@ fn scored_estimate(encoding: &str, picture: &Picture<LinearRgb>) -> Value {
 }
 
 #[test]
-fn what_is_lifted_and_rendered_back_is_the_estimate() {
+fn a_lifted_estimate_is_rendered_back_as_the_estimate() {
     let lifted = scored(&ROOM, "nn", &[]);
     assert!(psnr(&lifted, "albedo.input") >= 35.0, "{lifted}");
     assert!(psnr(&lifted, "albedo.unobserved") < psnr(&lifted, "albedo.input"), "{lifted}");
-    // Twin: half a pixel beside it costs more than all else together.
+    // Twin: a shift by half a pixel costs more than all other errors together.
     let picture = truth(&ROOM);
     let shifted = Picture::from_fn(picture.width(), picture.height(), |x, y| {
         let (a, b) = (picture.get(x, y).0, picture.get((x + 1).min(picture.width() - 1), y).0);
@@ -79,7 +78,7 @@ fn what_is_lifted_and_rendered_back_is_the_estimate() {
 }
 
 #[test]
-fn baselines_come_in_their_order() {
+fn baselines_score_in_the_expected_order() {
     let [nn, part, instance, grey] = [
         scored(&ROOM, "nn", &["--estimate", "gt"]),
         scored(&ROOM, "median-part", &["--estimate", "gt"]),
@@ -124,17 +123,18 @@ fn three_encodings_of_one_estimate_give_one_atlas() {
                 rounded += usize::from(a != b);
             }
         }
-        // Half a step apart at most: only what lies on the edge of two bytes may fall to either.
+        // Only values on the boundary between two bytes may be rounded differently.
         assert!(rounded * 1000 < texels, "{rounded} of {texels}");
     }
-    // Twin: a wrong word for the encoding shows.
+    // Twin: a wrong encoding changes the result.
     let wrong = estimate("srgb", &picture);
     let out = folder.path().join("wrong");
     run(baseline("nn", &ROOM, &out).args(lifted_words(&wrong))).ends_with(0);
     assert!(atlases[0] != base_colors(&out));
 }
 
-/// A red and a green box that touch, a blue sheet a millimetre before a yellow one, and a mirror that shows them all.
+/// A red and a green box that touch, a blue sheet a millimetre in front of a yellow one, and a mirror that reflects
+/// all.
 const BOXES: &str = r#"<scene version="3.0.0">
 <sensor type="perspective"><float name="fov" value="60"/><transform name="to_world">
 <lookat origin="0.3, 0.4, 4" target="0, 0, 0" up="0, 1, 0"/></transform>
@@ -180,7 +180,7 @@ pub fn is_all(dataset: &Path, submission: &Path, instance: &str, linear: [f32; 3
 }
 
 #[test]
-fn no_colour_goes_from_one_instance_to_another() {
+fn no_colour_is_transferred_between_instances() {
     let (folder, dataset) = boxes();
     let grey = [0.5; 3];
     let expected = [
@@ -199,7 +199,7 @@ fn no_colour_goes_from_one_instance_to_another() {
             assert!(is_all(&dataset, &out, instance, color), "{name} {instance}");
         }
     }
-    // Twin: from any instance, the sheet behind takes the colour of the sheet before it.
+    // Twin: with --any-instance, the sheet behind takes the colour of the sheet in front of it.
     let out = folder.path().join("any");
     run(baseline("nn", &dataset, &out).arg("--any-instance")).ends_with(0);
     assert!(!is_all(&dataset, &out, "yellow", grey));
@@ -211,7 +211,7 @@ fn no_colour_goes_from_one_instance_to_another() {
 }
 
 #[test]
-fn a_method_may_say_less_than_its_adapter() {
+fn an_estimate_may_lack_maps_of_its_adapter() {
     let folder = tempfile::tempdir().unwrap();
     let [estimates, out] = ["estimates", "out"].map(|name| folder.path().join(name));
     std::fs::create_dir_all(estimates.join("room")).unwrap();
@@ -230,9 +230,9 @@ fn a_method_may_say_less_than_its_adapter() {
         .says("base_color.png");
 }
 
-/// Columns: the truth and two submissions; rows: five views, and the scale beneath the errors.
+/// Columns: the truth and two submissions; rows: five views, and the colour scale below the errors.
 #[test]
-fn pictures_lie_side_by_side() {
+fn pictures_are_side_by_side() {
     let folder = tempfile::tempdir().unwrap();
     let [gt, grey, out] = ["gt", "grey", "out"].map(|name| folder.path().join(name));
     run(&mut baseline("gt", &ROOM, &gt)).ends_with(0);
@@ -244,7 +244,7 @@ fn pictures_lie_side_by_side() {
     let (albedo, error) = (read("room-albedo.png"), read("room-albedo-error.png"));
     assert_eq!((albedo.width(), albedo.height()), (3 * 160 + 2 * 4, 5 * 120 + 4 * 4));
     assert_eq!((error.width(), error.height()), (2 * 160 + 4, 5 * 120 + 5 * 4 + 12));
-    // The truth's own submission is nearly black where errors are, the grey one is not.
+    // The error maps of the truth's own submission are nearly black, those of the grey one are not.
     let brightness = |left: usize| -> u64 {
         let places = (left..left + 160).flat_map(|x| (0..120).map(move |y| (x, y)));
         places.map(|(x, y)| error.get(x, y).iter().map(|v| u64::from(*v)).sum::<u64>()).sum()
@@ -266,7 +266,7 @@ fn other_proportions_are_refused() {
 }
 
 #[test]
-fn what_cannot_be_lifted_is_said() {
+fn an_estimate_that_cannot_be_lifted_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let nn = |words: &[&str]| -> Run { run(baseline("nn", &ROOM, &out).args(words)).ends_with(2) };
@@ -287,15 +287,15 @@ fn what_cannot_be_lifted_is_said() {
 }
 
 #[test]
-fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
+fn texgen_files_are_exported_and_its_textures_imported() {
     let folder = tempfile::tempdir().unwrap();
     let (objects, results) = (folder.path().join("objects"), folder.path().join("results"));
     let mut command = mateval();
     command.args(["baseline", "texgen-export", "--dataset"]).arg(&*ROOM).arg("--out").arg(&objects);
     run(&mut command).ends_with(0);
 
-    // The stand-in copies the partial atlas, and paints what is not seen: red at the lower edge, green at the upper
-    // one.
+    // The stand-in for TEXGen copies the partial atlas and paints unseen texels: red in the lower half, green in the
+    // upper.
     std::fs::create_dir(&results).unwrap();
     let list = std::fs::read_to_string(objects.join("objects.jsonl")).unwrap();
     let ids: Vec<String> = list
@@ -334,8 +334,8 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
             }
         }
     }
-    // Everything is one of the two, but for the seams of the two colours and for texels that 1024 a side did not
-    // resolve.
+    // All texels have one of the two colours, except at the seam between them and where 1024 texels a side do not
+    // resolve the surface.
     let all: usize = base_colors(&nn).iter().map(|(_, picture)| picture.pixels().len()).sum();
     assert!(kept * 10 > all && painted.iter().all(|half| half * 20 > all), "{kept} {painted:?} of {all}");
     assert!((kept + painted[0] + painted[1]) * 100 > all * 97, "{kept} {painted:?} of {all}");
@@ -345,7 +345,7 @@ fn texgen_gets_what_it_reads_and_gives_back_what_it_paints() {
     run(import().arg("--force")).ends_with(2).says("living-00012.png");
 }
 
-/// The header of a NumPy file of whole numbers of 64 bits, and the numbers.
+/// A NumPy file of 64-bit integers.
 fn npy(labels: &[i64]) -> Vec<u8> {
     let header = format!("{{'descr': '<i8', 'fortran_order': False, 'shape': ({},), }}", labels.len());
     let padded = format!("{header:<117}\n");
@@ -357,7 +357,7 @@ fn npy(labels: &[i64]) -> Vec<u8> {
 }
 
 #[test]
-fn partfield_gets_meshes_and_gives_back_a_second_set_of_parts() {
+fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
     let (folder, dataset) = boxes();
     let [meshes, clusters] = ["meshes", "clusters"].map(|name| folder.path().join(name));
     run(mateval().args(["baseline", "partfield-export", "--dataset"]).arg(&dataset).arg("--out").arg(&meshes))

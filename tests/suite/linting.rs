@@ -24,7 +24,7 @@ fn lint(submission: &Path, words: &[&str]) -> Run {
     run(&mut lint_command(submission, words))
 }
 
-/// Exit code, stdout and stderr of a good submission, of one that is not, and of none.
+/// Exit code, stdout and stderr for a good submission, for a bad one, and for a path that does not exist.
 #[test]
 fn the_verdict_is_one_line_and_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
@@ -58,7 +58,7 @@ fn the_verdict_is_one_line_and_the_exit_code() {
 }
 
 #[test]
-fn an_archive_is_the_folder_that_it_holds() {
+fn an_archive_is_checked_and_scored_like_its_folder() {
     let folder = tempfile::tempdir().unwrap();
     let submission = truth(folder.path());
     std::fs::remove_file(submission.join("scenes/room/rug/base_color.png")).unwrap();
@@ -77,7 +77,7 @@ fn an_archive_is_the_folder_that_it_holds() {
     assert_eq!((&file["good"], &file["errors"]), (&false.into(), &1.into()));
     assert_eq!(file["findings"][0]["code"], "missing_map");
 
-    // The score is the folder's, and says what it would.
+    // The score and its findings are those of the folder.
     let [of_folder, of_zip] = ["folder.json", "zip.json"].map(|name| folder.path().join(name));
     let scored = |submission: &Path, out: &Path| {
         run(score(submission, dataset(), out).env("MATEVAL_CACHE", folder.path())).ends_with(0);
@@ -86,26 +86,28 @@ fn an_archive_is_the_folder_that_it_holds() {
     assert_eq!(scored(&submission, &of_folder), scored(&zip, &of_zip));
 }
 
-/// What a run took.
+/// Resources that a run used.
 struct Cost {
     cpu_seconds: f64,
     peak_mib: f64,
 }
 
-/// Runs a command, and looks on. What the kernel counts for it stands until it is waited for, but for its memory.
+/// Runs a command and measures it. The kernel keeps the counters of an ended process until it is waited for, except for
+/// its memory.
 fn watched(command: &mut Command) -> (Run, Cost) {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let told = |file: &str| std::fs::read_to_string(format!("/proc/{}/{file}", child.id())).unwrap();
+    let proc_file = |file: &str| std::fs::read_to_string(format!("/proc/{}/{file}", child.id())).unwrap();
     let mut peak_kib = 0.0;
     let cpu_seconds = loop {
-        let stat = told("stat");
-        // Behind the name, which may hold anything: the state, and ten numbers on the ticks in user and system.
+        let stat = proc_file("stat");
+        // After the name, which may hold any characters: the state, and ten numbers later the ticks in user and system
+        // mode.
         let fields: Vec<&str> = stat.rsplit_once(") ").unwrap().1.split(' ').collect();
         if fields[0] == "Z" {
             const TICKS_A_SECOND: f64 = 100.0;
             break (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / TICKS_A_SECOND;
         }
-        let status = told("status");
+        let status = proc_file("status");
         if let Some(line) = status.lines().find_map(|line| line.strip_prefix("VmHWM:")) {
             peak_kib = line.trim().trim_end_matches(" kB").parse::<f64>().unwrap();
         }
@@ -114,8 +116,8 @@ fn watched(command: &mut Command) -> (Run, Cost) {
     (Run::of(child.wait_with_output().unwrap()), Cost { cpu_seconds, peak_mib: peak_kib / 1024.0 })
 }
 
-/// 10 MB of zip from which 100 GB would come, three ways: entries that share their bytes, entries that say to be that
-/// large, and entries that say to be small.
+/// Zips of 10 MB that would unpack to 100 GB, in three ways: entries that share their data, entries whose stated size
+/// is that large, and entries whose stated size is too small.
 fn zip_bombs() -> Vec<(&'static str, Vec<u8>)> {
     let zeros = ZipEntry::new("0", &vec![0; 500 << 20]);
     let filler = ZipEntry::stored("filler", &vec![7; (10 << 20) - zeros.data.len()]);
@@ -129,8 +131,8 @@ fn zip_bombs() -> Vec<(&'static str, Vec<u8>)> {
     vec![("overlapping_entries", sharing), ("archive_too_large", boasting), ("wrong_size", modest)]
 }
 
-/// The same as a stream, of which no more than a thousandth is packed: ten gigabytes of a file, of what is passed over,
-/// and a file that says to be of 8 GB.
+/// The same for compressed streams, of at most a thousandth of their unpacked size: a file of ten gigabytes, ten
+/// gigabytes of skipped entries, and a file whose stated size is 8 GB.
 fn tar_bombs() -> Vec<(&'static str, Vec<u8>)> {
     let zeros = gzip(&vec![0; 64 << 20]);
     let body = zeros.repeat((10 << 20) / zeros.len());
@@ -143,7 +145,7 @@ fn tar_bombs() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// Each ends within a second of the processor's time and 200 MB of memory, and says why.
+/// Each check ends within a second of processor time and 200 MB of memory, and states the reason.
 #[test]
 fn bombs_end_early_and_take_no_memory() {
     let folder = tempfile::tempdir().unwrap();
@@ -159,9 +161,9 @@ fn bombs_end_early_and_take_no_memory() {
             cost.cpu_seconds,
             cost.peak_mib
         );
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "left behind");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "files were left behind");
     }
-    // The twin: what is measured is measured.
+    // The twin: the measurement detects a costly run.
     let (run, cost) = watched(Command::new("dd").args(["if=/dev/zero", "of=/dev/null", "bs=300M", "count=10"]));
     run.ends_with(0);
     assert!(cost.cpu_seconds > 0.1 && cost.peak_mib > 300.0, "{} s, {} MiB", cost.cpu_seconds, cost.peak_mib);

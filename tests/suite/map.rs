@@ -1,4 +1,4 @@
-//! `crates/README.md`, the map of the code, against the code: paths that it names, arrows that it draws, first lines.
+//! Checks `crates/README.md`, the map of the code, against the code: the paths, the dependencies, and the first lines.
 
 use std::path::{Path, PathBuf};
 
@@ -9,13 +9,13 @@ fn crates() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("crates")
 }
 
-/// The paths that a text names: words in backticks that hold a slash, without blanks, below `crates/`.
+/// The paths below `crates/` that a text names: words in backticks with a slash and without blanks.
 fn named_paths(text: &str) -> Vec<&str> {
     let words = text.split('`').skip(1).step_by(2);
     words.filter(|word| word.contains('/') && !word.contains([' ', '<', '*'])).collect()
 }
 
-/// Those of them that do not exist.
+/// The paths that do not exist.
 fn missing(paths: &[&str]) -> Vec<String> {
     let exists = |path: &&&str| crates().join(path).exists();
     paths.iter().filter(|path| !exists(path)).map(|path| (*path).to_owned()).collect()
@@ -31,7 +31,7 @@ fn every_path_on_the_map_exists() {
 
 /// The twin.
 #[test]
-fn a_path_to_nowhere_is_found() {
+fn a_missing_path_is_found() {
     let text = "| a metric | `metrics/src/`, `metrics/src/nowhere.rs`, `cargo run -- schema` |";
     assert_eq!(missing(&named_paths(text)), ["metrics/src/nowhere.rs"]);
 }
@@ -51,13 +51,13 @@ fn the_map_draws_the_arrows() {
     }
 }
 
-/// Whether a file begins with a line that says what it holds.
+/// Whether a file begins with a line that states its content.
 fn introduces_itself(text: &str) -> bool {
     text.lines().next().is_some_and(|line| line.strip_prefix("//! ").is_some_and(|words| words.len() > 10))
 }
 
 #[test]
-fn every_source_file_says_what_it_holds() {
+fn every_source_file_states_its_content() {
     let files = files_below(&crates());
     let sources = files.iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
     let mut seen = 0;
@@ -69,6 +69,6 @@ fn every_source_file_says_what_it_holds() {
         }
     }
     assert!(seen > 350, "only {seen} files seen");
-    assert!(silent.is_empty(), "begin with a line of what they hold: {silent:?}");
+    assert!(silent.is_empty(), "begin these files with a line that states their content: {silent:?}");
     assert!(!introduces_itself("use std::path::Path;") && !introduces_itself("//! Tests.\n"));
 }

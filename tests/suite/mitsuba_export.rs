@@ -11,7 +11,7 @@ fn export(dataset: &Path, scene: &str, view: &str, out: &Path, more: &[&str]) ->
 }
 
 #[test]
-fn the_sample_means_the_same() {
+fn the_sample_is_represented_completely() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let done = export(dataset(), "room", "up_left", &out, &[]).ends_with(0);
@@ -25,7 +25,7 @@ fn the_sample_means_the_same() {
     );
     assert!(text.contains("<integer name=\"sample_count\" value=\"4\"/>"));
 
-    // Again: refused, then forced, with the same bytes.
+    // A second export is refused; a forced one writes the same bytes.
     export(dataset(), "room", "up_left", &out, &[]).ends_with(2).says("already exists");
     export(dataset(), "room", "up_left", &out, &["--force"]).ends_with(0);
     assert_eq!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
@@ -35,7 +35,7 @@ fn the_sample_means_the_same() {
 }
 
 #[test]
-fn what_is_not_there_is_refused_before_anything_is_written() {
+fn missing_inputs_are_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     export(dataset(), "attic", "input", &out, &[]).ends_with(2).says("has no scene 'attic'");
@@ -47,7 +47,7 @@ fn what_is_not_there_is_refused_before_anything_is_written() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// Ground truth that was changed since is not exported as if it were the dataset's.
+/// Ground truth that was changed after the dataset was built is not exported.
 #[test]
 fn changed_truth_is_refused() {
     let changed = copied_dataset();

@@ -1,4 +1,4 @@
-//! Labels from outside as a second set of parts: `part_labels` in a recipe.
+//! External labels as a second set of parts: `part_labels` in a recipe.
 
 use std::path::{Path, PathBuf};
 
@@ -54,7 +54,7 @@ fn parts_of<'a>(parts: &'a Value, instance: &str) -> Vec<&'a Value> {
     parts.as_array().unwrap().iter().filter(|part| part["instance"] == instance).collect()
 }
 
-/// How many values the picture has where the sofa is.
+/// The number of different values of the picture where it shows the sofa.
 fn values_on_the_sofa(view: &Path, picture: &str) -> usize {
     let read = |file: &str| png_io::read_ids(&view.join(file)).unwrap();
     let scene = json(&view.join("../../scene.json"));
@@ -82,17 +82,17 @@ fn labels_become_a_second_set_of_parts() {
     assert_eq!(parts_of(&set["parts"], "sofa").len(), 2);
     let files = scene["source"]["files"].as_array().unwrap();
     assert!(files.iter().any(|file| file["path"] == "labels/partfield/sofa.npy"), "{files:?}");
-    // What has no labels keeps its own parts, and that is said.
+    // An instance without labels keeps its own parts, which is reported.
     assert_eq!(parts_of(&set["parts"], "shelf").len(), parts_of(&scene["parts"], "shelf").len());
     let findings = scene["findings"].as_array().unwrap();
     assert!(findings.iter().any(|f| f["code"] == "unlabelled" && f["message"].as_str().unwrap().contains("'shelf'")));
-    // The own parts are as without labels.
+    // The source's own parts are the same as without labels.
     assert_eq!(scene["parts"], json(&dataset().join("scenes/room/scene.json"))["parts"]);
     let view = room.join("views/input");
     assert!(values_on_the_sofa(&view, "part.png") > 2);
     assert_eq!(values_on_the_sofa(&view, "part_partfield.png"), 2);
 
-    // The twin: a picture or a mesh of the set that is another one is found.
+    // The twin: a changed picture or mesh of the set is found.
     Room::of(&labelled.dataset()).edit_ids("views/input/part_partfield.png", |id| if id < 2 { id } else { id - 1 });
     rehash(&labelled.dataset());
     let verdict = run(&mut verify(&labelled.dataset())).ends_with(1);

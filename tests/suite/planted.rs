@@ -1,4 +1,4 @@
-//! Faults planted in a dataset, and its hashes renewed so that only what the fault means can give it away.
+//! Plants faults in a dataset and renews its hashes, so that only the content can reveal a fault.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use mateval_image::Picture;
 use mateval_scene::{json, manifest};
 use serde_json::Value;
 
-/// A damaged dataset's one scene.
+/// The scene of a damaged dataset.
 pub struct Room(PathBuf);
 
 impl Room {
@@ -20,7 +20,7 @@ impl Room {
         self.0.join(name)
     }
 
-    /// Changes `scene.json` by hand.
+    /// Changes `scene.json`.
     pub fn edit_scene(&self, change: impl FnOnce(&mut Value)) {
         edit_json(&self.file("scene.json"), change);
     }
@@ -32,7 +32,7 @@ impl Room {
         mateval_image::png_io::write_ids(&path, &picture).unwrap();
     }
 
-    /// Changes a mask; `change` is given column, row and whether the pixel counts.
+    /// Changes a mask; the arguments of `change` are column, row and whether the pixel counts.
     pub fn edit_mask(&self, name: &str, change: impl Fn(usize, usize, bool) -> bool) {
         let path = self.file(name);
         let mask = mateval_image::png_io::read_mask(&path).unwrap();
@@ -41,7 +41,7 @@ impl Room {
         mateval_image::png_io::write_mask(&path, &changed).unwrap();
     }
 
-    /// Changes floats of a GLB's binary chunk: those of node `node`'s attribute, one after the other.
+    /// Changes the floats of an attribute of the node `node` in a GLB's binary chunk, one after the other.
     pub fn edit_glb(&self, name: &str, node: &str, attribute: &str, change: impl FnMut(usize, f32) -> f32) {
         let path = self.file(name);
         let mut bytes = std::fs::read(&path).unwrap();
@@ -50,7 +50,7 @@ impl Room {
     }
 }
 
-/// Changes a JSON file by hand.
+/// Changes a JSON file.
 pub fn edit_json(path: &Path, change: impl FnOnce(&mut Value)) {
     let mut value = super::sample::json(path);
     change(&mut value);

@@ -1,4 +1,4 @@
-//! A hidden split: two trees of one dataset, and a commitment that no later truth can meet.
+//! A hidden split: two trees of one dataset, and a commitment that no other truth matches.
 
 use std::path::Path;
 
@@ -16,9 +16,9 @@ fn commitment(run: &Run) -> &str {
 }
 
 #[test]
-fn trees_lie_apart_and_give_the_dataset_again() {
+fn the_two_trees_together_are_the_dataset() {
     let out = tempfile::tempdir().unwrap();
-    let told = publish(dataset(), out.path()).ends_with(0);
+    let published = publish(dataset(), out.path()).ends_with(0);
     let [public, private] = ["public", "private"].map(|name| out.path().join(name));
     let (shown, hidden) = (files_below(&public), files_below(&private));
     let is_truth = |path: &Path| path.components().nth(2).is_some_and(|part| part.as_os_str() == "ground_truth");
@@ -26,11 +26,11 @@ fn trees_lie_apart_and_give_the_dataset_again() {
     assert!(hidden.len() > 20 && hidden.iter().all(|path| is_truth(path)), "{hidden:?}");
     assert_eq!(manifest(&public), manifest(dataset()));
     run(&mut verify(&public)).ends_with(0);
-    // What anyone can hash who has the public tree.
+    // The commitment can be computed from the public tree.
     let lines = manifest(&public);
     let lines: String =
         lines.lines().filter(|line| line.contains("/ground_truth/")).map(|line| format!("{line}\n")).collect();
-    assert_eq!(commitment(&told), mateval_scene::manifest::sha256_of_bytes(lines.as_bytes()));
+    assert_eq!(commitment(&published), mateval_scene::manifest::sha256_of_bytes(lines.as_bytes()));
     copy_folder(&private, &public);
     let whole: Vec<_> = files_below(dataset());
     assert_eq!(files_below(&public), whole);
@@ -43,21 +43,21 @@ fn trees_lie_apart_and_give_the_dataset_again() {
 }
 
 #[test]
-fn another_truth_is_another_commitment() {
+fn another_truth_has_another_commitment() {
     let (out, changed) = (tempfile::tempdir().unwrap(), copied_dataset());
-    let told = publish(dataset(), &out.path().join("a")).ends_with(0);
+    let published = publish(dataset(), &out.path().join("a")).ends_with(0);
     let truth = changed.path().join("scenes/room/ground_truth/lights.json");
     std::fs::write(&truth, std::fs::read_to_string(&truth).unwrap() + " ").unwrap();
-    // Not what the manifest says: nothing is published.
+    // The files do not match the manifest: nothing is published.
     publish(changed.path(), &out.path().join("b")).ends_with(2).says("changed_file");
     assert!(!out.path().join("b").exists() || files_below(&out.path().join("b")).is_empty());
     mateval_scene::manifest::write(changed.path()).unwrap();
     let other = publish(changed.path(), &out.path().join("b")).ends_with(0);
-    assert_ne!(commitment(&told), commitment(&other));
+    assert_ne!(commitment(&published), commitment(&other));
 }
 
 #[test]
-fn nothing_is_overwritten_and_nothing_goes_into_one_folder() {
+fn nothing_is_overwritten_and_the_two_folders_must_differ() {
     let out = tempfile::tempdir().unwrap();
     publish(dataset(), out.path()).ends_with(0);
     publish(dataset(), out.path()).ends_with(2).says("--force");
@@ -66,6 +66,6 @@ fn nothing_is_overwritten_and_nothing_goes_into_one_folder() {
     run_words(words.into_iter().chain([one.as_path(), Path::new("--private"), one.as_path(), dataset()]))
         .ends_with(2)
         .says("not be withheld");
-    // A public tree has nothing left to withhold.
+    // A public tree has no ground truth to withhold.
     publish(&out.path().join("public"), &out.path().join("again")).ends_with(2);
 }

@@ -1,8 +1,8 @@
-//! The README's numbers against a run.
+//! Checks the README's numbers against a run.
 
 use super::command::{build, run, run_words};
 
-/// The demo's dataset at its own size; renders change no albedo score and are left out.
+/// Uses the demo's dataset at its own size, without renders, which do not affect albedo scores.
 #[test]
 fn its_table_is_what_the_demo_prints() {
     let folder = tempfile::tempdir().unwrap();
@@ -19,7 +19,7 @@ fn its_table_is_what_the_demo_prints() {
         let result: serde_json::Value = serde_json::from_slice(&std::fs::read(result).unwrap()).unwrap();
         let row = readme_row(method, &result);
         assert!(readme.contains(&row), "README.md lacks '{row}'");
-        // The twin: a result that is off by a hundredth has another row, which the README lacks.
+        // The twin: a result that differs by a hundredth has another row, which the README does not contain.
         let mut wrong = result;
         let summary = &mut wrong["protocols"]["mateval-1"]["summary"];
         summary["albedo.novel.psnr"] = (summary["albedo.novel.psnr"].as_f64().unwrap() + 0.01).into();

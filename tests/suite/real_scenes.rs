@@ -1,4 +1,4 @@
-//! The real scenes, where they are: a dataset of one at a small size, and what is missing of another.
+//! Tests on the real scenes, if these exist: a small dataset of one, and the missing files of another.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use mateval_testkit::data::shared_data;
 use super::command::{baseline, build, run, score, verify};
 use super::sample::json;
 
-/// Builds staircase2 with this line in the recipe's head and gives its scene.json and the summary of `gt`'s scores.
+/// Builds staircase2 with this line in the recipe's head; returns its scene.json and the summary of `gt`'s scores.
 fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, serde_json::Value) {
     let recipe = folder.join("recipe.toml");
     let scene = "[[scene]]\nid = \"staircase2\"\nbitterli = \"staircase2/scene.xml\"\n";
@@ -23,7 +23,7 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, se
     (json(&dataset.join("scenes/staircase2/scene.json")), summary)
 }
 
-/// 30,911 triangles in OBJ files: what SOURCE_FORMATS counts. Rectangles and disks come on top of it.
+/// 30,911 triangles in OBJ files, as SOURCE_FORMATS counts them. Rectangles and disks are additional.
 #[test]
 fn staircase2_is_built_verified_and_scored() {
     let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };
@@ -39,7 +39,8 @@ fn staircase2_is_built_verified_and_scored() {
     assert!((psnr("albedo.input") - psnr("albedo_aligned.input")).abs() < 0.1, "{summary}");
 }
 
-/// The twin: with atlases that are too small, less than 38 dB are reached; with those that the tool chooses, far more.
+/// The twin: with atlases that are too small, scores stay below 38 dB; with those that the tool chooses, they are far
+/// above.
 #[test]
 fn staircase2_needs_its_texels() {
     let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };
@@ -62,7 +63,7 @@ fn bathroom_names_exactly_what_is_missing() {
     assert_eq!(missing, expected.map(|file| ("missing_file", file)));
 }
 
-/// The twin: nothing is missing of the other scenes, in either spelling.
+/// The twin: the other scenes lack nothing, in either spelling.
 #[test]
 fn the_other_scenes_are_whole() {
     for name in ["staircase2/scene.xml", "living-room/scene.xml", "living-room/scene_v0.6_dppm.xml"] {

@@ -1,4 +1,5 @@
-//! Track `relit`: the truth under other weights of its lights is what Blender renders of a scene with those lights.
+//! Track `relit`: the truth under other weights of its lights agrees with Blender's render of a scene with those
+//! lights.
 
 use std::path::{Path, PathBuf};
 
@@ -10,10 +11,10 @@ use super::sample::{json, recipe_text, write_source};
 
 const HEAD: &str = "resolution = [96, 72]\natlas_size = 64\nviews = []";
 const SAMPLES: u32 = 64;
-/// Side of the tiles that are compared.
+/// Side of the compared tiles, in pixels.
 const TILE: usize = 8;
 
-/// What the two lamps of the room's XML are multiplied by; the sky stays.
+/// Factors for the two lamps of the room's XML; the sky is unchanged.
 const WEIGHTS: [[f32; 3]; 2] = [[1.3, 1.0, 0.6], [0.3, 0.45, 0.65]];
 
 /// The room's source with its lamps multiplied by the weights.
@@ -46,8 +47,8 @@ fn weighted(scene: &Path, weights: &[[f32; 3]]) -> [Picture<LinearRgb>; 2] {
     })
 }
 
-/// For each tile and channel, and last for each channel of the whole picture, how many standard errors the means are
-/// apart; variances from the halves.
+/// The difference of the means in standard errors, for each tile and channel, and for each channel of the whole
+/// picture. Variances come from the halves.
 fn z_values(a: &[Picture<LinearRgb>; 2], b: &[Picture<LinearRgb>; 2]) -> (Vec<f64>, Vec<f64>) {
     let sums =
         |pictures: &[Picture<LinearRgb>; 2], columns: std::ops::Range<usize>, rows: std::ops::Range<usize>, c| {
@@ -69,20 +70,20 @@ fn z_values(a: &[Picture<LinearRgb>; 2], b: &[Picture<LinearRgb>; 2]) -> (Vec<f6
     (tiles, [0, 1, 2].map(|c| z(0..96, 0..72, c)).to_vec())
 }
 
-/// Tiles are noisy, so a few may be far apart; were they all one, 0.27 % would be more than three standard errors.
+/// A few tiles may differ by more than three standard errors, because they are noisy: 0.27 % of normal deviates do.
 fn agree((tiles, whole): &(Vec<f64>, Vec<f64>)) -> bool {
     let far = tiles.iter().filter(|z| z.abs() > 3.0).count() as f64 / tiles.len() as f64;
     far < 0.03 && whole.iter().all(|z| z.abs() < 4.0)
 }
 
 #[test]
-fn weighted_truth_is_a_render_of_that_lighting() {
+fn weighted_truth_agrees_with_a_render_of_that_lighting() {
     let Some((python, _turn)) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let made = |name: &str, change: fn(&str) -> String| -> PathBuf {
         let source = folder.path().join(format!("{name}-source"));
         let recipe = write_source(&source, HEAD, &["room"]);
-        // Another id gives other seeds.
+        // Another id results in other seeds.
         std::fs::write(&recipe, recipe_text(HEAD, &[name])).unwrap();
         let xml = source.join("room/scene.xml");
         std::fs::write(&xml, change(&std::fs::read_to_string(&xml).unwrap())).unwrap();
@@ -93,7 +94,7 @@ fn weighted_truth_is_a_render_of_that_lighting() {
         dataset.join("scenes").join(name)
     };
     let (plain, relit) = (made("plain", str::to_owned), made("relit", reweighted));
-    // Which group is which lamp, from what both say they emit.
+    // The group of each lamp is found by their emission.
     let radiances = |scene: &Path| -> Vec<Option<[f32; 3]>> {
         let groups = json(&scene.join("ground_truth/lights.json"))["groups"].as_array().unwrap().clone();
         groups.iter().map(|group| serde_json::from_value(group["emission"]["radiance"].clone()).ok()).collect()

@@ -1,6 +1,6 @@
-//! One camera matrix for every picture: points of the meshes, projected by a few lines that share nothing with
-//! `mateval_scene::Camera`, find in each view the depth, the ids, the normal, the masks and the colours that its
-//! pictures hold. A camera rolled by three degrees must not.
+//! One camera matrix holds for every picture. Points of the meshes are projected by a few lines that share no code with
+//! `mateval_scene::Camera`; at the resulting pixels, the pictures of each view must hold the points' depth, ids,
+//! normals, masks and colours. With a camera rolled by three degrees they must not.
 
 use std::path::Path;
 
@@ -21,8 +21,8 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// A camera read from `scene.json` as FORMAT tells it: axes and place in the columns of `world_from_camera`, it looks
-/// along its -Z, +Y is up, pixels count from the top left.
+/// A camera read from `scene.json` according to FORMAT.md: the columns of `world_from_camera` are its axes and
+/// position, it looks along its -Z, +Y is up, pixels are counted from the top left.
 struct Eye {
     axes: [Point; 3],
     place: Point,
@@ -63,7 +63,7 @@ impl Eye {
     }
 }
 
-/// One view: its pictures, and the camera that they are looked at with.
+/// One view: its pictures, and the camera that projects points into them.
 struct Seen {
     eye: Eye,
     depth: Picture<f32>,
@@ -102,12 +102,12 @@ impl Seen {
     }
 }
 
-/// A point of a mesh and what pictures should say of it.
+/// A point of a mesh and the values that pictures should hold for it.
 struct Mark {
     point: Point,
     instance: u16,
     part: u16,
-    /// Of its triangle, where the mesh is flat: of unit length.
+    /// The unit normal of its triangle, if the mesh is flat.
     normal: Option<Point>,
 }
 
@@ -149,7 +149,7 @@ fn inner_points([a, b, c]: [Point; 3]) -> Vec<(Point, Point)> {
     grid.map(|(i, j)| ([0, 1, 2].map(|k| a[k] + u[k] * i + v[k] * j), cross.map(|k| k / length))).collect()
 }
 
-/// How many marks of a view are where its pictures show them.
+/// The numbers of marks of a view that its pictures do and do not show in the right place.
 #[derive(Debug, Default)]
 struct Tally {
     seen: usize,
@@ -159,8 +159,8 @@ struct Tally {
     wrong_normals: usize,
 }
 
-/// How far a mark may be from the tangent plane of a pixel that shows it, over its depth: what a bowl bends away within
-/// a pixel and a half.
+/// Largest distance of a mark from the tangent plane of a pixel that shows it, divided by its depth: the curvature of a
+/// bowl within a pixel and a half.
 const OFF_PLANE: f64 = 0.004;
 
 fn tally(seen: &Seen, marks: &[Mark]) -> Tally {
@@ -194,7 +194,7 @@ fn tally(seen: &Seen, marks: &[Mark]) -> Tally {
     tally
 }
 
-/// The tallies of all five views, their cameras rolled by so many degrees before.
+/// The tallies of all five views, whose cameras are first rolled by this angle.
 fn tallies(rolled_deg: f64) -> Vec<Tally> {
     let room = dataset().join("scenes/room");
     let mut scene = json(&room.join("scene.json"));
@@ -205,15 +205,15 @@ fn tallies(rolled_deg: f64) -> Vec<Tally> {
     views.iter().map(|view| tally(&Seen::read(&room, view), &marks)).collect()
 }
 
-/// Of the marks within a picture at least 55 of 100 are seen (the backs of things hide the rest), and no more than two
-/// of a thousand are neither seen nor behind something (what is thinner than a pixel falls between pixel centres).
+/// At least 55 % of the marks within a picture are seen (the others are on the backs of objects), and at most 0.2 % are
+/// neither seen nor behind something (objects thinner than a pixel may lie between pixel centres).
 fn agrees(tally: &Tally) -> bool {
     let all = tally.seen + tally.hidden + tally.wrong;
     tally.seen * 100 >= all * 55 && tally.wrong * 1000 <= all * 2
 }
 
 #[test]
-fn depth_ids_and_normals_are_where_the_meshes_project_to() {
+fn depth_ids_and_normals_match_the_projected_meshes() {
     for tally in tallies(0.0) {
         assert!(agrees(&tally), "{tally:?}");
         assert!(tally.seen > 5000 && tally.normals > 1000 && tally.wrong_normals == 0, "{tally:?}");
@@ -229,8 +229,8 @@ fn a_rolled_camera_fails() {
     }
 }
 
-/// Pixels of the novel views whose mark differs from "valid, and its point is outside of the input picture", with the
-/// input camera rolled; and all that are marked.
+/// The number of pixels of the novel views whose mark differs from "valid, and its point is outside the input picture",
+/// with the input camera rolled; and the number of marked pixels.
 fn unobserved_faults(rolled_deg: f64) -> (usize, usize) {
     let room = dataset().join("scenes/room");
     let scene = json(&room.join("scene.json"));
@@ -253,15 +253,15 @@ fn unobserved_faults(rolled_deg: f64) -> (usize, usize) {
 }
 
 #[test]
-fn unobserved_is_what_the_input_camera_does_not_hold() {
+fn unobserved_pixels_are_outside_the_input_picture() {
     let (wrong, marked) = unobserved_faults(0.0);
     assert!(wrong == 0 && marked > 1000, "{wrong} of {marked}");
     let (wrong, _) = unobserved_faults(3.0);
     assert!(wrong > 200, "a rolled input camera gives only {wrong} faults");
 }
 
-/// Truth pictures where the points of an instance of one material project to and nothing else is near: the largest
-/// difference of albedo, and how many pixels were looked at.
+/// Compares the albedo truth with the expected colour where points of an instance of one material project to and
+/// nothing else is near. Returns the largest difference and the number of pixels.
 fn off_colour(instance: &str, expected: [f32; 3]) -> (f32, usize) {
     let room = dataset().join("scenes/room");
     let scene = json(&room.join("scene.json"));

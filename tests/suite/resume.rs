@@ -1,4 +1,5 @@
-//! A build or a render that is killed goes on when it is started again, and ends as if nothing had been.
+//! A build or a render that was killed resumes when it is started again, and its result is that of an uninterrupted
+//! run.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -23,7 +24,7 @@ static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     Whole { recipe, manifest: manifest(&dataset) }
 });
 
-/// Starts the command and kills it (SIGKILL) once `is_time`. Panics where it ends by itself.
+/// Starts the command and kills it (SIGKILL) once `is_time` returns true. Panics if it ends by itself.
 fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
     let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let start = Instant::now();
@@ -36,7 +37,7 @@ fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
     assert!(child.wait().unwrap().code().is_none(), "it ended before it could be killed");
 }
 
-/// Nothing that is there may be taken for a finished dataset.
+/// Asserts that the folder cannot be mistaken for a finished dataset.
 fn assert_unfinished(out: &Path) {
     assert!(!out.join("dataset.json").exists());
     run(&mut verify(out)).ends_with(2).says("no dataset.json");
@@ -64,7 +65,7 @@ fn killed_at_once_and_within_a_scene() {
         work.join("geometry/parts.glb").is_file()
     }];
     for is_time in moments {
-        // What the last run left must not be taken for this one's.
+        // Files of the previous run must not be mistaken for those of this run.
         let _ = std::fs::remove_dir_all(&work);
         kill_when(&mut build(&WHOLE.recipe, &out), is_time);
         assert_unfinished(&out);
@@ -75,7 +76,7 @@ fn killed_at_once_and_within_a_scene() {
     assert!(manifest(&out) == WHOLE.manifest);
 }
 
-/// A scene's folder without its mark, whole or not, is what a kill between two steps leaves: it is made again.
+/// A kill between two steps leaves a scene's folder without its mark. Such a scene is built again, complete or not.
 #[test]
 fn half_written_scenes_are_made_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,17 +93,16 @@ fn half_written_scenes_are_made_again() {
     assert!(manifest(&out) == WHOLE.manifest);
 }
 
-/// A file that was missing when the scene was made is there now: the scene is made again, as a fresh build would make
-/// it.
+/// If a file that was missing when the scene was built exists now, the scene is built again, as in a fresh build.
 #[test]
-fn what_has_come_since_is_taken_in() {
+fn files_that_were_missing_before_are_used() {
     let folder = tempfile::tempdir().unwrap();
     let (source, out) = (folder.path().join("source"), folder.path().join("dataset"));
     let recipe = write_source(&source, SMALL, &["first", "second"]);
     let [texture, aside] = ["room/textures/planks.png", "planks.png"].map(|name| source.join(name));
     std::fs::rename(&texture, &aside).unwrap();
     kill_when(&mut build(&recipe, &out), || out.join(".build/first.json").is_file());
-    // The twin: while it is missing still, the scene is as it would be.
+    // The twin: while the file is still missing, the scene is the same.
     kill_when(&mut build(&recipe, &out), || out.join("scenes/.second.partial/views/input/depth.exr").is_file());
     assert!(out.join(".build/first.json").is_file() && !out.join("scenes/.first.partial").exists());
     std::fs::rename(&aside, &texture).unwrap();
@@ -112,7 +112,7 @@ fn what_has_come_since_is_taken_in() {
 }
 
 #[test]
-fn another_recipe_does_not_go_on() {
+fn another_recipe_does_not_resume() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("dataset");
     kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/first.json").is_file());
@@ -130,7 +130,7 @@ fn another_recipe_does_not_go_on() {
 }
 
 #[test]
-fn a_killed_render_goes_on() {
+fn a_killed_render_resumes() {
     let copy = copied_dataset();
     let renders = copy.path().join("scenes/room/ground_truth/renders/builtin");
     std::fs::remove_dir_all(&renders).unwrap();

@@ -1,4 +1,4 @@
-//! The built-in sample as a small dataset: made once and shared; a test that damages it takes a copy.
+//! The built-in sample as a small dataset, which is built once and shared; tests that change it use a copy.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -25,24 +25,24 @@ fn built(name: &str) -> PathBuf {
     dataset
 }
 
-/// The shared dataset, rendered with one sample; nobody writes to it.
+/// The shared dataset, rendered with one sample; tests must not write to it.
 pub fn dataset() -> &'static Path {
     &DATASET
 }
 
-/// As [`dataset`], without renders: what is scored on it takes a second, since no light is followed.
+/// Like [`dataset`], but without renders: scoring on it takes a second, because nothing is rendered.
 pub fn unrendered() -> &'static Path {
     &UNRENDERED
 }
 
-/// A copy of the shared dataset that may be damaged.
+/// A copy of the shared dataset that a test may change.
 pub fn copied_dataset() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     copy_folder(dataset(), folder.path());
     folder
 }
 
-/// Writes the sample's source with a recipe that has these lines in its head and the room once for each id. Gives the
+/// Writes the sample's source with a recipe that has these lines in its head and the room once for each id. Returns the
 /// recipe's path.
 pub fn write_source(source: &Path, head: &str, ids: &[&str]) -> PathBuf {
     run_words([Path::new("sample"), source]).ends_with(0);
@@ -94,7 +94,7 @@ pub fn manifest(dataset: &Path) -> String {
     std::fs::read_to_string(dataset.join("MANIFEST.sha256")).unwrap()
 }
 
-/// A JSON file as it stands.
+/// The content of a JSON file.
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }

@@ -1,5 +1,4 @@
-//! The documents say what the program does: schemas, examples and worked numbers of `dataset_spec/`, the map of
-//! `crates/`.
+//! Checks the documents against the program: the schemas, examples and worked numbers of `dataset_spec/`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,7 +8,7 @@ use serde_json::Value;
 
 use super::command::run_words;
 
-/// The command that brings the schemas up to date.
+/// The command that updates the schemas.
 const FIX: &str = "cargo run -- schema dataset_spec/schema --force";
 
 fn spec(path: &str) -> PathBuf {
@@ -22,7 +21,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     entries.map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap())).collect()
 }
 
-/// A line for every file that is not the same, byte for byte, in both folders.
+/// A line for every file whose bytes differ between the folders.
 fn differences(made: &Path, kept: &Path) -> Vec<String> {
     let (made, kept) = (files(made), files(kept));
     let names: std::collections::BTreeSet<&String> = made.keys().chain(kept.keys()).collect();
@@ -70,7 +69,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// What an example breaks of the schema of its name.
+/// The violations of the schema with the example's name.
 fn breaches(name: &str, example: &Value) -> Vec<String> {
     let schema = json(&spec(&format!("schema/{name}.schema.json")));
     let validator = jsonschema::validator_for(&schema).unwrap();
@@ -78,12 +77,12 @@ fn breaches(name: &str, example: &Value) -> Vec<String> {
 }
 
 #[test]
-fn examples_keep_their_schemas() {
+fn examples_match_their_schemas() {
     let mut seen = 0;
     for name in files(&spec("examples")).keys().filter_map(|name| name.strip_suffix(".json")) {
         let example = json(&spec(&format!("examples/{name}.json")));
         assert_eq!(breaches(name, &example), Vec::<String>::new(), "{name}");
-        // The twin: a key that nobody knows, and one that is not there.
+        // The twin: an unknown key, and a missing one.
         let mut unknown = example.clone();
         unknown.as_object_mut().unwrap().insert("colour".to_owned(), Value::Null);
         let mut lacking = example;
@@ -95,7 +94,7 @@ fn examples_keep_their_schemas() {
 }
 
 #[test]
-fn the_example_recipe_is_one() {
+fn the_example_recipe_can_be_read() {
     let (recipe, text) = mateval_prep::recipe::read(&spec("examples/recipe.toml")).unwrap();
     assert_eq!((recipe.scenes.len(), recipe.views.len()), (2, 2));
     // The twin.
@@ -115,7 +114,7 @@ fn the_worked_example_of_the_camera_is_right() {
     let text = std::fs::read_to_string(spec("FORMAT.md")).unwrap();
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for numbers in ["2.7076979", "(1.129893, 0.012000, 2.234759)", "2.695910, pixel position (81.6560, 232.5347)"] {
-        assert!(text.contains(numbers), "FORMAT.md no longer says {numbers}");
+        assert!(text.contains(numbers), "FORMAT.md no longer contains {numbers}");
     }
     let scene: SceneFile = mateval_scene::json::read(&spec("examples/scene.json")).unwrap();
     let [input, up_left] = [&scene.views[0].camera, &scene.views[1].camera];
@@ -124,7 +123,7 @@ fn the_worked_example_of_the_camera_is_right() {
     assert!(near(world.to_array(), [1.129893, 0.012, 2.234759], 1e-6), "{world}");
     let (pixel, depth) = up_left.project(world).unwrap();
     assert!(near([pixel.x, pixel.y, depth], [81.6560, 232.5347, 2.695910], 1e-4), "{pixel} {depth}");
-    // The twin: turned the other way it lies elsewhere.
+    // The twin: with the opposite turn the point lies elsewhere.
     let (other, _) = input.turned(-5.0, 5.0).project(world).unwrap();
     assert!((other - pixel).length() > 10.0);
 }

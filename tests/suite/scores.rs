@@ -1,5 +1,5 @@
-//! `eval score` on the sample: the truth scores high, grey scores its pinned values, tables keep what cannot be
-//! compared apart, and what is missing is said.
+//! `eval score` on the sample: the truth scores high, grey scores its pinned values, tables separate results
+//! that cannot be compared, and missing metrics are reported.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -41,7 +41,7 @@ fn value(summary: &Value, key: &str) -> f64 {
     summary[key].as_f64().unwrap_or_else(|| panic!("no {key} in {summary}"))
 }
 
-/// What grey scores under `mateval-1` and under `paper`. Computed once by a script that shares nothing with this
+/// The scores of grey under `mateval-1` and under `paper`. Computed once by a script that shares no code with this
 /// project: albedo.exr, valid.png and unobserved.png of each view read with OpenEXR 3 and scikit-image 0.26, the
 /// prediction a picture of the one colour that sRGB byte 188 stands for, SSIM by
 /// `skimage.metrics.structural_similarity` (gaussian_weights, sigma 1.5, population covariance; its full map averaged
@@ -68,7 +68,7 @@ const GREY: [(&str, f64, f64); 18] = [
     ("albedo_aligned.unobserved.ssim", 0.520950844, 0.943911728),
 ];
 
-/// Keys whose value is not within a millionth of the pinned one.
+/// Keys whose value differs from the pinned one by more than a millionth.
 fn off_grey(method: &str) -> Vec<String> {
     let summaries = ["mateval-1", "paper"].map(|protocol| summary(method, protocol));
     let mut off = Vec::new();
@@ -90,13 +90,13 @@ fn grey_scores_its_pinned_values() {
         let grey = summary("grey", protocol);
         let is_whole = |key: &&String| key.starts_with("albedo") && !key.contains("_specular");
         let keys = grey.as_object().unwrap().keys().filter(is_whole).count();
-        assert_eq!(keys, GREY.len(), "a key that nobody pinned");
+        assert_eq!(keys, GREY.len(), "a key is not pinned");
     }
-    // The twin: the truth scores none of them.
+    // The twin: the truth has none of these scores.
     assert_eq!(off_grey("gt").len(), 2 * GREY.len());
 }
 
-/// The error of a picture of one colour, from the files alone.
+/// Computes the error of a picture of one colour from the files alone.
 #[test]
 fn greys_error_is_that_of_one_colour() {
     let room = SCORED.join("dataset/scenes/room");
@@ -132,7 +132,7 @@ fn tables_show_both_and_refuse_other_fingerprints() {
     let result = |name: &str| SCORED.join(name).with_extension("json");
     let shown = run(mateval().args(["eval", "tables"]).args([result("gt"), result("grey")])).ends_with(0);
     let albedo = shown.stdout.split("### Albedo, input view").nth(1).unwrap();
-    // Without weights no result has LPIPS, so that there is no column of it.
+    // Without weights no result has LPIPS, so there is no column for it.
     assert!(!albedo.contains("missing"), "{albedo}");
     let row = albedo.lines().find(|line| line.starts_with("| grey")).unwrap();
     assert!(row.starts_with("| grey | <u>106.457</u> | <u>9.73</u> | <u>0.3161</u> | "), "{row}");
@@ -150,7 +150,7 @@ fn tables_show_both_and_refuse_other_fingerprints() {
 }
 
 #[test]
-fn lpips_without_weights_is_missing_and_says_what_mends_it() {
+fn lpips_without_weights_is_missing_and_names_the_fix() {
     const FIX: &str = "python3 tools/fetch_lpips_weights.py";
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
@@ -164,11 +164,11 @@ fn lpips_without_weights_is_missing_and_says_what_mends_it() {
         let summary = result["protocols"][protocol]["summary"].as_object().unwrap();
         assert!(!summary.keys().any(|key| key.contains("lpips")));
     }
-    // The tables say it too.
+    // The tables report it too.
     run(mateval().args(["eval", "tables"]).arg(&out)).ends_with(0).says(FIX);
 }
 
-/// The twin of the test above: with the weights, the distance is there and the fingerprint is another one.
+/// The twin of the test above: with the weights, the distance exists and the fingerprint differs.
 #[test]
 fn lpips_with_weights_is_scored() {
     let folder = tempfile::tempdir().unwrap();

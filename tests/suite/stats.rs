@@ -1,4 +1,4 @@
-//! `prep stats`: what it prints for the sample, that its numbers are those of `scene.json`, and what it refuses.
+//! `prep stats`: its output for the sample, its numbers against `scene.json`, and the inputs that it refuses.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,7 +16,7 @@ fn gives(command: &mut Command, code: i32, stdout: &str, stderr: &str) {
     assert_eq!(found, expected, "stdout:\n{}\nstderr:\n{}", found.stdout, found.stderr);
 }
 
-/// Super-categories and categories of the room's first instances, as a furnished source would give them.
+/// Super-categories and categories for the room's first instances, as in a furnished source.
 const FURNITURE: [(&str, Option<&str>); 5] = [
     ("Sofa", Some("Three-Seat / Multi-seat Sofa")),
     ("Chair", Some("Dining Chair")),
@@ -146,7 +146,7 @@ Objects by scene and super-category
   room         0     1         0      3       0    0      0      0                 1
 ";
 
-/// The instances of `scene.json`, counted without the program's types.
+/// Counts the instances of `scene.json` without the program's types.
 fn by_hand(scene: &Value) -> (usize, usize, usize) {
     let instances = scene["instances"].as_array().unwrap();
     let objects = instances.iter().filter(|instance| instance["role"]["type"] == "furniture").count();
@@ -155,7 +155,7 @@ fn by_hand(scene: &Value) -> (usize, usize, usize) {
 }
 
 #[test]
-fn the_json_is_exact_and_keeps_its_schema() {
+fn the_json_is_exact_and_matches_its_schema() {
     let copy = furnished();
     let printed = run(stats(copy.path()).args(["--format", "json"])).ends_with(0);
     assert_eq!(printed.stderr, "");
@@ -175,7 +175,7 @@ fn the_json_is_exact_and_keeps_its_schema() {
         serde_json::json!({ "super_category": "Chair", "objects": 3, "share": 0.6 })
     );
     assert_eq!(found["dataset"]["manifest_sha256"], json(&copy.path().join("dataset.json"))["manifest_sha256"]);
-    // The twin: a word that nobody knows.
+    // The twin: an unknown word.
     let mut unknown = found;
     unknown["total"]["chairs"] = Value::from(3);
     assert!(!validator.is_valid(&unknown));
@@ -197,13 +197,13 @@ fn the_picture_is_written_and_always_the_same() {
     );
     assert!(svg.contains("prefers-color-scheme: dark") && !svg.contains("<new>"), "{svg}");
     assert_eq!(draw("b.svg"), svg);
-    // Beside JSON, stdout has nothing else.
+    // With JSON, stdout holds nothing else.
     let path = out.path().join("c.svg");
     let printed = run(stats(copy.path()).args(["--format", "json", "--picture"]).arg(&path)).ends_with(0);
     assert!(serde_json::from_str::<Value>(&printed.stdout).is_ok() && path.is_file(), "{}", printed.stdout);
 }
 
-/// A picture replaces nothing unasked and never lies in the dataset, which it would make unsound.
+/// A picture replaces a file only with --force and never lies in the dataset, which would become unsound.
 #[test]
 fn places_that_a_picture_must_not_have() {
     let (copy, out) = (copied_dataset(), tempfile::tempdir().unwrap());
@@ -228,13 +228,13 @@ fn places_that_a_picture_must_not_have() {
     run(stats(copy.path()).args(["--force", "--picture"]).arg(&scene)).ends_with(2).says("would lie in the dataset");
     assert_eq!(files_below(copy.path()), before);
     assert_eq!(std::fs::read_to_string(&mine).unwrap(), "mine");
-    // The twin: where it may lie, and may replace.
+    // The twin: an allowed place, and a file that may be replaced.
     run(stats(copy.path()).args(["--force", "--picture"]).arg(&mine)).ends_with(0);
     assert!(std::fs::read_to_string(&mine).unwrap().starts_with("<svg"));
     run(stats(copy.path()).arg("--force")).ends_with(2).says("--picture <FILE.svg>");
 }
 
-/// JSON by strangers, with hashes that fit it: exit code 2, the file's name, and never a crash.
+/// Hostile JSON with matching hashes: exit code 2 and the file's name, and no crash.
 #[test]
 fn hostile_json() {
     let hostile: [fn(&mut Value); 9] = [
@@ -278,7 +278,7 @@ fn every_fault_at_once() {
     {
         assert!(refused.stderr.contains(fault), "'{fault}' not in {}", refused.stderr);
     }
-    // A changed file is one whose hash was not renewed.
+    // A file counts as changed if its hash was not renewed.
     let copy = copied_dataset();
     Room::of(copy.path()).edit_scene(|scene| scene["instances"][0]["category"] = Value::from("Sofa"));
     run(&mut stats(copy.path())).ends_with(2).says("changed_file");

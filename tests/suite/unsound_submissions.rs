@@ -1,4 +1,4 @@
-//! Submissions with faults: each is named, and what cannot be used scores exactly as grey 0.5 would.
+//! Submissions with faults: each fault is named, and a map that cannot be used scores exactly like grey 0.5.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::command::{baseline, mateval, run, score};
 use super::sample::{json, unrendered};
 
-/// `gt` on the shared dataset, to be damaged.
+/// `gt` on the shared dataset, for a test to damage.
 fn truth(folder: &Path, name: &str) -> PathBuf {
     let submission = folder.join(name);
     run(&mut baseline("gt", unrendered(), &submission)).ends_with(0);
@@ -20,14 +20,14 @@ fn base_color(submission: &Path, instance: &str, ending: &str) -> PathBuf {
     submission.join("scenes/room").join(instance).join("base_color").with_extension(ending)
 }
 
-/// Scores it; without LPIPS, which would only take time.
+/// Scores the submission without LPIPS, which would only take time.
 fn scored(submission: &Path) -> Value {
     let out = submission.with_extension("json");
     run(score(submission, unrendered(), &out).env("MATEVAL_CACHE", submission)).ends_with(0);
     json(&out)
 }
 
-/// Puts a grey EXR, as large as the least that is allowed, in the place of the map.
+/// Replaces the map by a grey EXR of the smallest allowed size.
 fn make_grey(submission: &Path, instance: &str) {
     std::fs::remove_file(base_color(submission, instance, "png")).unwrap();
     let grey = Picture::filled(64, 64, LinearRgb([0.5; 3]));
@@ -36,7 +36,7 @@ fn make_grey(submission: &Path, instance: &str) {
 
 type Fault = (&'static str, &'static str, fn(&Path));
 
-/// An instance, the finding's code, and what is done to `gt`.
+/// An instance, the finding's code, and the change of `gt`.
 const FAULTS: [Fault; 7] = [
     ("floor", "missing_map", |root| std::fs::remove_file(base_color(root, "floor", "png")).unwrap()),
     ("rug", "unsound_map", |root| {
@@ -63,7 +63,7 @@ const FAULTS: [Fault; 7] = [
 ];
 
 #[test]
-fn what_cannot_be_used_scores_as_grey() {
+fn unusable_maps_score_as_grey() {
     let folder = tempfile::tempdir().unwrap();
     let whole = scored(&truth(folder.path(), "whole"));
     assert_eq!(whole["findings"], Value::Array(Vec::new()));
@@ -79,7 +79,7 @@ fn what_cannot_be_used_scores_as_grey() {
 
         let grey = truth(folder.path(), &format!("grey_{instance}"));
         make_grey(&grey, instance);
-        // A folder that is gone takes roughness and metallic along, whose defaults light shows.
+        // With a missing folder, roughness and metallic are missing too; their defaults show in the light.
         for map in ["roughness.png", "metallic.png"] {
             let file = |submission: &Path| submission.join("scenes/room").join(instance).join(map);
             if !file(&folder.path().join(format!("damaged_{instance}"))).exists() {
@@ -89,13 +89,13 @@ fn what_cannot_be_used_scores_as_grey() {
         let grey = scored(&grey);
         assert_eq!(grey["findings"], Value::Array(Vec::new()), "{instance}");
         assert_eq!(damaged["protocols"], grey["protocols"], "{instance}");
-        // The twin: the map itself scores something else.
+        // The twin: the undamaged map has other scores.
         assert_ne!(damaged["protocols"], whole["protocols"], "{instance}");
     }
 }
 
 #[test]
-fn findings_are_told_on_stderr_too() {
+fn findings_are_also_on_stderr() {
     let folder = tempfile::tempdir().unwrap();
     let submission = truth(folder.path(), "gt");
     std::fs::remove_file(base_color(&submission, "floor", "png")).unwrap();
@@ -104,7 +104,7 @@ fn findings_are_told_on_stderr_too() {
 }
 
 #[test]
-fn another_datasets_submission_is_told() {
+fn a_submission_for_another_dataset_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let submission = truth(folder.path(), "gt");
     super::planted::edit_json(&submission.join("submission.json"), |file| {
@@ -114,7 +114,7 @@ fn another_datasets_submission_is_told() {
 }
 
 #[test]
-fn what_is_no_submission_cannot_be_scored() {
+fn inputs_that_cannot_be_scored_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
     run(&mut score(folder.path(), unrendered(), &out)).ends_with(2).says("submission.json");

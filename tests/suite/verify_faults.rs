@@ -1,4 +1,4 @@
-//! `prep verify`: it passes a sound dataset and names each of many planted faults.
+//! `prep verify` accepts a sound dataset and names each of many planted faults.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use super::command::{Run, run, verify};
 use super::planted::{Room, edit_json, rehash, roll};
 use super::sample::{copied_dataset, dataset};
 
-/// A fault, and what must be said of it.
+/// A fault and the finding that must report it.
 struct Fault {
     what: &'static str,
     /// Code and file of the finding.
@@ -51,7 +51,7 @@ fn check_all(faults: &[Fault], new_hashes: bool, expected: usize) {
     }
 }
 
-/// The twin of all others: new hashes alone are no fault, and neither is a dataset without its ground truth.
+/// The twin of all others: neither new hashes alone nor a missing ground truth are faults.
 #[test]
 fn sound_datasets_pass() {
     let passed = run(&mut verify(dataset())).ends_with(0);
@@ -255,7 +255,7 @@ fn pictures() {
     check_all(&faults, true, 11);
 }
 
-/// Gives the sofa's parts each other's ids in the input view.
+/// Exchanges the ids of the sofa's parts in the input view.
 fn shuffle_the_sofa(root: &Path) {
     let room = Room::of(root);
     let scene = super::sample::json(&room.file("scene.json"));
