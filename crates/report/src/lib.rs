@@ -1,8 +1,9 @@
-//! From results to what people look at.
+//! Shows results to people.
 //!
-//! In: results, and for pictures the dataset and the submissions. Out: tables ([`tables`]), ranks with intervals
-//! ([`ranking`]), a site ([`leaderboard`]), pictures side by side ([`picture_set`], [`strips`]), where and how a scene's
-//! albedo errs ([`explain`]), the metrics of two picture files ([`pair`]).
+//! In: results; for pictures also the dataset and the submissions. Out: tables ([`tables`]), ranks with intervals
+//! ([`ranking`]), a site ([`leaderboard`]), pictures side by side ([`picture_set`], [`strips`]), an explanation of
+//! where and how the albedo of a scene errs ([`explain`]), the metrics of two picture files ([`pair`]). Results that
+//! contradict each other, or what they are shown with, are refused with every reason ([`mismatch`]).
 
 pub mod error;
 pub mod explain;

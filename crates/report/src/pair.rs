@@ -9,7 +9,8 @@ use serde::Serialize;
 
 use crate::error::ReportError;
 
-/// What `eval image` gives. Values are null where no pixel or window counts; LPIPS is absent where its weights are.
+/// The metrics of a pair of pictures. A value is null if no pixel or window counts; networks without weights are left
+/// out.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct PairValues {
     /// Mean squared error over all pixels.
@@ -20,22 +21,22 @@ pub struct PairValues {
     pub ssim: Option<f64>,
     /// LPIPS of the whole picture.
     pub lpips: Vec<NetValue>,
-    /// The same inside a mask.
+    /// The metrics inside the mask, if there is one.
     pub masked: Option<MaskedValues>,
 }
 
-/// What `eval image` gives for a mask.
+/// The metrics of a pair of pictures inside a mask.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MaskedValues {
-    /// Pixels of the mask.
+    /// The number of pixels of the mask.
     pub pixels: usize,
     /// Mean squared error over them.
     pub mse: Option<f64>,
     /// Its PSNR, dB.
     pub psnr: Option<f64>,
-    /// SSIM over the windows wholly inside (`mateval-1`).
+    /// SSIM over the windows that lie wholly inside the mask (`mateval-1`).
     pub ssim_inside: Option<f64>,
-    /// How many those are.
+    /// The number of those windows.
     pub ssim_windows: usize,
     /// SSIM of both pictures blacked out outside (`paper`).
     pub ssim_black_fill: Option<f64>,
@@ -45,22 +46,22 @@ pub struct MaskedValues {
     pub lpips_black_fill: Vec<NetValue>,
 }
 
-/// A network's distance.
+/// The distance by one network.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct NetValue {
     /// `lpips_alex` or `lpips_vgg`.
     pub metric: String,
-    /// Its distance.
+    /// The distance; null if the picture is too small for the network.
     pub value: Option<f64>,
 }
 
-/// A picture to compare: sRGB-encoded, with the bytes that it was made of where it was 8-bit.
+/// A picture to compare: sRGB-encoded, with its bytes if it has 8 bits.
 struct Loaded {
     srgb: Picture<SrgbRgb>,
     bytes: Option<Picture<SrgbRgb>>,
 }
 
-/// Reads both pictures (PNG as it stands; EXR clipped to 0..1 and sRGB-encoded) and compares them.
+/// Reads both pictures (PNG unchanged, EXR clipped to 0..1 and sRGB-encoded) and compares them.
 pub fn compare(
     prediction: &Path,
     reference: &Path,
@@ -114,7 +115,7 @@ fn values(
     Ok(PairValues { mse, psnr, ssim: Some(ssim(p, r)?), lpips: each(&|net| net.whole(p, r).map(Some))?, masked })
 }
 
-/// MSE and PSNR. Bytes are compared as whole numbers: value / 255 would round in f32 and cost the ninth digit.
+/// MSE and PSNR. Bytes are compared as integers, since value / 255 rounds in f32 and changes the ninth digit.
 fn errors(
     prediction: &Loaded,
     reference: &Loaded,

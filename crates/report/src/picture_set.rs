@@ -1,6 +1,7 @@
-//! Pictures one by one, as a leaderboard shows them: `<method>/<scene>/<view>/<kind>.png`, the truth's under `_truth`.
+//! A set of single pictures, as a leaderboard shows them: `<method>/<scene>/<view>/<kind>.png`, the truth's under
+//! `_truth`.
 //!
-//! A kind is any word, as in `albedo` or `rgb_true`; `<kind>-error` is where a prediction of that kind errs.
+//! A kind is any word, as in `albedo` or `rgb_true`; `<kind>-error` shows the errors of a prediction of that kind.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
@@ -15,19 +16,19 @@ use crate::error::ReportError;
 use crate::strips::{StripPlan, StripRow, errors, rows};
 use mateval_eval::open_scene::scored_views;
 
-/// The truth's folder: no method's id begins like this.
+/// The folder of the truth's pictures; no id of a method begins with an underscore.
 pub const TRUTH: &str = "_truth";
 
-/// Behind a kind: where the prediction errs.
+/// The suffix of kinds that show errors.
 pub const ERROR: &str = "-error";
 
-/// Where a picture lies in a set.
+/// The path of a picture in a set.
 pub fn place(set: &Path, method: &str, scene: &SceneId, view: &ViewId, kind: &str) -> PathBuf {
     set.join(method).join(scene.as_str()).join(view.as_str()).join(format!("{kind}.png"))
 }
 
-/// Writes the pictures of one scene and their errors; `names` are the folders of the plan's submissions. What is not valid is
-/// black.
+/// Writes the pictures of one scene and their errors; `names` are the folders of the plan's submissions. Invalid
+/// pixels are black.
 pub fn write(
     plan: &StripPlan<'_>,
     names: &[&str],
@@ -44,7 +45,7 @@ pub fn write(
                 Ok(png_io::write_rgb_bytes(&path, picture)?)
             };
             for (method, picture) in std::iter::once(&TRUTH).chain(names).zip(&row.shown) {
-                write(method, shown.kind().word(), &valid_alone(&row, picture))?;
+                write(method, shown.kind().word(), &black_where_invalid(&row, picture))?;
             }
             for (method, error) in names.iter().zip(errors(&row)) {
                 write(method, &format!("{}{ERROR}", shown.kind()), &error)?;
@@ -54,21 +55,22 @@ pub fn write(
     Ok(())
 }
 
-fn valid_alone(row: &StripRow, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
+fn black_where_invalid(row: &StripRow, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
     Picture::from_fn(picture.width(), picture.height(), |x, y| match row.truth.valid.get(x, y) {
         true => picture.get(x, y).0.map(byte_from_unit),
         false => [0; 3],
     })
 }
 
-/// Which pictures there are: by method, scene and view their kinds.
+/// The kinds of pictures that exist, by method, scene and view.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PictureSet {
     kinds: BTreeMap<[String; 3], BTreeSet<String>>,
 }
 
 impl PictureSet {
-    /// What is in the folder; names that are no ids, and files that are no PNG, are passed over. Links are not followed.
+    /// Lists the pictures in a folder. Names that are not ids and files that are not PNG are skipped; links are not
+    /// followed.
     pub fn list(set: &Path) -> Result<Self, ReportError> {
         let mut found = Self::default();
         for method in folders(set)? {
@@ -90,7 +92,7 @@ impl PictureSet {
         self.kinds.get(&key).into_iter().flatten().map(String::as_str).collect()
     }
 
-    /// The views of a scene that anybody has a picture of.
+    /// The views of a scene that any method has a picture of.
     pub fn views(&self, scene: &SceneId) -> BTreeSet<&str> {
         self.kinds.keys().filter(|[_, of, _]| of == scene.as_str()).map(|[_, _, view]| view.as_str()).collect()
     }
@@ -109,7 +111,7 @@ impl PictureSet {
     }
 }
 
-/// Words that are safe in paths and links.
+/// Whether a name is safe in paths and links.
 fn is_word(name: &str) -> bool {
     let is_safe = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     !name.is_empty() && name.len() <= 64 && name.chars().all(is_safe)
@@ -139,7 +141,7 @@ fn entries(path: &Path) -> Result<Vec<(String, std::fs::FileType)>, ReportError>
     Ok(found)
 }
 
-/// Width and height of a PNG, from its head; none where it is no PNG.
+/// Width and height of a PNG, from its header; none if the file is not a PNG.
 pub(crate) fn png_size(path: &Path) -> Option<[u32; 2]> {
     let mut head = [0; 24];
     std::fs::File::open(path).ok()?.read_exact(&mut head).ok()?;

@@ -1,4 +1,5 @@
-//! Pictures side by side, as the paper's Figures 4 to 7: a row a view, the truth's column first, then one a submission.
+//! Pictures side by side, as in the paper's Figures 4 to 7: one row for each view; the truth first, then one column for
+//! each submission.
 
 use std::path::{Path, PathBuf};
 
@@ -16,57 +17,57 @@ use mateval_eval::result_key::PictureKind;
 use mateval_eval::shown_scene::{SceneAlbedo, SceneLight, scene_albedo, scene_light};
 use mateval_eval::truth::ViewTruth;
 
-/// What the input view shows is darkened to this share in the other views (of the sRGB value).
+/// In novel views, pixels that the input view sees are darkened to this share of their sRGB values.
 const OBSERVED_SHARE: f32 = 0.4;
-/// The error that is white: root mean square over the channels.
+/// The error that is drawn white: root mean square over the channels.
 pub const WHITE_ERROR: f32 = 0.5;
 /// Pixels between pictures, and their colour.
 const GAP: usize = 4;
 pub(crate) const GAP_COLOR: [u8; 3] = [255; 3];
-/// Rows of the scale beneath error maps.
+/// Height of the colour scale below error maps, in pixels.
 pub(crate) const SCALE_ROWS: usize = 12;
 
 /// What strips show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
-    /// base_color; errors are of linear values.
+    /// base_color, with errors of linear values.
     Albedo,
-    /// The scene lit as a track of protocol `mateval-1` lights it; errors are of sRGB values. Not [`Track::Relit`], which
-    /// has many lights.
+    /// Renders under a track of protocol `mateval-1`, with errors of sRGB values. Not [`Track::Relit`], which has
+    /// several lights.
     Light {
-        /// Which.
+        /// The track.
         track: Track,
-        /// Samples a pixel of each of two halves.
+        /// Samples per pixel in each of two halves.
         samples: u32,
     },
 }
 
-/// What strips are made of.
+/// What strips are made from.
 pub struct StripPlan<'a> {
-    /// With its ground truth.
+    /// The dataset, with its ground truth.
     pub dataset: &'a Dataset,
-    /// Folders; a column each.
+    /// Folders of submissions, one column for each.
     pub submissions: &'a [&'a Path],
-    /// All where there are none.
+    /// The scenes to show; all if empty.
     pub scenes: &'a [SceneId],
-    /// A pair of files each.
+    /// What to show, in a pair of files each.
     pub shown: &'a [Shown],
     /// The folder of the pictures.
     pub out: &'a Path,
-    /// Whether pictures that are there are replaced.
+    /// Whether existing pictures are replaced.
     pub force: bool,
 }
 
-/// A view's row: masks, and pictures of the truth and then of every submission.
+/// The row of a view: its masks, and the pictures of the truth and then of every submission.
 pub(crate) struct StripRow {
     pub(crate) truth: ViewTruth,
     pub(crate) shown: Vec<Picture<SrgbRgb>>,
-    /// What errors are taken of.
+    /// The values that errors are computed from.
     compared: Vec<Picture<[f32; 3]>>,
 }
 
 impl Shown {
-    /// The kind of picture, after which files are named.
+    /// The kind of picture that is shown, which file names contain.
     pub fn kind(self) -> PictureKind {
         match self {
             Self::Albedo => PictureKind::Albedo,
@@ -75,11 +76,11 @@ impl Shown {
     }
 }
 
-/// Writes `<scene>-<name>.png` and `<scene>-<name>-error.png` of all that shall be shown. Gives their paths.
+/// Writes `<scene>-<kind>.png` and `<scene>-<kind>-error.png` for each scene and kind of picture. Returns their paths.
 ///
-/// Views are rows in the dataset's order; columns are the truth, then the submissions in the plan's. In views other
-/// than the input what it shows is darkened, and what is not valid is black. Error maps leave the truth's column out;
-/// their last row is the scale, black 0 to white [`WHITE_ERROR`] from left to right.
+/// Rows are views in the dataset's order; columns are the truth, then the submissions in the plan's order. In novel
+/// views, pixels that the input view sees are darkened. Invalid pixels are black. Error maps have no column for the
+/// truth; their last row is the colour scale, from black for 0 on the left to white for [`WHITE_ERROR`] on the right.
 pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, ReportError> {
     let chosen = plan.dataset.chosen_scenes(plan.scenes)?;
     let paths = |scene: &SceneId, shown: Shown| {
@@ -108,7 +109,7 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     Ok(written)
 }
 
-/// One scene's views.
+/// The rows of one scene.
 pub(crate) fn rows(
     plan: &StripPlan<'_>,
     scene: &SceneFile,
@@ -162,7 +163,7 @@ fn darkened(truth: &ViewTruth, picture: &Picture<SrgbRgb>) -> Picture<[u8; 3]> {
     })
 }
 
-/// Where each submission errs.
+/// The error map of each submission.
 pub(crate) fn errors(row: &StripRow) -> Vec<Picture<[u8; 3]>> {
     let Some((reference, predicted)) = row.compared.split_first() else { return Vec::new() };
     let error = |picture: &Picture<[f32; 3]>| {
@@ -182,7 +183,7 @@ pub(crate) fn error_color(a: [f32; 3], b: [f32; 3]) -> [u8; 3] {
     glow((squares / 3.0).sqrt() / WHITE_ERROR)
 }
 
-/// Black, red, yellow, white for 0 to 1: brighter is worse, in print and to the colour-blind too.
+/// Black, red, yellow, white for 0 to 1: brighter is worse, also in print and for colour-blind readers.
 fn glow(share: f32) -> [u8; 3] {
     [0.0, 1.0, 2.0].map(|start| byte_from_unit(share.clamp(0.0, 1.0) * 3.0 - start))
 }
@@ -192,7 +193,7 @@ pub(crate) fn scale(width: usize) -> Picture<[u8; 3]> {
     Picture::from_fn(width, SCALE_ROWS, |x, _| glow((x as f32 + 0.5) / width as f32))
 }
 
-/// Rows of pictures with gaps between them; pictures of one row are of one height, of one column of one width.
+/// Pictures in rows and columns with gaps between them; those of a row have one height, those of a column one width.
 pub(crate) fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
     let starts = |sizes: &mut dyn Iterator<Item = usize>| {
         let mut starts = vec![0];

@@ -1,4 +1,4 @@
-//! What scales alone would mend: of pictures, instances, the scene.
+//! Scores of the albedo after scaling alone, with one scale for each picture, each instance or the whole scene.
 
 use std::collections::BTreeMap;
 
@@ -24,14 +24,14 @@ const ALL: [AlignedBy; 6] = [
     AlignedBy::InstanceAndChannel,
 ];
 
-/// Scales by what has one of its own.
+/// The scale of each channel, by owner.
 type Scales = BTreeMap<Owner, [f64; 3]>;
 
-/// Number of the view and index of the instance; 0 where all of them share.
+/// What has scales of its own: number of the view and index of the instance, each 0 if all of them share the scales.
 type Owner = (usize, u16);
 
-/// The scores of each kind of scales, first of the input view, then of the novel ones, then of what is unobserved in
-/// those.
+/// The scores with each kind of scales: first in the input view, then in the novel views, then in their unobserved
+/// pixels.
 pub(super) fn alignments(
     scene: &SceneId,
     protocol: &Protocol,
@@ -40,12 +40,12 @@ pub(super) fn alignments(
     let named = |source| ReportError::Metric { what: format!("scene '{scene}'"), source };
     let mut scores = Vec::new();
     for by in ALL {
-        scores.extend(of_kind(by, protocol, views).map_err(named)?);
+        scores.extend(scores_with(by, protocol, views).map_err(named)?);
     }
     Ok(scores)
 }
 
-fn of_kind(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Result<Vec<AlignmentScores>, MetricError> {
+fn scores_with(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Result<Vec<AlignmentScores>, MetricError> {
     let scales = scales(by, views);
     let mut values: BTreeMap<Views, Vec<f64>> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
@@ -75,11 +75,11 @@ fn owner(by: AlignedBy, view: usize, instance: u16) -> Owner {
     }
 }
 
-/// The best for squares over the valid pixels.
+/// The scales with the least squared error over the valid pixels.
 fn scales(by: AlignedBy, views: &[SceneAlbedo]) -> Scales {
     let mut sums: BTreeMap<Owner, [[f64; 3]; 2]> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
-        for at in counting(&view.truth.valid) {
+        for at in counted(&view.truth.valid) {
             let sums = sums.entry(owner(by, number, view.truth.instances.pixels()[at])).or_default();
             let (truth, predicted) = (view.truth.albedo.pixels()[at].0, view.predicted[0].pixels()[at].0);
             for c in 0..3 {
@@ -96,7 +96,7 @@ fn scales(by: AlignedBy, views: &[SceneAlbedo]) -> Scales {
     sums.into_iter().map(|(owner, sums)| (owner, best(sums))).collect()
 }
 
-fn counting(mask: &Mask) -> impl Iterator<Item = usize> {
+fn counted(mask: &Mask) -> impl Iterator<Item = usize> {
     mask.pixels().iter().enumerate().filter(|(_, counts)| **counts).map(|(at, _)| at)
 }
 
@@ -109,7 +109,7 @@ fn aligned(by: AlignedBy, scales: &Scales, number: usize, view: &SceneAlbedo) ->
         return scaled(predicted, scales.get(&(number, 0)).copied().unwrap_or([1.0; 3]));
     }
     let mut aligned = predicted.clone();
-    for at in counting(&view.truth.valid) {
+    for at in counted(&view.truth.valid) {
         let scales = scales[&owner(by, number, view.truth.instances.pixels()[at])];
         let LinearRgb(rgb) = predicted.pixels()[at];
         aligned.pixels_mut()[at] = LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * scales[c]) as f32));
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
     use mateval_eval::truth::ViewTruth;
 
-    /// Two views; instances 1 and 2 are half and a fourth as bright as they should be.
+    /// Two views in which instances 1 and 2 have a half and a fourth of their true brightness.
     fn views() -> Vec<SceneAlbedo> {
         let view = |number: usize| {
             let albedo = Picture::from_fn(6, 4, |x, y| LinearRgb([0.1 * (1 + x) as f32, 0.2 * (1 + y) as f32, 0.5]));
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn scales_of_instances_mend_what_those_of_the_scene_cannot() {
+    fn scales_of_instances_remove_errors_that_a_scale_of_the_scene_cannot() {
         let protocol = Protocol::named("mateval-1").unwrap();
         let scores = alignments(&SceneId::new("s").unwrap(), &protocol, &views()).unwrap();
         assert_eq!(scores.len(), 6 * 3);

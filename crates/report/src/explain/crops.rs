@@ -8,12 +8,12 @@ use super::patch::Patch;
 use crate::strips::{GAP_COLOR, SCALE_ROWS, error_color, grid, scale};
 use mateval_eval::shown_scene::SceneAlbedo;
 
-/// Pixels around the instance that are shown too.
+/// Width of the margin around the instance, in pixels.
 const MARGIN: usize = 8;
-/// What is not the instance is darkened to this share (of the sRGB value).
+/// Pixels of other instances are darkened to this share of their sRGB values.
 const OTHERS_SHARE: f32 = 0.4;
-/// Crops are enlarged by a whole factor until they are about this wide or high.
-const ABOUT: usize = 400;
+/// The width or height, in pixels, that crops are enlarged towards by a whole factor.
+const TARGET_SIZE: usize = 400;
 
 /// Number of the view in which the instance has the largest sum of squared errors.
 pub(super) fn worst_view(patches: &[Patch]) -> usize {
@@ -21,8 +21,8 @@ pub(super) fn worst_view(patches: &[Patch]) -> usize {
     patches.iter().max_by(|a, b| error(a).total_cmp(&error(b)).then(b.view.cmp(&a.view))).map_or(0, |patch| patch.view)
 }
 
-/// Truth, prediction and error of that view side by side; beneath the error its scale, from 0 to
-/// [`crate::strips::WHITE_ERROR`]. What is not the instance is dark, and has no error.
+/// Truth, prediction and error of that view side by side, with the colour scale of errors, from 0 to
+/// [`crate::strips::WHITE_ERROR`], below the error. Other instances are dark and show no error.
 pub(super) fn crop(views: &[SceneAlbedo], patches: &[Patch]) -> Picture<[u8; 3]> {
     let number = worst_view(patches);
     let patch = patches.iter().find(|patch| patch.view == number).expect("the worst view is one of the patches'");
@@ -64,7 +64,7 @@ impl Area {
         let right = (patch.corner[0] + patch.size[0] + MARGIN).min(picture.width());
         let bottom = (patch.corner[1] + patch.size[1] + MARGIN).min(picture.height());
         let (width, height) = (right - left, bottom - top);
-        Self { left, top, width, height, factor: (ABOUT / width.max(height)).max(1) }
+        Self { left, top, width, height, factor: (TARGET_SIZE / width.max(height)).max(1) }
     }
 
     /// `color` of the picture's pixels, each enlarged to a square.

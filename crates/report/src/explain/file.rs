@@ -1,25 +1,25 @@
-//! Type of the explanation that `mateval eval explain --format json` prints.
+//! The explanation of one scene, as `mateval eval explain --format json` prints it.
 
 use mateval_eval::result_key::{PictureKind, Views};
 use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The word for this version of an explanation.
+/// The format of this version of explanations.
 pub const EXPLAIN_FORMAT: &str = "mateval-explain/1";
 
-/// Where a submission's albedo errs in one scene, and how. Errors are squared, linear, means over channels, over the valid
-/// pixels of all scored views that show an instance.
+/// Where and how the albedo of a submission errs in one scene. Errors are mean squared errors of linear values, over
+/// channels and over the valid pixels of all scored views that show an instance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExplainFile {
     /// Always `mateval-explain/1`.
     pub format: String,
-    /// What made it, as in `mateval 0.1.0`.
+    /// The tool that wrote it, as in `mateval 0.1.0`.
     pub tool: String,
     /// The method's name.
     pub method: String,
-    /// The result's hash of the submission, which the submission was found to have.
+    /// Hash of the submission, on which the result and the submission agree.
     pub submission_sha256: String,
     /// SHA-256 of the dataset's manifest, hex.
     pub dataset_manifest_sha256: String,
@@ -31,41 +31,43 @@ pub struct ExplainFile {
     pub scene: SceneId,
     /// The scored views, in the scene's order.
     pub views: Vec<ViewId>,
-    /// Pixels that count, in all views.
+    /// The number of compared pixels in all views.
     pub pixels: usize,
     /// Mean over those pixels.
     pub mse: f64,
-    /// Of that mean, in dB.
+    /// PSNR of that mean, in dB.
     pub psnr: f64,
-    /// Of the whole scene; null where there is no error.
+    /// Shares of the whole scene's error; null if there is no error.
     pub kinds: Option<KindShares>,
-    /// Every instance that counts, the one with the largest share first.
+    /// Every instance with compared pixels, the one with the largest share first.
     pub instances: Vec<InstanceExplanation>,
-    /// What scales alone would mend.
+    /// Scores after scaling alone.
     pub alignments: Vec<AlignmentScores>,
-    /// The worst instances of each track of light that the result has them of, ten of each at most, the worst first.
+    /// The worst instances under each light for which the result has errors of instances, at most ten for each, the
+    /// worst first.
     pub light: Vec<LightShare>,
-    /// What the result found wrong with the submission in this scene.
+    /// The result's findings about the submission in this scene.
     pub findings: Vec<Finding>,
 }
 
-/// Shares of the squared error by kind, which add up to 1. Each is what its step takes away from what the steps before it
-/// have left, so that shares depend on the steps' order: it is that of these keys.
+/// Shares of the squared error by kind, which add up to 1. Each step removes its share from the error that the steps
+/// before it leave. The shares therefore depend on the order of the steps, which is the order of these keys.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KindShares {
-    /// By one scale an instance, of all channels alike: its brightness.
+    /// Removed by one scale for all channels of an instance: wrong brightness.
     pub scale: f64,
-    /// By one scale a channel and instance: its tint.
+    /// Removed by one scale for each channel of an instance: wrong tint.
     pub chroma: f64,
-    /// By a factor for each view of an instance that is a quadratic polynomial of the pixel's place: shading left in, or
-    /// another smooth change of brightness that the truth has and the prediction lacks.
+    /// Removed by a factor that is a quadratic polynomial of the pixel's position, in each view of an instance: shading
+    /// left in the albedo, or another smooth change of brightness that the truth has and the prediction lacks.
     pub shading: f64,
-    /// By moving the prediction up to 4 whole pixels along either axis, in each view of an instance.
+    /// Removed by moving the prediction by up to 4 whole pixels along either axis, in each view of an instance.
     pub misplacement: f64,
-    /// By adding a share of the truth's own detail, which blur would have removed, to an instance.
+    /// Removed by adding a share of the truth's own detail to an instance: detail that the prediction lacks, as after
+    /// blur.
     pub detail: f64,
-    /// None of these.
+    /// Removed by none of the steps.
     pub rest: f64,
 }
 
@@ -75,9 +77,9 @@ pub struct KindShares {
 pub struct InstanceExplanation {
     /// The instance.
     pub instance: InstanceId,
-    /// The source's category, where it says so.
+    /// Its category, if the source states one.
     pub category: Option<String>,
-    /// The source's broader category.
+    /// Its broader category, if the source states one.
     pub super_category: Option<String>,
     /// Its pixels in all views.
     pub pixels: usize,
@@ -85,15 +87,15 @@ pub struct InstanceExplanation {
     pub mse: f64,
     /// Its share of the scene's squared error, 0 to 1.
     pub share: f64,
-    /// Null where it has no error.
+    /// Shares of its error; null if it has none.
     pub kinds: Option<KindShares>,
-    /// The factor that brings its albedo nearest to the truth's; 1 where all of it is black.
+    /// The factor that brings the prediction nearest to the truth; 1 if the prediction is black.
     pub scale: f64,
-    /// The factors a channel that do so behind that one; 1 where a channel is black.
+    /// For each channel, the factor that does so after `scale`; 1 if the channel is black.
     pub channel_scales: [f64; 3],
-    /// Where the prediction had to be moved.
+    /// The views in which the prediction was moved.
     pub shifts: Vec<ViewShift>,
-    /// Standard deviation, in pixels, of the blur whose loss the missing detail is most like; null where none is missing.
+    /// Standard deviation, in pixels, of the blur that best explains the missing detail; null if none is missing.
     pub blur_sigma_pixels: Option<f64>,
 }
 
@@ -103,17 +105,17 @@ pub struct InstanceExplanation {
 pub struct ViewShift {
     /// The view.
     pub view: ViewId,
-    /// To the right and down.
+    /// Pixels to the right and down.
     pub pixels: [i32; 2],
 }
 
-/// What is left after scales of one kind: means over the scene's pictures, in the protocol's space of albedo.
+/// The scores after scaling: means over the scene's pictures, in the protocol's albedo space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AlignmentScores {
-    /// What has a scale of its own.
+    /// What has scales of its own.
     pub scales: AlignedBy,
-    /// `input`, `novel`, `unobserved`.
+    /// `input`, `novel` or `unobserved`.
     pub views: Views,
     /// Mean over pictures.
     pub mse: f64,
@@ -121,7 +123,7 @@ pub struct AlignmentScores {
     pub psnr: f64,
 }
 
-/// What has a scale of its own. Scales are the best for the squared error in linear light over the valid pixels.
+/// What has scales of its own. The scales minimise the squared error of linear values over the valid pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignedBy {
@@ -151,8 +153,8 @@ pub struct LightShare {
     pub category: Option<String>,
     /// Its pixels in the input view and the novel ones.
     pub pixels: usize,
-    /// Mean over those, as the result has it: of encoded pictures, free of noise.
+    /// Mean squared error over those, from the result: of sRGB-encoded pictures, with render noise removed.
     pub mse: f64,
-    /// Of the scene's, which can hold terms below 0 too: noise is removed on average only.
+    /// Its share of the scene's squared error. Single errors can be below 0, since noise is removed only on average.
     pub share: f64,
 }

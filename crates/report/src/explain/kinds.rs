@@ -1,8 +1,8 @@
 //! An instance's squared error, taken apart by kind so that the parts add up.
 //!
-//! Let t be the truth's pixels of one instance in all views and channels, m0 = p the prediction's, in linear light. Each
-//! step k changes the model m(k-1) to the m(k) that is nearest to t, in the sum of squares E(k) = |t - m(k)|², among those
-//! that it may choose from:
+//! Let t be the truth's pixels of one instance in all views and channels, and m0 = p the prediction's, both linear.
+//! Step k replaces the model m(k-1) by that m(k) of its family of models which is nearest to t, in the sum of squares
+//! E(k) = |t - m(k)|²:
 //!
 //! 1. scale: m1 = s m0, one s for all; s = <t, m0> / <m0, m0>.
 //! 2. chroma: m2 = s_c m1, one s_c a channel, by the same formula.
@@ -12,37 +12,38 @@
 //!    ([`super::shift`]).
 //! 5. detail: m5 = m4 + b (t - G t), one b >= 0, G the one of some Gaussians that does best ([`super::lost_detail`]).
 //!
-//! Steps 1, 2 and 3 are orthogonal projections of what is left, t - m(k-1), on the space that the step spans, step 5 is one
-//! on a half line, and step 4 picks the best of a list that holds no change. So no step makes E larger, its kind's part is
-//! E(k-1) - E(k) >= 0, the rest is E(5), and they add up to E(0).
+//! Steps 1, 2 and 3 are orthogonal projections of the residual t - m(k-1) on the space that the step spans, step 5 is
+//! one on a half line, and step 4 picks the best of a list that includes no shift. No step therefore increases E: the
+//! part of its kind is E(k-1) - E(k) >= 0, the rest is E(5), and all parts add up to E(0).
 //!
-//! **Order matters.** An error that two steps could take away counts for the first. Scale and chroma take a little of
-//! every error, as the best fit to what does not match is dimmer. A quadratic also follows what is smooth in the truth and
-//! lacking in the prediction, which has nothing to do with light: of a flat prediction 'shading' is the truth's own slope.
-//! Detail comes behind misplacement, as what is at the wrong place lacks where it should be. Detail of the prediction that
-//! the truth does not have is rest. Views and instances of few pixels let steps 3 and 4 fit what is chance.
+//! **Order matters.** An error that two steps could remove counts for the first of them. Scale and chroma remove a
+//! little of every error, because the best fit to values that do not match is dimmer. A quadratic also follows smooth
+//! changes of the truth that the prediction lacks, whether or not light causes them: for a flat prediction, 'shading'
+//! is the slope of the truth itself. Detail comes after misplacement, because misplaced detail is missing where it
+//! belongs. Detail of the prediction that the truth does not have is rest. In views and instances of few pixels, steps
+//! 3 and 4 fit chance.
 
 use super::file::KindShares;
 use super::model::{Model, error};
 use super::patch::Patch;
 use super::{lost_detail, scales, shift, smooth_field};
 
-/// What was found of one instance, or of several.
+/// The error of one instance, or of several, taken apart.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Explained {
     pub(super) pixels: usize,
     /// Sum over pixels and channels.
     pub(super) squared_error: f64,
-    /// What is left after each step.
+    /// The squared error that each step leaves.
     left: [f64; 5],
     pub(super) scale: f64,
     pub(super) channel_scales: [f64; 3],
-    /// Only those that are none.
+    /// The views in which the model was moved.
     pub(super) shifts: Vec<shift::Shift>,
     pub(super) blur_sigma_pixels: Option<f64>,
 }
 
-/// Takes one instance's patches apart.
+/// Takes the error of one instance apart, given its patches.
 pub(super) fn explained(patches: &[Patch]) -> Explained {
     let mut model: Model = patches.iter().map(|patch| patch.predicted.clone()).collect();
     let squared_error = error(patches, &model);
@@ -64,7 +65,7 @@ pub(super) fn explained(patches: &[Patch]) -> Explained {
 }
 
 impl Explained {
-    /// All of them as one; scales, shifts and blur are an instance's alone.
+    /// The sum over several instances, without scales, shifts and blur, which only single instances have.
     pub(super) fn sum<'a>(all: impl Iterator<Item = &'a Self>) -> Self {
         let none = Self {
             pixels: 0,
@@ -83,12 +84,12 @@ impl Explained {
         })
     }
 
-    /// Mean over pixels and channels; 0 where there are none.
+    /// Mean squared error over pixels and channels; 0 if there are no pixels.
     pub(super) fn mse(&self) -> f64 {
         if self.pixels == 0 { 0.0 } else { self.squared_error / (3 * self.pixels) as f64 }
     }
 
-    /// The shares; none where there is no error.
+    /// The shares of the kinds; none if there is no error.
     pub(super) fn kinds(&self) -> Option<KindShares> {
         let [scale, chroma, shading, shift, detail] = self.left;
         let share = |before: f64, after: f64| (before - after) / self.squared_error;

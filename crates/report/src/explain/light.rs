@@ -1,4 +1,4 @@
-//! The worst instances of each track of light, from the result alone.
+//! The worst instances under each light, from the result alone.
 
 use std::collections::BTreeMap;
 
@@ -9,16 +9,16 @@ use super::plan::WORST;
 use mateval_eval::result::ProtocolResult;
 use mateval_eval::result_key::{PictureKind, Views};
 
-/// The tracks of light that instances have errors of.
+/// The kinds of renders for which results hold errors of instances.
 pub(super) const LIGHTS: [PictureKind; 2] = [PictureKind::RgbTrue, PictureKind::RgbFitted];
 
-/// Of each track in turn the instances with the largest shares of the scene's squared error in the input view and the
-/// novel ones, the largest first.
+/// For each kind of render, the [`WORST`] instances with the largest shares of the scene's squared error in the input
+/// view and the novel views, the largest first.
 pub(super) fn worst(scores: &ProtocolResult, scene: &SceneId) -> Vec<LightShare> {
-    LIGHTS.into_iter().flat_map(|picture| of_track(scores, scene, picture)).collect()
+    LIGHTS.into_iter().flat_map(|picture| of_kind(scores, scene, picture)).collect()
 }
 
-fn of_track(scores: &ProtocolResult, scene: &SceneId, picture: PictureKind) -> Vec<LightShare> {
+fn of_kind(scores: &ProtocolResult, scene: &SceneId, picture: PictureKind) -> Vec<LightShare> {
     let mut sums: BTreeMap<&InstanceId, (f64, usize, Option<String>)> = BTreeMap::new();
     let of_scene = scores.instances.iter().filter(|errors| errors.scene == *scene && errors.picture == picture);
     for errors in of_scene.filter(|errors| matches!(errors.views, Views::Input | Views::Novel)) {
@@ -35,7 +35,7 @@ fn of_track(scores: &ProtocolResult, scene: &SceneId, picture: PictureKind) -> V
         mse: sum / pixels as f64,
         share: sum / total,
     };
-    // Where noise is all there is, shares would say nothing.
+    // Without an error above the noise, shares are undefined.
     let mut shares: Vec<LightShare> = if total > 0.0 { sums.into_iter().map(share).collect() } else { Vec::new() };
     shares.sort_by(|a, b| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
     shares.truncate(WORST);

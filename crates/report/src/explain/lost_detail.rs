@@ -6,8 +6,9 @@ use super::patch::Patch;
 /// Standard deviations of the Gaussians, in pixels.
 pub(super) const SIGMAS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 
-/// Adds b · (t - G t) to the model, with the b and the Gaussian G that bring it nearest to the truth t; gives G's standard
-/// deviation, or none where no b above 0 brings it nearer. G averages over the instance's pixels alone.
+/// Adds b · (t - G t) to the model, with the b and the Gaussian G that bring it nearest to the truth t. Returns the
+/// standard deviation of G, or none if no b above 0 brings the model nearer. G averages over the instance's pixels
+/// alone.
 pub(super) fn take(patches: &[Patch], model: &mut Model) -> Option<f64> {
     let mut best: Option<(f64, f64, f64, Model)> = None;
     for sigma in SIGMAS {
@@ -33,13 +34,13 @@ pub(super) fn take(patches: &[Patch], model: &mut Model) -> Option<f64> {
     Some(sigma)
 }
 
-/// The truth less its mean under a Gaussian, which leaves out what is not of the instance.
+/// The truth minus the blurred truth.
 pub(super) fn detail(patch: &Patch, sigma: f64) -> Vec<[f64; 3]> {
     let smooth = blurred(patch, sigma);
     patch.truth.iter().zip(smooth).map(|(t, s)| std::array::from_fn(|c| t[c] - s[c])).collect()
 }
 
-/// The truth under a Gaussian, cut off at three standard deviations.
+/// The truth blurred by a Gaussian over the instance's pixels alone, cut off at three standard deviations.
 pub(super) fn blurred(patch: &Patch, sigma: f64) -> Vec<[f64; 3]> {
     let radius = (3.0 * sigma) as isize;
     let weights: Vec<f64> =

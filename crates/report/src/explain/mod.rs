@@ -1,11 +1,12 @@
 //! Where a submission's albedo errs in one scene, and how.
 //!
-//! In: a result, the dataset and the submission it was made of. Out: an [`ExplainFile`], and pictures of the worst
-//! instances.
+//! In: a result, the dataset and the submission that it was made from. Out: an [`ExplainFile`], and pictures of the
+//! worst instances.
 //!
-//! Between: `belongs` makes sure that all three belong together, `patch` takes the pictures apart by instance, `kinds`
-//! takes each instance's error apart (`scales`, `smooth_field`, `shift`, `lost_detail`), `alignments` says what
-//! scales alone would mend, `light` looks up light's worst instances, `crops` shows, [`text`] tells.
+//! Between: `belongs` checks that all three belong together, `patch` splits the pictures by instance, `kinds` splits
+//! the error of each instance by kind (`scales`, `smooth_field`, `shift`, `lost_detail`), `alignments` computes scores
+//! after scaling alone, `light` lists the worst instances under each light, `crops` draws the worst instances, and
+//! [`text`] prints the explanation.
 
 mod alignments;
 mod belongs;
@@ -45,7 +46,7 @@ use mateval_eval::shown_scene::{SceneAlbedo, scene_albedo};
 /// The page that links the pictures.
 const PAGE: &str = "explain.md";
 
-/// What was found, and what it takes to show it.
+/// An explanation, and what is needed to draw its pictures.
 pub struct Explanation {
     /// The numbers.
     pub file: ExplainFile,
@@ -56,7 +57,7 @@ pub struct Explanation {
     worst: Vec<u16>,
 }
 
-/// Takes the scene's albedo apart. Fails where result, dataset and submission do not belong together.
+/// Explains the error of the scene's albedo. Fails if result, dataset and submission do not belong together.
 pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explanation, ReportError> {
     let scores = belongs::check(plan)?;
     let scene = plan.dataset.scene(plan.scene)?;
@@ -95,18 +96,18 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
     Ok(Explanation { file, views, patches, worst })
 }
 
-/// What was found of each instance, with its index.
+/// The explanation of each instance with its index, the one with the largest share first.
 fn worst_first(
     scene: &SceneFile,
     views: &[ViewId],
     found: &[(u16, Explained)],
     whole: &Explained,
 ) -> Vec<(u16, InstanceExplanation)> {
-    let told = |(index, found): &(u16, Explained)| {
+    let explanation = |(index, found): &(u16, Explained)| {
         let instance = scene.instances.iter().find(|instance| instance.index.0.get() == *index)?;
         Some((*index, instance_explanation(views, instance, found, whole)))
     };
-    let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(told).collect();
+    let mut instances: Vec<(u16, InstanceExplanation)> = found.iter().filter_map(explanation).collect();
     instances.sort_by(|(_, a), (_, b)| b.share.total_cmp(&a.share).then_with(|| a.instance.cmp(&b.instance)));
     instances
 }
@@ -134,7 +135,7 @@ fn instance_explanation(
 }
 
 impl Explanation {
-    /// Writes a PNG for each of the worst instances and `explain.md` into the folder `out`; gives their paths.
+    /// Writes a PNG for each of the worst instances and `explain.md` into the folder `out`. Returns their paths.
     pub fn write(&self, out: &Path, force: bool) -> Result<Vec<PathBuf>, ReportError> {
         let names: Vec<String> = self.file.instances[..self.worst.len()]
             .iter()
@@ -161,8 +162,8 @@ impl Explanation {
     }
 }
 
-/// Fails where the folder `out` holds an explanation already and may not be overwritten. Pictures, whose names are not known
-/// before, are looked at when they are written.
+/// Fails if the folder `out` already holds an explanation that may not be overwritten. Pictures, whose names are not
+/// known yet, are checked when they are written.
 pub fn check_out(out: &Path, force: bool) -> Result<(), ReportError> {
     Ok(check_free(&out.join(PAGE), force, "--out")?)
 }

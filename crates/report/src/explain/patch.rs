@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use mateval_eval::shown_scene::SceneAlbedo;
 
-/// A patch of fewer pixels has neither a smooth factor nor a shift of its own: both would fit what is chance. (Eight for
-/// each term of the factor.)
+/// A patch of fewer pixels gets neither a smooth factor nor a shift, which would fit chance: eight pixels for each
+/// term of the factor.
 pub(super) const FEWEST_PIXELS: usize = 48;
 
-/// The valid pixels of one instance in one view; a box around them says which is where.
+/// The valid pixels of one instance in one view, with their bounding box.
 pub(super) struct Patch {
     /// Number of the view.
     pub(super) view: usize,
@@ -16,17 +16,18 @@ pub(super) struct Patch {
     pub(super) corner: [usize; 2],
     /// Columns and rows of the box.
     pub(super) size: [usize; 2],
-    /// Pixel by place in the box, row by row.
+    /// The pixel at each position of the box, row by row.
     index: Vec<Option<u32>>,
     /// Column and row in the picture, row by row.
     pub(super) places: Vec<[usize; 2]>,
-    /// Linear.
+    /// Linear RGB of the truth at each place.
     pub(super) truth: Vec<[f64; 3]>,
-    /// Linear.
+    /// Linear RGB of the prediction at each place.
     pub(super) predicted: Vec<[f64; 3]>,
 }
 
-/// By index of the instance, then by view; only those that have pixels. Pixels that show no instance are left out.
+/// The patches of every instance that has any, by its index, in the order of views. Pixels that show no instance are
+/// left out.
 pub(super) fn patches(views: &[SceneAlbedo]) -> BTreeMap<u16, Vec<Patch>> {
     let mut all: BTreeMap<u16, Vec<Patch>> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
@@ -49,7 +50,7 @@ pub(super) fn patches(views: &[SceneAlbedo]) -> BTreeMap<u16, Vec<Patch>> {
 }
 
 impl Patch {
-    /// At least one place, each once; a value of the truth and the prediction for each.
+    /// `places` holds at least one position, each once; `truth` and `predicted` hold a value for each of them.
     pub(super) fn new(view: usize, places: Vec<[usize; 2]>, truth: Vec<[f64; 3]>, predicted: Vec<[f64; 3]>) -> Self {
         let least = |axis: usize| places.iter().map(|place| place[axis]).min().unwrap_or(0);
         let most = |axis: usize| places.iter().map(|place| place[axis]).max().unwrap_or(0);
@@ -62,7 +63,7 @@ impl Patch {
         Self { view, corner, size, index, places, truth, predicted }
     }
 
-    /// The pixel at a place of the box, if it is one of the instance's.
+    /// The pixel at a position of the box; none if it does not belong to the instance.
     pub(super) fn at(&self, x: isize, y: isize) -> Option<usize> {
         let inside = |v: isize, axis: usize| usize::try_from(v).ok().filter(|v| *v < self.size[axis]);
         let (x, y) = (inside(x, 0)?, inside(y, 1)?);

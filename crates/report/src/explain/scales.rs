@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::patch::Patch;
 
-/// Sums over all pixels, by channel, of truth times model and of the model's squares.
+/// Sums over all pixels, by channel: of truth times model, and of the model's squares.
 fn sums(patches: &[Patch], model: &Model) -> ([f64; 3], [f64; 3]) {
     let (mut products, mut squares) = ([0.0; 3], [0.0; 3]);
     for (truth, model) in patches.iter().zip(model).flat_map(|(patch, model)| patch.truth.iter().zip(model)) {
@@ -15,12 +15,12 @@ fn sums(patches: &[Patch], model: &Model) -> ([f64; 3], [f64; 3]) {
     (products, squares)
 }
 
-/// The best scale for squares; 1 where there is nothing to scale.
+/// The scale with the least squared error; 1 if the model is black.
 pub(super) fn best_scale(product: f64, square: f64) -> f64 {
     if square == 0.0 { 1.0 } else { product / square }
 }
 
-/// Multiplies the model by the one scale that brings it nearest to the truth; gives it.
+/// Multiplies the model by the one scale that brings it nearest to the truth. Returns the scale.
 pub(super) fn take_scale(patches: &[Patch], model: &mut Model) -> f64 {
     let (products, squares) = sums(patches, model);
     let scale = best_scale(products.iter().sum(), squares.iter().sum());
@@ -28,7 +28,7 @@ pub(super) fn take_scale(patches: &[Patch], model: &mut Model) -> f64 {
     scale
 }
 
-/// Multiplies the model's channels by the scales that bring them nearest to the truth; gives them.
+/// Multiplies the model's channels by the scales that bring them nearest to the truth. Returns the scales.
 pub(super) fn take_channel_scales(patches: &[Patch], model: &mut Model) -> [f64; 3] {
     let (products, squares) = sums(patches, model);
     let scales = std::array::from_fn(|c| best_scale(products[c], squares[c]));

@@ -20,9 +20,10 @@ pub(super) fn shaded(model: &[[f64; 3]], factors: &[f64]) -> Vec<[f64; 3]> {
     model.iter().zip(factors).map(|(value, factor)| value.map(|v| v * factor)).collect()
 }
 
-/// Moves the model by the whole pixels that bring it, times the factors, nearest to the truth, and multiplies it by them;
-/// none where it is best where it is. Factors do not move, and a pixel that would get its value from outside the instance
-/// keeps its own: so a flat prediction cannot gain. Of equals the first by row, then column.
+/// Moves the model by the whole pixels that bring it, times the factors, nearest to the truth, and multiplies it by the
+/// factors. Returns none if the model is best unmoved. Factors do not move, and a pixel whose new value would come from
+/// outside the instance keeps its own, so that a flat prediction cannot improve. Of equally good shifts, the first by
+/// row, then by column, is taken.
 pub(super) fn take(patch: &Patch, model: &mut [[f64; 3]], factors: &[f64]) -> Option<Shift> {
     let farthest = if model.len() < FEWEST_PIXELS { 0 } else { FARTHEST };
     let (mut least, mut best) = (patch_error(&patch.truth, &shaded(model, factors)), [0, 0]);
@@ -44,7 +45,7 @@ fn moved(patch: &Patch, model: &[[f64; 3]], factors: &[f64], pixel: usize, [dx, 
     model[patch.at(x - dx, y - dy).unwrap_or(pixel)].map(|v| v * factors[pixel])
 }
 
-/// The sum of squares after a shift; some number that is not below `enough` where it is not.
+/// The squared error after a shift, or any number of at least `enough` if the error is at least `enough`.
 fn moved_error(patch: &Patch, model: &[[f64; 3]], factors: &[f64], shift: [isize; 2], enough: f64) -> f64 {
     let mut sum = 0.0;
     for (pixel, truth) in patch.truth.iter().enumerate() {

@@ -4,11 +4,13 @@ use super::patch::{FEWEST_PIXELS, Patch};
 
 /// 1, x, y and their products of second order.
 const TERMS: usize = 6;
-/// A term of which less than this share of squares is new beside those before it is left out, as in a patch of one row.
+/// A term is left out if less than this share of its squares is independent of the terms before it, as in a patch of
+/// one row.
 const LEAST_NEW: f64 = 1e-9;
 
-/// The factor 1 + q for each pixel, q the quadratic polynomial of its place that brings model · (1 + q) nearest to the
-/// truth: what the model leaves is projected on the model times each term. One polynomial for all channels.
+/// The factor 1 + q for each pixel, where q is the quadratic polynomial of its position that brings model · (1 + q)
+/// nearest to the truth: the residual is projected on the products of the model and each term. All channels share the
+/// polynomial.
 pub(super) fn factors(patch: &Patch, model: &[[f64; 3]]) -> Vec<f64> {
     if model.len() < FEWEST_PIXELS {
         return vec![1.0; model.len()];
@@ -31,7 +33,7 @@ pub(super) fn factors(patch: &Patch, model: &[[f64; 3]]) -> Vec<f64> {
     (0..model.len()).map(factor).collect()
 }
 
-/// Of places from -1 to 1 over the patch's box.
+/// The terms of the polynomial at a pixel, whose position runs from -1 to 1 over the patch's box.
 fn terms(patch: &Patch, pixel: usize) -> [f64; TERMS] {
     let place = patch.in_box(pixel);
     let [x, y] = [0, 1].map(|axis| match patch.size[axis] {
@@ -41,7 +43,7 @@ fn terms(patch: &Patch, pixel: usize) -> [f64; TERMS] {
     [1.0, x, y, x * x, x * y, y * y]
 }
 
-/// Solves the normal equations by Cholesky's method; a term that is nothing new beside those before it weighs 0.
+/// Solves the normal equations by Cholesky decomposition; a term that depends on those before it gets weight 0.
 fn solution(matrix: [[f64; TERMS]; TERMS], right: [f64; TERMS]) -> [f64; TERMS] {
     let mut lower = [[0.0; TERMS]; TERMS];
     let mut forward = [0.0; TERMS];

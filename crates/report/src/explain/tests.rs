@@ -12,7 +12,8 @@ use mateval_eval::result_key::{PictureKind, Views};
 
 type Pixel = [f64; 3];
 
-/// White noise from 0.3 to 0.7, grey by three fourths, from integers alone; the same wherever it is asked for.
+/// White noise from 0.3 to 0.7, three fourths of it shared by all channels, computed from the position with integers
+/// alone.
 fn texture(x: i64, y: i64) -> Pixel {
     let noise = |channel: i64| {
         let mut word =
@@ -25,7 +26,8 @@ fn texture(x: i64, y: i64) -> Pixel {
     [1, 2, 3].map(|channel| 0.3 + 0.3 * noise(0) + 0.1 * noise(channel))
 }
 
-/// Two views of a disc, each another piece of the texture; the prediction is made from place, truth and number.
+/// Two views of a disc, each of another part of the texture; `prediction` maps a position and the truth there to a
+/// pixel.
 fn discs(prediction: impl Fn(i64, i64, Pixel) -> Pixel) -> Vec<Patch> {
     [0, 1]
         .map(|view| {
@@ -44,7 +46,7 @@ fn list(kinds: &KindShares) -> [f64; 6] {
     [kinds.scale, kinds.chroma, kinds.shading, kinds.misplacement, kinds.detail, kinds.rest]
 }
 
-/// That the shares add up, none is below 0, and the kind of this number has more than `least`.
+/// Checks that the shares add up, that none is below 0, and that the kind at place `kind` has more than `least`.
 fn check(found: &Explained, kind: usize, least: f64) {
     let shares = list(&found.kinds().unwrap());
     assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{shares:?}");
@@ -79,7 +81,7 @@ fn planted_shading_is_shading() {
     check(&found, 2, 0.9);
 }
 
-/// The prediction lies 3 pixels to the right of and 2 above where it should.
+/// The prediction lies 3 pixels too far right and 2 too high.
 #[test]
 fn a_planted_shift_is_misplacement() {
     let found = explained(&discs(|x, y, _| texture(x - 3, y + 2)));
@@ -100,7 +102,7 @@ fn planted_blur_is_detail() {
     }
 }
 
-/// The twin of all: another texture's detail on top is none of these.
+/// The twin of them all: detail of another texture is of no known kind.
 #[test]
 fn planted_noise_is_rest() {
     let found = explained(&discs(|x, y, t| {
@@ -111,7 +113,7 @@ fn planted_noise_is_rest() {
 }
 
 #[test]
-fn flat_predictions_cannot_gain_by_moving() {
+fn flat_predictions_do_not_improve_by_moving() {
     let found = explained(&discs(|_, _, _| [0.5; 3]));
     check(&found, 4, 0.8);
     assert!(found.shifts.is_empty());
@@ -123,9 +125,9 @@ fn the_truth_has_no_kinds() {
     assert_eq!((found.kinds(), found.mse()), (None, 0.0));
 }
 
-/// Few pixels, a single row, all black: nothing fails, and shares add up.
+/// Patches of one pixel, of one row and of black pixels do not fail, and their shares add up.
 #[test]
-fn odd_patches() {
+fn degenerate_patches() {
     let row = |length: usize, predicted: Pixel| {
         let places: Vec<[usize; 2]> = (0..length).map(|x| [x, 7]).collect();
         let truth = places.iter().map(|[x, y]| texture(*x as i64, *y as i64)).collect();
@@ -137,7 +139,7 @@ fn odd_patches() {
     }
 }
 
-/// Two instances as one scene: parts of sums are sums of parts.
+/// Two instances as one scene: the parts of the sum are the sums of the parts.
 #[test]
 fn sums_of_instances_add_up() {
     let all = [explained(&discs(|_, _, t| t.map(|v| 0.6 * v))), explained(&discs(|x, y, _| texture(x - 3, y + 2)))];
@@ -161,7 +163,8 @@ fn errors(instance: &str, views: Views, pixels: usize, mse: f64) -> InstancePixe
     }
 }
 
-/// 10 * 0.2 + 30 * 0.2 = 8 against 100 * 0.02 = 2; unobserved pixels are novel ones too, and not counted twice.
+/// 10 * 0.2 + 30 * 0.2 = 8 against 100 * 0.02 = 2; unobserved pixels belong to the novel views and are not counted
+/// twice.
 #[test]
 fn lights_worst_instances_by_share() {
     let instances = vec![
@@ -188,7 +191,7 @@ fn lights_worst_instances_by_share() {
     assert!(light::worst(&scores, &SceneId::new("t").unwrap()).is_empty());
 }
 
-/// Text and page hold the same numbers, and a table's rows are of one length.
+/// Text and page hold the same numbers, and the rows of a table have the same length.
 #[test]
 fn text_and_page() {
     let kinds = KindShares { scale: 0.5, chroma: 0.25, shading: 0.125, misplacement: 0.125, detail: 0.0, rest: 0.0 };
@@ -213,7 +216,7 @@ fn text_and_page() {
     };
     let plain = text::plain(&file);
     assert!(
-        plain.starts_with("m, scene s: albedo MSE 10.000 (1e-3, linear), PSNR 20.00 dB, over 12 pixels of 1 views")
+        plain.starts_with("m, scene s: albedo MSE 10.000 (1e-3, linear), PSNR 20.00 dB, over 12 pixels in 1 views")
     );
     assert!(plain.contains("(whole scene)"), "{plain}");
     let page = text::markdown(&file, &[]);

@@ -1,4 +1,4 @@
-//! The explanation for people: numbers are rounded here, the JSON has them whole.
+//! The explanation as text and as a page, with rounded numbers.
 
 use std::fmt::Write as _;
 
@@ -14,18 +14,18 @@ use crate::strips::WHITE_ERROR;
 
 /// A picture of one of the worst instances.
 pub(super) struct Crop {
-    /// Its name beside the page.
+    /// Its file name; it lies in the page's folder.
     pub(super) file: String,
-    /// The view that it is of.
+    /// The view that it shows.
     pub(super) view: ViewId,
 }
 
 const KINDS: &str = "\
-Shares of the squared error (linear), each of what the steps before it have left; together they are all of it.
-The steps: one scale an instance; one a channel (chroma); a smooth factor a view (shading left in); a shift of up
-to 4 pixels (misplacement); the truth's own detail (blur). The rest is none of these.";
+Shares of the squared error of linear values. Each step removes its share from the error that the steps before it leave:
+one scale for each instance; one for each channel (chroma); a smooth factor in each view (shading left in the albedo); a
+shift of up to 4 pixels (misplacement); detail of the truth that the prediction lacks (blur). No step removes the rest.";
 
-/// Tables set in columns.
+/// The explanation as text, with aligned tables.
 pub fn plain(file: &ExplainFile) -> String {
     let tables = tables(file).iter().map(Table::text).collect::<Vec<_>>();
     let mut parts = vec![format!("{}\n", title(file))];
@@ -62,7 +62,7 @@ pub(super) fn markdown(file: &ExplainFile, crops: &[Crop]) -> String {
 
 fn title(file: &ExplainFile) -> String {
     format!(
-        "{}, scene {}: albedo MSE {} (1e-3, linear), PSNR {:.2} dB, over {} pixels of {} views",
+        "{}, scene {}: albedo MSE {} (1e-3, linear), PSNR {:.2} dB, over {} pixels in {} views",
         file.method,
         file.scene,
         thousandths(file.mse),
@@ -74,7 +74,7 @@ fn title(file: &ExplainFile) -> String {
 
 fn findings(file: &ExplainFile) -> Option<String> {
     let lines: String = file.findings.iter().map(|finding| format!("- {finding}\n")).collect();
-    (!lines.is_empty()).then(|| format!("What the result found wrong here:\n\n{lines}"))
+    (!lines.is_empty()).then(|| format!("Findings of the result in this scene:\n\n{lines}"))
 }
 
 fn tables(file: &ExplainFile) -> Vec<Table> {
@@ -106,8 +106,9 @@ fn kinds(file: &ExplainFile) -> Table {
         let category = i.category.as_deref().unwrap_or("other");
         row([i.instance.as_str(), category], i.share, i.pixels, i.mse, i.kinds.as_ref())
     }));
-    let told = rows.len() - 2;
-    let title = format!("Where and how the albedo errs: {told} of {} instances, the worst first", file.instances.len());
+    let shown = rows.len() - 2;
+    let title =
+        format!("Where and how the albedo errs: {shown} of {} instances, the worst first", file.instances.len());
     Table { title, words: 2, rows }
 }
 
@@ -149,7 +150,7 @@ fn alignments(scores: &[AlignmentScores]) -> Table {
         });
         rows.push([name.to_owned()].into_iter().chain(cells).collect());
     }
-    Table { title: "What scales alone would mend (in the protocol's space)".to_owned(), words: 1, rows }
+    Table { title: "Scores after scaling alone (in the protocol's albedo space)".to_owned(), words: 1, rows }
 }
 
 fn light(picture: PictureKind, shares: &[&LightShare]) -> Table {
@@ -170,7 +171,7 @@ fn thousandths(mse: f64) -> String {
     format!("{:.3}", unsigned_zero(1e3 * mse, 1e3))
 }
 
-/// What rounds to zero in steps of 1 / `steps` is zero without a sign.
+/// Zero without a sign for values that round to zero in steps of 1 / `steps`.
 fn unsigned_zero(value: f64, steps: f64) -> f64 {
     if (value * steps).abs() < 0.5 { 0.0 } else { value }
 }

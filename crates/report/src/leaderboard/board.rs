@@ -26,13 +26,13 @@ impl<'a> Board<'a> {
     /// Gathers what pages show from the plan's results and their ranking.
     pub(super) fn new(plan: &LeaderboardPlan<'a>, ranking: Ranking, pictures: PictureSet) -> Self {
         let method = |((method, result), verified): ((&RankedMethod, &ResultFile), &Verified)| {
-            let said = result.submission.clone();
+            let submission = result.submission.clone();
             LeaderboardMethod {
                 id: method.id.clone(),
-                description: said.description,
-                url: said.url,
-                licence: said.licence,
-                cost: said.cost,
+                description: submission.description,
+                url: submission.url,
+                licence: submission.licence,
+                cost: submission.cost,
                 verified: *verified,
             }
         };
@@ -45,7 +45,8 @@ impl<'a> Board<'a> {
             version: text(|dataset| &dataset.version),
             manifest_sha256: text(|dataset| &dataset.manifest_sha256),
         };
-        let heads = ranking.methods.iter().zip(&methods).map(|(ranked, said)| MethodHead::new(ranked, said, &ranking));
+        let heads =
+            ranking.methods.iter().zip(&methods).map(|(ranked, method)| MethodHead::new(ranked, method, &ranking));
         Self {
             results: plan.results,
             scores: plan.results.iter().filter_map(|result| result.protocols.get(plan.protocol)).collect(),

@@ -86,8 +86,8 @@ fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column) -> Row<'a> {
     }
 }
 
-/// All pairs of methods by one number, row against column: the share of draws that the row's method wins, in percent, and 1
-/// if it is significantly better, -1 if it is significantly worse.
+/// All pairs of methods by one number, row against column: the share of draws that the row's method wins, in percent,
+/// and 1 if it is significantly better, -1 if it is significantly worse.
 #[derive(Serialize)]
 struct Wins<'a> {
     names: Vec<&'a str>,
@@ -113,7 +113,7 @@ fn wins(key: ResultKey, ranking: &KeyRanking, methods: &[RankedMethod]) -> Strin
         let percent = (100.0 * win).round() as u32;
         table.wins[a][b] = Some(percent);
         table.wins[b][a] = Some(100 - percent);
-        if pair.is_sure() {
+        if pair.is_significant() {
             let sign = if win > 0.5 { 1 } else { -1 };
             table.sure[a][b] = sign;
             table.sure[b][a] = -sign;

@@ -1,4 +1,5 @@
-//! Keys of results as the columns that readers choose from: picture, views, metric.
+//! The columns of the board that hold scores: one for each key of the results, chosen by picture, views, metric and
+//! surfaces.
 
 use mateval_eval::metric::{Better, Metric};
 use mateval_eval::result_key::{PictureKind, ResultKey, Surfaces, Views};
@@ -13,7 +14,7 @@ const FIRST: [ResultKey; 3] = [
     ResultKey::whole(PictureKind::Albedo, Views::Input, Metric::Psnr),
 ];
 
-/// One number of a method.
+/// A column of scores.
 #[derive(Clone, Serialize)]
 pub(super) struct Column {
     pub(super) key: ResultKey,
@@ -26,7 +27,7 @@ pub(super) struct Column {
     /// As in `PSNR`.
     pub(super) metric_title: &'static str,
     pub(super) better: Better,
-    /// Whether it is shown before anybody has chosen.
+    /// Whether it is shown initially.
     pub(super) is_shown: bool,
 }
 
@@ -69,7 +70,7 @@ impl Column {
     }
 }
 
-/// Whether a column is shown before anybody has chosen.
+/// Whether a column is shown initially.
 fn is_shown(ResultKey { picture, views, metric }: ResultKey) -> bool {
     matches!(picture.kind, PictureKind::Albedo | PictureKind::RgbTrue)
         && matches!(views, Views::Input | Views::Novel)
@@ -87,20 +88,20 @@ pub(super) fn columns(ranking: &Ranking) -> Vec<Column> {
     columns
 }
 
-/// The column that a board is sorted by at first.
+/// The column that a board is sorted by initially.
 pub(super) fn first(columns: &[Column]) -> Option<&Column> {
     let known = FIRST.iter().find_map(|key| columns.iter().find(|column| column.key == *key));
     known.or_else(|| columns.iter().find(|column| column.is_shown))
 }
 
-/// The PSNR of whole pictures, a column for each picture and views: what a page of a scene or a method shows.
+/// The columns that pages of scenes and methods show: PSNR on all surfaces, for each picture and views.
 pub(super) fn headlines(columns: &[Column]) -> Vec<&Column> {
     let is_headline =
         |column: &&Column| column.key.metric == Metric::Psnr && column.key.picture.surfaces == Surfaces::All;
     columns.iter().filter(is_headline).collect()
 }
 
-/// What readers choose from.
+/// The choices that readers have, in groups.
 #[derive(Serialize)]
 pub(super) struct Choices {
     groups: Vec<ChoiceGroup>,
@@ -120,7 +121,7 @@ struct Choice {
     is_shown: bool,
 }
 
-/// The words that some column has.
+/// The choices that match at least one column.
 pub(super) fn choices(columns: &[Column]) -> Choices {
     type Words = Vec<(&'static str, &'static str)>;
     let pictures: Words = PictureKind::ALL.iter().map(|kind| (kind.word(), kind.title())).collect();

@@ -1,4 +1,4 @@
-//! The leaderboard's numbers as files.
+//! The numbers of a leaderboard as files.
 
 use std::borrow::Cow;
 
@@ -13,14 +13,14 @@ use crate::tables::{Grouping, TableFormat, tables};
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::result_key::ResultKey;
 
-/// The tables in the paper's layout; not there where no two results cover the same scenes.
+/// The tables in the paper's layout; not written if no result covers all scenes.
 pub(super) const TABLES: &str = "downloads/tables.tex";
 
-/// Writes them all.
+/// Writes all of the files.
 pub(super) fn write(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     site.file(LEADERBOARD_PATH, &json::to_text(&board.file))?;
     site.file("downloads/leaderboard.csv", &standings_csv(&board.file))?;
-    // Tables hold results side by side only if these cover the same scenes.
+    // Tables compare only results that cover the same scenes.
     let scenes = &board.ranking().scenes;
     let is_whole = |result: &&ResultFile| result.dataset.scenes == *scenes;
     let whole: Cow<'_, [ResultFile]> = match board.results.iter().all(|result| is_whole(&result)) {
@@ -38,11 +38,11 @@ pub(super) fn write(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) ->
     Ok(())
 }
 
-/// A line a method and number.
+/// One line for each method and key.
 fn standings_csv(file: &LeaderboardFile) -> String {
     let mut lines =
         vec!["id,method,key,better,value,low,high,rank_best,rank_worst,scenes,houses,verified,partial".to_owned()];
-    for (ranked, said) in file.ranking.methods.iter().zip(&file.methods) {
+    for (ranked, method) in file.ranking.methods.iter().zip(&file.methods) {
         for (key, ranking) in &file.ranking.keys {
             let Some(standing) = ranking.standings.iter().find(|standing| standing.method == ranked.id) else {
                 continue;
@@ -62,7 +62,7 @@ fn standings_csv(file: &LeaderboardFile) -> String {
                 standing.rank.worst,
                 standing.scenes,
                 standing.houses,
-                word(&said.verified),
+                word(&method.verified),
                 ranked.partial
             ));
         }
@@ -70,12 +70,12 @@ fn standings_csv(file: &LeaderboardFile) -> String {
     lines.join("\n") + "\n"
 }
 
-/// As JSON says it.
+/// The word for a value in JSON.
 fn word<T: serde::Serialize>(value: &T) -> String {
     serde_json::to_value(value).ok().and_then(|value| value.as_str().map(str::to_owned)).unwrap_or_default()
 }
 
-/// A line a scene, a column a key.
+/// One line for each scene, one column for each key.
 fn scenes_csv(scenes: &[SceneId], scores: &ProtocolResult) -> String {
     let keys: std::collections::BTreeSet<&ResultKey> =
         scores.scenes.values().flat_map(std::collections::BTreeMap::keys).collect();

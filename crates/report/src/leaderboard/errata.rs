@@ -1,4 +1,4 @@
-//! What was found wrong after it was published, from a file that the leaderboard's keeper writes.
+//! Errors that were found after publication, from a file that the maintainer of the leaderboard writes.
 
 use std::path::Path;
 
@@ -8,30 +8,30 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ReportError;
 
-/// The word for this version of errata.
+/// The format of this version of errata.
 pub const ERRATA_FORMAT: &str = "mateval-errata/1";
 
-/// Errata, as they are to be shown.
+/// Errata, in the order in which they are shown.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ErrataFile {
     /// Always `mateval-errata/1`.
     pub format: String,
-    /// One a fault.
+    /// One entry for each error.
     pub entries: Vec<Erratum>,
 }
 
-/// One fault.
+/// One error.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Erratum {
     /// When it was found, as in `2026-03-01`.
     pub date: String,
-    /// In a few words.
+    /// A title of a few words.
     pub title: String,
-    /// What was wrong, and what was done.
+    /// What was wrong, and how it was corrected.
     pub text: String,
-    /// Names of methods and scenes that it touches; all where empty.
+    /// Names of the methods and scenes that it affects; all of them if empty.
     #[serde(default)]
     pub affects: Vec<String>,
 }

@@ -1,4 +1,4 @@
-//! `leaderboard.json`: all that a leaderboard shows of all methods together, for programs.
+//! `leaderboard.json`: everything that a leaderboard shows about its methods, for programs.
 
 use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::verified::Verified;
 use crate::ranking::file::Ranking;
 
-/// The word for this version of a leaderboard.
+/// The format of this version of leaderboards.
 pub const LEADERBOARD_FORMAT: &str = "mateval-leaderboard/1";
 
 /// Where the file lies in a leaderboard's folder; what has no such file is not a leaderboard and is never replaced.
@@ -19,17 +19,17 @@ pub(super) const LEADERBOARD_PATH: &str = "downloads/leaderboard.json";
 pub struct LeaderboardFile {
     /// Always `mateval-leaderboard/1`.
     pub format: String,
-    /// What made it, as in `mateval 0.1.0`.
+    /// The tool that wrote it, as in `mateval 0.1.0`.
     pub tool: String,
-    /// The dataset that all were scored on.
+    /// The dataset that all submissions were scored on.
     pub dataset: LeaderboardDataset,
-    /// What each method says of itself, in the ranking's order.
+    /// What each submission states about its method, in the ranking's order.
     pub methods: Vec<LeaderboardMethod>,
-    /// Numbers, intervals, ranks.
+    /// Scores, intervals and ranks.
     pub ranking: Ranking,
 }
 
-/// The dataset that all were scored on.
+/// The dataset that all submissions were scored on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaderboardDataset {
@@ -41,7 +41,7 @@ pub struct LeaderboardDataset {
     pub manifest_sha256: String,
 }
 
-/// What a method says of itself.
+/// What a submission states about its method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaderboardMethod {
@@ -53,8 +53,8 @@ pub struct LeaderboardMethod {
     pub url: Option<String>,
     /// Its licence.
     pub licence: Option<String>,
-    /// What it takes.
+    /// Its cost.
     pub cost: Option<Cost>,
-    /// Whether its score was computed again.
+    /// Whether its result was verified.
     pub verified: Verified,
 }

@@ -1,4 +1,5 @@
-//! A method's page: all its numbers, against the others, by scene and category, and where it is worst.
+//! The page of a method: all of its scores, comparisons with the others, scores by scene and category, and its worst
+//! cases.
 
 use std::collections::BTreeMap;
 
@@ -21,11 +22,11 @@ use mateval_eval::metric::Metric;
 use mateval_eval::result::InstancePixelErrors;
 use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 
-/// How many of the worst scenes and objects are shown.
+/// The numbers of worst scenes and instances that are shown.
 const WORST_SCENES: usize = 5;
 const WORST_INSTANCES: usize = 10;
 
-/// Findings that a page lists.
+/// The most findings that a page lists.
 const FINDINGS: usize = 100;
 
 #[derive(Serialize)]
@@ -44,7 +45,7 @@ struct MethodPage<'a> {
     columns: Vec<&'a Column>,
     scenes: Vec<SceneRow<'a>>,
     findings: Vec<String>,
-    findings_in_all: usize,
+    finding_count: usize,
 }
 
 #[derive(Serialize)]
@@ -102,7 +103,7 @@ struct SceneRow<'a> {
     cells: Vec<Option<String>>,
 }
 
-/// `methods/<id>.html` of the method at this place.
+/// Writes `methods/<id>.html` of the method at place `at`.
 pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let (head, result, scores) = (&board.heads[at], &board.results[at], board.scores[at]);
     let columns = headlines(&board.columns);
@@ -121,7 +122,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         scenes: scene_rows(board, at, &columns),
         columns,
         findings: result.findings.iter().take(FINDINGS).map(ToString::to_string).collect(),
-        findings_in_all: result.findings.len(),
+        finding_count: result.findings.len(),
     };
     site.page(&Page {
         file: &format!("methods/{}.html", head.id),
@@ -135,13 +136,13 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
 fn verified_text(verified: Verified) -> &'static str {
     match verified {
         Verified::No => "not yet",
-        Verified::Confirmed => "yes: eval verify has computed these numbers again",
-        Verified::Refuted => "no: eval verify has found other numbers",
-        Verified::Stale => "no: verified once, but the result has changed since",
+        Verified::Confirmed => "yes: eval verify computed the same numbers",
+        Verified::Refuted => "no: eval verify computed different numbers",
+        Verified::Stale => "no: the result has changed since it was verified",
     }
 }
 
-/// A row a picture and views, a column a metric.
+/// One row for each picture and views, one column for each metric.
 fn score_rows<'a>(board: &'a Board<'_>, id: &str) -> Vec<ScoreRow<'a>> {
     let mut rows: Vec<ScoreRow<'a>> = Vec::new();
     for column in &board.columns {
@@ -157,7 +158,7 @@ fn score_rows<'a>(board: &'a Board<'_>, id: &str) -> Vec<ScoreRow<'a>> {
     rows
 }
 
-/// The method against each other one, by the board's first number.
+/// Comparisons with every other method, by the score that the board is sorted by initially.
 fn duels<'a>(board: &'a Board<'_>, id: &str) -> Vec<DuelRow<'a>> {
     let Some(column) = board.first() else { return Vec::new() };
     let pairs = board.ranking().keys.get(&column.key).map_or(&[][..], |key| &key.pairs);
@@ -181,7 +182,7 @@ fn duels<'a>(board: &'a Board<'_>, id: &str) -> Vec<DuelRow<'a>> {
             p_text: pair.p_holm.map_or_else(String::new, |p| format!("{p:.4}")),
             verdict: match win {
                 None => "too few houses",
-                Some(_) if !pair.is_sure() => "may be chance",
+                Some(_) if !pair.is_significant() => "not significant",
                 Some(win) if win > 0.5 => "better",
                 Some(_) => "worse",
             },
@@ -200,9 +201,9 @@ fn worst_scenes<'a>(board: &'a Board<'_>, at: usize) -> Vec<WorstScene<'a>> {
     scenes.into_iter().map(|(id, value)| WorstScene { id, text: column.text(value) }).collect()
 }
 
-/// By what they add to the squared error of the albedo of novel views.
+/// The instances that contribute most to the squared error of albedo in novel views.
 fn worst_instances(instances: &[InstancePixelErrors]) -> Vec<WorstInstance<'_>> {
-    // Freed of noise an error may be below 0.
+    // After noise removal an error can be below 0.
     let error = |errors: &InstancePixelErrors| errors.mse.max(0.0) * errors.pixels as f64;
     let mut found: Vec<&InstancePixelErrors> = instances
         .iter()

@@ -1,10 +1,11 @@
 //! The leaderboard as a static site that opens from the disk.
 //!
-//! In: results of one protocol, perhaps pictures. Out: a folder with a page for the board, each method and each scene, the
-//! protocol, the paper's own numbers and errata, and the numbers as files.
+//! In: results under one protocol, and optionally pictures. Out: a folder with pages for the board, for each method and
+//! scene, for the protocol, the paper's own numbers and errata, and with the numbers as files.
 //!
-//! `columns` says which numbers there are, `heads` what is shown of a method; a file for each page puts together what its
-//! template in `templates` needs, and `site` writes it. No page needs a server or anything from elsewhere.
+//! `board` gathers what pages show: `columns` of scores, `facts` about methods, `heads` that name a method. Each page
+//! has a file that collects the values for its template in `templates`, and `site` writes it. No page needs a server or
+//! loads anything from elsewhere.
 
 mod board;
 mod board_page;
@@ -41,8 +42,8 @@ use self::site::{PAGES, Page, Site, SiteWriter};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
-/// Writes the site into the folder `out`, whole or not at all. An earlier leaderboard there is replaced if `force`; nothing
-/// else ever is.
+/// Writes the site into the folder `out`, completely or not at all. Replaces a leaderboard that exists there if
+/// `force`, and never replaces anything else.
 pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Progress<'_>) -> Result<(), ReportError> {
     check_place(out, force)?;
     progress("ranking", 0, 1);
@@ -65,7 +66,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     }
     scene_page::write_list(&board, &site)?;
     protocol_page::write(&board, &site)?;
-    write_plain(plan, &site)?;
+    write_constant_pages(plan, &site)?;
     Ok(work.finish()?)
 }
 
@@ -92,8 +93,8 @@ fn site(board: &Board<'_>) -> Site {
     }
 }
 
-/// The pages that hold nothing of the results.
-fn write_plain(plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
+/// Writes the pages that do not depend on the results.
+fn write_constant_pages(plan: &LeaderboardPlan<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let paper = paper::page();
     site.page(&Page {
         file: "paper.html",

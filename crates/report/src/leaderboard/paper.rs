@@ -1,4 +1,4 @@
-//! The paper's own Tables II to V. They were measured on other pictures and are never ranked with ours.
+//! The paper's own Tables II to V. They were measured on other renders and are never ranked with results.
 
 use mateval_eval::metric::{Better, Metric};
 use mateval_eval::result_key::{PictureKind, Views};
@@ -18,12 +18,12 @@ struct PaperTables {
 struct PaperRow {
     family: String,
     method: String,
-    /// `a`, `r`, `m`: which maps are the method's own; null where it says nothing of it.
+    /// The maps that the method itself estimates, as `a`, `r`, `m`; null if the paper does not state them.
     estimated: Option<Vec<String>>,
     scores: Vec<PaperScores>,
 }
 
-/// A block of four numbers. The paper does not name the network of its LPIPS, so that its numbers have no keys of ours.
+/// A block of four numbers. The paper does not state the network of its LPIPS, so that they have no result keys.
 #[derive(Deserialize)]
 struct PaperScores {
     picture: PictureKind,
@@ -107,7 +107,7 @@ pub(super) fn page() -> PaperPage {
     PaperPage { source: tables.source, note: tables.note, tables: LAYOUT.map(table).into() }
 }
 
-/// None where the paper leaves the row out of the table.
+/// None if the paper leaves the row out of the table.
 fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
     let cells = |(_, picture, views): &Block| -> [Option<String>; 4] {
         let found = row.scores.iter().find(|scores| scores.picture == *picture && scores.views == *views);
@@ -130,7 +130,7 @@ fn shown(row: &PaperRow, blocks: &[Block]) -> Option<ShownRow> {
 mod tests {
     use super::*;
 
-    /// The paper's Table III, first row and the row of the truth by TEXGen; Table II has more rows than the others.
+    /// The first row of Table III; Table II has more rows than the others.
     #[test]
     fn the_papers_numbers() {
         let page = page();

@@ -1,4 +1,4 @@
-//! The protocol's page: the fingerprint and all that it is made of.
+//! The page of the protocol: the fingerprint and everything that it is a hash of.
 
 use minijinja::context;
 use minijinja::value::Serde;
@@ -21,11 +21,11 @@ struct ProtocolPage<'a> {
     rules: Vec<(String, String)>,
     ranking: &'a RankingRules,
     percent: u32,
-    /// How most intervals were found; none where there are none.
+    /// How intervals were found; none if there are no intervals.
     kind: Option<IntervalKind>,
 }
 
-/// `protocol.html`.
+/// Writes `protocol.html`.
 pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let (Some(result), Some(scores)) = (board.results.first(), board.scores.first()) else { return Ok(()) };
     let rules = &board.ranking().rules;
@@ -35,7 +35,7 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         weights: result.lpips_weights.get(&scores.protocol.lpips_net).and_then(Option::as_ref),
         renderer: result.dataset.scored_renderer.as_ref().map(mateval_scene::RendererId::as_str),
         protocol_sha256: scores.protocol.sha256(),
-        rules: told(&scores.protocol),
+        rules: rules_of(&scores.protocol),
         ranking: rules,
         percent: (100.0 * rules.confidence).round() as u32,
         kind: intervals.filter_map(|standing| standing.interval).map(|interval| interval.kind).next(),
@@ -49,10 +49,10 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     })
 }
 
-/// Every number and word of a protocol with the path of its key.
-fn told(protocol: &Protocol) -> Vec<(String, String)> {
+/// Every number and word of a protocol, with the path of its key.
+fn rules_of(protocol: &Protocol) -> Vec<(String, String)> {
     let mut rules = Vec::new();
-    // By way of its text, in which single-precision numbers have the digits that they were given.
+    // From its JSON text, which gives single-precision numbers with as few digits as they need.
     let value = serde_json::from_str(&mateval_scene::json::to_text(protocol)).unwrap_or(Value::Null);
     leaves(&value, String::new(), &mut rules);
     rules

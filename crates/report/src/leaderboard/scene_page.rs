@@ -1,4 +1,4 @@
-//! A scene's page: all methods side by side in all views, the slider between prediction and truth, and scores.
+//! The page of a scene: all methods side by side in all views, the slider between prediction and truth, and scores.
 
 use std::collections::BTreeSet;
 
@@ -28,7 +28,7 @@ struct ScenePage<'a> {
     kinds: Vec<Kind>,
     views: Vec<&'a str>,
     gallery: Vec<GalleryRow<'a>>,
-    /// What the slider shows before a script runs.
+    /// The picture that the slider shows before the script runs.
     start: Option<String>,
     start_truth: Option<String>,
     width: u32,
@@ -59,7 +59,7 @@ struct ScoreRow<'a> {
     cells: Vec<Option<String>>,
 }
 
-/// An entry of the list of scenes.
+/// An entry in the list of scenes.
 #[derive(Serialize)]
 struct SceneCard<'a> {
     id: &'a str,
@@ -70,7 +70,7 @@ struct SceneCard<'a> {
     best: Option<String>,
 }
 
-/// `scenes/<scene>.html` of the scene at this place.
+/// Writes `scenes/<scene>.html` of the scene at place `at`.
 pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let scenes = &board.ranking().scenes;
     let scene = &scenes[at];
@@ -114,7 +114,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
     })
 }
 
-/// `scenes.html`.
+/// Writes `scenes.html`.
 pub(super) fn write_list<'a>(board: &'a Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let card = |scene: &'a SceneId| {
         let kinds = board.pictures.kinds(TRUTH, scene, INPUT);
@@ -147,7 +147,7 @@ fn views_in_order(views: BTreeSet<&str>) -> Vec<&str> {
     views
 }
 
-/// The truth, then the methods, as far as there are pictures.
+/// The truth, then the methods, each if it has pictures.
 fn gallery<'a>(board: &'a Board<'_>, scene: &SceneId, views: &[&'a str]) -> Vec<GalleryRow<'a>> {
     let methods = board.heads.iter().map(|head| (head.id.as_str(), head.name.as_str()));
     let row = |(id, name): (&'a str, &'a str)| {
@@ -163,7 +163,7 @@ fn gallery<'a>(board: &'a Board<'_>, scene: &SceneId, views: &[&'a str]) -> Vec<
     rows.filter(|row| row.cells.iter().any(Option::is_some)).collect()
 }
 
-/// Of the picture that a page in a folder names; 4 by 3 where there is none.
+/// Width and height of the picture that a page names; 4 by 3 if there is none.
 fn size(site: &SiteWriter<'_>, file: Option<String>) -> [u32; 2] {
     file.and_then(|file| png_size(&site.path(file.trim_start_matches("../")))).unwrap_or([4, 3])
 }
@@ -173,7 +173,7 @@ fn score_rows<'a>(board: &'a Board<'_>, scene: &SceneId, columns: &[&Column]) ->
     board.heads.iter().enumerate().map(row).collect()
 }
 
-/// Which method does best by the board's first number, and how well.
+/// The best method by the score that the board is sorted by initially, with that score.
 fn best(board: &Board<'_>, scene: &SceneId) -> Option<String> {
     let column = board.first()?;
     let sign = column.better.sign();

@@ -1,4 +1,4 @@
-//! The files of a site: templates filled and written, and what every page has.
+//! Writes the files of a site: filled templates with what every page shows, and assets.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::error::ReportError;
 
-/// What is written as it stands.
+/// Files that are written unchanged.
 const ASSETS: [(&str, &str); 5] = [
     ("site.css", include_str!("templates/site.css")),
     ("sort.js", include_str!("templates/sort.js")),
@@ -31,7 +31,7 @@ const TEMPLATES: [(&str, &str); 9] = [
     ("errata.j2", include_str!("templates/errata.j2")),
 ];
 
-/// What every page says.
+/// What every page shows.
 #[derive(Clone, Serialize)]
 pub(super) struct Site {
     pub(super) title: String,
@@ -66,7 +66,7 @@ pub(super) struct Page<'a> {
     pub(super) template: &'static str,
     pub(super) title: &'a str,
     pub(super) scripts: &'static [&'static str],
-    /// What it has beyond what all have.
+    /// The values for its template, besides those that every page has.
     pub(super) values: Value,
 }
 
@@ -82,7 +82,7 @@ impl<'a> SiteWriter<'a> {
         let mut environment = Environment::new();
         environment.set_auto_escape_callback(|_| AutoEscape::Html);
         for (name, text) in TEMPLATES {
-            environment.add_template(name, text).expect("the templates are ours");
+            environment.add_template(name, text).expect("the templates are valid: a test fills all of them");
         }
         Self { folder, site, environment }
     }
@@ -95,9 +95,9 @@ impl<'a> SiteWriter<'a> {
         let root = if page.file.contains('/') { "../" } else { "" };
         let (scripts, site) = (Serde(page.scripts), Serde(&self.site));
         let shared = context! { site, root, title => page.title, current => page.file, scripts };
-        let template = self.environment.get_template(page.template).expect("it is among ours");
+        let template = self.environment.get_template(page.template).expect("every page names one of the templates");
         let text = template.render(context! { ..page.values.clone(), ..shared });
-        self.file(page.file, &text.expect("the template is ours, and all its values are there"))
+        self.file(page.file, &text.expect("the templates are valid: a test fills all of them"))
     }
 
     pub(super) fn file(&self, file: &str, text: &str) -> Result<(), ReportError> {

@@ -1,4 +1,4 @@
-//! A small site from made-up results; the browser's tests are in `tests/site`.
+//! Tests of a small site of invented results; tests in a browser are in `tests/site`.
 
 use mateval_eval::result::ResultFile;
 use mateval_image::{Picture, png_io};
@@ -89,24 +89,24 @@ fn only_a_leaderboard_is_replaced() {
 }
 
 #[test]
-fn a_mark_is_of_the_very_bytes() {
+fn verifications_hold_for_the_same_bytes_only() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.json");
     let result = result("a", &scores(30.0, 0.0));
     json::write(&path, &result).unwrap();
     assert_eq!(verified::read(&path, &result).unwrap(), Verified::No);
-    let say = |format: &str, result_sha256: &str, confirmed: bool| {
-        let said = serde_json::json!({
+    let write_sidecar = |format: &str, result_sha256: &str, confirmed: bool| {
+        let file = serde_json::json!({
             "format": format, "tool": "mateval", "result_sha256": result_sha256, "confirmed": confirmed, "differences": 0, "findings": [],
             "submission_sha256": result.submission.sha256,
             "dataset_manifest_sha256": result.dataset.manifest_sha256,
         });
-        json::write(&verified::sidecar(&path), &said).unwrap();
+        json::write(&verified::sidecar(&path), &file).unwrap();
         verified::read(&path, &result)
     };
     let (format, sha256) = ("mateval-verification/1", sha256_of_file(&path).unwrap());
-    assert_eq!(say(format, &sha256, true).unwrap(), Verified::Confirmed);
-    assert_eq!(say(format, &sha256, false).unwrap(), Verified::Refuted);
-    assert_eq!(say(format, &"0".repeat(64), true).unwrap(), Verified::Stale);
-    assert!(say("mateval-verification/9", &sha256, true).is_err());
+    assert_eq!(write_sidecar(format, &sha256, true).unwrap(), Verified::Confirmed);
+    assert_eq!(write_sidecar(format, &sha256, false).unwrap(), Verified::Refuted);
+    assert_eq!(write_sidecar(format, &"0".repeat(64), true).unwrap(), Verified::Stale);
+    assert!(write_sidecar("mateval-verification/9", &sha256, true).is_err());
 }

@@ -1,4 +1,4 @@
-//! Whether `eval verify` has confirmed a result: what `RESULT.verified.json` beside it says.
+//! Whether `eval verify` confirmed a result, as `RESULT.verified.json` beside the result states.
 
 use std::path::{Path, PathBuf};
 
@@ -11,17 +11,17 @@ use crate::error::ReportError;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::{VERIFICATION_FORMAT, VerificationFile};
 
-/// Whether a result's numbers were computed again.
+/// Whether a result was verified.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Verified {
-    /// Nobody has.
+    /// It was not verified.
     No,
-    /// They have come out the same.
+    /// `eval verify` computed the same numbers.
     Confirmed,
-    /// They have not.
+    /// `eval verify` computed different numbers.
     Refuted,
-    /// The verification is of other bytes: the result, or what it was made of, has changed since.
+    /// The verification belongs to other bytes: the result, or what it was made from, has changed since.
     Stale,
 }
 
@@ -30,20 +30,20 @@ pub fn sidecar(result: &Path) -> PathBuf {
     result.with_extension("verified.json")
 }
 
-/// What the sidecar of the result in `path` says; `result` is what that file holds.
+/// The state that the sidecar of the result in the file `path` gives; `result` is the content of that file.
 pub fn read(path: &Path, result: &ResultFile) -> Result<Verified, ReportError> {
     let sidecar = sidecar(path);
     if !sidecar.exists() {
         return Ok(Verified::No);
     }
-    let said: VerificationFile = json::read(&sidecar)?;
-    if said.format != VERIFICATION_FORMAT {
-        return Err(ReportError::Format { path: sidecar, found: said.format, expected: VERIFICATION_FORMAT });
+    let file: VerificationFile = json::read(&sidecar)?;
+    if file.format != VERIFICATION_FORMAT {
+        return Err(ReportError::Format { path: sidecar, found: file.format, expected: VERIFICATION_FORMAT });
     }
-    let is_of_this = said.result_sha256 == sha256_of_file(path)?
-        && said.submission_sha256 == result.submission.sha256
-        && said.dataset_manifest_sha256 == result.dataset.manifest_sha256;
-    Ok(match (is_of_this, said.confirmed) {
+    let is_of_these_bytes = file.result_sha256 == sha256_of_file(path)?
+        && file.submission_sha256 == result.submission.sha256
+        && file.dataset_manifest_sha256 == result.dataset.manifest_sha256;
+    Ok(match (is_of_these_bytes, file.confirmed) {
         (false, _) => Verified::Stale,
         (true, true) => Verified::Confirmed,
         (true, false) => Verified::Refuted,

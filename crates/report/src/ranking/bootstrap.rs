@@ -1,18 +1,18 @@
-//! Intervals of methods and verdicts on pairs, from the same draws of houses for all of them.
+//! Intervals of methods and comparisons of pairs, from the same draws of houses for all of them.
 
 use super::clusters::{Clusters, Mean};
 use super::draws::Draws;
 use super::file::{Interval, IntervalKind};
 
-/// What an interval leaves out on each side: 95 % are within.
+/// The share of draws outside an interval on each side: 95 % lie inside.
 const TAIL: f64 = 0.025;
 
-/// How one method does against another.
+/// The comparison of one method with another.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Duel {
-    /// Share of draws in which the first has the higher mean; equal ones count half.
+    /// The share of draws in which the first has the higher mean; equal means count half.
     pub(super) first_higher: f64,
-    /// Chance of a difference as large, either way, if there were none.
+    /// p-value: the probability of a difference this large, in either direction, between equal methods.
     pub(super) p: f64,
 }
 
@@ -30,7 +30,7 @@ pub(super) fn intervals(clusters: &Clusters, draws: &Draws, kind: IntervalKind) 
         let [low, high] = match kind {
             IntervalKind::Percentile => [low, high],
             _ if mean.standard_error == 0.0 => [mean.value; 2],
-            // Efron & Tibshirani 1993, chapter 12: what is high among draws makes the lower end.
+            // Efron & Tibshirani 1993, chapter 12: the upper quantile of the draws gives the lower end.
             IntervalKind::Student => [high, low].map(|off| mean.value - off * mean.standard_error),
         };
         (mean.value, (low.is_finite() && high.is_finite()).then_some(Interval { low, high, kind }))
@@ -38,7 +38,7 @@ pub(super) fn intervals(clusters: &Clusters, draws: &Draws, kind: IntervalKind) 
     means.iter().zip(columns).map(interval).collect()
 }
 
-/// The values that [`TAIL`] of the draws lie below, and above.
+/// The values below and above which [`TAIL`] of the draws lie.
 fn tails(mut values: Vec<f64>) -> [f64; 2] {
     // The k-th of n draws is the quantile k / (n + 1).
     let below = ((values.len() + 1) as f64 * TAIL) as usize;
@@ -47,7 +47,7 @@ fn tails(mut values: Vec<f64>) -> [f64; 2] {
     [low, high].map(|at| *values.select_nth_unstable_by(at, f64::total_cmp).1)
 }
 
-/// Verdicts on pairs of columns.
+/// Compares pairs of columns.
 pub(super) fn duels(clusters: &Clusters, pairs: &[(usize, usize)], draws: &Draws, kind: IntervalKind) -> Vec<Duel> {
     let mut tallies = vec![Tally::default(); pairs.len()];
     clusters.each_draw(draws, |row| {
@@ -55,15 +55,15 @@ pub(super) fn duels(clusters: &Clusters, pairs: &[(usize, usize)], draws: &Draws
             tally.count(row[*a], row[*b]);
         }
     });
-    let chances: Vec<f64> = match kind {
-        IntervalKind::Percentile => tallies.iter().map(|tally| tally.chance(draws.len())).collect(),
-        IntervalKind::Student => studentised_chances(&clusters.differences(pairs), draws),
+    let p_values: Vec<f64> = match kind {
+        IntervalKind::Percentile => tallies.iter().map(|tally| tally.p_value(draws.len())).collect(),
+        IntervalKind::Student => studentised_p_values(&clusters.differences(pairs), draws),
     };
     let first_higher = |tally: &Tally| 0.5 + 0.5 * (tally.above as f64 - tally.below as f64) / draws.len() as f64;
-    tallies.iter().zip(chances).map(|(tally, p)| Duel { first_higher: first_higher(tally), p }).collect()
+    tallies.iter().zip(p_values).map(|(tally, p)| Duel { first_higher: first_higher(tally), p }).collect()
 }
 
-/// How many draws lie above and below something; the rest are equal to it.
+/// The numbers of draws above and below a bound; the rest equal it.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     above: usize,
@@ -76,15 +76,17 @@ impl Tally {
         self.below += usize::from(value < bound);
     }
 
-    /// Twice the share of draws on the rarer side, equal ones with it (Davison & Hinkley 1997, equation 4.11).
-    fn chance(&self, draws: usize) -> f64 {
+    /// The p-value: twice the share of draws on the rarer side, draws at the bound included (Davison & Hinkley 1997,
+    /// equation 4.11).
+    fn p_value(&self, draws: usize) -> f64 {
         let rarer = draws - self.above.max(self.below);
         (2.0 * (rarer + 1) as f64 / (draws + 1) as f64).min(1.0)
     }
 }
 
-/// The same of differences over their standard errors: whether those of the draws are as large as the one that was found.
-fn studentised_chances(differences: &Clusters, draws: &Draws) -> Vec<f64> {
+/// p-values of studentised differences: how often the draws have a difference over its standard error as large as the
+/// one found.
+fn studentised_p_values(differences: &Clusters, draws: &Draws) -> Vec<f64> {
     let means = differences.means();
     let found: Vec<f64> = means.iter().map(studentised).collect();
     let mut tallies = vec![Tally::default(); means.len()];
@@ -93,10 +95,10 @@ fn studentised_chances(differences: &Clusters, draws: &Draws) -> Vec<f64> {
             tally.count(*off, *found);
         }
     });
-    tallies.iter().map(|tally| tally.chance(draws.len())).collect()
+    tallies.iter().map(|tally| tally.p_value(draws.len())).collect()
 }
 
-/// Nothing at all is no difference; one that is the same in every house is a sure one.
+/// A mean over its standard error; 0 for a mean of 0, and infinite for a difference that is the same in every house.
 fn studentised(mean: &Mean) -> f64 {
     if mean.value == 0.0 { 0.0 } else { mean.value / mean.standard_error }
 }
@@ -107,7 +109,7 @@ mod tests {
 
     const BOTH: [IntervalKind; 2] = [IntervalKind::Percentile, IntervalKind::Student];
 
-    /// Ten houses of one scene: a ramp, the same again, and one that is 0.5 higher everywhere.
+    /// Ten houses of one scene: a ramp, a copy of it, and one that is 0.5 higher everywhere.
     fn three() -> Clusters {
         let ramp: Vec<f64> = (0..10).map(f64::from).collect();
         let higher = ramp.iter().map(|value| value + 0.5).collect();
@@ -115,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_methods_are_equal_and_sure_differences_sure() {
+    fn equal_methods_do_not_differ_and_constant_differences_are_significant() {
         let draws = Draws::new(1, 999, 10);
         for kind in BOTH {
             let duels = duels(&three(), &[(0, 1), (2, 0), (0, 2)], &draws, kind);
@@ -142,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_varies_is_sure() {
+    fn intervals_of_constants_have_no_width() {
         let clusters = Clusters::gather(&[vec![2.0; 6]], &[0, 1, 2, 3, 4, 5]);
         for kind in BOTH {
             let (_, interval) = intervals(&clusters, &Draws::new(1, 99, 6), kind)[0];

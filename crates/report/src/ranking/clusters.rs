@@ -1,18 +1,19 @@
-//! Values of scenes gathered by house: scenes of one house are alike, so whole houses are drawn.
+//! Scores of scenes summed by house: scenes of one house are alike, so that the bootstrap draws whole houses.
 
 use std::collections::BTreeMap;
 
 use super::draws::Draws;
 
-/// Means within this share of rounding are no difference.
+/// Differences of means within this relative bound are rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// What the bootstrap sees of some columns: for each cluster how many scenes it has, and each column's sum over them.
+/// What the bootstrap needs of some columns of scores: for each cluster, its number of scenes and the sum of each
+/// column over them.
 #[derive(Debug)]
 pub(super) struct Clusters {
     columns: usize,
     scenes: Vec<f64>,
-    /// Cluster by cluster, a number a column.
+    /// Cluster by cluster, one sum for each column.
     sums: Vec<f64>,
 }
 
@@ -24,8 +25,8 @@ pub(super) struct Mean {
 }
 
 impl Clusters {
-    /// `values` holds a column's value of each scene, `house` the number of each scene's house. Clusters are in the order in
-    /// which their houses appear.
+    /// `values` holds a column's value of each scene, `house` the number of each scene's house. Clusters are in the
+    /// order in which their houses appear.
     pub(super) fn gather(values: &[Vec<f64>], house: &[usize]) -> Self {
         let mut places: BTreeMap<usize, usize> = BTreeMap::new();
         let mut clusters = Self { columns: values.len(), scenes: Vec::new(), sums: Vec::new() };
@@ -43,12 +44,12 @@ impl Clusters {
         clusters
     }
 
-    /// How many there are.
+    /// The number of clusters.
     pub(super) fn len(&self) -> usize {
         self.scenes.len()
     }
 
-    /// The differences of these pairs of columns, as columns.
+    /// The differences of pairs of columns, as new columns.
     pub(super) fn differences(&self, pairs: &[(usize, usize)]) -> Self {
         let rows = self.sums.chunks_exact(self.columns.max(1));
         let sums = rows.flat_map(|row| pairs.iter().map(|&(a, b)| row[a] - row[b])).collect();
@@ -70,7 +71,7 @@ impl Clusters {
         (0..self.columns).map(mean).collect()
     }
 
-    /// Shows the columns' means in each draw.
+    /// Calls `see` for each draw with the means of all columns.
     pub(super) fn each_draw(&self, draws: &Draws, mut see: impl FnMut(&[f64])) {
         let mut means = vec![0.0; self.columns];
         for counts in draws.iter() {
@@ -88,8 +89,8 @@ impl Clusters {
         }
     }
 
-    /// Shows, in each draw, how many of the draw's own standard errors each mean is off that of all clusters. Infinite where
-    /// the draw holds one cluster alone, and is off.
+    /// Calls `see` for each draw with each column's mean minus its mean over all clusters, in the draw's own standard
+    /// errors. Infinite if the draw holds a single cluster with another mean.
     pub(super) fn each_studentised_draw(&self, draws: &Draws, mut see: impl FnMut(&[f64])) {
         let residuals = self.residuals();
         let clusters = self.len() as f64;
@@ -113,7 +114,7 @@ impl Clusters {
         }
     }
 
-    /// What each cluster's sums are off those that the means would make.
+    /// Each cluster's sums minus those that its scenes would have at the columns' means.
     fn residuals(&self) -> Vec<f64> {
         let means = self.means();
         let rows = self.sums.chunks_exact(self.columns.max(1)).zip(&self.scenes);
@@ -138,7 +139,7 @@ impl Sums {
         self.by_size += counted * size;
     }
 
-    /// The draw's mean less the whole one, over the draw's standard error.
+    /// The draw's mean minus the mean over all clusters, over the draw's standard error.
     fn studentised(&self, scenes: f64, squared_scenes: f64, clusters: f64) -> f64 {
         let off = self.residuals / scenes;
         // Squares about the draw's own mean.
@@ -165,14 +166,14 @@ mod tests {
         assert!((mean.standard_error - (2.0 * squares).sqrt() / 3.0).abs() < 1e-15, "{mean:?}");
     }
 
-    /// With one scene a house it is the textbook's standard error of a mean.
+    /// With one scene in each house it is the textbook's standard error of a mean.
     #[test]
-    fn single_scenes_are_the_textbooks() {
+    fn single_scenes_have_the_textbooks_standard_error() {
         let clusters = Clusters::gather(&[vec![2.0, 4.0, 4.0, 6.0]], &[0, 1, 2, 3]);
         assert!((clusters.means()[0].standard_error - (8.0_f64 / 3.0 / 4.0).sqrt()).abs() < 1e-15);
     }
 
-    /// A draw's sums give what its clusters, gathered anew, give.
+    /// A draw has the mean and the standard error of its clusters as a sample of their own.
     #[test]
     fn a_draw_is_a_sample_of_its_own() {
         let (sizes, sums) = ([1.0, 2.0, 3.0, 1.0, 2.0], [2.0, 3.0, 9.0, 0.5, 1.0]);
@@ -191,7 +192,7 @@ mod tests {
         let mut seen = 0;
         for ((mean, off), (expected_mean, expected_off)) in means.iter().zip(&offs).zip(&expected) {
             assert!((mean - expected_mean).abs() < 1e-12);
-            // A draw of one house is infinitely off by its own measure.
+            // A draw of a single house has no standard error, and its difference is infinite.
             let is_same = off == expected_off || (off - expected_off).abs() < 1e-9 * off.abs().max(1.0);
             assert!(is_same, "{off} {expected_off}");
             seen += 1;

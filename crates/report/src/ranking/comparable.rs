@@ -1,4 +1,4 @@
-//! Which results may be ranked together, and on which scenes.
+//! Which results can be ranked together, and on which scenes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,7 +13,7 @@ use mateval_eval::result::{ProtocolResult, ResultFile};
 pub(super) struct Entrant<'a> {
     pub(super) result: &'a ResultFile,
     pub(super) scores: &'a ProtocolResult,
-    /// Scenes of which the submission has no base colour at all.
+    /// Scenes for which the submission has no base colour.
     pub(super) left_out: BTreeSet<SceneId>,
 }
 
@@ -26,7 +26,8 @@ impl<'a> Entrant<'a> {
         self.result.method.clone()
     }
 
-    /// What its fingerprint would be if these scenes had been scored; of none of them: all else that numbers depend on.
+    /// The fingerprint that it would have if these scenes had been scored; without scenes, a hash of everything else
+    /// that scores depend on.
     fn basis(&self, scenes: &[&SceneId]) -> String {
         let weights = self.result.lpips_weights.get(&self.scores.protocol.lpips_net).and_then(Option::as_deref);
         let dataset = &self.result.dataset;
@@ -35,16 +36,17 @@ impl<'a> Entrant<'a> {
     }
 }
 
-/// What may be ranked together.
+/// Results that can be ranked together.
 pub(super) struct Board<'a> {
     pub(super) entrants: Vec<Entrant<'a>>,
-    /// That any result covers, in the dataset's order.
+    /// The scenes that any result covers, in the dataset's order.
     pub(super) scenes: Vec<SceneId>,
     pub(super) houses: BTreeMap<SceneId, String>,
     pub(super) fingerprint: String,
 }
 
-/// Fails with everything that keeps the results apart. Those of fewer scenes are let in where `partial`.
+/// Gathers results under one protocol. Fails with every reason for which they cannot be ranked together; results that
+/// lack scenes are accepted only if `partial`.
 pub(super) fn board<'a>(results: &'a [ResultFile], protocol: &str, partial: bool) -> Result<Board<'a>, ReportError> {
     if results.is_empty() {
         return Err(ReportError::NoResults);
@@ -108,7 +110,7 @@ fn too_few_scenes(entrant: &Entrant<'_>, scenes: &[SceneId]) -> Option<Mismatch>
     (scored < scenes).then(|| Mismatch::TooFewScenes { method: entrant.name(), scored, scenes })
 }
 
-/// Every result has its scenes in the dataset's order; those that the longest lacks follow in the order of their names.
+/// The scenes of the result that covers most of them, in the dataset's order, then those that it lacks, by name.
 fn scenes_of_any(entrants: &[Entrant<'_>]) -> Vec<SceneId> {
     let longest = entrants.iter().map(|entrant| &entrant.result.dataset.scenes).max_by_key(|scenes| scenes.len());
     let mut scenes = longest.cloned().unwrap_or_default();

@@ -1,11 +1,12 @@
-//! Which clusters each draw of the bootstrap holds: from a fixed generator, so that it is the same on every machine.
+//! The clusters that each draw of the bootstrap holds, from a fixed generator, so that they are the same on every
+//! machine.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mateval_scene::splitmix64;
 
-/// Draws with replacement of as many clusters as there are.
+/// Draws with replacement, each of as many clusters as the results have.
 pub(super) struct Draws {
     clusters: usize,
     /// How often each draw holds each cluster, draw by draw.
@@ -13,17 +14,17 @@ pub(super) struct Draws {
 }
 
 impl Draws {
-    /// Whether so many clusters can be counted.
+    /// The largest supported number of clusters.
     pub(super) const MOST_CLUSTERS: usize = u16::MAX as usize;
 
-    /// `draws` draws of `clusters` clusters, at most [`Draws::MOST_CLUSTERS`]. The k-th number of a draw follows from the seed,
-    /// the draw and k alone.
+    /// `draws` draws of `clusters` clusters, at most [`Draws::MOST_CLUSTERS`]. The k-th number of a draw follows from
+    /// the seed, the draw and k alone.
     pub(super) fn new(seed: u64, draws: usize, clusters: usize) -> Self {
         let mut counts = vec![0; draws * clusters];
         for (draw, counts) in counts.chunks_exact_mut(clusters.max(1)).enumerate() {
             for k in 0..clusters {
                 let index = (draw * clusters + k) as u64;
-                // The upper bits of a product are an even choice but for one part in 2^32.
+                // The upper bits of the product are uniform up to one part in 2^32.
                 let drawn = ((splitmix64::number(seed, index) >> 32) * clusters as u64) >> 32;
                 counts[drawn as usize] += 1;
             }
@@ -41,7 +42,7 @@ impl Draws {
     }
 }
 
-/// Draws by the number of clusters, made when they are first asked for.
+/// Draws by the number of clusters, made on first use.
 pub(super) struct DrawTable {
     seed: u64,
     draws: usize,
@@ -49,12 +50,12 @@ pub(super) struct DrawTable {
 }
 
 impl DrawTable {
-    /// All of them of one seed and length.
+    /// A table of draws with one seed and one number of draws.
     pub(super) fn new(seed: u64, draws: usize) -> Self {
         Self { seed, draws, made: Mutex::default() }
     }
 
-    /// Those of `clusters` clusters.
+    /// The draws of `clusters` clusters.
     pub(super) fn of(&self, clusters: usize) -> Arc<Draws> {
         let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
         Arc::clone(made.entry(clusters).or_insert_with(|| Arc::new(Draws::new(self.seed, self.draws, clusters))))
@@ -65,10 +66,10 @@ impl DrawTable {
 mod tests {
     use super::*;
 
-    /// Every draw holds as many as there are; over all draws each cluster is held once a draw and its count has the
-    /// variance of a binomial's, 1 - 1/n.
+    /// Every draw holds 20 clusters. Over all draws, the count of each cluster has the mean 1 and the variance of a
+    /// binomial distribution, 1 - 1/n.
     #[test]
-    fn draws_are_even() {
+    fn draws_are_uniform() {
         let draws = Draws::new(1, 10_000, 20);
         assert_eq!(draws.len(), 10_000);
         assert!(draws.iter().all(|counts| counts.iter().map(|&c| usize::from(c)).sum::<usize>() == 20));

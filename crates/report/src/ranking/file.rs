@@ -1,4 +1,4 @@
-//! What a ranking says, as the JSON of a leaderboard holds it.
+//! A ranking, as `leaderboard.json` holds it.
 
 use std::collections::BTreeMap;
 
@@ -16,35 +16,35 @@ use mateval_eval::result_key::ResultKey;
 pub struct Ranking {
     /// The protocol's name.
     pub protocol: String,
-    /// The fingerprint that all have; with partial results that of the protocol on all scenes that any covers.
+    /// The fingerprint of all results; with partial results, the one that a result on all of `scenes` would have.
     pub fingerprint: String,
-    /// How it was drawn and judged.
+    /// How houses were drawn and methods compared.
     pub rules: RankingRules,
     /// The scenes that any result covers, in the dataset's order.
     pub scenes: Vec<SceneId>,
-    /// The house of each scene: scenes of one are drawn together.
+    /// The house of each scene; scenes of one house are drawn together.
     pub houses: BTreeMap<SceneId, String>,
     /// In the order in which the results were given.
     pub methods: Vec<RankedMethod>,
-    /// By each number that can be ranked.
+    /// The ranking by each score.
     pub keys: BTreeMap<ResultKey, KeyRanking>,
 }
 
-/// How it was drawn and judged.
+/// How houses were drawn and methods compared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RankingRules {
-    /// Of the random numbers.
+    /// The seed of the random numbers.
     pub seed: u64,
-    /// Draws of the houses.
+    /// The number of draws of houses.
     pub draws: usize,
-    /// Share of all cases that an interval covers.
+    /// The share of cases in which an interval holds the mean.
     pub confidence: f64,
-    /// Corrected chances under this are differences.
+    /// Differences with a corrected p-value below this are significant.
     pub level: f64,
-    /// Under so many houses intervals are Student's.
+    /// With fewer houses, intervals are of kind `student`.
     pub student_below: usize,
-    /// Under so many houses there are no intervals, and no method is better than another.
+    /// With fewer houses, there are no intervals and no significant differences.
     pub least_houses: usize,
 }
 
@@ -52,7 +52,7 @@ pub struct RankingRules {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RankedMethod {
-    /// Its name made safe for files and links, with a number behind it where another one has it.
+    /// Its name made safe for files and links, followed by a number if another method has the same.
     pub id: String,
     /// Its name.
     pub method: String,
@@ -60,21 +60,21 @@ pub struct RankedMethod {
     pub submission_sha256: String,
     /// Scenes that were not scored.
     pub not_scored: Vec<SceneId>,
-    /// Scenes that were scored, but of which the submission has no base colour at all: all grey.
+    /// Scenes that were scored, but for which the submission has no base colour: scored as grey.
     pub left_out: Vec<SceneId>,
-    /// Whether it is ranked on what it covers only.
+    /// Whether it is ranked only on the scenes that it covers.
     pub partial: bool,
 }
 
-/// The ranking by one number.
+/// The ranking by one score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KeyRanking {
     /// Whether more is better.
     pub better: Better,
-    /// Methods that have this number, in the order of `methods`.
+    /// Methods that have this score, in the order of `methods`.
     pub standings: Vec<Standing>,
-    /// Each two of them.
+    /// All pairs of them.
     pub pairs: Vec<Pair>,
 }
 
@@ -86,17 +86,18 @@ pub struct Standing {
     pub method: String,
     /// Mean over its scenes.
     pub value: f64,
-    /// Null where there are too few houses.
+    /// Null if there are too few houses.
     pub interval: Option<Interval>,
-    /// Scenes that have this number.
+    /// The number of scenes that have this score.
     pub scenes: usize,
-    /// Their houses.
+    /// The number of their houses.
     pub houses: usize,
-    /// From 1 + those that are significantly better to all - those that are significantly worse.
+    /// From 1 + the number of methods that are significantly better to the number of methods that are not significantly
+    /// worse.
     pub rank: RankRange,
 }
 
-/// Where the mean over all houses that could have been drawn lies, with 95 % confidence.
+/// The interval that holds, with 95 % confidence, the mean over all houses of the kind that was scored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interval {
@@ -128,29 +129,29 @@ pub struct RankRange {
     pub worst: usize,
 }
 
-/// Two methods on the scenes that both have.
+/// The comparison of two methods on the scenes that both have.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Pair {
-    /// A method's id.
+    /// The id of a method.
     pub first: String,
-    /// Another's.
+    /// The id of another method.
     pub second: String,
-    /// Scenes that both have.
+    /// The number of scenes that both have.
     pub scenes: usize,
-    /// Mean of the first less that of the second; null without such scenes.
+    /// The mean of the first minus the mean of the second; null without such scenes.
     pub difference: Option<f64>,
-    /// Share of draws in which the first is better, equal ones count half; null where there are too few houses.
+    /// The share of draws in which the first is better; equal means count half. Null if there are too few houses.
     pub win: Option<f64>,
-    /// Chance of a difference as large, if there were none; null where there are too few houses.
+    /// p-value of the difference; null if there are too few houses.
     pub p: Option<f64>,
-    /// The same corrected for all pairs (Holm).
+    /// The p-value corrected for all pairs (Holm).
     pub p_holm: Option<f64>,
 }
 
 impl Pair {
-    /// Whether their difference is more than chance.
-    pub fn is_sure(&self) -> bool {
+    /// Whether the difference is significant.
+    pub fn is_significant(&self) -> bool {
         self.p_holm.is_some_and(|p| p < LEVEL)
     }
 }

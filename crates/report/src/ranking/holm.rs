@@ -1,16 +1,16 @@
 //! Holm's correction of p-values for many comparisons at once.
 
-/// Chances that are less are differences.
+/// Differences with a corrected p-value below this are significant.
 pub(super) const LEVEL: f64 = 0.05;
 
-/// Chances corrected for so many tests (Holm 1979): under [`LEVEL`] where Holm's steps refuse.
-pub(super) fn corrected(chances: &[f64]) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..chances.len()).collect();
-    order.sort_by(|&a, &b| chances[a].total_cmp(&chances[b]));
-    let mut corrected = vec![0.0; chances.len()];
+/// p-values corrected for their number (Holm 1979): below [`LEVEL`] where Holm's procedure rejects equality.
+pub(super) fn corrected(p_values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..p_values.len()).collect();
+    order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
+    let mut corrected = vec![0.0; p_values.len()];
     let mut largest: f64 = 0.0;
     for (done, at) in order.into_iter().enumerate() {
-        largest = largest.max(chances[at] * (chances.len() - done) as f64);
+        largest = largest.max(p_values[at] * (p_values.len() - done) as f64);
         corrected[at] = largest.min(1.0);
     }
     corrected

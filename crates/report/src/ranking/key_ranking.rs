@@ -1,4 +1,4 @@
-//! The ranking by one number: each two methods on the scenes that both have.
+//! The ranking by one score, which compares each pair of methods on the scenes that both have.
 
 use super::bootstrap::{Duel, duels, intervals};
 use super::clusters::Clusters;
@@ -13,7 +13,7 @@ pub(super) struct KeyValues<'a> {
     pub(super) better: Better,
     /// Ids of the methods that have any.
     pub(super) methods: Vec<&'a str>,
-    /// A method's value of each scene; none where the method does not cover it, or it has none.
+    /// For each method, its value for each scene; none if it does not cover the scene or has no such value.
     pub(super) values: Vec<Vec<Option<f64>>>,
 }
 
@@ -37,8 +37,8 @@ pub(super) fn rank_key(key: &KeyValues<'_>, house: &[usize], rules: &RankingRule
         }
     }
     met.sort_by_key(|met| (met.first, met.second));
-    let chances: Vec<f64> = met.iter().map(|met| met.duel.map_or(1.0, |duel| duel.p)).collect();
-    let corrected = corrected(&chances);
+    let p_values: Vec<f64> = met.iter().map(|met| met.duel.map_or(1.0, |duel| duel.p)).collect();
+    let corrected = corrected(&p_values);
     let beaten: Vec<(usize, usize)> =
         met.iter().zip(&corrected).filter(|(_, p)| **p < rules.level).map(|(met, _)| met.winner(key.better)).collect();
     let ranks = rank_ranges(key.methods.len(), &beaten);
@@ -54,7 +54,7 @@ pub(super) fn rank_key(key: &KeyValues<'_>, house: &[usize], rules: &RankingRule
     }
 }
 
-/// Methods that have values of the very same scenes; they are drawn together.
+/// Groups of methods that have values for exactly the same scenes, and can share their draws.
 fn groups_of_equal_cover(values: &[Vec<Option<f64>>]) -> Vec<Vec<usize>> {
     let is_alike = |a: usize, b: usize| values[a].iter().zip(&values[b]).all(|(a, b)| a.is_some() == b.is_some());
     let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -93,7 +93,7 @@ impl<'a> Shared<'a> {
         Self { members, scenes: scenes.len(), clusters: Clusters::gather(&columns, &houses) }
     }
 
-    /// None where there are too few houses to draw from.
+    /// The kind of intervals; none if there are too few houses to draw from.
     fn kind(&self, rules: &RankingRules) -> Option<IntervalKind> {
         match self.clusters.len() {
             few if few < rules.least_houses => None,
@@ -111,7 +111,7 @@ impl<'a> Shared<'a> {
         found.into_iter().map(mean).collect()
     }
 
-    /// `pairs` are places among the members.
+    /// Compares pairs of members, which are given by their places.
     fn meetings(&self, pairs: &[(usize, usize)], rules: &RankingRules, draws: &DrawTable) -> Vec<Meeting> {
         if pairs.is_empty() {
             return Vec::new();
@@ -132,7 +132,7 @@ impl<'a> Shared<'a> {
     }
 }
 
-/// Two methods, by their places among the key's.
+/// The comparison of two methods, which are given by their places in the key's list.
 struct Meeting {
     first: usize,
     second: usize,
@@ -142,7 +142,7 @@ struct Meeting {
 }
 
 impl Meeting {
-    /// With the method that stands first as the first.
+    /// The same comparison, with the method that is listed first as `first`.
     fn in_order(self) -> Self {
         if self.first < self.second {
             return self;

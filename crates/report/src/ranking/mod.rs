@@ -1,8 +1,9 @@
-//! Methods ranked: every number with its interval, each two methods compared, ranks as ranges.
+//! Ranks methods: an interval for every score, a comparison of every pair of methods, and ranks as ranges.
 //!
-//! Scenes of one house are alike, so houses are drawn with replacement, the same for all methods: `draws` says which,
-//! `clusters` gathers values by house, `bootstrap` makes intervals and verdicts, `holm` corrects these for their number,
-//! `key_ranking` puts one key together. `comparable` says what may be ranked together at all.
+//! `comparable` checks which results can be ranked together. Scenes of one house are alike, so that whole houses are
+//! drawn with replacement, the same ones for all methods: `draws` draws them, `clusters` sums scores by house,
+//! `bootstrap` computes intervals and p-values, `holm` corrects these for their number, `rank_ranges` derives ranks,
+//! and `key_ranking` combines these steps for one score.
 
 mod bootstrap;
 mod clusters;
@@ -28,25 +29,26 @@ use crate::error::ReportError;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result_key::ResultKey;
 
-/// Draws of the houses, where pairs do not ask for more.
+/// The number of draws of houses, unless the pairs of methods need more.
 const DRAWS: usize = 10_000;
 
-/// Draws for each pair: so many pairs' least possible chance, 2 / (draws + 1), is still under Holm's first step.
+/// Draws for each pair of methods: enough for the smallest possible p-value, 2 / (draws + 1), to stay below Holm's
+/// first step.
 const DRAWS_A_PAIR: usize = 40;
 
-/// Where the random numbers begin.
+/// The seed of the random numbers.
 const SEED: u64 = 0;
 
-/// Under so many houses intervals are Student's: percentiles are too narrow there.
+/// With fewer houses, intervals are Student's, as those of percentiles are too narrow.
 const STUDENT_BELOW: usize = 50;
 
-/// Under so many houses draws of a single house, which say nothing, are too frequent: one in 9 of three houses, one in 64 of
-/// four.
+/// With fewer houses, draws of a single house, which have no variance, are too frequent: one in 9 with three houses,
+/// one in 64 with four.
 const LEAST_HOUSES: usize = 5;
 
-/// Ranks the results under one protocol. Results of different fingerprints are refused, and so are those of fewer scenes than
-/// others unless `partial`: then each is ranked on what it covers. Without it a scene that a submission leaves out counts
-/// as the grey that it is scored as.
+/// Ranks the results under one protocol. Results with different fingerprints are refused. So are results that lack
+/// scenes of others unless `partial`, which ranks each result on the scenes that it covers. Without `partial`, a scene
+/// that a submission leaves out counts as the grey that it was scored as.
 pub fn rank(results: &[ResultFile], protocol: &str, partial: bool) -> Result<Ranking, ReportError> {
     let board = comparable::board(results, protocol, partial)?;
     let rules = rules(results.len());
@@ -75,7 +77,7 @@ fn rules(methods: usize) -> RankingRules {
     }
 }
 
-/// The number of each scene's house.
+/// For each scene, the number of its house.
 fn house_numbers(board: &Board<'_>) -> Result<Vec<usize>, ReportError> {
     let names: Vec<&str> = board.houses.values().map(String::as_str).collect::<BTreeSet<_>>().into_iter().collect();
     if names.len() > Draws::MOST_CLUSTERS {
@@ -102,7 +104,7 @@ fn methods(board: &Board<'_>, partial: bool) -> Vec<RankedMethod> {
     board.entrants.iter().map(method).collect()
 }
 
-/// The name in lower case with hyphens for all that is neither a letter of ASCII nor a digit.
+/// An unused id: the name in lower case, with hyphens for everything that is neither an ASCII letter nor a digit.
 fn unused_id(name: &str, used: &mut BTreeSet<String>) -> String {
     let plain: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
@@ -116,7 +118,7 @@ fn unused_id(name: &str, used: &mut BTreeSet<String>) -> String {
     id
 }
 
-/// Every key, and what each method has of it.
+/// Every key with the values that each method has for it.
 fn values_by_key<'a>(
     board: &Board<'_>,
     methods: &'a [RankedMethod],

@@ -1,4 +1,4 @@
-//! Rankings of simulated leaderboards, whose truth is known.
+//! Tests of rankings on simulated leaderboards, whose true means are known.
 
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::{Finding, InstanceId, Severity, splitmix64};
@@ -12,19 +12,19 @@ use mateval_eval::protocol::Protocol;
 use mateval_eval::result::{InstanceTexelErrors, ProtocolResult, RESULT_FORMAT, SubmissionId, TexelErrors};
 use mateval_eval::result_key::{PictureKind, Views};
 
-/// Standard normals and even numbers, in a row.
+/// A sequence of random numbers, uniform and standard normal.
 struct Chance(u64, u64);
 
 impl Chance {
-    fn even(&mut self) -> f64 {
+    fn uniform(&mut self) -> f64 {
         self.1 += 1;
         (splitmix64::number(self.0, self.1) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     /// Box and Muller 1958.
     fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.even()).ln()).sqrt();
-        radius * (2.0 * std::f64::consts::PI * self.even()).cos()
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (2.0 * std::f64::consts::PI * self.uniform()).cos()
     }
 }
 
@@ -41,11 +41,11 @@ struct Simulated {
     pictures: Vec<Vec<f64>>,
 }
 
-/// What every method's mean is, over all houses that there could be.
+/// The mean of every method over the whole population of houses.
 const TRUTH: f64 = 25.0;
 
-/// Houses of one to four scenes; PSNR varies by 2 dB from house to house and by 1 dB from scene to scene for all methods
-/// alike, by 1 dB from house to house for each method of its own, and by 1 dB from view to view. All methods are equally good.
+/// Houses of one to four scenes and equally good methods. PSNR varies by 2 dB between houses and by 1 dB between
+/// scenes, alike for all methods, and independently for each method by 1 dB between houses and by 1 dB between views.
 fn simulate(houses: usize, seed: u64) -> Simulated {
     let mut chance = Chance(seed, 0);
     let mut board =
@@ -53,7 +53,7 @@ fn simulate(houses: usize, seed: u64) -> Simulated {
     for house in 0..houses {
         let of_house = 2.0 * chance.normal();
         let of_method: Vec<f64> = (0..METHODS).map(|_| chance.normal()).collect();
-        for _ in 0..1 + (4.0 * chance.even()) as usize {
+        for _ in 0..1 + (4.0 * chance.uniform()) as usize {
             let of_scene = chance.normal();
             board.houses.push(house);
             for (method, own) in of_method.iter().enumerate() {
@@ -81,10 +81,10 @@ fn coverage(boards: u64, houses: usize, kind: IntervalKind, by: impl Fn(Simulate
 
 const BOARDS: u64 = 1000;
 
-/// Of the twins, which miss by far.
+/// The number of boards for the twins, which miss by far.
 const FEW_BOARDS: u64 = 200;
 
-/// Fewer than [`DRAWS`], for the test's sake: an interval's ends vary a little more from board to board.
+/// Fewer than [`DRAWS`], to save time: the ends of an interval vary a little more from board to board.
 const BOARD_DRAWS: usize = 1000;
 
 fn by_house(board: Simulated) -> Clusters {
@@ -100,7 +100,7 @@ fn by_picture(board: Simulated) -> Clusters {
 fn intervals_cover_the_truth() {
     let covered = coverage(BOARDS, 60, IntervalKind::Percentile, by_house);
     assert!((0.93..=0.97).contains(&covered), "{covered}");
-    // The twin: pictures of one house drawn as if they had nothing in common.
+    // The twin draws pictures as if those of one house were independent.
     let covered = coverage(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
     assert!(covered < 0.7, "{covered}");
 }
@@ -109,16 +109,16 @@ fn intervals_cover_the_truth() {
 fn students_intervals_cover_the_truth_of_few_houses() {
     let covered = coverage(BOARDS, 12, IntervalKind::Student, by_house);
     assert!((0.92..=0.98).contains(&covered), "{covered}");
-    // The twins: what they are for, and pictures.
+    // The twins: percentiles, which need more houses, and pictures.
     let covered = coverage(BOARDS, 12, IntervalKind::Percentile, by_house);
     assert!(covered < 0.92, "{covered}");
     let covered = coverage(FEW_BOARDS, 12, IntervalKind::Student, by_picture);
     assert!(covered < 0.7, "{covered}");
 }
 
-/// Equal methods are held different in one pair of twenty; drawn by picture much more often.
+/// Equal methods differ significantly in one pair of twenty; if pictures are drawn, in many more.
 #[test]
-fn chances_are_what_they_say() {
+fn p_values_of_equal_methods_are_uniform() {
     let refused = |boards: u64, houses, kind, by: fn(Simulated) -> Clusters| {
         let one = |board| {
             let clusters = by(simulate(houses, board));
@@ -147,7 +147,7 @@ fn summary(scenes: &BTreeMap<SceneId, BTreeMap<ResultKey, f64>>) -> BTreeMap<Res
     summary
 }
 
-/// A method's result with these PSNR, a house a scene.
+/// The result of a method with these PSNR, one for each scene, and one scene in each house.
 pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
     let scenes: BTreeMap<_, _> = psnr
         .iter()
@@ -198,7 +198,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
     }
 }
 
-/// So many scenes around a mean, all methods alike but for `wobble`.
+/// PSNR of twelve scenes around a mean, the same for all methods except for `wobble`.
 pub(crate) fn scores(mean: f64, wobble: f64) -> Vec<f64> {
     (0..12).map(|at| mean + 0.7 * f64::from(at % 5) + wobble * f64::from(at * 7 % 11 - 5)).collect()
 }
@@ -221,7 +221,7 @@ fn copies_share_a_rank() {
         let pair = &ranking.keys[key].pairs[1];
         assert_eq!((pair.first.as_str(), pair.second.as_str()), ("good", "good-2"));
         assert_eq!((pair.difference, pair.win, pair.p_holm), (Some(0.0), Some(0.5), Some(1.0)));
-        // More is better of PSNR, less of MSE: the better one wins either way.
+        // Higher PSNR and lower MSE are better: the same method wins by both.
         assert_eq!(ranking.keys[key].pairs[0].win, Some(1.0), "{key}");
     }
 }
@@ -236,9 +236,9 @@ fn the_same_bytes_whatever_the_threads() {
     assert_eq!(text(1), text(3));
 }
 
-/// Fifty methods are 1225 pairs: with 10,000 draws none of them could be told apart.
+/// Fifty methods are 1225 pairs, of which 10,000 draws could not show a single significant difference.
 #[test]
-fn many_methods_ask_for_more_draws() {
+fn many_methods_need_more_draws() {
     for methods in [2, 22, 23, 50] {
         let pairs = methods * (methods - 1) / 2;
         let least = 2.0 / (rules(methods).draws + 1) as f64;
@@ -248,7 +248,7 @@ fn many_methods_ask_for_more_draws() {
 }
 
 #[test]
-fn few_houses_say_nothing() {
+fn few_houses_give_no_intervals() {
     let [four, five] = [4, 5].map(|scenes| {
         let cut = |method: &str, mean| result(method, &scores(mean, 0.1)[..scenes]);
         rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-1", false).unwrap()
@@ -260,7 +260,7 @@ fn few_houses_say_nothing() {
 }
 
 #[test]
-fn partial_results_are_let_in_only_when_asked() {
+fn partial_results_are_accepted_only_on_request() {
     let part = result("part", &scores(40.0, 0.0)[..6]);
     let results = [result("whole", &scores(30.0, 0.0)), part.clone(), result("low", &scores(20.0, 0.0))];
     let error = rank(&results, "mateval-1", false).unwrap_err().to_string();
@@ -272,13 +272,13 @@ fn partial_results_are_let_in_only_when_asked() {
     assert_eq!([standings[0].scenes, standings[1].scenes], [12, 6]);
     let pairs: Vec<usize> = ranking.keys[&PSNR].pairs.iter().map(|pair| pair.scenes).collect();
     assert_eq!(pairs, [6, 12, 6]);
-    // What the whole ones get does not depend on the part.
+    // The intervals of complete results do not depend on the partial one.
     let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-1", false).unwrap();
     let interval = |ranking: &Ranking| ranking.keys[&PSNR].standings[0].interval;
     assert_eq!(interval(&ranking), interval(&alone));
 }
 
-/// A scene without any base colour is grey by default, and not there where only what is covered counts.
+/// A scene without any base colour counts as grey by default, and does not count with `partial`.
 #[test]
 fn scenes_left_out_of_a_submission() {
     let mut gaps = result("gaps", &scores(30.0, 0.0));
@@ -309,7 +309,7 @@ fn scenes_left_out_of_a_submission() {
 }
 
 #[test]
-fn what_cannot_be_ranked_together() {
+fn results_that_cannot_be_ranked_together() {
     let good = result("good", &scores(30.0, 0.0));
     let refused = |change: fn(&mut ResultFile)| {
         let mut other = result("other", &scores(20.0, 0.0));

@@ -2,7 +2,7 @@
 
 use super::table::{Cell, Column, Table};
 
-/// The table; its title is the head of the methods' column. What is missing is empty.
+/// The table; its title is the head of the column of methods. Missing values are empty.
 pub(super) fn text(table: &Table<'_>) -> String {
     let names = table.group_head.into_iter().chain([table.title]).map(quoted);
     let heads = table.columns.iter().flat_map(|column| {

@@ -1,14 +1,14 @@
-//! What has rows of its own in a table.
+//! How the rows of a table are grouped.
 
-/// What has rows of its own, one for each method.
+/// How the rows of a table are grouped; every group has one row for each method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grouping {
-    /// The whole dataset: means over scenes.
+    /// One group for the whole dataset: means over scenes.
     Dataset,
-    /// Each scene: means over its pictures.
+    /// One group for each scene: means over its pictures.
     Scene,
-    /// Each category of instances: errors pooled over pixels.
+    /// One group for each category of instances: errors pooled over pixels.
     Category,
-    /// Each broader category, in the same way.
+    /// One group for each broader category, in the same way.
     SuperCategory,
 }

@@ -1,11 +1,11 @@
-//! Which tables exist, and their columns.
+//! The tables, and their columns.
 
 use mateval_eval::metric::Metric;
 use mateval_eval::result_key::{PictureKind, PictureName, Surfaces, Views};
 
 use super::value::Quantity;
 
-/// Columns that stand under one title.
+/// Columns under one title.
 pub(super) struct Block {
     pub(super) title: &'static str,
     pub(super) picture: PictureName,
@@ -44,7 +44,7 @@ const PAPER: [TableWords; 4] = [
     ("Aligned albedo, unobserved regions", &[("Aligned albedo", PictureKind::AlbedoAligned, Views::Unobserved)]),
 ];
 
-/// Those that the paper does not have.
+/// The tables that the paper does not have.
 const OURS: [TableWords; 4] = [
     (
         "RGB, true light",
@@ -96,7 +96,7 @@ fn layout(title: String, blocks: &[BlockWords], surfaces: Surfaces) -> Layout {
     Layout { title, blocks: blocks.iter().map(block).collect() }
 }
 
-/// The tables of what is pooled over instances' pixels.
+/// The tables of errors that are pooled over the pixels of instances.
 pub(super) fn pooled() -> Vec<Layout> {
     let views = [Views::Input, Views::Novel, Views::Unobserved];
     let block = |kind, views: Views| Block {

@@ -1,7 +1,8 @@
-//! Tables of several results: the paper's II to V, then ours in the same layout; whole, or by scene or category.
+//! Tables of several results: the paper's II to V, then ours in the same layout, for the whole dataset or by scene or
+//! category.
 //!
-//! `layouts` says which tables there are, `rows` where their numbers come from, `table` sets them and marks the best,
-//! and a file for each format writes them.
+//! `layouts` lists the tables and their columns, `rows` collects their numbers, `table` fills them and marks the best,
+//! and each format has a file that writes them.
 
 pub(crate) mod csv;
 mod grouping;
@@ -28,13 +29,13 @@ pub enum TableFormat {
     Markdown,
     /// LaTeX with booktabs; best bold, second underlined.
     Latex,
-    /// Comma-separated, all digits, no marks; standard errors in columns of their own.
+    /// Comma-separated values with all digits and without marks; standard errors have columns of their own.
     Csv,
 }
 
-/// Sets the results side by side under one protocol. Results of different fingerprints, or of different scenes, are
-/// refused. A column that no result has is left out; a value that some result lacks is shown as missing, and as a dash where
-/// no result has it of that scene or category.
+/// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
+/// column without values is left out. A value is shown as missing if another result has it for that scene or category,
+/// and as a dash if none has.
 pub fn tables(
     results: &[ResultFile],
     protocol: &str,

@@ -15,8 +15,8 @@ pub(super) const OTHER: &str = "other";
 
 /// By category: the number of pixels, the mean squared error over all of them, and its PSNR.
 ///
-/// Every pixel weighs the same, whatever scene, view and instance it is of: unlike the other tables' this PSNR is that of a
-/// mean. It is missing where the error, freed of noise, is not above 0.
+/// Every pixel has the same weight, regardless of scene, view and instance. Unlike in the other tables, PSNR is that of
+/// a mean. It is missing if the error is not above 0 after noise removal.
 pub(crate) fn pooled(instances: &[InstancePixelErrors], by: Grouping) -> BTreeMap<String, BTreeMap<CellKey, Value>> {
     let mut sums: BTreeMap<(String, PictureKind, Views), (f64, usize)> = BTreeMap::new();
     for errors in instances.iter().filter(|errors| errors.pixels > 0) {

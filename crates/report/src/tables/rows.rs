@@ -1,4 +1,4 @@
-//! Where a table's numbers come from: one row a method, in groups.
+//! The numbers of a table: one row for each method, in groups.
 
 use std::collections::BTreeMap;
 
@@ -16,14 +16,14 @@ pub(super) struct Row {
     pub(super) values: BTreeMap<CellKey, Value>,
 }
 
-/// Rows that are held against each other.
+/// Rows that are compared with each other.
 pub(super) struct Group {
     /// The scene or category; empty for the whole dataset.
     pub(super) name: String,
     pub(super) rows: Vec<Row>,
 }
 
-/// The groups; methods in the order of the results. Scenes are in the dataset's order, categories in that of their names,
+/// The groups, with methods in the order of the results. Scenes are in the dataset's order, categories by name with
 /// `other` last.
 pub(super) fn groups(results: &[ResultFile], protocol: &str, grouping: Grouping) -> Vec<Group> {
     let scored: Vec<(&str, &ProtocolResult)> =

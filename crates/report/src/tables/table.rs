@@ -7,12 +7,12 @@ use super::layouts::Layout;
 use super::rows::Group;
 use super::value::{CellKey, Quantity, Value};
 
-/// A table whose every column has a value somewhere.
+/// A table without empty columns.
 pub(super) struct Table<'a> {
     pub(super) title: &'a str,
-    /// Head of the column of groups; none where the whole dataset is the only one.
+    /// Head of the column of groups; none if the whole dataset is the only group.
     pub(super) group_head: Option<&'static str>,
-    /// Titles of blocks and how many columns each has left.
+    /// Titles of blocks, and the number of columns of each.
     pub(super) blocks: Vec<(&'static str, usize)>,
     pub(super) columns: Vec<Column>,
     pub(super) groups: Vec<TableGroup<'a>>,
@@ -21,12 +21,12 @@ pub(super) struct Table<'a> {
 /// A column.
 pub(super) struct Column {
     pub(super) block: &'static str,
-    /// Whether any of its values says how sure it is.
+    /// Whether any of its values has a standard error.
     pub(super) has_errors: bool,
     pub(super) key: CellKey,
 }
 
-/// Rows that are held against each other.
+/// Rows that are compared with each other.
 pub(super) struct TableGroup<'a> {
     pub(super) name: &'a str,
     /// Methods and their cells.
@@ -36,15 +36,15 @@ pub(super) struct TableGroup<'a> {
 /// One value as it is shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cell {
-    /// Scaled; none where it is missing.
+    /// Scaled; none if it is missing.
     pub(super) value: Option<Value>,
-    /// Whether another method of the group has one; if none has, there was nothing to measure.
+    /// Whether another method of the group has a value; if none has, there was nothing to measure.
     pub(super) has_rivals: bool,
     pub(super) digits: usize,
     pub(super) mark: Mark,
 }
 
-/// How well a value does among those of its group.
+/// The place of a value among those of its group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mark {
     Best,
@@ -53,7 +53,7 @@ pub(super) enum Mark {
 }
 
 impl<'a> Table<'a> {
-    /// Fills a layout. Columns without any value are left out, and so are groups; none where nothing is left.
+    /// Fills a layout. Columns and groups without values are left out; none if nothing is left.
     pub(super) fn fill(layout: &'a Layout, grouping: Grouping, groups: &'a [Group]) -> Option<Self> {
         let mut columns: Vec<Column> = Vec::new();
         let mut blocks = Vec::new();
@@ -101,7 +101,7 @@ impl<'a> TableGroup<'a> {
     }
 }
 
-/// Marks the best and the second best value; equal values share a mark, and a value that is alone has none.
+/// Marks the best and the second best value. Equal values share a mark, and a single value has none.
 fn marked(values: &[Option<Value>], quantity: Quantity) -> Vec<Cell> {
     let better = quantity.better();
     let mut distinct: Vec<f64> = values.iter().flatten().map(|value| value.value).collect();
@@ -126,7 +126,7 @@ fn marked(values: &[Option<Value>], quantity: Quantity) -> Vec<Cell> {
 }
 
 impl Column {
-    /// Title of block and metric, and an arrow to what is better.
+    /// Title of block and metric, and an arrow that shows whether higher or lower is better.
     pub(super) fn head(&self) -> String {
         let arrow = match self.key.quantity.better() {
             Some(Better::Lower) => " ↓",
@@ -138,7 +138,7 @@ impl Column {
 }
 
 impl Cell {
-    /// The rounded value between the marks, and its standard error behind `plus_minus`.
+    /// The rounded value between its marks, and its standard error after `plus_minus`.
     pub(super) fn text(&self, best: (&str, &str), second: (&str, &str), plus_minus: &str) -> String {
         let Some(Value { value, standard_error }) = self.value else {
             return if self.has_rivals { "missing" } else { "-" }.to_owned();

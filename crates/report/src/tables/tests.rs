@@ -122,7 +122,7 @@ fn csv_by_the_byte() {
     assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Csv), expected);
 }
 
-/// Scene a has no values and is left out; a scene's noise is its own.
+/// Scene a has no values and is left out; scene b shows its own noise.
 #[test]
 fn by_scene_in_the_datasets_order() {
     let markdown = shown(&three(), Grouping::Scene, TableFormat::Markdown);
@@ -134,7 +134,7 @@ fn by_scene_in_the_datasets_order() {
     assert!(latex.contains("\\midrule\nb & a|1 & 10.00 $\\pm$ 0.25"), "{latex}");
 }
 
-/// The paper's four come first, in its order; columns without values are not there, tables without columns neither.
+/// The paper's four tables come first, in its order; columns without values and tables without columns are left out.
 #[test]
 fn papers_tables_then_ours() {
     let keys = ["rgb_fitted.novel", "albedo_aligned.unobserved", "albedo.novel", "albedo.input", "roughness.input"];
@@ -154,7 +154,7 @@ fn papers_tables_then_ours() {
         "Albedo, input view, specular regions only",
     ];
     assert_eq!(titles, expected);
-    // A value without rivals is not the best of any.
+    // A single value is not marked as the best.
     assert!(!markdown.contains("**") && !markdown.contains("missing"), "{markdown}");
 }
 
@@ -194,7 +194,7 @@ fn pools_by_pixels_over_scenes() {
     assert!(csv.contains("\"Seat\",\"m\",1000,70,11.54901959985743"), "{csv}");
 }
 
-/// An error freed of noise that is below 0 has no PSNR.
+/// An error that is below 0 after noise removal has no PSNR.
 #[test]
 fn pooled_noise_has_no_psnr() {
     let markdown = shown(&[with_instances()], Grouping::Category, TableFormat::Markdown);
@@ -202,9 +202,9 @@ fn pooled_noise_has_no_psnr() {
     assert!(light.contains("| other | m | 10 | -0.001 |\n"), "{light}");
 }
 
-/// What some method has is missing of another; of what nobody has there was nothing to measure.
+/// A value that only another method has is missing; if no method has it, there was nothing to measure.
 #[test]
-fn missing_or_nothing_to_measure() {
+fn missing_values_and_values_that_cannot_exist() {
     let mut both = [with_instances(), with_instances()];
     both[0].protocols.get_mut("paper").unwrap().instances.push(errors("b", None, PictureKind::Albedo, 10, 0.1));
     both[1].protocols.get_mut("paper").unwrap().instances.retain(|errors| errors.category.is_some());

@@ -3,22 +3,22 @@
 use mateval_eval::metric::{Better, Metric, NumberStyle};
 use mateval_eval::result_key::{PictureName, ResultKey, Views};
 
-/// What a column of numbers holds.
+/// The quantity that a column of numbers holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Quantity {
-    /// The number of pixels that count.
+    /// The number of compared pixels.
     Pixels,
     /// A score.
     Score(Metric),
 }
 
 impl Quantity {
-    /// Every score, as they are shown.
+    /// Every score, in the order in which tables show them.
     pub(crate) fn scores() -> Vec<Self> {
         Metric::ALL.iter().copied().map(Self::Score).collect()
     }
 
-    /// Which way is better; none for what is no score.
+    /// Whether higher or lower is better; none for counts.
     pub(crate) fn better(self) -> Option<Better> {
         match self {
             Self::Pixels => None,
@@ -53,6 +53,6 @@ impl From<ResultKey> for CellKey {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Value {
     pub(crate) value: f64,
-    /// The standard error that render noise makes, in the value's unit.
+    /// The standard error that render noise causes, in the value's unit.
     pub(crate) standard_error: Option<f64>,
 }

@@ -1,6 +1,6 @@
 "use strict";
-// The leaderboard: which columns and rows are shown, by what they are sorted, and who beats whom by that. All of it is in
-// the address behind the #, so that a view can be linked to.
+// The leaderboard: which columns and rows are shown, how rows are sorted, and the table of pairs. All choices are kept
+// in the address after the #, so that they can be linked to.
 
 const table = document.getElementById("board");
 const form = document.getElementById("controls");
@@ -45,7 +45,7 @@ function sortBoard() {
   drawIntervals(head);
 }
 
-// A line from end to end and a dot at the value, on one scale for all rows, in the column that is sorted by.
+// Draws intervals in the sorted column: a line from end to end and a dot at the value, on one scale for all rows.
 function drawIntervals(head) {
   table.querySelectorAll("td svg").forEach((old) => old.remove());
   const cells = [...table.tBodies[0].rows].map((row) => row.cells[head.cellIndex]).filter((cell) => cell.dataset.l);
@@ -68,21 +68,21 @@ function element(name, attributes) {
   return made;
 }
 
-// As in "Albedo, novel views PSNR".
+// The title of a column, as in "Albedo, novel views PSNR".
 function title(head) {
   const metric = head.querySelector("b");
   const words = head.querySelector("button").firstChild.textContent.trim();
   return metric ? `${words} ${metric.firstChild.textContent.trim()}` : words;
 }
 
-function tell() {
+function showStatus() {
   const rows = [...table.tBodies[0].rows];
   const shown = rows.filter((row) => !row.hidden).length;
   const count = shown === rows.length ? "" : ` ${shown} of ${rows.length} methods are shown.`;
   document.getElementById("status").textContent = `Sorted by ${title(headOf(sorted.key))}.${count}`;
 }
 
-// A script of its own for each number: pages opened from the disk may not fetch.
+// Each key has its own script, since pages that are opened from the disk may not fetch.
 const wins = {};
 let winsKey = null;
 function boardWins(key, data) {
@@ -114,7 +114,7 @@ function showWins() {
     });
     body.insertRow().append(Object.assign(cell("th", `${row + 1} ${name}`), { scope: "row", title: name }), ...cells);
   });
-  const words = cell("p", `In percent of draws, by ${title(headOf(winsKey))}.`);
+  const words = cell("p", `Percentage of draws won, by ${title(headOf(winsKey))}.`);
   words.className = "small";
   document.getElementById("wins").replaceChildren(words, made);
 }
@@ -153,7 +153,7 @@ function recall() {
 function update() {
   showColumns();
   showRows();
-  tell();
+  showStatus();
   remember();
 }
 
@@ -166,15 +166,15 @@ table.tHead.addEventListener("click", (event) => {
   const first = head.dataset.better !== "higher";
   sorted = { key, ascending: sorted.key === key ? !sorted.ascending : first };
   sortBoard();
-  tell();
+  showStatus();
   remember();
   loadWins();
 });
-window.addEventListener("hashchange", () => { recall(); showColumns(); showRows(); sortBoard(); tell(); loadWins(); });
+window.addEventListener("hashchange", () => { recall(); showColumns(); showRows(); sortBoard(); showStatus(); loadWins(); });
 
 recall();
 showColumns();
 showRows();
 sortBoard();
-tell();
+showStatus();
 loadWins();

@@ -1,7 +1,8 @@
 "use strict";
-// Tables whose heads are buttons: a press sorts by that column, another one turns it round.
+// Tables whose heads are buttons: a click sorts by that column, another click reverses the order.
 
-// What cells hold in data-v: numbers where all are numbers, else words. Rows without a value come last either way.
+// Sorts by data-v of the cells: as numbers if all of them are numbers, else as words. Rows without a value always come
+// last.
 function sortRows(body, at, ascending) {
   const value = (row) => row.cells[at].dataset.v;
   const rows = [...body.rows];
@@ -10,7 +11,7 @@ function sortRows(body, at, ascending) {
   const compare = numbers
     ? (a, b) => Number(value(a)) - Number(value(b))
     : (a, b) => value(a).localeCompare(value(b), "en", { numeric: true });
-  // Reversed by sign, not by turning the list round: equal rows keep their order.
+  // Reversed by sign instead of reversing the list, so that equal rows keep their order.
   has.sort((a, b) => (ascending ? 1 : -1) * compare(a, b));
   body.append(...has, ...rows.filter((row) => !has.includes(row)));
 }
