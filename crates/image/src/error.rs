@@ -28,7 +28,7 @@ pub enum ImageError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What was found and what would be read.
+        /// What was found and what is supported.
         what: String,
     },
     /// The number of pixels is not width times height.

@@ -15,7 +15,7 @@ impl LinearRgb {
     }
 }
 
-/// sRGB-encoded red, green, blue; 0 to 1 where it shows something displayable.
+/// sRGB-encoded red, green, blue; 0 to 1 for displayable colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SrgbRgb(pub [f32; 3]);
 

@@ -1,4 +1,4 @@
-//! Metrics of how far a picture is from the true one.
+//! Metrics of the difference between a picture and a reference.
 //!
 //! In: a prediction and a reference of the same size, and the mask of the pixels that count, in that order. Out: one
 //! number, or `None` where no pixel (or no window) counts. The type of a picture is its colour space; the caller clips

@@ -50,7 +50,7 @@ mod tests {
 
     use super::*;
 
-    /// By hand: ((0.5)² + 0 + 0 + (0.25)² + 0 + 0) / 6.
+    /// Computed by hand: ((0.5)² + 0 + 0 + (0.25)² + 0 + 0) / 6.
     #[test]
     fn a_small_number_by_hand() {
         let p = Picture::new(2, 1, vec![LinearRgb([1.0, 0.0, 0.0]), LinearRgb([0.25, 0.5, 0.5])]).unwrap();
@@ -105,7 +105,7 @@ mod tests {
             prop_assert_eq!(mse(&p, &r, Some(&mask)).unwrap(), mse(&r, &p, Some(&mask)).unwrap());
             let whole = mse(&p, &r, None).unwrap().unwrap();
             prop_assert_eq!(mse(&p, &r, Some(&Picture::filled(4, 3, true))).unwrap(), Some(whole));
-            // Free of the pixels' order, up to rounding.
+            // Independent of the order of pixels, up to rounding.
             let turned = |mut pixels: Vec<LinearRgb>| { pixels.reverse(); Picture::new(4, 3, pixels).unwrap() };
             let reversed = mse(&turned(a), &turned(b), None).unwrap().unwrap();
             prop_assert!((reversed - whole).abs() <= 1e-14 * whole);

@@ -121,7 +121,7 @@ impl Camera {
         self.matrix().transform_point3(self.camera_direction(pixel) * depth)
     }
 
-    /// The place of a world point in the picture, and its depth along the camera's axis in metres; none behind the
+    /// The position of a world point in the picture, and its depth along the camera's axis in metres; none behind the
     /// camera.
     pub fn project(&self, world: DVec3) -> Option<(DVec2, f64)> {
         self.projection().project(world)

@@ -21,11 +21,11 @@ pub struct DatasetFile {
     pub name: String,
     /// The dataset's own version, from its recipe.
     pub version: String,
-    /// What made it, as in `mateval 0.1.0`.
+    /// The program and version that made it, as in `mateval 0.1.0`.
     pub tool: String,
     /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
     pub scenes: Vec<SceneId>,
-    /// The renderer whose pictures are scored against and shown as `input/rgb`; null until there is one.
+    /// The renderer of the reference pictures, which are also shown as `input/rgb`; null until all are rendered.
     pub scored_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,
@@ -51,7 +51,7 @@ pub struct Licence {
 pub struct TargetsFile {
     /// Always `mateval/1`.
     pub format: String,
-    /// One entry a picture.
+    /// One entry for each picture.
     pub targets: Vec<Target>,
 }
 
@@ -65,7 +65,7 @@ pub struct Target {
     pub view: ViewId,
 }
 
-/// `scenes/<scene>/scene.json`: what the scene holds and from where it is seen.
+/// `scenes/<scene>/scene.json`: the content of the scene and its views.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
@@ -85,7 +85,7 @@ pub struct SceneFile {
     pub instances: Vec<Instance>,
     /// In the order of their index.
     pub parts: Vec<Part>,
-    /// Other ways to split the instances into parts, from labels made elsewhere.
+    /// Other ways to split the instances into parts, from external labels.
     pub part_sets: Vec<PartSet>,
     /// What was wrong with the source and what was done instead, sorted.
     pub findings: Vec<Finding>,
@@ -127,7 +127,7 @@ pub struct View {
     pub camera: Camera,
 }
 
-/// One object, as methods give textures for.
+/// One object that methods provide textures for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Instance {
@@ -139,13 +139,13 @@ pub struct Instance {
     pub name: String,
     /// Its role in the scene.
     pub role: Role,
-    /// What it is, where the source says so.
+    /// Its category; null where the source does not state it.
     pub category: Option<String>,
-    /// The benchmark's broader category, where the source says so.
+    /// The benchmark's broader category; null where the source does not state it.
     pub super_category: Option<String>,
     /// Triangles in `instances.glb`.
     pub triangles: usize,
-    /// Its uv atlas; null where there is none to recover (glass).
+    /// Its uv atlas; null for glass and for shapes without area.
     pub atlas: Option<Atlas>,
 }
 
@@ -155,7 +155,7 @@ pub struct Instance {
 pub struct Atlas {
     /// Texels a side of the baked truth.
     pub size: u32,
-    /// Charts in it.
+    /// Number of charts.
     pub charts: u32,
     /// Share of the square that charts cover, 0 to 1.
     pub coverage: f64,

@@ -1,4 +1,4 @@
-//! Which dataset, and which of its scenes, a result or a report of lint is about.
+//! The dataset, and those of its scenes, that a result or a lint report is about.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use crate::dataset::SceneFile;
 use crate::open::Dataset;
 use crate::{RendererId, SceneId};
 
-/// What it was scored on.
+/// The dataset and the scenes that were scored or checked.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetId {
@@ -21,18 +21,18 @@ pub struct DatasetId {
     pub manifest_sha256: String,
     /// The scenes that were scored, in the dataset's order.
     pub scenes: Vec<SceneId>,
-    /// How many scenes it has.
+    /// The number of scenes of the dataset.
     pub scenes_in_all: usize,
-    /// The house of each scored scene: rankings draw scenes of one house together.
+    /// The house of each scored scene. Rankings draw scenes of one house together.
     #[serde(default)]
     pub houses: BTreeMap<SceneId, String>,
-    /// The renderer whose pictures light was compared with; null where there were none.
+    /// The renderer whose pictures were the reference for light; null without such pictures.
     #[serde(default)]
     pub scored_renderer: Option<RendererId>,
 }
 
 impl DatasetId {
-    /// Of a dataset of which `scenes` are looked at.
+    /// Describes a dataset of which `scenes` are scored or checked.
     pub fn new<'a>(dataset: &Dataset, scenes: impl IntoIterator<Item = &'a SceneFile>) -> Self {
         let scenes: Vec<&SceneFile> = scenes.into_iter().collect();
         Self {

@@ -30,10 +30,10 @@ pub enum SceneError {
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What was found and what would be read.
+        /// What was found and what is supported.
         what: String,
     },
-    /// Scenes were asked for that the dataset does not have.
+    /// Scenes were requested that the dataset does not have.
     #[error("'{}' has no scene {}; it has {}", dataset.display(), quoted(unknown), quoted(known))]
     UnknownScenes {
         /// The dataset's folder.
@@ -43,12 +43,12 @@ pub enum SceneError {
         /// All scenes that it has.
         known: Vec<SceneId>,
     },
-    /// An output exists and was not to be replaced.
+    /// An output exists and replacing it was not allowed.
     #[error("'{}' already exists; choose another {place}, or add --force to overwrite it", path.display())]
     Exists {
         /// The output.
         path: PathBuf,
-        /// What names the output in the command, as in `--out`.
+        /// The argument of the command that names the output, as in `--out`.
         place: &'static str,
     },
     /// A picture could not be read or written.

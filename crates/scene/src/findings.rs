@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// The input cannot be used as it stands.
+    /// The input cannot be used.
     Error,
     /// Something was left out or replaced.
     Warning,
@@ -40,11 +40,11 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FindingCount {
-    /// How much they weigh.
+    /// Their severity.
     pub severity: Severity,
     /// Their code.
     pub code: String,
-    /// How many.
+    /// Their number.
     pub count: usize,
 }
 

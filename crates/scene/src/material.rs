@@ -14,13 +14,13 @@ pub struct TextureIndex(pub usize);
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ColorInput {
-    /// The same everywhere.
+    /// One colour everywhere.
     Constant([f32; 3]),
-    /// Looked up at the surface's uv.
+    /// A texture, looked up at the surface's uv.
     Texture {
-        /// Which.
+        /// The texture.
         texture: TextureIndex,
-        /// Where in it.
+        /// The mapping from the surface's uv to the texture's.
         uv: UvTransform,
     },
 }
@@ -29,15 +29,15 @@ pub enum ColorInput {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ScalarInput {
-    /// The same everywhere.
+    /// One number everywhere.
     Constant(f32),
     /// One channel of a texture, looked up at the surface's uv.
     Texture {
-        /// Which.
+        /// The texture.
         texture: TextureIndex,
         /// 0 red, 1 green, 2 blue.
         channel: usize,
-        /// Where in it.
+        /// The mapping from the surface's uv to the texture's.
         uv: UvTransform,
     },
 }
@@ -202,11 +202,12 @@ pub enum PrincipledFlavour {
 pub struct BumpMap {
     /// The height.
     pub height: ScalarInput,
-    /// Multiplies it.
+    /// The factor that multiplies the heights.
     pub scale: f32,
 }
 
-/// Where a surface is less opaque than this, it is cut out of the pictures that hold no light (depth, ids, materials).
+/// Where a surface's opacity is below this value, rays pass through it in the pictures without light (depth, ids,
+/// materials).
 pub const CUT_OUT_BELOW_OPACITY: f32 = 0.5;
 
 /// A surface's material.
@@ -221,11 +222,11 @@ pub struct Material {
     pub two_sided: bool,
     /// Opacity from 0, which lets all light pass straight through, to 1; none means opaque everywhere.
     pub opacity: Option<ScalarInput>,
-    /// Bends the shading normal.
+    /// The bump map, which bends the shading normal.
     pub bump: Option<BumpMap>,
 }
 
-/// What a method is to recover at a point of a surface.
+/// The values that a method should recover at a point of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
     /// Linear.
@@ -239,15 +240,15 @@ pub struct Appearance {
 /// A texture of a material and how it is looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lookup {
-    /// Which.
+    /// The texture.
     pub texture: TextureIndex,
     /// 0 red, 1 green, 2 blue; 0 for colours.
     pub channel: usize,
-    /// Where in it.
+    /// The mapping from the surface's uv to the texture's.
     pub uv: UvTransform,
 }
 
-/// The parameters of a [`MaterialModel`] by type, for what holds for every model: checks and texture lookups.
+/// The parameters of a [`MaterialModel`] by type, for checks and texture lookups that are the same for every model.
 #[derive(Clone, Debug, Default)]
 pub struct ModelInputs<'a> {
     /// Colours, constant or textured.
@@ -261,7 +262,7 @@ pub struct ModelInputs<'a> {
 }
 
 impl Material {
-    /// Every texture that the material looks up.
+    /// All texture lookups of the material.
     pub fn lookups(&self) -> Vec<Lookup> {
         let ModelInputs { colors, scalars, .. } = self.model.inputs();
         let around = self.opacity.iter().chain(self.bump.iter().map(|bump| &bump.height));
@@ -269,7 +270,7 @@ impl Material {
         colors.chain(scalars.into_iter().chain(around).filter_map(ScalarInput::lookup)).collect()
     }
 
-    /// Whether it has base_color, roughness and metallic. Glass has not.
+    /// Whether the material has base_color, roughness and metallic. Glass does not.
     pub fn has_appearance(&self) -> bool {
         !matches!(self.model, MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. })
     }
@@ -310,7 +311,7 @@ impl Material {
         Some(appearance)
     }
 
-    /// [`Self::appearance`] if none of its values comes from a texture.
+    /// [`Self::appearance`] if it needs no texture; otherwise none.
     pub fn constant_appearance(&self) -> Option<Appearance> {
         let constant = |color: &ColorInput| color.lookup().is_none();
         let number = |scalar: &ScalarInput| scalar.lookup().is_none();

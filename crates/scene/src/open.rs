@@ -152,7 +152,7 @@ mod tests {
     use super::*;
     use crate::Role;
 
-    /// An untrusted word is refused where it stands in the file.
+    /// The error for an untrusted word names its place in the file.
     #[test]
     fn unknown_roles_sources_and_lights_are_refused() {
         let folder = tempfile::tempdir().unwrap();

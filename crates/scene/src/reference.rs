@@ -46,39 +46,40 @@ pub struct SourceTexture {
     pub texture: Texture,
 }
 
-/// A texture that varies the radiance of a glowing surface from place to place, as a lamp's shade does.
+/// A texture that varies the radiance of an emitting surface from place to place, as on a lamp's shade.
 ///
-/// It is looked up at the surface's own uv, zero where that has none, and multiplies the radiance channel by channel.
+/// It is looked up at the surface's own uv, or at zero if the surface has none, and multiplies the radiance channel by
+/// channel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EmissionMap {
-    /// Which; no texel below 0.
+    /// The texture, which has no texel below 0.
     pub texture: TextureIndex,
-    /// Where in it.
+    /// The mapping from the surface's uv to the texture's.
     pub uv: UvTransform,
 }
 
 impl EmissionMap {
-    /// What the radiance is multiplied by at the surface's `uv`, linear.
+    /// The linear factor of the radiance at the surface's `uv`.
     pub fn at(&self, textures: &[Texture], uv: Vec2) -> [f32; 3] {
         textures[self.texture.0].sample(self.uv.apply(uv).to_array())
     }
 }
 
-/// What emits light.
+/// A kind of emitter.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Emission {
-    /// Surfaces that glow.
+    /// Surfaces that emit light.
     Area {
-        /// Which.
+        /// The surfaces that emit.
         surfaces: Vec<SurfaceIndex>,
         /// Linear Rec. 709 radiance, W/(m^2 sr) in the scene's own unit.
         radiance: [f32; 3],
-        /// Multiplies it, place by place; absent: it is the same all over.
+        /// A texture that multiplies the radiance from place to place; if absent, the radiance is the same everywhere.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         map: Option<EmissionMap>,
-        /// Whether the back glows too; Mitsuba's does not, Blender's does.
+        /// Whether the back emits too, as in Blender but not in Mitsuba.
         two_sided: bool,
     },
     /// A latitude-longitude picture around the scene.
@@ -86,7 +87,7 @@ pub enum Emission {
         /// Linear radiance. In the map's own frame a direction d is looked up at u = atan2(d.x, -d.z) / (2 pi),
         /// v (from the top) = acos(d.y) / pi (Mitsuba's convention).
         texture: TextureIndex,
-        /// Multiplies it.
+        /// The factor that multiplies the texture.
         scale: f32,
         /// Rotation of the map's frame into the world, row-major.
         world_from_environment: [[f32; 3]; 3],
@@ -98,13 +99,13 @@ pub enum Emission {
     },
 }
 
-/// One group of emitters, with a picture of its own in the light basis.
+/// A group of emitters, which has its own picture in the light basis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightGroup {
     /// Its name, unique in the scene.
     pub name: String,
-    /// What it is.
+    /// How the group emits.
     pub emission: Emission,
     /// Whether camera rays see it emit. If not, they see the plain surface, or black for an environment.
     pub camera_visible: bool,
@@ -113,13 +114,13 @@ pub struct LightGroup {
 /// A scene with its source materials and lights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReferenceScene {
-    /// Every object, glass and lamps included.
+    /// All surfaces, including glass and lamps.
     pub surfaces: Vec<Surface>,
-    /// What they are made of.
+    /// The materials of the surfaces.
     pub materials: Vec<Material>,
-    /// What those look up.
+    /// The textures of materials and lights.
     pub textures: Vec<SourceTexture>,
-    /// What emits.
+    /// The groups of emitters.
     pub lights: Vec<LightGroup>,
 }
 

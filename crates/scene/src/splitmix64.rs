@@ -1,7 +1,7 @@
 //! SplitMix64 (Steele et al., "Fast splittable pseudorandom number generators", OOPSLA 2014) as a function of seed and
-//! index, so that every random number can be had without those before it.
+//! index, so that every random number can be computed without those before it.
 
-/// What separates two neighbouring states of the generator.
+/// The difference between two successive states of the generator.
 pub const INCREMENT: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The number at `index`, counted from 0, of the sequence that starts from `seed`.

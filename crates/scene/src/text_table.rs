@@ -18,7 +18,7 @@ pub fn row<const N: usize>(cells: [&str; N]) -> Vec<String> {
 }
 
 impl Table {
-    /// Title and rows with words aligned left and numbers right, or `none` for a table of nothing but a head.
+    /// Title and rows with words aligned left and numbers right, or `none` for a table that has only a head.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
         if self.rows.len() <= 1 {

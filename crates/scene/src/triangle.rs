@@ -26,7 +26,7 @@ pub fn distance(corners: [DVec3; 3], point: DVec3) -> f64 {
 /// A point on an edge of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgePoint {
-    /// Where it is.
+    /// Its position.
     pub point: DVec3,
     /// Its barycentric weights; one of them is 0.
     pub weights: DVec3,

@@ -119,7 +119,7 @@ impl UvAtlas {
     fn claim_near(&mut self) {
         let mut distances = Picture::filled(self.size, self.size, f32::INFINITY);
         for triangle in 0..self.corners.len() {
-            // A triangle without area shows nothing, so it must not take its neighbours' texels.
+            // A triangle without area is not visible, so it must not take its neighbours' texels.
             if self.texel_area(triangle) == 0.0 {
                 continue;
             }

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::SceneError;
 
-/// Fails where the output `path` exists and `force` does not allow to replace it. `place` is what names the output in
-/// the command, as in `--out`.
+/// Fails where the output `path` exists and `force` does not allow replacing it. `place` is the argument of the command
+/// that names the output, as in `--out`.
 pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), SceneError> {
     if force || !path.exists() { Ok(()) } else { Err(SceneError::Exists { path: path.to_owned(), place }) }
 }

@@ -9,17 +9,17 @@ fn encode(LinearRgb(rgb): LinearRgb) -> SrgbRgb {
     SrgbRgb(rgb.map(|value| mateval_image::transfer::srgb_from_linear(value.clamp(0.0, 1.0))))
 }
 
-/// What was found over all seeds.
+/// The results over all seeds.
 struct Found {
     /// The true error, encoded.
     truth: f64,
-    /// Found less true, and the noise of that.
+    /// The estimate minus the true error, and the noise of this difference.
     bias: (f64, f64),
     estimates: Vec<EncodingBias>,
 }
 
 impl Found {
-    /// Of a prediction that is the reference times `factors`; the reference has `more` times as many samples.
+    /// Runs with a prediction that is the reference times `factors`; the reference has `more` times as many samples.
     fn new(render: Render, factors: [f32; 3], more: u32) -> Self {
         let reference = waves(SIDE);
         let prediction = reference.map(|LinearRgb(rgb)| LinearRgb(std::array::from_fn(|c| rgb[c] * factors[c])));
@@ -54,11 +54,11 @@ const DARKER: [f32; 3] = [0.8; 3];
 const BRIGHTER: [f32; 3] = [1.25; 3];
 const TINTED: [f32; 3] = [1.2, 0.8, 1.0];
 const SAME: [f32; 3] = [1.0; 3];
-/// What the prediction is, and how many times more samples the reference has.
+/// The prediction's factors, and the ratio of the reference's samples to the prediction's.
 const PAIRS: [([f32; 3], u32); 6] = [(DARKER, 1), (DARKER, 8), (BRIGHTER, 1), (BRIGHTER, 8), (TINTED, 1), (SAME, 8)];
 
-/// In every seed; in nearly all where all noise is that of 16 blocks, too few to tell their spread. The twin: what
-/// bounds the bias of 64 samples does not bound that of 4.
+/// The bound holds for every seed, or for nearly every one where all noise comes from 16 blocks, too few to estimate
+/// their spread. The twin: the bound at 64 samples does not hold for the bias at 4.
 #[test]
 fn the_bound_holds() {
     let blocks = squares(SIDE, 0);
@@ -81,8 +81,8 @@ fn the_bound_holds() {
     assert!(twins >= 8, "{twins}");
 }
 
-/// At 64 samples the estimate is right to a fifth (and the noise of what it is held against); the twin, no estimate at
-/// all, is not.
+/// At 64 samples the estimate is right to a fifth (plus the noise of the reference value); the twin, an estimate of 0,
+/// is not.
 #[test]
 fn the_estimate_is_the_bias() {
     for (factors, more) in PAIRS.into_iter().filter(|&(factors, _)| factors != SAME) {
@@ -106,7 +106,7 @@ fn the_bound_is_a_small_share_of_the_error() {
             "{scatter:?}: {}",
             found.mean(|e| e.bound) / found.truth
         );
-        // The twin: that of 16 samples is not.
+        // The twin: the one at 16 samples is not.
         let coarse = Found::new(render(scatter, 16), DARKER, 1);
         assert!(coarse.mean(|e| e.bound) > share * coarse.truth);
     }

@@ -63,7 +63,7 @@ fn enlarged_counts(from: usize, to: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// By hand: two samples enlarged to four lie at 0, 0.25, 0.75 and 1; three stay where they are.
+    /// Computed by hand: two samples enlarged to four lie at 0, 0.25, 0.75 and 1; three are unchanged.
     #[test]
     fn counts_by_hand() {
         assert_eq!(enlarged_counts(2, 4), [2.0, 2.0]);

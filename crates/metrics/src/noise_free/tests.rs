@@ -34,14 +34,14 @@ impl Halved {
         noise_free_mse(Halves { a, b }, Halves { a: ia, b: ib }, &all(), blocks).unwrap().unwrap()
     }
 
-    /// The error of the halves' means, noise and all.
+    /// The error of the halves' means, including noise.
     fn plain_error(&self) -> f64 {
         let [a, b, ia, ib] = &self.0;
         mse(&mean_of(a, b), &mean_of(ia, ib), None).unwrap().unwrap()
     }
 }
 
-/// By hand: X = (0.5, 0.25), Y = (0.25, 0.25), so X Y = (0.125, 0.0625) and D = (0.09375, 0).
+/// Computed by hand: X = (0.5, 0.25), Y = (0.25, 0.25), so X Y = (0.125, 0.0625) and D = (0.09375, 0).
 #[test]
 fn a_small_number_by_hand() {
     let picture = |values: [f32; 2]| Picture::new(2, 1, values.to_vec()).unwrap();
@@ -106,7 +106,7 @@ fn the_estimate_has_no_bias() {
     }
 }
 
-/// Standard errors as told, over the estimates' true spread.
+/// The ratio of the reported standard errors to the true spread of the estimates.
 fn told_over_true(errors: &[f64], estimates: &[f64]) -> f64 {
     let root = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
     root / mean_and_deviation(estimates).1
@@ -129,7 +129,7 @@ fn the_standard_error_is_the_spread() {
             };
             let ratio = found(if correlated { &blocks } else { &single });
             assert!((0.8..1.25).contains(&ratio), "{scatter:?} {samples} {correlated}: {ratio}");
-            // The twin: what is correlated, taken as if it were not.
+            // The twin: correlated noise treated as if it were not correlated.
             assert!(!correlated || found(&single) < 0.7);
         }
     }
@@ -158,7 +158,7 @@ fn the_error_of_a_mean_psnr_is_its_spread() {
         };
         let (ratio, twin) = (found(&blocks), found(&others));
         assert!((0.8..1.25).contains(&ratio), "{scatter:?} {samples}: {ratio}");
-        // The twin: views as if they shared nothing.
+        // The twin: views treated as if they shared no block.
         assert!(twin < 0.8 * ratio && (samples < 64 || twin < 0.8), "{scatter:?} {samples}: {twin} for the twin");
     }
 }
@@ -177,7 +177,8 @@ fn the_thread_count_changes_no_bit() {
     assert_ne!(with(1), Halved::new([&render; 2], [&scaled(&reference, 0.8), &reference], 1).error(&squares(SIDE, 0)));
 }
 
-/// The noise is told apart: who has fewer samples has more of it, and the squares of both add up to that of the whole.
+/// The two sources of noise are separated: the picture with fewer samples has more noise, and both squares add up to
+/// the square of the whole.
 #[test]
 fn whose_noise_it_is() {
     let reference = waves(SIDE);
@@ -191,7 +192,7 @@ fn whose_noise_it_is() {
             let square = |part: fn(&NoiseFreeMse) -> f64| errors.iter().map(|error| part(error).powi(2)).sum::<f64>();
             let (p, r) = (square(NoiseFreeMse::prediction_error), square(NoiseFreeMse::reference_error));
             let found = (p / r).sqrt();
-            // The prediction is darker, and its noise with it.
+            // The prediction is darker, so its noise is smaller.
             assert!((0.6..1.1).contains(&(found / ratio)), "{scatter:?}: {found}");
             assert!(((p + r) / square(NoiseFreeMse::standard_error) - 1.0).abs() < 0.05);
         }
@@ -210,7 +211,7 @@ fn psnr_of_an_estimate() {
     assert_eq!(psnr(0.01, 0.006), plain(Psnr::from_mse(0.01).unwrap().db));
     assert_eq!(psnr(0.0, 0.0), NoiseFreePsnr { db: 100.0, exact: true, lower_bound: false });
     assert_eq!(psnr(1e-20, 0.0), plain(100.0));
-    // Two thirds of the noise say nothing: 0.01 + 1.645 * 0.01.
+    // Not significant: 0.01 + 1.645 * 0.01.
     for (mse, noise, bound) in
         [(0.01, 0.01, 0.02645), (0.0, 0.01, 0.01645), (-0.01, 0.01, 0.01645), (-0.02, 0.01, 0.02)]
     {
@@ -222,8 +223,8 @@ fn psnr_of_an_estimate() {
     assert!(matches!(error_of(f64::NAN, 0.0).psnr(), Err(MetricError::InvalidMse { .. })));
 }
 
-/// By hand: 10 / ln 10 * 0.002 / 0.01 is 0.86859 dB; two equal views that share their block have as much, two that do
-/// not have it over the root of 2.
+/// Computed by hand: 10 / ln 10 * 0.002 / 0.01 is 0.86859 dB. Two equal views that share their block have the same
+/// error, two that do not have it divided by the root of 2.
 #[test]
 fn mean_psnr_errors_by_hand() {
     let (view, mut other) = (error_of(0.01, 0.002), error_of(0.01, 0.002));
