@@ -15,12 +15,14 @@ pub mod house;
 mod pattern;
 mod room;
 mod solid;
+mod text_file;
 
 use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
 
 pub use error::SampleError;
+use text_file::write_text;
 
 /// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
@@ -71,10 +73,6 @@ fn write_room(out: &Path) -> Result<(), SampleError> {
     }
     write_text(&room.join("LICENSE.txt"), LICENSE)?;
     write_text(&room.join("scene.xml"), &room::xml())
-}
-
-fn write_text(path: &Path, text: &str) -> Result<(), SampleError> {
-    std::fs::write(path, text).map_err(SampleError::io("write", path))
 }
 
 #[cfg(test)]

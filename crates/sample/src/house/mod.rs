@@ -31,8 +31,8 @@ use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
 
-use super::write_text;
 use crate::SampleError;
+use crate::text_file::write_text;
 
 /// The house's licence file: CC0 1.0.
 const LICENSE: &str = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\

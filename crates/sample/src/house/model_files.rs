@@ -13,7 +13,7 @@ use super::models::{Model, Quirk};
 use super::swatches::{self, Swatch};
 use crate::SampleError;
 use crate::solid::Solid;
-use crate::write_text;
+use crate::text_file::write_text;
 
 /// Decimals of numbers in OBJ files, which are in metres.
 const DECIMALS: usize = 5;
