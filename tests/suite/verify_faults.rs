@@ -84,12 +84,12 @@ fn hashes() {
             plant: |root| std::fs::remove_file(Room::of(root).file("views/up_left/part.png")).unwrap(),
         },
         Fault {
-            what: "a file too many",
+            what: "an unlisted file",
             expected: ("unlisted_file", "scenes/room/notes.txt"),
             plant: |root| std::fs::write(Room::of(root).file("notes.txt"), "x").unwrap(),
         },
         Fault {
-            what: "a line taken from the manifest",
+            what: "a line removed from the manifest",
             expected: ("wrong_manifest", "dataset.json"),
             plant: |root| {
                 let text = super::sample::manifest(root);
@@ -109,26 +109,26 @@ fn json_files() {
             plant: |root| Room::of(root).edit_scene(|scene| scene["exposure"] = Value::from("1")),
         },
         Fault {
-            what: "a word that the format does not know",
+            what: "an unknown key",
             expected: ("breaks_schema", "targets.json"),
             plant: |root| edit_json(&root.join("targets.json"), |file| file["target"] = Value::from(1)),
         },
         Fault {
-            what: "targets that name a view that is not there",
+            what: "a target that names a missing view",
             expected: ("dangling_reference", "targets.json"),
             plant: |root| {
                 edit_json(&root.join("targets.json"), |file| file["targets"][1]["view"] = "upside_down".into())
             },
         },
         Fault {
-            what: "a target twice",
+            what: "a duplicate target",
             expected: ("duplicate_target", "targets.json"),
             plant: |root| {
                 edit_json(&root.join("targets.json"), |file| file["targets"][1] = file["targets"][0].clone());
             },
         },
         Fault {
-            what: "a part of an instance that is not there",
+            what: "a part of an instance that does not exist",
             expected: ("dangling_reference", "scenes/room/scene.json"),
             plant: |root| Room::of(root).edit_scene(|scene| scene["parts"][0]["instance"] = "nobody".into()),
         },
@@ -159,7 +159,7 @@ fn cameras() {
             },
         },
         Fault {
-            what: "a matrix that is no rotation",
+            what: "a matrix that is not a rotation",
             expected: ("bad_camera", "scenes/room/scene.json"),
             plant: |root| {
                 Room::of(root).edit_scene(|s| s["views"][0]["camera"]["world_from_camera"][0][0] = Value::from(2.0));
@@ -187,17 +187,17 @@ fn pictures() {
             plant: |root| Room::of(root).edit_ids("views/input/instance.png", |id| if id == 1 { 60_000 } else { id }),
         },
         Fault {
-            what: "the parts shuffled",
+            what: "shuffled parts",
             expected: ("bad_id", "scenes/room/views/input/part.png"),
             plant: |root| Room::of(root).edit_ids("views/input/part.png", |id| if id < 2 { id } else { id - 1 }),
         },
         Fault {
-            what: "the parts of one instance shuffled",
+            what: "shuffled parts of one instance",
             expected: ("not_reprojected", "scenes/room/views/input/part.png"),
             plant: shuffle_the_sofa,
         },
         Fault {
-            what: "unobserved where nothing is valid",
+            what: "unobserved pixels where nothing is valid",
             expected: ("bad_mask", "scenes/room/views/up_left/unobserved.png"),
             plant: |root| {
                 let room = Room::of(root);
@@ -206,7 +206,7 @@ fn pictures() {
             },
         },
         Fault {
-            what: "unobserved where the input view looks",
+            what: "unobserved pixels that the input view shows",
             expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
             plant: |root| {
                 let room = Room::of(root);
@@ -215,12 +215,12 @@ fn pictures() {
             },
         },
         Fault {
-            what: "nothing unobserved",
+            what: "no unobserved pixel",
             expected: ("not_reprojected", "scenes/room/views/up_left/unobserved.png"),
             plant: |root| Room::of(root).edit_mask("views/up_left/unobserved.png", |_, _, _| false),
         },
         Fault {
-            what: "nothing valid",
+            what: "no valid pixel",
             expected: ("not_reprojected", "scenes/room/views/input/valid.png"),
             plant: |root| Room::of(root).edit_mask("views/input/valid.png", |_, _, _| false),
         },
@@ -235,7 +235,7 @@ fn pictures() {
             },
         },
         Fault {
-            what: "normals of no length",
+            what: "normals of length 0",
             expected: ("bad_normal", "scenes/room/views/down_left/normal.exr"),
             plant: |root| {
                 let path = Room::of(root).file("views/down_left/normal.exr");
@@ -272,7 +272,7 @@ fn meshes() {
     let faults =
         [
             Fault {
-                what: "a uv outside of the atlas",
+                what: "a uv outside the atlas",
                 expected: ("bad_uv", "scenes/room/geometry/instances.glb"),
                 plant: |root| {
                     let instances = "geometry/instances.glb";
@@ -303,7 +303,7 @@ fn meshes() {
                 },
             },
             Fault {
-                what: "instances in the place of parts",
+                what: "instances in place of parts",
                 expected: ("wrong_nodes", "scenes/room/geometry/parts.glb"),
                 plant: |root| {
                     let room = Room::of(root);
@@ -362,7 +362,7 @@ fn ground_truth() {
             },
         },
         Fault {
-            what: "a render that is not there",
+            what: "a missing render",
             expected: ("unreadable", "scenes/room/ground_truth/renders/builtin/down_right/rgb_b.exr"),
             plant: |root| {
                 std::fs::remove_file(Room::of(root).file("ground_truth/renders/builtin/down_right/rgb_b.exr")).unwrap();

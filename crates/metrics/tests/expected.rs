@@ -1,7 +1,8 @@
-//! The metrics agree with scikit-image and with the LPIPS authors' code, on small pictures that are made here and,
-//! where the shared data exist, on real ones.
+//! The metrics agree with scikit-image and with the LPIPS authors' code, on small generated pictures and, where the
+//! shared data exist, on real ones.
 //!
-//! LPIPS needs its weights in MatEval's cache folder. What is missing is skipped, or fails (`mateval_testkit::data`).
+//! LPIPS needs its weights in MatEval's cache folder. A test whose input is missing is skipped, or
+//! fails (`mateval_testkit::data`).
 #![allow(clippy::unwrap_used, clippy::print_stderr)] // tests may; deviations are printed
 
 mod vectors;
@@ -15,15 +16,15 @@ use mateval_testkit::data::shared_data;
 use serde::Deserialize;
 use weights::load_lpips;
 
-/// Cases made here; all have a mask.
+/// Number of generated cases; all have a mask.
 const MADE_CASES: usize = 10;
-/// Cases of the shared data.
+/// Number of cases of the shared data.
 const SHARED_CASES: usize = 12;
-/// Those of them that have a mask.
+/// Number of cases of the shared data with a mask.
 const SHARED_MASKED_CASES: usize = 10;
-/// Relative.
+/// Relative tolerance.
 const MSE_TOLERANCE: f64 = 1e-9;
-/// Relative, for pictures that were rounded to `f32`.
+/// Relative tolerance for pictures that were rounded to `f32`.
 const ROUNDED_MSE_TOLERANCE: f64 = 1e-7;
 const SSIM_TOLERANCE: f64 = 1e-6;
 const LPIPS_TOLERANCE: f64 = 2e-5;
@@ -63,7 +64,7 @@ struct Loaded {
     mask: Option<Mask>,
 }
 
-/// The cases that are made here and those of the shared data, the latter empty where they are skipped.
+/// The generated cases and those of the shared data; the latter are empty if they are skipped.
 fn load_cases() -> Vec<Loaded> {
     let mut cases = vectors::load();
     assert_eq!(cases.len(), MADE_CASES);
@@ -149,7 +150,7 @@ fn mse_and_psnr_of_whole_numbers() {
     check_mse_and_psnr(MSE_TOLERANCE, |value| (value * 255.0).round(), |mse| mse / (255.0 * 255.0));
 }
 
-/// Pictures are scored as value/255 in `f32`; the wider tolerance is for that rounding alone.
+/// Pictures are scored as value/255 in `f32`; the wider tolerance allows for that rounding only.
 #[test]
 fn mse_and_psnr_of_values_in_f32() {
     check_mse_and_psnr(ROUNDED_MSE_TOLERANCE, |value| value, |mse| mse);
@@ -167,7 +168,7 @@ fn check_mse_and_psnr(tolerance: f64, value: impl Fn(f32) -> f32, unit: impl Fn(
         mses.relative(&case.prediction, masked, case.masked_mse.unwrap());
         psnrs.relative(&case.prediction, Psnr::from_mse(whole).unwrap().db, case.psnr.unwrap());
         psnrs.relative(&case.prediction, Psnr::from_mse(masked).unwrap().db, case.masked_psnr.unwrap());
-        // The twin: a missing mask is noticed.
+        // The twin: a missing mask is detected.
         assert!((whole / case.masked_mse.unwrap() - 1.0).abs() > tolerance);
     }
     mses.finish(2 * count_masked(&cases));
@@ -187,7 +188,7 @@ fn ssim_by_all_three_rules() {
         check.value(&case.prediction, black_fill, case.blackfill_ssim.unwrap());
         check.value(&case.prediction, valid.ssim, case.masked_ssim_valid_windows.unwrap());
         assert_eq!(valid.windows, case.valid_windows.unwrap());
-        // The twin: one rule in place of another is noticed.
+        // The twin: the wrong mask rule is detected.
         assert!((whole - case.blackfill_ssim.unwrap()).abs() > SSIM_TOLERANCE);
         assert!((black_fill - case.masked_ssim_valid_windows.unwrap()).abs() > SSIM_TOLERANCE);
     }
@@ -218,7 +219,7 @@ fn check_lpips(net: Net, expected: impl Fn(&Case) -> (f64, Option<f64>, Option<f
         check.value(&case.prediction, found, masked.unwrap());
     }
     check.finish(cases.len() + 2 * count_masked(&cases));
-    // The twin: pictures whose channels are in the wrong order are noticed.
+    // The twin: channels in the wrong order are detected.
     let swap = |picture: &Picture<SrgbRgb>| picture.map(|SrgbRgb([r, g, b])| SrgbRgb([b, g, r]));
     let Loaded { case, prediction, reference, .. } = &cases[0];
     let swapped = lpips.whole(&swap(prediction), &swap(reference)).unwrap();

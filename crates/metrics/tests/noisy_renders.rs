@@ -12,7 +12,7 @@ use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_of, waves
 
 const SIDE: usize = 96;
 
-/// A room of sorts, flatter than the waves: LPIPS sees noise best where nothing else is.
+/// A simple picture of a room, flatter than the waves: LPIPS reacts to noise most where the picture is flat.
 fn reference() -> Picture<LinearRgb> {
     let waves = waves(SIDE);
     Picture::from_fn(SIDE, SIDE, |x, y| match (x / 24 + y / 32) % 3 {
@@ -30,8 +30,8 @@ fn prediction() -> Picture<LinearRgb> {
     })
 }
 
-/// Both halves' mean and both halves, encoded; `samples` in all, one of which is off by half its value (standard
-/// deviation).
+/// The mean of both halves and the halves, encoded; `samples` together. The standard deviation of one sample is half
+/// its value.
 fn noisy(scatter: Scatter, samples: u32) -> [Picture<SrgbRgb>; 3] {
     let strength = match scatter {
         Scatter::GaussianLike => 0.5,
@@ -42,7 +42,7 @@ fn noisy(scatter: Scatter, samples: u32) -> [Picture<SrgbRgb>; 3] {
     [mean_of(&a, &b), a, b].map(|picture| picture.to_srgb())
 }
 
-/// By both rules.
+/// Under both mask rules.
 fn measure(lpips: &Lpips, [mean, a, b]: &[Picture<SrgbRgb>; 3]) -> [ExtrapolatedLpips; 2] {
     let (reference, prediction) = (reference().to_srgb(), MeanAndHalves { mean, a, b });
     let mask: Mask = Picture::from_fn(SIDE, SIDE, |x, y| x > 20 || y > 30);
@@ -60,7 +60,7 @@ fn sixty_four_samples_are_as_good_as_4096() {
         let (few, many) = (measure(&lpips, &noisy(scatter, 64)), measure(&lpips, &noisy(scatter, 4096)));
         for (few, many) in few.iter().zip(&many) {
             assert!((few.lpips - many.of_mean).abs() < 0.01, "{scatter:?}: {few:?} for {many:?}");
-            // The twin: noise and all, it is off by more.
+            // The twin: without extrapolation the error is larger.
             assert!((few.of_mean - many.of_mean).abs() > 0.03, "{scatter:?}: {few:?} for {many:?}");
         }
     }

@@ -1,20 +1,21 @@
 //! Inputs that are not in the repository: the shared data and the weights of LPIPS.
 //!
-//! Where one of them is missing, the test that needs it is skipped and says so on stderr. With
-//! `MATEVAL_REQUIRE_DATA=1`, which CI sets, it fails instead.
+//! If one of them is missing, the test that needs it is skipped, which is printed to stderr. With
+//! `MATEVAL_REQUIRE_DATA=1`, which CI sets, the test fails instead.
 
 use std::path::{Path, PathBuf};
 
 /// The path of `file` in the shared data: in the folder that `MATEVAL_DATA` names, or in `../shared/data` from the
-/// repository's root. None, after saying so, where it does not exist; panics there under `MATEVAL_REQUIRE_DATA=1`.
+/// repository's root. If it does not exist, reports this and returns none, or panics under
+/// `MATEVAL_REQUIRE_DATA=1`.
 pub fn shared_data(file: &str) -> Option<PathBuf> {
     let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
     let path = variable("MATEVAL_DATA").unwrap_or_else(beside).join(file);
     existing(path, "set MATEVAL_DATA to the folder of the shared data")
 }
 
-/// The path of a weights file of LPIPS in MatEval's cache folder. None, after saying so, where it does not exist;
-/// panics there under `MATEVAL_REQUIRE_DATA=1`.
+/// The path of a weights file of LPIPS in MatEval's cache folder. If it does not exist, reports this and returns none,
+/// or panics under `MATEVAL_REQUIRE_DATA=1`.
 pub fn lpips_weights(file: &str) -> Option<PathBuf> {
     let folder = variable("MATEVAL_CACHE")
         .or_else(|| variable("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
@@ -29,12 +30,12 @@ pub fn report_missing(what: &str) {
     say_skipped(what);
 }
 
-/// Says on stderr, past the test runner's capture, that a test or a part of it is skipped.
+/// Prints to stderr, bypassing the test runner's capture, that a test or a part of it is skipped.
 pub fn say_skipped(why: &str) {
     use std::io::Write as _;
     let thread = std::thread::current();
     let line = format!("SKIPPED: {}: {why}\n", thread.name().unwrap_or("a test"));
-    // A closed stderr is no reason to fail.
+    // A closed stderr must not fail the test.
     let _ = std::io::stderr().write_all(line.as_bytes());
 }
 

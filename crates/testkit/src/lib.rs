@@ -1,4 +1,4 @@
-//! What the tests and benches of several crates share. A dev-dependency only: no crate that is shipped uses it.
+//! Code that the tests and benches of several crates share. It is only a dev-dependency: no released crate uses it.
 //!
 //! [`data`] finds inputs that are not in the repository; [`synthetic_noise`] makes noisy pictures whose expectation is
 //! known.

@@ -3,30 +3,30 @@
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::splitmix64::{INCREMENT, number};
 
-/// How single samples scatter about their mean.
+/// The distribution of single samples about their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Scatter {
     /// The sum of four uniform values.
     GaussianLike,
-    /// As in path tracing: nine in ten find nothing, the tenth finds ten times the mean.
+    /// As in path tracing: nine of ten samples find no light, the tenth finds ten times the mean.
     HeavyTailed,
 }
 
-/// Both of them.
+/// Both distributions.
 pub const SCATTERS: [Scatter; 2] = [Scatter::GaussianLike, Scatter::HeavyTailed];
 
 /// How a picture is rendered.
 #[derive(Clone, Copy, Debug)]
 pub struct Render<'a> {
-    /// How its samples scatter.
+    /// The distribution of its samples.
     pub scatter: Scatter,
     /// The share of each sample that scatters.
     pub strength: f64,
     /// Samples a pixel.
     pub samples: u32,
-    /// Where given, three of four samples are shared by all pixels of a block, in whatever view.
+    /// If given, three of four samples are shared by all pixels of a block, in all views.
     pub blocks: Option<&'a Picture<u32>>,
-    /// Two views have different noise outside shared samples.
+    /// The view; two views have different noise except in shared samples.
     pub view: u64,
 }
 
@@ -85,7 +85,7 @@ pub fn squares(side: usize, first: u32) -> Picture<u32> {
     Picture::from_fn(side, side, |x, y| first + (y / 4 * side.div_ceil(4) + x / 4) as u32)
 }
 
-/// Every pixel a block of its own.
+/// Blocks of one pixel each.
 pub fn single_pixels(side: usize) -> Picture<u32> {
     Picture::from_fn(side, side, |x, y| (y * side + x) as u32)
 }

@@ -1,5 +1,5 @@
 #![no_main]
-//! A tar, in gzip or still to be put in it, unpacked: nothing may be written outside of its folder.
+//! Unpacks a tar, which is compressed first if it is not a gzip: nothing may be written outside its folder.
 
 use std::io::Write as _;
 

@@ -1,5 +1,5 @@
 #![no_main]
-//! A zip, unpacked: nothing may be written outside of its folder.
+//! Unpacks a zip: nothing may be written outside its folder.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_submission::archive::unpack_zip;

@@ -1,11 +1,11 @@
 #![no_main]
-//! A Mitsuba scene without any file beside it.
+//! Reads a Mitsuba scene without other files.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_sources::bitterli::{Limits, read};
 
 fuzz_target!(|bytes: &[u8]| {
-    // What computed skies and spheres may take: a run must be short.
+    // Limits computed skies and spheres, because a run must be short.
     let limits = Limits { triangles: 1 << 20, vertices: 1 << 20, texels: 1 << 20, ..Limits::default() };
     mateval_fuzz::with_file("scene.xml", bytes, |path| drop(read(path, &limits)));
 });

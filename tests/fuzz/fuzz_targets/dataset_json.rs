@@ -9,7 +9,7 @@ use mateval_scene::reference_io::{LightsFile, ReferenceFile};
 fuzz_target!(|bytes: &[u8]| {
     mateval_fuzz::with_file("scene.json", bytes, |path| {
         if let Ok(scene) = json::read::<SceneFile>(path) {
-            // What is written is read again, and is the same.
+            // A value that is written and read again must be the same.
             mateval_fuzz::with_file("again.json", json::to_text(&scene).as_bytes(), |again| {
                 assert_eq!(json::read::<SceneFile>(again).expect("we wrote it"), scene);
             });

@@ -1,5 +1,5 @@
 #![no_main]
-//! An EXR as a map of a submission; the first byte says which map.
+//! Reads an EXR as a map of a submission; the first byte selects the map.
 
 use std::path::Path;
 

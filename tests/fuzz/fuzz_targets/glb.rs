@@ -1,5 +1,5 @@
 #![no_main]
-//! Meshes as binary glTF: triangles name vertices that there are.
+//! Reads meshes from binary glTF: triangles must refer to existing vertices.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_scene::glb;

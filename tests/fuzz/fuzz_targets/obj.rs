@@ -1,5 +1,5 @@
 #![no_main]
-//! An OBJ mesh and an MTL: triangles name vertices that there are.
+//! Reads an OBJ mesh and an MTL: triangles must refer to existing vertices.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_scene::obj::{self, Materials, ObjLimits};

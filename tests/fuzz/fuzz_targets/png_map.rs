@@ -1,5 +1,5 @@
 #![no_main]
-//! A PNG as a map of a submission; the first byte says which map.
+//! Reads a PNG as a map of a submission; the first byte selects the map.
 
 use std::path::Path;
 

@@ -1,5 +1,5 @@
 #![no_main]
-//! `RESULT.json`, and tables of it.
+//! Reads `RESULT.json` and makes tables of it.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_eval::result::ResultFile;

@@ -1,5 +1,5 @@
 #![no_main]
-//! `submission.json`, as scores read it and as `eval lint` does: both must agree on what can be read.
+//! Reads `submission.json` as scoring and as `eval lint` do: both must accept the same files.
 
 use libfuzzer_sys::fuzz_target;
 use mateval_scene::Severity;

@@ -1,5 +1,5 @@
 #![no_main]
-//! A texture of any kind that a source scene may have: PNG, JPEG, BMP, Radiance HDR.
+//! Reads a texture of any format that a source scene may have: PNG, JPEG, BMP, Radiance HDR.
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
-//! What targets share: bytes as a file of its own folder, for parsers that read files.
+//! Shared by the targets: writes bytes as a file in a new folder, for parsers that read files.
 
 use std::path::{Path, PathBuf};
 
-/// Writes the bytes as `name` into a new folder, and hands the file's path over.
+/// Writes the bytes as `name` into a new folder and calls a function with the file's path.
 pub fn with_file<T>(name: &str, bytes: &[u8], read: impl FnOnce(&Path) -> T) -> T {
     let folder = tempfile::tempdir().expect("there is a place for temporary files");
     let path: PathBuf = folder.path().join(name);

@@ -1,4 +1,4 @@
-//! Writes what the targets start from, into `CORPUS/<target>/`, out of the built-in sample and of files made on the spot.
+//! Writes the initial corpus of the targets to `CORPUS/<target>/`, from the built-in sample and from generated files.
 
 #[path = "../../../crates/eval/tests/suite/packed.rs"]
 mod packed;
@@ -41,7 +41,7 @@ fn keep(corpus: &Path, target: &str, name: &str, bytes: &[u8]) -> std::io::Resul
     std::fs::write(folder.join(name), bytes)
 }
 
-/// Maps of the least size, of every kind; the first byte says which map it is.
+/// Maps of the smallest size, of every kind; the first byte selects the map.
 fn maps(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let (png, exr) = (work.join("a.png"), work.join("a.exr"));
     let ramp = Picture::from_fn(64, 64, |x, y| [(x * 4) as u8, (y * 4) as u8, 9]);
@@ -69,7 +69,7 @@ fn maps(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// A small submission, packed in every way.
+/// A small submission, packed in every supported format.
 fn archives(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let folder = work.join("submission");
     std::fs::create_dir_all(folder.join("scenes/room/rug"))?;

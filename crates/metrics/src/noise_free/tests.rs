@@ -107,7 +107,7 @@ fn the_estimate_has_no_bias() {
 }
 
 /// The ratio of the reported standard errors to the true spread of the estimates.
-fn told_over_true(errors: &[f64], estimates: &[f64]) -> f64 {
+fn reported_over_true(errors: &[f64], estimates: &[f64]) -> f64 {
     let root = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
     root / mean_and_deviation(estimates).1
 }
@@ -124,8 +124,8 @@ fn the_standard_error_is_the_spread() {
                 (0..300).map(|seed| Halved::new([&render; 2], [&prediction, &reference], seed)).collect();
             let found = |ids: &Picture<u32>| {
                 let errors: Vec<_> = halved.iter().map(|halved| halved.error(ids)).collect();
-                let told: Vec<f64> = errors.iter().map(NoiseFreeMse::standard_error).collect();
-                told_over_true(&told, &errors.iter().map(|error| error.mse).collect::<Vec<_>>())
+                let reported: Vec<f64> = errors.iter().map(NoiseFreeMse::standard_error).collect();
+                reported_over_true(&reported, &errors.iter().map(|error| error.mse).collect::<Vec<_>>())
             };
             let ratio = found(if correlated { &blocks } else { &single });
             assert!((0.8..1.25).contains(&ratio), "{scatter:?} {samples} {correlated}: {ratio}");
@@ -148,13 +148,13 @@ fn the_error_of_a_mean_psnr_is_its_spread() {
         };
         let pairs: Vec<_> = (0..200).map(|seed| [halved(0, seed), halved(1, seed)]).collect();
         let found = |second: &Picture<u32>| {
-            let (mut told, mut means) = (Vec::new(), Vec::new());
+            let (mut reported, mut means) = (Vec::new(), Vec::new());
             for [first, other] in &pairs {
                 let views = [first.error(&blocks), other.error(second)];
-                told.push(psnr_mean_error(&[&views[0], &views[1]]).unwrap().total);
+                reported.push(psnr_mean_error(&[&views[0], &views[1]]).unwrap().total);
                 means.push(views.iter().map(|view| view.psnr().unwrap().db).sum::<f64>() / 2.0);
             }
-            told_over_true(&told, &means)
+            reported_over_true(&reported, &means)
         };
         let (ratio, twin) = (found(&blocks), found(&others));
         assert!((0.8..1.25).contains(&ratio), "{scatter:?} {samples}: {ratio}");

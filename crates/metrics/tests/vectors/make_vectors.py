@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Writes vectors.json: what scikit-image and lpips say of the pictures that mod.rs makes.
+"""Writes vectors.json: the values that scikit-image and lpips compute for the pictures of mod.rs.
 
 Run it where these are installed, on the CPU:
 
     pip install numpy scikit-image torch torchvision lpips safetensors
     python3 make_vectors.py
 
-The pictures are made anew here from the same integers as in mod.rs; their SHA-256 in vectors.json ties the two
+The pictures are generated here again from the same integers as in mod.rs; their SHA-256 in vectors.json ties the two
 together. The networks of lpips get the weights that tools/fetch_lpips_weights.py writes, which hold its linear layers
 too, so that nothing is downloaded. vectors.json changes only together with mod.rs or with a version below.
 """
@@ -56,7 +56,7 @@ def tiles(x: int, y: int, c: int) -> int:
 
 
 def waves(x: int, y: int, c: int) -> int:
-    """Slanted waves, a little apart in each channel."""
+    """Slanted waves, slightly shifted in each channel."""
     return (2 * triangle_wave(3 * x + 2 * y, 64 + 8 * c) + triangle_wave(5 * y + 2 * x, 37)) // 3
 
 
@@ -71,7 +71,7 @@ def picture(width: int, height: int, value: object) -> np.ndarray:
 
 
 def predicted(reference: np.ndarray, kind: str) -> np.ndarray:
-    """The reference as a method might have missed it."""
+    """The reference with errors as a method might make them."""
     height, width, _ = reference.shape
     at = lambda x, y, c: int(reference[min(max(y, 0), height - 1), min(max(x, 0), width - 1), c])
     kinds = {
@@ -94,7 +94,7 @@ def mask_of(width: int, height: int) -> np.ndarray:
 
 
 def ssim_map(p: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """The mean over channels of the index of every window, by the place of its centre."""
+    """The mean over channels of the index of every window, by the position of its centre."""
     _, full = structural_similarity(
         p, r, gaussian_weights=True, sigma=1.5, use_sample_covariance=False, data_range=1.0, channel_axis=2, full=True
     )
@@ -138,7 +138,7 @@ def lpips_of(model: lpips.LPIPS, p: np.ndarray, r: np.ndarray) -> tuple[float, n
 
 
 def values(models: dict[str, lpips.LPIPS], p: np.ndarray, r: np.ndarray, mask: np.ndarray) -> dict[str, float | int]:
-    """All that is compared; `p` and `r` are bytes."""
+    """All values that are compared; `p` and `r` are bytes."""
     p, r = p / 255.0, r / 255.0
     black_p, black_r = p * mask[..., None], r * mask[..., None]
     inside = windows_inside(mask)
@@ -162,7 +162,7 @@ def values(models: dict[str, lpips.LPIPS], p: np.ndarray, r: np.ndarray, mask: n
 
 
 def sha256(picture: np.ndarray) -> str:
-    """Of the bytes, row by row."""
+    """The SHA-256 of the bytes, row by row."""
     return hashlib.sha256(np.ascontiguousarray(picture).tobytes()).hexdigest()
 
 

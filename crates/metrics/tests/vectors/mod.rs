@@ -1,5 +1,5 @@
-//! Small pictures made from whole numbers, and what scikit-image and lpips say of them: `vectors.json`, which
-//! `make_vectors.py` writes from the same pictures.
+//! Small pictures made from integers, and the values that scikit-image and lpips compute for them: `vectors.json`,
+//! which `make_vectors.py` writes from the same pictures.
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_scene::manifest::sha256_of_bytes;
@@ -17,13 +17,13 @@ struct Vectors {
 
 #[derive(Deserialize)]
 struct Vector {
-    /// Of the bytes of prediction, reference and mask (0 and 1).
+    /// SHA-256 of the bytes of prediction, reference and mask (0 and 1).
     sha256: [String; 3],
     #[serde(flatten)]
     case: Case,
 }
 
-/// All cases with their pictures, which are those of the script to the byte.
+/// All cases with their pictures, whose bytes equal those of the script.
 pub fn load() -> Vec<Loaded> {
     let vectors: Vectors = serde_json::from_str(include_str!("vectors.json")).unwrap();
     vectors.cases.into_iter().map(loaded).collect()
@@ -59,7 +59,7 @@ fn tiles(x: usize, y: usize, c: usize) -> u64 {
     flat + (3 * x as u64 + 2 * y as u64) % 40 + grain
 }
 
-/// Slanted waves, a little apart in each channel.
+/// Slanted waves, slightly shifted in each channel.
 fn waves(x: usize, y: usize, c: usize) -> u64 {
     (2 * triangle_wave(3 * x + 2 * y, 64 + 8 * c) + triangle_wave(5 * y + 2 * x, 37)) / 3
 }
@@ -70,7 +70,7 @@ fn triangle_wave(at: usize, period: usize) -> u64 {
     (within.min(period - within) * 510 / period) as u64
 }
 
-/// The reference as a method might have missed it.
+/// The reference with errors as a method might make them.
 fn predicted(reference: &Bytes, kind: &str) -> Bytes {
     let (width, height) = (reference.width(), reference.height());
     let clamped = |at: usize, by: i64, side: usize| (at as i64 + by).clamp(0, side as i64 - 1) as usize;

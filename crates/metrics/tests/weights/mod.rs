@@ -1,4 +1,4 @@
-//! The real networks of LPIPS, where their weights are.
+//! The real networks of LPIPS, if their weights exist.
 
 use mateval_metrics::{Lpips, Net};
 use mateval_testkit::data::lpips_weights;
