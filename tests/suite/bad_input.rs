@@ -222,7 +222,7 @@ fn a_camera_that_is_too_near() {
     let above =
         |height: f64| format!("{{ position = [2.0, {height}, 2.0], target = [1.0, {height}, 1.0], fov_y_deg = 60.0 }}");
     let built = built_from(&above(0.000_2), "views = []").ends_with(0);
-    built.says("warning [camera_too_near] 'scene.xml' view 'input': something is ");
+    built.says("warning [camera_too_near] 'scene.xml' view 'input': a surface is ");
     // The twin.
     assert!(!built_from(&above(0.1), "views = []").ends_with(0).stderr.contains("camera_too_near"));
 }

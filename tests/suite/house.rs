@@ -129,7 +129,7 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     let mut text = std::fs::read_to_string(source.join(model)).unwrap();
     text.push_str("# one remark more\n");
     std::fs::write(source.join(model), text).unwrap();
-    build_from(&recipe, &source, &dataset).ends_with(2).says(&format!("input '{model}' is "));
+    build_from(&recipe, &source, &dataset).ends_with(2).says(&format!("input '{model}' has the hash "));
     assert!(!dataset.join("dataset.json").exists());
     // The twin: with the hashes taken out the same source builds.
     let text = std::fs::read_to_string(&recipe).unwrap();

@@ -71,7 +71,7 @@ fn labels_become_a_second_set_of_parts() {
     let count = triangles_of("sofa");
     labelled.label("sofa", &(0..count).map(|at| i64::from(at < count / 2)).collect::<Vec<_>>());
     (0..12).for_each(|at| labelled.label(&format!("sofa-{at:02}"), &[0]));
-    let unused = "warning [unused_labels] 'labels/partfield': 12 files of 'partfield' are named after no instance: \
+    let unused = "warning [unused_labels] 'labels/partfield': 12 files of 'partfield' match no instance: \
                   'sofa-00.npy', 'sofa-01.npy'";
     labelled.build().ends_with(0).says(unused).says("'sofa-09.npy' and 2 more; ignored them");
     run(&mut verify(&labelled.dataset())).ends_with(0);
@@ -106,7 +106,7 @@ fn labels_become_a_second_set_of_parts() {
 #[test]
 fn labels_that_do_not_fit_are_refused_all_at_once() {
     let labelled = Labelled::new();
-    labelled.build().ends_with(2).says("there is no 'labels/partfield/<instance>.npy' of any instance");
+    labelled.build().ends_with(2).says("'labels/partfield' has no file '<instance>.npy' for any instance");
     let (sofa, table) = (triangles_of("sofa"), triangles_of("table"));
     labelled.label("sofa", &vec![0; sofa - 1]);
     labelled.label("table", &vec![0; table + 1]);

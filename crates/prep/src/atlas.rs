@@ -1,56 +1,67 @@
-//! One overlap-free uv atlas a mesh, by xatlas.
+//! Unwraps a mesh into a uv atlas without overlaps, by xatlas.
 
 use glam::Vec2;
 use mateval_scene::TriangleMesh;
-use xatlas_rs_v2::{ChartOptions, IndexData, MeshData, MeshDecl, PackOptions, Xatlas};
+use xatlas_rs_v2::{AddMeshError, ChartOptions, IndexData, MeshData, MeshDecl, PackOptions, Xatlas};
 
-/// Texels between two charts, at the atlas's own size.
+/// Texels between two charts, at the final size of the atlas.
 pub const GUTTER: u32 = 4;
 /// Least and most texels a side of an atlas whose size is chosen.
 pub const CHOSEN_SIZES: (u32, u32) = (256, 4096);
 
-/// xatlas drops faces below an area of 1e-7 and edges below a length; a mesh is made this long for it.
+/// The longest side of a mesh as xatlas sees it. xatlas drops faces with an area below 1e-7 and edges below a length, so
+/// every mesh is scaled to this length first.
 const XATLAS_LENGTH: f32 = 1000.0;
-/// Times that packing is tried at a smaller scale before giving up.
+/// How often packing is tried at a smaller scale before it fails.
 const MAX_PACKS: u32 = 24;
-/// How much coarser packing is tried where it is not known by how much it was too fine.
+/// The factor on the scale after a packing that overflowed, of which it is unknown by how much it was too fine.
 const OVERFLOW_STEP: f64 = 0.7;
 
-/// How large an atlas shall be.
+/// The wanted size of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SizeWish {
     /// Texels a side.
     Fixed(u32),
-    /// The least power of two within [`CHOSEN_SIZES`] at which a texel's side is at most so many metres on the surface.
+    /// The least power of two within [`CHOSEN_SIZES`] at which a texel's side on the surface is at most this long, in metres.
     Texel(f64),
 }
 
 /// A mesh with its atlas.
 #[derive(Clone, Debug)]
 pub struct Unwrapped {
-    /// The same triangles in the same order, vertices split where charts part; `uvs` are the atlas's.
+    /// The same triangles in the same order. Vertices are split at the borders of charts; `uvs` are those of the atlas.
     pub mesh: TriangleMesh,
     /// Texels a side.
     pub size: u32,
-    /// Charts.
+    /// Number of charts.
     pub charts: u32,
     /// Share of the square that triangles cover, 0 to 1.
     pub coverage: f64,
-    /// Length of a texel's side on the surface in metres, on the average over area.
+    /// Length of a texel's side on the surface in metres, averaged over the area.
     pub texel_m: f64,
-    /// Triangles that xatlas left out (no area to speak of); all three corners lie on one point of another chart.
+    /// Number of triangles that xatlas left out since their area is negligible. All three corners of each lie on one point of
+    /// another chart.
     pub unmapped: usize,
 }
 
 /// Why a mesh has no atlas.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AtlasError {
-    /// No triangle of it has an area.
+    /// No triangle has an area.
     #[error("no triangle has an area")]
     NoArea,
-    /// xatlas did not take the mesh.
-    #[error("xatlas refused the mesh: {0}")]
-    Refused(String),
+    /// xatlas refused the mesh.
+    #[error("xatlas refused the mesh: {}", reason_of(*.0))]
+    Refused(Refusal),
+    /// xatlas returned another number of meshes.
+    #[error("xatlas returned {found} meshes, expected one")]
+    Meshes {
+        /// The number of meshes.
+        found: usize,
+    },
+    /// xatlas returned the triangles in another order.
+    #[error("xatlas returned the triangles in another order")]
+    Reordered,
     /// Too many charts for the size.
     #[error("its {charts} charts do not fit into {size}x{size} texels with gutters of {GUTTER}")]
     DoesNotFit {
@@ -59,6 +70,39 @@ pub enum AtlasError {
         /// Texels a side.
         size: u32,
     },
+}
+
+/// Why xatlas refuses a mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// xatlas states no reason.
+    Unspecified,
+    /// A triangle has a corner that does not exist.
+    IndexOutOfRange,
+    /// A face has fewer than three corners.
+    FaceVertexCount,
+    /// The number of corners is not a multiple of three.
+    IndexCount,
+}
+
+fn reason_of(refusal: Refusal) -> &'static str {
+    match refusal {
+        Refusal::Unspecified => "it states no reason",
+        Refusal::IndexOutOfRange => "a triangle has a corner that does not exist",
+        Refusal::FaceVertexCount => "a face has fewer than three corners",
+        Refusal::IndexCount => "the number of corners is not a multiple of three",
+    }
+}
+
+impl From<AddMeshError> for AtlasError {
+    fn from(error: AddMeshError) -> Self {
+        Self::Refused(match error {
+            AddMeshError::Error => Refusal::Unspecified,
+            AddMeshError::IndexOutOfRange => Refusal::IndexOutOfRange,
+            AddMeshError::InvalidFaceVertexCount => Refusal::FaceVertexCount,
+            AddMeshError::InvalidIndexCount => Refusal::IndexCount,
+        })
+    }
 }
 
 /// Cuts the mesh into charts and packs them.
@@ -70,7 +114,7 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
         ..MeshDecl::default()
     };
     let mut atlas = Xatlas::new();
-    atlas.add_mesh(&decl).map_err(|error| AtlasError::Refused(format!("{error:?}")))?;
+    atlas.add_mesh(&decl)?;
     atlas.compute_charts(&ChartOptions::default());
     let side = mesh.area().sqrt() * f64::from(scale);
     match wish {
@@ -81,7 +125,7 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
         SizeWish::Texel(texel_m) => {
             let mut size = pack_at_least(&mut atlas, 1.0 / (texel_m * f64::from(scale)), side)?;
             let mut unwrapped = read_back(&atlas, mesh, size)?;
-            // Packing may have had to go coarser than was asked for.
+            // Packing may have been coarser than wanted.
             while unwrapped.texel_m > texel_m && size < CHOSEN_SIZES.1 {
                 size *= 2;
                 pack_into(&mut atlas, 1.0 / (texel_m * f64::from(scale)), side, size)?;
@@ -92,7 +136,8 @@ pub fn unwrap(mesh: &TriangleMesh, wish: SizeWish) -> Result<Unwrapped, AtlasErr
     }
 }
 
-/// The positions about the middle of the box, its longest side [`XATLAS_LENGTH`]; and the factor from metres.
+/// The positions about the centre of their box, scaled so that its longest side is [`XATLAS_LENGTH`], and the factor from
+/// metres.
 fn scaled_positions(mesh: &TriangleMesh) -> Result<(Vec<f32>, f32), AtlasError> {
     let (low, high) = mesh
         .positions
@@ -107,11 +152,11 @@ fn scaled_positions(mesh: &TriangleMesh) -> Result<(Vec<f32>, f32), AtlasError> 
     Ok((positions, scale))
 }
 
-/// Packs at `texels_per_unit` or finer into the least power of two that holds it; where even the largest does not, as
-/// fine as fits. `side` is that of a square of the mesh's area, in units.
+/// Packs at `texels_per_unit` or finer into the smallest power of two that holds all charts, or as finely as possible into
+/// the largest one. `side` is the side of a square with the mesh's area, in units.
 fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64) -> Result<u32, AtlasError> {
     let (least, most) = CHOSEN_SIZES;
-    // Charts do not overlap: no more than the largest square's own area can fit.
+    // Charts do not overlap, so their area is at most that of the largest square.
     let density = texels_per_unit.min(f64::from(most) / side).min(density_bound(most, side));
     let mut size = ((side * density).ceil() as u32).clamp(least, most).next_power_of_two();
     let packed = loop {
@@ -126,7 +171,7 @@ fn pack_at_least(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64) -> Res
     Ok(size)
 }
 
-/// Packs at `texels_per_unit`, or as little coarser as it takes, so that the atlas is no larger than `size`.
+/// Packs into an atlas of at most `size`, at `texels_per_unit` or only as much coarser as needed.
 fn pack_into(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64, size: u32) -> Result<(), AtlasError> {
     let mut density = texels_per_unit.min(density_bound(size, side));
     for _ in 0..MAX_PACKS {
@@ -139,31 +184,32 @@ fn pack_into(atlas: &mut Xatlas<'_>, texels_per_unit: f64, side: f64, size: u32)
     Err(AtlasError::DoesNotFit { charts: atlas.chart_count(), size })
 }
 
-/// Texels a unit at which no mesh fits into `size` any more; finer, and xatlas would raster charts of any size.
+/// Texels a unit above which no mesh fits into `size`. At finer scales xatlas would rasterise charts of any size.
 fn density_bound(size: u32, side: f64) -> f64 {
     4.0 * f64::from(size) / f64::from(XATLAS_LENGTH).max(side)
 }
 
-/// What packing gave.
+/// The result of packing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Packed {
     /// The longer side in texels.
     Side(u32),
-    /// More than the room that xatlas was given: at least a chart was made smaller, or is in another atlas.
+    /// Larger than the square that xatlas was given: at least one chart was made smaller or is in another atlas.
     Overflow,
 }
 
-/// Packs into a room of four times `size`, at most twice the largest atlas.
+/// Packs into a square of four times `size`, and of at most twice the largest atlas.
 ///
-/// Without a room xatlas lets its atlas grow, tries 4096 random places for each chart, and **aborts** where none is free:
-/// of an atlas of 4096 texels, of which only the last rows and columns are, one time in fifty. With a room it makes a
-/// chart that is too long smaller and begins another atlas where it finds no place, and so always comes to an end.
+/// Without a given square, xatlas lets its atlas grow, tries 4096 random places for each chart and **aborts** if none is
+/// free. For an atlas of 4096 texels, in which only the last rows and columns are free, that happens one time in fifty.
+/// With a given square, xatlas shrinks a chart that is too long, begins another atlas if it finds no place, and therefore
+/// always terminates.
 fn pack(atlas: &mut Xatlas<'_>, texels_per_unit: f64, size: u32) -> Result<Packed, AtlasError> {
-    let room = (4 * size).min(2 * CHOSEN_SIZES.1);
+    let square = (4 * size).min(2 * CHOSEN_SIZES.1);
     atlas.pack_charts(&PackOptions {
         padding: GUTTER,
         texels_per_unit: texels_per_unit as f32,
-        resolution: room,
+        resolution: square,
         bilinear: true,
         ..PackOptions::default()
     });
@@ -173,22 +219,22 @@ fn pack(atlas: &mut Xatlas<'_>, texels_per_unit: f64, size: u32) -> Result<Packe
     let meshes = atlas.meshes();
     let vertices = meshes.into_iter().flat_map(|mesh| mesh.vertex_array).filter(|vertex| vertex.atlas_index >= 0);
     let farthest = vertices.fold(0.0_f32, |farthest, vertex| farthest.max(vertex.uv[0]).max(vertex.uv[1]));
-    // Charts end in the middle of a texel; less what is lost in rounding.
+    // Charts end in the middle of a texel; 1e-3 allows for rounding.
     let side = (farthest - 1e-3).ceil() as u32;
-    Ok(if atlas.atlas_count() > 1 || side >= room { Packed::Overflow } else { Packed::Side(side) })
+    Ok(if atlas.atlas_count() > 1 || side >= square { Packed::Overflow } else { Packed::Side(side) })
 }
 
 fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwrapped, AtlasError> {
     let packed = atlas.meshes();
     let [packed] = packed.as_slice() else {
-        return Err(AtlasError::Refused(format!("{} meshes came back, expected one", packed.len())));
+        return Err(AtlasError::Meshes { found: packed.len() });
     };
     let mut triangles: Vec<[u32; 3]> = packed.index_array.as_chunks::<3>().0.to_vec();
     let mut source_vertices: Vec<u32> = packed.vertex_array.iter().map(|vertex| vertex.xref).collect();
     let same = triangles.len() == mesh.triangles.len()
         && triangles.iter().zip(&mesh.triangles).all(|(new, old)| new.map(|v| source_vertices[v as usize]) == *old);
     if !same {
-        return Err(AtlasError::Refused("the triangles came back in another order".to_owned()));
+        return Err(AtlasError::Reordered);
     }
     let side = size as f32;
     let mapped: Vec<bool> = packed.vertex_array.iter().map(|vertex| vertex.atlas_index >= 0).collect();
@@ -207,8 +253,8 @@ fn read_back(atlas: &Xatlas<'_>, mesh: &TriangleMesh, size: u32) -> Result<Unwra
     Ok(Unwrapped { mesh, size, charts: atlas.chart_count(), coverage, texel_m, unmapped })
 }
 
-/// Gives triangles without a chart corners of their own, all three at one mapped place: that of one of their vertices,
-/// else the first. Gives the number of such triangles.
+/// Adds corners for triangles without a chart, all three at one mapped place: that of one of their vertices, or else the
+/// first mapped one. Returns the number of such triangles.
 fn place_unmapped(
     triangles: &mut [[u32; 3]],
     source_vertices: &mut Vec<u32>,

@@ -1,4 +1,4 @@
-//! A recipe carried out: scene by scene, each whole or not at all, going on where an earlier run was killed.
+//! Makes the dataset of a recipe scene by scene, each completely or not at all. A run that was killed is resumed.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,40 +12,41 @@ use serde::{Deserialize, Serialize};
 use crate::build_scene::{self, Built};
 use crate::error::PrepError;
 use crate::part_labels;
-use crate::recipe::{self, Recipe, RecipeScene};
+use crate::recipe::fault::{RecipeFault, RecipeSceneFault};
+use crate::recipe::{self, Recipe, RecipeScene, SourcePath};
 use mateval_scene::Progress;
 use mateval_sources::below::relative_below;
 
-/// The recipe as the dataset keeps it.
+/// The name of the recipe in the dataset.
 pub const RECIPE: &str = "recipe.toml";
-/// What an unfinished build keeps in the dataset's folder; a finished one removes it.
+/// The folder that an unfinished build keeps in the dataset's; a finished build removes it.
 const BUILD: &str = ".build";
 
-/// What a build was given.
+/// The inputs of a build.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
     /// The recipe.
     pub recipe: PathBuf,
-    /// The folder that its paths are relative to; the recipe's own where absent.
+    /// The folder that the recipe's paths are relative to; if absent, the recipe's own.
     pub source: Option<PathBuf>,
     /// The dataset's folder.
     pub out: PathBuf,
-    /// Replace a finished dataset that is there.
+    /// Replace a finished dataset.
     pub force: bool,
 }
 
-/// What a build gave.
+/// The result of a build.
 #[derive(Clone, Debug)]
 pub struct BuildReport {
     /// The dataset's description.
     pub dataset: DatasetFile,
     /// The findings of every scene.
     pub findings: Vec<(SceneId, Vec<Finding>)>,
-    /// Scenes that an earlier, unfinished run had already made.
+    /// Scenes that an earlier, unfinished run had already finished.
     pub resumed: Vec<SceneId>,
 }
 
-/// What an unfinished build must share with the one that goes on with it.
+/// The properties in which an unfinished build must equal the build that resumes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct BuildKey {
     tool: String,
@@ -53,11 +54,11 @@ struct BuildKey {
     source: PathBuf,
 }
 
-/// Carries the recipe out. `tool` is the name and version that the dataset is marked with.
+/// Makes the dataset. `tool` is the name and version that the dataset records.
 pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Result<BuildReport, PrepError> {
     let (mut recipe, text) = recipe::read(&options.recipe)?;
     let source = source_folder(options);
-    place_below(options, &mut recipe, &source)?;
+    make_relative(options, &mut recipe, &source)?;
     check_sources(options, &recipe, &source)?;
     let key = BuildKey {
         tool: tool.to_owned(),
@@ -74,7 +75,7 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         let finished = if resumes { finished_scene(&folder, &mark, entry, &source) } else { None };
         let made = match finished {
             Some(mark) => {
-                // Of a run killed between making a scene anew and removing the old one.
+                // Left by a run that was killed between making a scene again and removing the old one.
                 remove_aside(folder.path())?;
                 report.resumed.push(entry.id.clone());
                 mark
@@ -95,72 +96,75 @@ fn source_folder(options: &BuildOptions) -> PathBuf {
     options.source.clone().unwrap_or_else(beside)
 }
 
-/// Makes the paths of all rooms relative to `source`: they end in the dataset.
-fn place_below(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
+/// Makes the paths that the dataset records relative to `source`.
+fn make_relative(options: &BuildOptions, recipe: &mut Recipe, source: &Path) -> Result<(), PrepError> {
     let mut faults = Vec::new();
     for scene in &mut recipe.scenes {
-        let Some(room) = &mut scene.front3d else { continue };
-        let paths = [("house", Some(&mut room.house)), ("models", Some(&mut room.models))];
-        let paths = paths.into_iter().chain([("textures", room.textures.as_mut()), ("cameras", room.cameras.as_mut())]);
-        for (key, path) in paths.filter_map(|(key, path)| Some((key, path?))) {
+        let id = scene.id.clone();
+        for (key, path) in scene.recorded_paths() {
             match relative_below(path, source) {
                 Ok(relative) => *path = relative,
-                Err(what) => {
-                    let hint = "name the folder that holds house, models, textures and cameras with --source";
-                    faults.push(format!("scene '{}': {key}: {what}; {hint}", scene.id));
-                }
+                Err(source) => faults.push((id.clone(), RecipeSceneFault::OutsideSource { key, source })),
             }
         }
     }
-    if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
+    refuse_if_any(options, faults)
 }
 
-/// Whatever can fail early must: every scene's sources are there, and are what the recipe pins, before the first is made.
-fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
-    let mut faults: Vec<String> = recipe.scenes.iter().flat_map(|scene| missing_sources(scene, source)).collect();
+/// Fails where a scene of the recipe has a fault.
+fn refuse_if_any(options: &BuildOptions, faults: Vec<(SceneId, RecipeSceneFault)>) -> Result<(), PrepError> {
     if faults.is_empty() {
-        faults = recipe.scenes.iter().flat_map(|scene| changed_inputs(scene, &scene.root(source))).collect();
+        return Ok(());
     }
-    if faults.is_empty() { Ok(()) } else { Err(PrepError::Recipe { path: options.recipe.clone(), faults }) }
+    let faults = faults.into_iter().map(|(scene, fault)| RecipeFault::Scene { scene, fault }).collect();
+    Err(PrepError::Recipe { path: options.recipe.clone(), faults })
 }
 
-fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<String> {
-    let mut wanted: Vec<(&str, &Path, bool)> = Vec::new();
-    if let Some(xml) = &scene.bitterli {
-        wanted.push(("bitterli", xml, false));
+/// Fails before the first scene is made if any scene's sources are missing or differ from those that the recipe pins.
+fn check_sources(options: &BuildOptions, recipe: &Recipe, source: &Path) -> Result<(), PrepError> {
+    refuse_if_any(options, faults_of_all(recipe, source, missing_sources))?;
+    refuse_if_any(options, faults_of_all(recipe, source, changed_inputs))
+}
+
+/// The faults that `check` finds in every scene of the recipe.
+fn faults_of_all(
+    recipe: &Recipe,
+    source: &Path,
+    check: fn(&RecipeScene, &Path) -> Vec<RecipeSceneFault>,
+) -> Vec<(SceneId, RecipeSceneFault)> {
+    let mut all = Vec::new();
+    for scene in &recipe.scenes {
+        all.extend(check(scene, source).into_iter().map(|fault| (scene.id.clone(), fault)));
     }
-    if let Some(room) = &scene.front3d {
-        wanted.push(("house", &room.house, false));
-        wanted.push(("models", &room.models, true));
-        wanted.extend(room.textures.as_deref().map(|path| ("textures", path, true)));
-        wanted.extend(room.cameras.as_deref().map(|path| ("cameras", path, false)));
-    }
-    let mut wanted: Vec<_> = wanted.into_iter().map(|(key, path, folder)| (key, source.join(path), folder)).collect();
-    let labels = scene.part_labels.values().map(|path| ("part_labels", scene.root(source).join(path), true));
-    wanted.extend(labels);
-    let fault = |(key, path, is_folder): (&str, PathBuf, bool)| {
-        let there = if is_folder { path.is_dir() } else { path.is_file() };
+    all
+}
+
+fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
+    let labels = scene.part_labels.values();
+    let labels = labels.map(|path| ("part_labels", scene.root(source).join(path), true));
+    let paths =
+        scene.source_paths().into_iter().map(|SourcePath { key, path, is_folder }| (key, source.join(path), is_folder));
+    let fault = |(key, path, is_folder): (&'static str, PathBuf, bool)| {
+        let exists = if is_folder { path.is_dir() } else { path.is_file() };
         let kind = if is_folder { "folder" } else { "file" };
-        let hint = format!("correct `{key}`, or name the folder with --source");
-        (!there).then(|| format!("scene '{}': there is no {kind} '{}'; {hint}", scene.id, path.display()))
+        (!exists).then_some(RecipeSceneFault::MissingSource { key, kind, path })
     };
-    wanted.into_iter().filter_map(fault).collect()
+    paths.chain(labels).filter_map(fault).collect()
 }
 
-/// What of `inputs` is missing or another file than it says.
-fn changed_inputs(scene: &RecipeScene, root: &Path) -> Vec<String> {
-    let fault = |(path, pinned): (&String, &String)| {
-        let file = root.join(path);
-        if !file.is_file() {
-            return Some(format!("scene '{}': input '{path}' is not there, or is no ordinary file", scene.id));
+/// The pinned inputs that do not exist or have other bytes.
+fn changed_inputs(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
+    let root = scene.root(source);
+    let fault = |(file, pinned): (&String, &String)| {
+        let (path, file) = (root.join(file), file.clone());
+        if !path.is_file() {
+            return Some(RecipeSceneFault::MissingInput { file });
         }
-        let found = match manifest::sha256_of_file(&file) {
-            Ok(found) if found == *pinned => return None,
-            Ok(found) => format!("is {found}"),
-            Err(error) => format!("cannot be read ({error})"),
-        };
-        let hint = "get the file that the release was made of";
-        Some(format!("scene '{}': input '{path}' {found}, expected {pinned}; {hint}", scene.id))
+        match manifest::sha256_of_file(&path) {
+            Ok(found) if found == *pinned => None,
+            Ok(found) => Some(RecipeSceneFault::ChangedInput { file, found, pinned: pinned.clone() }),
+            Err(source) => Some(RecipeSceneFault::UnreadableInput { file, source }),
+        }
     };
     scene.inputs.iter().filter_map(fault).collect()
 }
@@ -178,14 +182,14 @@ fn empty_dataset(recipe: &Recipe, tool: &str) -> DatasetFile {
     }
 }
 
-/// Makes the output's folder ready. True where an unfinished build of the same recipe and source is gone on with.
+/// Prepares the output's folder. Returns whether an unfinished build of the same recipe and source is resumed.
 fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepError> {
     let out = &options.out;
-    let refuse = |what: &str| PrepError::Output { path: out.clone(), what: what.to_owned() };
+    let path = || out.clone();
     let marks = out.join(BUILD);
     let key_file = marks.join("key.json");
     let is_dataset = out.join(DATASET).is_file();
-    // Other tools have folders of that name: only one with our key is ours.
+    // Other tools may use a folder of that name: only one with our key is ours.
     let found_key = json::read::<BuildKey>(&key_file).ok();
     let unfinished = !is_dataset && found_key.is_some();
     if unfinished && !options.force && found_key.as_ref() == Some(key) {
@@ -196,12 +200,9 @@ fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepEr
     match (unfinished || is_dataset, is_empty, options.force) {
         (_, true, _) => {}
         (true, _, true) => put_aside(out)?,
-        (true, ..) if unfinished => {
-            let what = "holds an unfinished build of another recipe, source or version; add --force to replace it";
-            return Err(refuse(what));
-        }
-        (true, ..) => return Err(refuse("holds a finished dataset; add --force to replace it")),
-        _ => return Err(refuse("is there and is no dataset: it is not replaced; choose another --out")),
+        (true, ..) if unfinished => return Err(PrepError::OtherBuild { path: path() }),
+        (true, ..) => return Err(PrepError::FinishedDataset { path: path() }),
+        _ => return Err(PrepError::NotADataset { path: path() }),
     }
     std::fs::create_dir_all(&marks).map_err(PrepError::io("make", &marks))?;
     json::write(&key_file, key)?;
@@ -209,23 +210,23 @@ fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepEr
     Ok(false)
 }
 
-/// Whether nothing in the folder has another name.
+/// Whether every entry of the folder has one of these names.
 pub(crate) fn holds_only(folder: &Path, names: &[&str]) -> bool {
     std::fs::read_dir(folder)
         .is_ok_and(|entries| entries.flatten().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
 }
 
-/// What a finished scene leaves in the build folder.
+/// The file that a finished scene leaves in the build folder.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct SceneMark {
     licence: Option<Licence>,
-    /// Files that were looked for and were not there, as `scene.json` would tell them.
+    /// Files that were looked for but do not exist, with paths as in `scene.json`.
     absent: Vec<String>,
-    /// All that was in the folders of labels, whether used or not.
+    /// All files in the folders of labels, whether used or not.
     labels: BTreeSet<PathBuf>,
 }
 
-/// A scene that an earlier run made of the same files as are there now: none is another one, and none has come since.
+/// The mark of a scene that an earlier run made from the same files: none has changed, and none has been added since.
 fn finished_scene(folder: &SceneFolder, mark: &Path, entry: &RecipeScene, source: &Path) -> Option<SceneMark> {
     let mark: SceneMark = json::read(mark).ok()?;
     let scene: SceneFile = json::read(&folder.scene_file()).ok()?;
@@ -239,7 +240,7 @@ fn finished_scene(folder: &SceneFolder, mark: &Path, entry: &RecipeScene, source
 /// The files in the folders of a scene's labels.
 fn label_files(entry: &RecipeScene, source: &Path) -> BTreeSet<PathBuf> {
     let files = |folder: &PathBuf| {
-        // One that cannot be listed fails where it is read.
+        // A folder that cannot be listed fails where it is read.
         let names = part_labels::file_names(&entry.root(source).join(folder)).unwrap_or_default();
         names.into_iter().map(|name| folder.join(name)).collect::<Vec<_>>()
     };
@@ -255,7 +256,7 @@ fn make_scene(
     progress: Progress<'_>,
 ) -> Result<SceneMark, PrepError> {
     if mark.exists() {
-        // It is of what is about to be replaced.
+        // The mark belongs to the scene that is about to be replaced.
         std::fs::remove_file(mark).map_err(PrepError::io("remove", mark))?;
     }
     let work = WorkFolder::start(folder.path())?;
@@ -265,7 +266,7 @@ fn make_scene(
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
     let made = SceneMark { licence, absent, labels };
     work.finish()?;
-    // Only now: a scene without its mark is made again.
+    // The mark is written last, since a scene without its mark is made again.
     json::write(mark, &made)?;
     Ok(made)
 }
@@ -280,7 +281,7 @@ fn finish(out: &Path, recipe: &Recipe, text: &str, dataset: &mut DatasetFile) ->
     mateval_image::store::write_whole(&out.join(RECIPE), text.as_bytes())?;
     dataset.manifest_sha256 = manifest::write(out)?;
     json::write(&out.join(DATASET), dataset)?;
-    // From here on the dataset is finished: what is left of the build folder no longer counts.
+    // From here on the dataset is finished, and the build folder no longer matters.
     let marks = out.join(BUILD);
     std::fs::remove_dir_all(&marks).map_err(PrepError::io("remove", &marks))
 }

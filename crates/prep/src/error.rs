@@ -4,26 +4,29 @@ use std::path::PathBuf;
 
 use mateval_scene::{SceneId, ViewId};
 
-/// Why a dataset could not be made.
+use crate::build_scene::fault::SceneFault;
+use crate::recipe::fault::RecipeFault;
+
+/// Why a dataset, its renders or a survey could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepError {
-    /// The file system refused.
+    /// A file or folder could not be read or written.
     #[error("cannot {action} '{}': {source}", path.display())]
     Io {
         /// What was tried, as in "read" or "write".
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's reason.
         source: std::io::Error,
     },
-    /// A recipe that cannot be carried out; every fault is listed.
-    #[error("recipe '{}': {}", path.display(), faults.join("; "))]
+    /// The recipe is not valid, or its sources are missing; all faults are listed.
+    #[error("recipe '{}': {}", path.display(), joined(faults))]
     Recipe {
         /// The recipe.
         path: PathBuf,
-        /// All that is wrong with it.
-        faults: Vec<String>,
+        /// Its faults.
+        faults: Vec<RecipeFault>,
     },
     /// A file of a survey's rules that is not valid.
     #[error("rules '{}': {}", path.display(), source.to_string().trim_end())]
@@ -97,21 +100,31 @@ pub enum PrepError {
         /// Width and height of the rendered picture, in pixels.
         found: [usize; 2],
     },
-    /// The output is in the way.
-    #[error("'{}' {what}", path.display())]
-    Output {
+    /// The output folder holds an unfinished build with another key.
+    #[error("'{}' holds an unfinished build of another recipe, source or version; add --force to replace it", path.display())]
+    OtherBuild {
         /// The dataset's folder.
         path: PathBuf,
-        /// What is wrong with it and what to do.
-        what: String,
     },
-    /// A scene from which nothing can be made.
-    #[error("scene '{scene}': {what}")]
+    /// The output folder holds a finished dataset.
+    #[error("'{}' holds a finished dataset; add --force to replace it", path.display())]
+    FinishedDataset {
+        /// The dataset's folder.
+        path: PathBuf,
+    },
+    /// The output folder exists and is not a dataset.
+    #[error("'{}' exists and is not a dataset; it is not replaced: choose another --out", path.display())]
+    NotADataset {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A scene cannot be made.
+    #[error("scene '{scene}': {fault}")]
     Scene {
         /// Its id.
-        scene: String,
-        /// What is missing.
-        what: String,
+        scene: SceneId,
+        /// The reason.
+        fault: Box<SceneFault>,
     },
     /// The source could not be read at all.
     #[error(transparent)]
@@ -133,4 +146,12 @@ impl PrepError {
         let path = path.into();
         move |source| Self::Io { action, path, source }
     }
+    /// A [`PrepError::Scene`]; to be used with `map_err`.
+    pub(crate) fn scene<E: Into<SceneFault>>(scene: &SceneId) -> impl FnOnce(E) -> Self {
+        move |fault| Self::Scene { scene: scene.clone(), fault: Box::new(fault.into()) }
+    }
+}
+
+fn joined(faults: &[RecipeFault]) -> String {
+    faults.iter().map(RecipeFault::to_string).collect::<Vec<_>>().join("; ")
 }

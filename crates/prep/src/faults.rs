@@ -1,13 +1,13 @@
-//! Faults of a dataset on disk, gathered.
+//! Collects the faults of a dataset on disk.
 
 use mateval_scene::{Finding, Severity};
 
-/// Faults of a dataset, gathered so that all of them are reported at once.
+/// Faults of a dataset, collected so that all of them are reported together.
 #[derive(Debug, Default)]
 pub struct Faults {
     /// All of them, in the order in which they were found.
     pub all: Vec<Finding>,
-    /// Put before the file of every fault that is added.
+    /// A prefix for the file of every fault that is added.
     pub prefix: String,
 }
 
@@ -20,11 +20,11 @@ impl Faults {
             file: format!("{}{file}", self.prefix),
             place: place.into(),
             message: message.into(),
-            action: "get the dataset anew, or build it again".to_owned(),
+            action: "download the dataset again, or build it again".to_owned(),
         });
     }
 
-    /// The value, or the reason why it could not be read as a fault.
+    /// The value; or none, after adding the reason why it could not be read.
     pub fn read<T, E: std::fmt::Display>(&mut self, file: &str, result: Result<T, E>) -> Option<T> {
         result.map_err(|error| self.add("unreadable", file, "", error.to_string())).ok()
     }

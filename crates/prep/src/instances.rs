@@ -1,14 +1,12 @@
-//! Instances of a scene: ids and numbers.
+//! The instances of a scene: their ids, numbers, roles and categories.
 
 use std::collections::BTreeSet;
-use std::num::NonZeroU16;
 
 use mateval_scene::ids::id_text_from;
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{InstanceId, InstanceIndex, Role};
 
-use crate::part_split::PartSplit;
-use mateval_sources::parts::connected_parts;
+use crate::numbering::{TooMany, number};
 use mateval_sources::source_scene::InstanceOrigin;
 
 /// One instance: instance k is surface k of the reference scene.
@@ -20,18 +18,13 @@ pub struct InstanceEntry {
     pub index: InstanceIndex,
     /// Its role in the scene.
     pub role: Role,
-    /// What it is, where the source says so.
+    /// Its category, where the source states one.
     pub category: Option<String>,
-    /// The broader category, where the source says so.
+    /// Its broader category, where the source states one.
     pub super_category: Option<String>,
 }
 
-/// Too many instances or parts for 16 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("more than 65535 instances or parts; split the scene")]
-pub struct TooMany;
-
-/// Numbers instances in the order of the surfaces, from 1 on; `origins` holds one a surface.
+/// The instances of a scene, numbered from 1 in the order of its surfaces. `origins` holds one entry for each surface.
 pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<InstanceEntry>, TooMany> {
     let mut taken = BTreeSet::new();
     scene
@@ -52,23 +45,7 @@ pub fn list(scene: &ReferenceScene, origins: &[InstanceOrigin]) -> Result<Vec<In
         .collect()
 }
 
-/// The source's own parts of the instances that [`list`] numbered.
-pub fn own_parts(
-    scene: &ReferenceScene,
-    origins: &[InstanceOrigin],
-    instances: &[InstanceEntry],
-) -> Result<PartSplit, TooMany> {
-    let of_triangle = |(surface, origin): (&Surface, &InstanceOrigin)| {
-        origin.part_of_triangle.clone().unwrap_or_else(|| connected_parts(&surface.mesh))
-    };
-    PartSplit::new(None, instances, scene.surfaces.iter().zip(origins).map(of_triangle).collect())
-}
-
-pub(crate) fn number(value: usize) -> Result<NonZeroU16, TooMany> {
-    u16::try_from(value).ok().and_then(NonZeroU16::new).ok_or(TooMany)
-}
-
-/// The surface's name as an id; a number behind it where it is taken.
+/// The surface's name as an id. If the id is taken, a number is appended.
 fn unique_id(surface: &Surface, taken: &mut BTreeSet<String>) -> InstanceId {
     let stem = id_text_from(&surface.name, "object");
     let mut text = stem.clone();
@@ -88,6 +65,7 @@ mod tests {
     use mateval_sources::front3d::{HouseFiles, Limits, furnish};
 
     use super::*;
+    use crate::part_split::PartSplit;
 
     fn scene(names: &[&str]) -> ReferenceScene {
         let mesh = TriangleMesh {
@@ -101,11 +79,11 @@ mod tests {
     }
 
     #[test]
-    fn ids_are_unique_and_numbers_run_on() {
+    fn ids_are_unique_and_parts_are_numbered_across_instances() {
         let scene = scene(&["Mesh 1", "mesh-1", "mesh-1-2", "椅子", ""]);
         let origins = vec![InstanceOrigin::default(); 5];
         let list = list(&scene, &origins).unwrap();
-        let split = own_parts(&scene, &origins, &list).unwrap();
+        let split = PartSplit::own(&scene, &origins, &list).unwrap();
         let ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
         assert_eq!(ids, ["mesh-1", "mesh-1-2", "mesh-1-2-2", "object", "object-2"]);
         assert_eq!(list[2].index.0.get(), 3);
@@ -114,7 +92,7 @@ mod tests {
         assert_eq!(parts, (1..=10).collect::<Vec<u16>>());
     }
 
-    /// A whole house: ids of instances and parts exist once, and every instance has the parts that its source states.
+    /// In a whole house the ids of instances and parts are unique, and every instance has the parts that its source states.
     #[test]
     fn ids_of_the_sample_house_are_unique() {
         let folder = tempfile::tempdir().unwrap();
@@ -130,7 +108,7 @@ mod tests {
         let house = furnish(&files, &Limits::default()).unwrap();
         let origins: Vec<_> = house.placed.iter().map(|placed| placed.origin.clone()).collect();
         let list = list(&house.scene, &origins).unwrap();
-        let split = own_parts(&house.scene, &origins, &list).unwrap();
+        let split = PartSplit::own(&house.scene, &origins, &list).unwrap();
         let mut ids: Vec<&str> = list.iter().map(|entry| entry.id.as_str()).collect();
         ids.extend(split.instances.iter().flat_map(|entry| entry.parts.iter().map(|part| part.id.as_str())));
         let count = ids.len();

@@ -1,11 +1,12 @@
-//! From source scenes to a dataset.
+//! Makes a dataset from source scenes.
 //!
-//! In: a recipe and the folders that it names (rooms of 3D-FRONT, Mitsuba scenes of Bitterli's resources). Out: a dataset
-//! folder as `dataset_spec/FORMAT.md` describes it.
+//! The inputs are a recipe and the folders that it names: rooms of 3D-FRONT, or Mitsuba scenes of Bitterli's resources. The
+//! output is a dataset's folder as `dataset_spec/FORMAT.md` describes it.
 //!
-//! Between: [`recipe`] is checked whole, [`mateval_sources`] reads each source, [`instances`] numbers, [`atlas`] unwraps,
-//! [`bake`] fills textures, [`views`] makes the pictures, [`build`] writes scene by scene, [`render`] adds the RGB truth.
-//! [`survey`] lists the rooms that a recipe could name.
+//! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene with [`build_scene`]:
+//! [`mateval_sources`] reads the source, [`instances`] numbers its surfaces, [`part_split`] and [`part_labels`] split them
+//! into parts, [`atlas`] unwraps them, [`bake`] fills their textures, and [`views`] makes the pictures. [`render`] adds the
+//! RGB truth. [`survey`] lists the rooms that a recipe could name.
 
 pub mod atlas;
 pub mod bake;
@@ -15,7 +16,8 @@ pub mod build_scene;
 pub mod error;
 pub mod faults;
 pub mod instances;
-pub(crate) mod part_labels;
+pub mod numbering;
+pub mod part_labels;
 pub mod part_split;
 pub mod recipe;
 pub mod render;

@@ -1,8 +1,9 @@
-//! Labels made elsewhere (as by PartField), read as a second way to split the instances into parts.
+//! Reads labels from another program, such as PartField, as a further split of the instances into parts.
 //!
-//! In: a folder with `<instance>.npy`, a NumPy array of one whole number a triangle, in the order of `instances.glb`. Out:
-//! a [`PartSplit`] in which each label of an instance is a part, whether it hangs together or not. An instance without a
-//! file keeps the source's own parts, which is a finding; a file that does not fit its instance is an error.
+//! The input is a folder with files `<instance>.npy`: NumPy arrays of one integer for each triangle, in the order of
+//! `instances.glb`. The output is a [`PartSplit`] in which each label of an instance is a part, whether its triangles are
+//! connected or not. An instance without a file keeps the source's own parts, which is a finding. A file that does not fit
+//! its instance is an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -11,18 +12,90 @@ use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Finding, PartSetId, Severity};
 
 use crate::instances::InstanceEntry;
+use crate::numbering::TooMany;
 use crate::part_split::PartSplit;
 use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::SourceFolder;
-use mateval_sources::npy;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_sources::npy::{self, NpyError};
 use mateval_sources::parts::{MAX_PARTS, parts_of_labels};
 
-/// Largest file that is read: more than any instance's triangles need.
+/// The largest file that is read, in bytes: more than the triangles of any instance need.
 pub(crate) const MAX_FILE_BYTES: u64 = 1 << 28;
-/// Most labels that fit nothing and are told by name.
+/// The most unused files that a finding names.
 const MAX_NAMES: usize = 10;
 
-/// Reads the labels in the folder `labels`, relative to `folder`. In words what is wrong with every file that is.
+/// Why a folder of labels cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LabelFault {
+    /// The folder has no file for any instance.
+    #[error("part_labels: '{folder}' has no file '<instance>.npy' for any instance")]
+    NoFiles {
+        /// The folder.
+        folder: String,
+    },
+    /// The folder cannot be listed.
+    #[error("part_labels: cannot list '{folder}': {source}")]
+    Unlistable {
+        /// The folder.
+        folder: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A file lies outside of the folder, cannot be read or is too large.
+    #[error(transparent)]
+    File(#[from] FileFault),
+    /// A file's size cannot be found out.
+    #[error("cannot read '{file}': {source}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A file is larger than the instance's labels can be.
+    #[error("'{file}' has {found} bytes; expected {triangles} labels, at most {most} bytes")]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// Its size in bytes.
+        found: u64,
+        /// The largest size allowed, in bytes.
+        most: u64,
+        /// Triangles of the instance.
+        triangles: usize,
+    },
+    /// A file is not an array of integers.
+    #[error("'{file}': {source}")]
+    Array {
+        /// The file.
+        file: String,
+        /// The reason.
+        source: NpyError,
+    },
+    /// A file has another number of labels than its instance has triangles.
+    #[error("'{file}' has {found} labels; expected {expected}, one for each triangle in the order of instances.glb")]
+    Count {
+        /// The file.
+        file: String,
+        /// Its labels.
+        found: usize,
+        /// Triangles of the instance.
+        expected: usize,
+    },
+    /// A file has too many different labels.
+    #[error("'{file}' has {found} different labels; expected at most {MAX_PARTS}")]
+    TooManyLabels {
+        /// The file.
+        file: String,
+        /// Its number of different labels.
+        found: usize,
+    },
+    /// All labels together are more parts than pictures can hold.
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
+}
+
+/// Reads the labels in the folder `labels`, relative to `folder`. An error lists every file that does not fit.
 pub(crate) fn read(
     id: &PartSetId,
     labels: &Path,
@@ -30,7 +103,7 @@ pub(crate) fn read(
     scene: &ReferenceScene,
     own: (&[InstanceEntry], &PartSplit),
     findings: &mut Vec<Finding>,
-) -> Result<PartSplit, Vec<String>> {
+) -> Result<PartSplit, Vec<LabelFault>> {
     let labels = labels.to_string_lossy();
     let (mut faults, mut of_triangles, mut found) = (Vec::new(), Vec::new(), 0);
     for ((instance, own), surface) in own.0.iter().zip(&own.1.instances).zip(&scene.surfaces) {
@@ -47,13 +120,13 @@ pub(crate) fn read(
         }
     }
     if found == 0 && faults.is_empty() {
-        faults.push(format!("part_labels: there is no '{labels}/<instance>.npy' of any instance"));
+        faults.push(LabelFault::NoFiles { folder: labels.to_string() });
     }
     if !faults.is_empty() {
         return Err(faults);
     }
     findings.extend(unused(id, &labels, folder, own.0).map_err(|fault| vec![fault])?);
-    PartSplit::new(Some(id.clone()), own.0, of_triangles).map_err(|error| vec![error.to_string()])
+    PartSplit::new(Some(id.clone()), own.0, of_triangles).map_err(|error| vec![error.into()])
 }
 
 fn unlabelled(id: &PartSetId, instance: &InstanceEntry, folder: &str) -> Finding {
@@ -67,15 +140,16 @@ fn unlabelled(id: &PartSetId, instance: &InstanceEntry, folder: &str) -> Finding
     }
 }
 
-/// Files of the folder that are named after no instance: of another scene, or with a name that was mistyped.
+/// A finding that names the files of the folder that match no instance, as those of another scene or with a mistyped name.
 fn unused(
     id: &PartSetId,
     labels: &str,
     folder: &SourceFolder,
     instances: &[InstanceEntry],
-) -> Result<Option<Finding>, String> {
+) -> Result<Option<Finding>, LabelFault> {
     let used: BTreeSet<String> = instances.iter().map(|instance| format!("{}.npy", instance.id)).collect();
-    let names = file_names(&folder.root().join(labels)).map_err(|error| format!("cannot list '{labels}': {error}"))?;
+    let unlistable = |source| LabelFault::Unlistable { folder: labels.to_owned(), source };
+    let names = file_names(&folder.root().join(labels)).map_err(unlistable)?;
     let unused: Vec<String> = names.difference(&used).map(|name| format!("'{}'", shortened(name))).collect();
     let shown = unused[..unused.len().min(MAX_NAMES)].join(", ");
     let rest = unused.len().saturating_sub(MAX_NAMES);
@@ -85,45 +159,46 @@ fn unused(
         code: "unused_labels".to_owned(),
         file: labels.to_owned(),
         place: String::new(),
-        message: format!("{} files of '{id}' are named after no instance: {shown}{more}", unused.len()),
+        message: format!("{} files of '{id}' match no instance: {shown}{more}", unused.len()),
         action: "ignored them".to_owned(),
     }))
 }
 
-/// The arrays in a folder.
+/// The names of the arrays in a folder.
 pub(crate) fn file_names(folder: &Path) -> std::io::Result<BTreeSet<String>> {
     let names = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.file_name().to_string_lossy().into_owned()));
     names.filter(|name: &std::io::Result<String>| name.as_ref().map_or(true, |name| name.ends_with(".npy"))).collect()
 }
 
-/// The part of each triangle; none where there is no file.
+/// The part of each triangle, or none if the file does not exist.
 fn of_instance(
     folder: &mut SourceFolder,
     file: &str,
     mesh: &mateval_scene::TriangleMesh,
-) -> Result<Option<Vec<usize>>, String> {
+) -> Result<Option<Vec<usize>>, LabelFault> {
     let triangles = mesh.triangles.len();
-    let relative = SourceFolder::relative(file).map_err(|fault| fault.message)?;
+    let named = || file.to_owned();
+    let relative = SourceFolder::relative(file)?;
     let most = (npy::MAX_PREFIX_BYTES + npy::MAX_HEADER_BYTES + npy::MAX_NUMBER_BYTES * triangles) as u64;
     match folder.path(&relative) {
         Err(fault) if fault.code == "missing_file" => return Ok(None),
-        Err(fault) => return Err(fault.message),
+        Err(fault) => return Err(fault.into()),
         Ok(path) => {
-            let size = path.metadata().map_err(|error| format!("'{file}' cannot be read: {error}"))?.len();
-            if size > most {
-                return Err(format!("'{file}' has {size} bytes; expected {triangles} labels, at most {most} bytes"));
+            let unreadable = |source| LabelFault::Unreadable { file: named(), source };
+            let found = path.metadata().map_err(unreadable)?.len();
+            if found > most {
+                return Err(LabelFault::TooLarge { file: named(), found, most, triangles });
             }
         }
     }
-    let bytes = folder.read(&relative).map_err(|fault| fault.message)?;
-    let labels = npy::whole_numbers(&bytes).map_err(|what| format!("'{file}': {what}"))?;
+    let bytes = folder.read(&relative)?;
+    let labels = npy::whole_numbers(&bytes).map_err(|source| LabelFault::Array { file: named(), source })?;
     if labels.len() != triangles {
-        let (found, id) = (labels.len(), "as in instances.glb");
-        return Err(format!("'{file}' has {found} labels; expected {triangles}, one a triangle, {id}"));
+        return Err(LabelFault::Count { file: named(), found: labels.len(), expected: triangles });
     }
     let different: BTreeSet<i64> = labels.iter().copied().collect();
     if different.len() > MAX_PARTS {
-        return Err(format!("'{file}' has {} different labels; expected at most {MAX_PARTS}", different.len()));
+        return Err(LabelFault::TooManyLabels { file: named(), found: different.len() });
     }
     let number: BTreeMap<i64, usize> = different.into_iter().zip(0..).collect();
     let labels: Vec<usize> = labels.iter().map(|label| number[label]).collect();
@@ -138,7 +213,7 @@ mod tests {
 
     use super::*;
 
-    /// A row of triangles, each larger than the one before.
+    /// A row of triangles, each larger than the previous one.
     fn mesh(triangles: usize) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
         for at in 0..triangles {
@@ -158,7 +233,7 @@ mod tests {
         bytes
     }
 
-    fn parts_of(bytes: &[u8], triangles: usize) -> Result<Option<Vec<usize>>, String> {
+    fn parts_of(bytes: &[u8], triangles: usize) -> Result<Option<Vec<usize>>, LabelFault> {
         let root = tempfile::tempdir().unwrap();
         std::fs::write(root.path().join("sofa.npy"), bytes).unwrap();
         let mut folder = SourceFolder::new(root.path(), 1 << 20).unwrap();
@@ -166,18 +241,18 @@ mod tests {
     }
 
     #[test]
-    fn a_label_is_a_part_whatever_its_number_type_and_shape() {
-        let expected = Ok(Some(vec![1, 0, 1, 0]));
-        assert_eq!(parts_of(&npy(&[7_i64, -1, 7, -1], &[4]), 4), expected);
-        assert_eq!(parts_of(&npy(&[7_i32, -1, 7, -1], &[4, 1]), 4), expected);
-        assert_eq!(parts_of(&npy(&[9_u8, 200, 9, 200], &[1, 4]), 4), expected);
-        assert_eq!(parts_of(&npy(&[u64::MAX, 0, u64::MAX, 0], &[4]), 4), expected);
+    fn labels_of_every_integer_type_and_shape_are_parts() {
+        let expected = Some(vec![1, 0, 1, 0]);
+        assert_eq!(parts_of(&npy(&[7_i64, -1, 7, -1], &[4]), 4).unwrap(), expected);
+        assert_eq!(parts_of(&npy(&[7_i32, -1, 7, -1], &[4, 1]), 4).unwrap(), expected);
+        assert_eq!(parts_of(&npy(&[9_u8, 200, 9, 200], &[1, 4]), 4).unwrap(), expected);
+        assert_eq!(parts_of(&npy(&[u64::MAX, 0, u64::MAX, 0], &[4]), 4).unwrap(), expected);
     }
 
     #[test]
-    fn what_does_not_fit_is_refused_with_both_counts() {
+    fn arrays_that_do_not_fit_are_refused_with_both_counts() {
         let refused = |bytes: &[u8], words: &str| {
-            let fault = parts_of(bytes, 4).unwrap_err();
+            let fault = parts_of(bytes, 4).unwrap_err().to_string();
             assert!(fault.contains("sofa.npy") && fault.contains(words), "{fault}");
         };
         refused(&npy(&[1_i64, 2, 3], &[3]), "has 3 labels; expected 4");
@@ -187,6 +262,6 @@ mod tests {
         refused(b"PK", "found 2 bytes");
         refused(&vec![0; 5000], "at most 4140 bytes");
         let many: Vec<i64> = (0..100).collect();
-        assert!(parts_of(&npy(&many, &[100]), 100).unwrap_err().contains("100 different labels"));
+        assert!(parts_of(&npy(&many, &[100]), 100).unwrap_err().to_string().contains("100 different labels"));
     }
 }

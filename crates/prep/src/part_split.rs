@@ -1,4 +1,4 @@
-//! A way to split all instances of a scene into parts: ids, numbers, and which triangle is of which part.
+//! A split of all instances of a scene into parts: the parts' ids and numbers, and the part of each triangle.
 
 use std::num::NonZeroU16;
 
@@ -6,21 +6,26 @@ use mateval_scene::dataset::Part;
 use mateval_scene::ids::PartIndex;
 use mateval_scene::{PartId, PartSetId, TriangleMesh};
 
-use crate::instances::{InstanceEntry, TooMany, number};
+use mateval_scene::reference::{ReferenceScene, Surface};
+use mateval_sources::parts::connected_parts;
+use mateval_sources::source_scene::InstanceOrigin;
 
-/// A way to split all instances into parts.
+use crate::instances::InstanceEntry;
+use crate::numbering::{TooMany, number};
+
+/// A split of all instances into parts.
 #[derive(Clone, Debug)]
 pub struct PartSplit {
     /// Its id; none for the source's own parts.
     pub id: Option<PartSetId>,
-    /// One an instance.
+    /// The parts of each instance.
     pub instances: Vec<InstanceParts>,
 }
 
 /// The parts of one instance.
 #[derive(Clone, Debug)]
 pub struct InstanceParts {
-    /// The part of each of its triangles, as a place in `parts`.
+    /// The part of each of its triangles, as an index in `parts`.
     pub of_triangle: Vec<usize>,
     /// Its parts.
     pub parts: Vec<PartEntry>,
@@ -36,8 +41,20 @@ pub struct PartEntry {
 }
 
 impl PartSplit {
-    /// Numbers the parts in the order of the instances, from 1 on. `of_triangles` holds for each instance the part (0, 1,
-    /// ...) of each of its triangles.
+    /// The source's own parts of `instances`, which were made from the same surfaces and origins.
+    pub fn own(
+        scene: &ReferenceScene,
+        origins: &[InstanceOrigin],
+        instances: &[InstanceEntry],
+    ) -> Result<Self, TooMany> {
+        let of_triangle = |(surface, origin): (&Surface, &InstanceOrigin)| {
+            origin.part_of_triangle.clone().unwrap_or_else(|| connected_parts(&surface.mesh))
+        };
+        Self::new(None, instances, scene.surfaces.iter().zip(origins).map(of_triangle).collect())
+    }
+
+    /// Numbers the parts from 1 in the order of the instances. `of_triangles` holds for each instance the part (0, 1, ...)
+    /// of each of its triangles.
     pub fn new(
         id: Option<PartSetId>,
         instances: &[InstanceEntry],
@@ -67,7 +84,7 @@ impl PartSplit {
         self.instances.iter().map(of).collect()
     }
 
-    /// The parts as `scene.json` lists them; `instances` are those that it was made of.
+    /// The parts as `scene.json` lists them. `instances` are those that the split was made from.
     pub fn listed(&self, instances: &[InstanceEntry]) -> Vec<Part> {
         let of_instance = |(split, instance): (&InstanceParts, &InstanceEntry)| {
             let instance = instance.id.clone();
@@ -82,7 +99,7 @@ impl PartSplit {
         self.instances.iter().zip(instances).flat_map(of_instance).collect()
     }
 
-    /// The parts' ids and meshes, in the order of their numbers; `meshes` holds one an instance.
+    /// The ids and meshes of the parts, in the order of their numbers. `meshes` holds the mesh of each instance.
     pub fn meshes(&self, meshes: &[TriangleMesh]) -> Vec<(PartId, TriangleMesh)> {
         let of_instance = |(split, mesh): (&InstanceParts, &TriangleMesh)| {
             let part = |(at, part): (usize, &PartEntry)| {

@@ -1,4 +1,4 @@
-//! The meshes of a finished scene, held against its `scene.json`: one an instance, one a part.
+//! Compares the meshes of a finished scene, one for each instance and each part, with its `scene.json`.
 
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::glb::{self, GlbNode};
@@ -9,15 +9,16 @@ use crate::faults::Faults;
 
 const INSTANCES: &str = "geometry/instances.glb";
 
-/// The meshes of a scene: one an instance, one a part.
+/// The meshes of a scene.
 pub struct Meshes {
     /// The nodes of `instances.glb`.
     pub instances: Vec<GlbNode>,
-    /// For every set of parts and every instance the place in the set of each of its triangles.
+    /// For every set of parts and every instance: the part of each triangle, as an index in the set.
     pub part_sets: Vec<Vec<Vec<usize>>>,
 }
 
-/// None where the meshes do not fit `scene.json`, so that nothing can be held against them.
+/// Reads the meshes and compares them with `scene.json`. Returns none where they differ, since nothing else can then be
+/// compared with them.
 pub fn check(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) -> Option<Meshes> {
     let instances = faults.read(INSTANCES, glb::read(&folder.instances()))?;
     let known = scene.instances.iter().map(|instance| (instance.id.as_str(), instance.triangles));
@@ -47,7 +48,7 @@ pub fn check(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) -> Op
     Some(Meshes { instances, part_sets })
 }
 
-/// The nodes have the ids and numbers of triangles that `scene.json` tells, in its order.
+/// Whether the nodes have the ids and numbers of triangles that `scene.json` states, in the same order.
 fn same_nodes<'a>(
     file: &str,
     nodes: &[GlbNode],
@@ -56,7 +57,7 @@ fn same_nodes<'a>(
 ) -> bool {
     let before = faults.all.len();
     if nodes.len() != known.len() {
-        faults.add("wrong_nodes", file, "", format!("{} nodes, scene.json tells of {}", nodes.len(), known.len()));
+        faults.add("wrong_nodes", file, "", format!("found {} nodes, scene.json lists {}", nodes.len(), known.len()));
     }
     for (node, (id, triangles)) in nodes.iter().zip(known) {
         if node.name != id || node.mesh.triangles.len() != triangles {
@@ -81,8 +82,8 @@ fn check_uv(has_atlas: bool, node: &GlbNode, faults: &mut Faults) {
     }
 }
 
-/// The parts of an instance hold its triangles in their order: each triangle is the next one of exactly one part. `owned`
-/// tells each instance's places in `parts`.
+/// The part of each triangle. The parts of an instance must hold its triangles in their order: each triangle is the next
+/// one of exactly one part. `owned` holds for each instance the indices of its parts.
 fn parts_of_triangles(
     instances: &[GlbNode],
     owned: impl Iterator<Item = Vec<usize>>,
@@ -112,7 +113,7 @@ fn parts_of_triangles(
     Some(all)
 }
 
-/// The value in `part.png` of every triangle of every instance, from the meshes. Fails where these are not those of
+/// The value in `part.png` of every triangle of every instance, from the meshes. Fails where the meshes differ from
 /// `scene.json`.
 pub fn part_values(folder: &SceneFolder, scene: &SceneFile) -> Result<Vec<Vec<u16>>, PrepError> {
     let mut faults = Faults::default();

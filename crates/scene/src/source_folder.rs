@@ -9,7 +9,8 @@ use crate::findings::shortened;
 use crate::manifest::sha256_of_bytes;
 
 /// Why a file that another file names was not read.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{message}")]
 pub struct FileFault {
     /// The finding's code.
     pub code: &'static str,

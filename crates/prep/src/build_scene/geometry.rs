@@ -1,11 +1,11 @@
-//! The meshes of a scene as glTF: instances and, of the same triangles, parts.
+//! Writes the meshes of a scene as glTF: the instances, and the same triangles as parts.
 
 use mateval_scene::glb::{self, GlbNode};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::{SceneError, TriangleMesh};
 
-use super::Plan;
 use super::materials::InstanceAtlas;
+use super::plan::Plan;
 
 /// Writes `instances.glb` and, for each set of parts, its `parts.glb`.
 pub(super) fn write(plan: &Plan, folder: &SceneFolder, atlases: &[InstanceAtlas]) -> Result<(), SceneError> {

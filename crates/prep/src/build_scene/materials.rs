@@ -1,19 +1,18 @@
-//! Every instance unwrapped and its material baked.
+//! Unwraps every instance and bakes its material.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_image::{Picture, Texture, png_io};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::submission::Map;
-use mateval_scene::{Finding, Severity, TriangleMesh};
+use mateval_scene::{Finding, Progress, Severity, TriangleMesh};
 use rayon::prelude::*;
 
-use super::Plan;
+use super::plan::Plan;
 use crate::atlas::{AtlasError, SizeWish, Unwrapped, unwrap};
 use crate::bake::{Baked, BakedMaterial, bake};
 use crate::error::PrepError;
 use crate::instances::InstanceEntry;
-use mateval_scene::Progress;
 
 /// An instance's atlas, if it has one.
 pub(super) struct InstanceAtlas {
@@ -22,7 +21,7 @@ pub(super) struct InstanceAtlas {
     findings: Vec<Finding>,
 }
 
-/// Unwraps every instance and bakes its material; one instance a thread. `nearest` is the depth at which each is seen.
+/// Unwraps every instance and bakes its material, in parallel. `nearest` holds the depth at which each instance is seen.
 pub(super) fn write(
     plan: &mut Plan,
     folder: &SceneFolder,
@@ -61,7 +60,7 @@ fn write_instance(
     if !material.has_appearance() {
         return Ok(atlas);
     }
-    let (unwrapped, remark) = match unwrap_as_wished(&surface.mesh, fixed_size, half_pixel_m) {
+    let (unwrapped, remark) = match unwrap_at_wanted_size(&surface.mesh, fixed_size, half_pixel_m) {
         Ok(unwrapped) => unwrapped,
         Err(error) => {
             atlas.findings.push(atlas_finding(plan, instance, "no_atlas", &error.to_string()));
@@ -71,7 +70,7 @@ fn write_instance(
     atlas.findings.extend(remark.map(|(code, what)| atlas_finding(plan, instance, code, &what)));
     if unwrapped.unmapped > 0 {
         let what =
-            format!("{} of {} triangles have no place in its atlas", unwrapped.unmapped, surface.mesh.triangles.len());
+            format!("{} of {} triangles have no area in its atlas", unwrapped.unmapped, surface.mesh.triangles.len());
         atlas.findings.push(atlas_finding(plan, instance, "unmapped_triangles", &what));
     }
     if let Some(baked) = bake(&unwrapped, &surface.mesh, material, textures) {
@@ -84,14 +83,14 @@ fn write_instance(
 
 type Remark = Option<(&'static str, String)>;
 
-/// At the recipe's size, or as fine as half a pixel; an instance that no view shows gets the least size. Where its charts
-/// do not fit into the recipe's size it gets the least power of two that they fit into.
-fn unwrap_as_wished(
+/// Unwraps at the recipe's size, or so that a texel is at most half a pixel of the input view. An instance that no view shows
+/// gets the least size. If its charts do not fit into the recipe's size, it gets the least power of two that they fit into.
+fn unwrap_at_wanted_size(
     mesh: &TriangleMesh,
     fixed_size: Option<u32>,
     half_pixel_m: Option<f64>,
 ) -> Result<(Unwrapped, Remark), AtlasError> {
-    // So coarse that only the charts and their gutters ask for room.
+    // So coarse that only the number of charts and their gutters decide the size.
     let least = SizeWish::Texel(mesh.area().sqrt().max(f64::MIN_POSITIVE));
     let unwrapped = match fixed_size {
         Some(size) => match unwrap(mesh, SizeWish::Fixed(size)) {
@@ -116,15 +115,15 @@ fn unwrap_as_wished(
     Ok((unwrapped, remark))
 }
 
-/// A texel larger than half a pixel by this factor is worth a finding.
+/// A texel that exceeds half a pixel by more than this factor is a finding.
 const COARSE: f64 = 1.02;
 
 fn atlas_finding(plan: &Plan, instance: &InstanceEntry, code: &str, message: &str) -> Finding {
     let action = match code {
-        "no_atlas" => "it has no atlas and is not scored",
-        "atlas_grown" => "its atlas is larger than the recipe says",
-        "unmapped_triangles" => "each lies on one point of it; they have no area to speak of",
-        _ => "kept; its truth is as coarse as its texels",
+        "no_atlas" => "left it without an atlas; it is not scored",
+        "atlas_grown" => "made its atlas larger than the recipe states",
+        "unmapped_triangles" => "placed each on one point of the atlas; their area is negligible",
+        _ => "kept the size; the truth is as coarse as its texels",
     };
     Finding {
         severity: if code == "no_atlas" { Severity::Warning } else { Severity::Note },
@@ -142,8 +141,8 @@ fn clipped_finding(plan: &Plan, instance: &InstanceEntry, baked: &Baked) -> Opti
         code: "base_color_clipped".to_owned(),
         file: plan.file.clone(),
         place: format!("instance '{}'", instance.id),
-        message: "its base colour leaves 0..1".to_owned(),
-        action: "clipped where it is baked; the truth's pictures are not".to_owned(),
+        message: "its base colour exceeds 0..1".to_owned(),
+        action: "clipped it in the baked texture, but not in the truth's pictures".to_owned(),
     })
 }
 

@@ -1,3 +1,5 @@
+//! What a recipe must contain, and that all of its faults are reported.
+
 use super::*;
 
 fn read_text(text: &str) -> Result<Recipe, PrepError> {
@@ -8,7 +10,7 @@ fn read_text(text: &str) -> Result<Recipe, PrepError> {
 }
 
 #[test]
-fn the_least_recipe() {
+fn absent_keys_have_their_defaults() {
     let recipe = read_text("name = 'mini'\n[[scene]]\nid = 'a'\nbitterli = 'a/scene.xml'").unwrap();
     assert_eq!(recipe.views.len(), 4);
     assert_eq!((recipe.views[1].id.as_str(), recipe.views[1].x_deg, recipe.views[1].y_deg), ("up_right", 5.0, -5.0));
@@ -16,17 +18,17 @@ fn the_least_recipe() {
 }
 
 #[test]
-fn every_fault_at_once() {
+fn all_faults_are_reported_together() {
     let text = "name = 'x'\nresolution = [4, 9]\nsamples = 0\n\
         [[scene]]\nid = 'a'\nbitterli = 'a'\nexposure = 0.0\n[[scene]]\nid = 'a'\nbitterli = 'b'\natlas_size = 9";
     let error = read_text(text).unwrap_err().to_string();
-    for part in ["resolution = [4, 9]", "samples = 0", "'a' is there twice", "exposure = 0", "atlas_size = 9"] {
+    for part in ["resolution = [4, 9]", "samples = 0", "'a' is listed twice", "exposure = 0", "atlas_size = 9"] {
         assert!(error.contains(part), "{part} not in {error}");
     }
 }
 
 #[test]
-fn cameras_stand_on_earth() {
+fn cameras_are_within_a_million_metres() {
     let at = |x: &str| {
         let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\n";
         read_text(&format!("{text}camera = {{ position = [{x}, 0, 0], target = [0, 0, 0], fov_y_deg = 40 }}"))

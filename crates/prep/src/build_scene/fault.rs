@@ -1,0 +1,110 @@
+//! The faults for which a scene of a recipe is refused while it is made.
+
+use mateval_scene::Finding;
+use mateval_sources::front3d::camera_sampler::CameraError;
+
+use crate::numbering::TooMany;
+use crate::part_labels::LabelFault;
+use crate::recipe::fault::RecipeSceneFault;
+
+/// Why a scene cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneFault {
+    /// The recipe's entry of the scene is not valid.
+    #[error(transparent)]
+    Recipe(#[from] RecipeSceneFault),
+    /// The source has no usable surface.
+    #[error("the source has no surface that could be read:{}", Finding::list(findings))]
+    NoSurfaces {
+        /// Everything that was wrong with the source.
+        findings: Vec<Finding>,
+    },
+    /// The scene has more instances or parts than pictures can hold.
+    #[error(transparent)]
+    TooMany(#[from] TooMany),
+    /// Files differ from those that the recipe pins.
+    #[error("its files differ from the recipe's `inputs`: {}", joined(faults))]
+    Pins {
+        /// Each file that differs.
+        faults: Vec<PinFault>,
+    },
+    /// Labels of parts do not fit the scene.
+    #[error("{}", joined(faults))]
+    Labels {
+        /// Each file that does not fit.
+        faults: Vec<LabelFault>,
+    },
+    /// The input view shows no instance that has an atlas.
+    #[error("the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera")]
+    NothingSeen,
+    /// The source's picture size is out of range.
+    #[error("the source's film is {width}x{height}; state a resolution of {least} to {most} a side in the recipe")]
+    FilmSize {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Least pixels of a side.
+        least: u32,
+        /// Most pixels of a side.
+        most: u32,
+    },
+    /// A camera by position and target looks nowhere, or straight up or down.
+    #[error("camera: position and target must differ, and not only in height")]
+    CameraDirection,
+    /// The house has no such room.
+    #[error("the house has no room '{room}'; it has '{}'", rooms.join("', '"))]
+    NoRoom {
+        /// The room in the recipe.
+        room: String,
+        /// The rooms of the house.
+        rooms: Vec<String>,
+    },
+    /// The house has no designer's camera with this number.
+    #[error("the house has no designer's camera {number}; it has {}", listed(known))]
+    NoDesignersCamera {
+        /// The number in the recipe.
+        number: usize,
+        /// The numbers of the house's cameras.
+        known: Vec<usize>,
+    },
+    /// No drawn camera was accepted.
+    #[error(transparent)]
+    DrawnCamera(#[from] CameraError),
+}
+
+/// A file that differs from those that the recipe pins.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PinFault {
+    /// The file has other bytes.
+    #[error("'{file}' has the hash {found}, expected {pinned}")]
+    Changed {
+        /// The file.
+        file: String,
+        /// Its SHA-256.
+        found: String,
+        /// The SHA-256 in the recipe.
+        pinned: String,
+    },
+    /// The file was read but is not pinned.
+    #[error("'{file}' was read but is not in `inputs`")]
+    Unlisted {
+        /// The file.
+        file: String,
+    },
+    /// The file is pinned but was not read.
+    #[error("'{file}' is in `inputs` but was not read")]
+    Unread {
+        /// The file.
+        file: String,
+    },
+}
+
+fn joined<T: std::fmt::Display>(faults: &[T]) -> String {
+    faults.iter().map(T::to_string).collect::<Vec<_>>().join("; ")
+}
+
+fn listed(numbers: &[usize]) -> String {
+    let numbers: Vec<String> = numbers.iter().map(usize::to_string).collect();
+    if numbers.is_empty() { "none".to_owned() } else { numbers.join(", ") }
+}

@@ -1,0 +1,87 @@
+//! Plans a scene: its instances, parts and views, before anything is written.
+
+use std::path::Path;
+
+use mateval_scene::dataset::View;
+use mateval_scene::reference::ReferenceScene;
+use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::{Finding, SceneLights, SourceKind};
+use mateval_sources::source_scene::SourceScene;
+
+use super::fault::SceneFault;
+use super::turned_views::views_of;
+use crate::error::PrepError;
+use crate::instances::{self, InstanceEntry};
+use crate::part_labels;
+use crate::part_split::PartSplit;
+use crate::recipe::{Recipe, RecipeScene};
+
+/// A scene with numbered instances and parts and with the cameras of all views.
+pub(super) struct Plan {
+    /// Where the scene came from.
+    pub(super) kind: SourceKind,
+    /// The house that it belongs to.
+    pub(super) house: String,
+    pub(super) lights: SceneLights,
+    pub(super) scene: std::sync::Arc<ReferenceScene>,
+    pub(super) instances: Vec<InstanceEntry>,
+    /// The source's own parts first.
+    pub(super) part_splits: Vec<PartSplit>,
+    pub(super) views: Vec<View>,
+    pub(super) findings: Vec<Finding>,
+    /// The file that findings refer to by default.
+    pub(super) file: String,
+    /// Every file read and its SHA-256; sorted.
+    pub(super) files: Vec<(String, String)>,
+}
+
+/// Numbers the instances and parts of a scene that was read, and places its cameras. Returns also the files that were
+/// looked for but do not exist; sorted.
+pub(super) fn plan(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Path,
+    mut read: SourceScene,
+) -> Result<(Plan, Vec<String>), PrepError> {
+    if read.scene.surfaces.is_empty() {
+        return Err(PrepError::scene(&entry.id)(SceneFault::NoSurfaces { findings: read.findings }));
+    }
+    let instances = instances::list(&read.scene, &read.origins).map_err(PrepError::scene(&entry.id))?;
+    let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
+    let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
+    let views = views_of(recipe, read.camera);
+    let scene = std::sync::Arc::new(read.scene);
+    let SourceScene { kind, lights, house, findings, file, files, absent, .. } = read;
+    let house = entry.house.clone().unwrap_or(house);
+    Ok((Plan { kind, house, lights, scene, instances, part_splits, views, findings, file, files }, absent))
+}
+
+/// The source's own parts, then those of the recipe's labels.
+fn part_splits(
+    entry: &RecipeScene,
+    source: &Path,
+    instances: &[InstanceEntry],
+    own: PartSplit,
+    read: &mut SourceScene,
+) -> Result<Vec<PartSplit>, PrepError> {
+    let root = entry.root(source);
+    let mut folder = SourceFolder::new(&root, part_labels::MAX_FILE_BYTES).map_err(PrepError::io("open", &root))?;
+    let (mut splits, mut faults) = (Vec::new(), Vec::new());
+    for (id, labels) in &entry.part_labels {
+        let own = (instances, &own);
+        match part_labels::read(id, labels, &mut folder, &read.scene, own, &mut read.findings) {
+            Ok(split) => splits.push(split),
+            Err(of_set) => faults.extend(of_set),
+        }
+    }
+    if !faults.is_empty() {
+        return Err(PrepError::scene(&entry.id)(SceneFault::Labels { faults }));
+    }
+    let labels = folder.into_files();
+    read.files.extend(labels.hashes);
+    read.files.sort();
+    read.absent.extend(labels.absent);
+    read.absent.sort();
+    splits.insert(0, own);
+    Ok(splits)
+}

@@ -1,0 +1,132 @@
+//! Writes the pictures of every view of a scene and notes what they show.
+
+use std::path::Path;
+
+use mateval_image::exr_io::{self, Precision};
+use mateval_image::png_io;
+use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
+use mateval_scene::{Finding, Progress, SceneId, Severity, ViewId};
+use mateval_tracer::World;
+
+use super::fault::SceneFault;
+use super::plan::Plan;
+use crate::error::PrepError;
+use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
+
+/// What the pictures of all views show.
+#[derive(Default)]
+pub(super) struct Seen {
+    /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
+    pub(super) nearest: Vec<Option<f64>>,
+    /// Whether the input view shows something that is scored.
+    input_shows_something: bool,
+    /// Findings about views that are of little use.
+    pub(super) findings: Vec<Finding>,
+}
+
+impl Seen {
+    /// Fails if the input view shows nothing that is scored.
+    pub(super) fn or_refuse(self, scene: &SceneId) -> Result<Self, PrepError> {
+        if self.input_shows_something { Ok(self) } else { Err(PrepError::scene(scene)(SceneFault::NothingSeen)) }
+    }
+}
+
+/// A surface that is nearer than this, in metres, fills the picture with a few texels; one that contains the camera fills it
+/// with noise.
+const TOO_NEAR_M: f64 = 0.001;
+
+/// Writes the pictures of every view. `scored` states for each instance whether it has an atlas.
+pub(super) fn write(
+    plan: &Plan,
+    folder: &SceneFolder,
+    scored: &[bool],
+    progress: Progress<'_>,
+) -> Result<Seen, PrepError> {
+    let world = World::new(plan.scene.clone())?;
+    let instances: Vec<u16> = plan.instances.iter().map(|entry| entry.index.0.get()).collect();
+    let parts: Vec<(String, Vec<Vec<u16>>)> =
+        plan.part_splits.iter().map(|split| (part_picture(split.id.as_ref()), split.values())).collect();
+    let scene = ViewScene::new(&plan.scene, &world, &instances, scored);
+    let mut seen = Seen::default();
+    let mut in_input = vec![None; plan.instances.len()];
+    let mut elsewhere = vec![None; plan.instances.len()];
+    for (at, view) in plan.views.iter().enumerate() {
+        progress("views", at, plan.views.len());
+        let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
+        note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
+        check_use(plan, &view.id, &geometry, &mut seen);
+        write_view(folder, &view.id, &geometry, &truth)?;
+        write_parts(&folder.view(&view.id), &geometry, &parts)?;
+    }
+    progress("views", plan.views.len(), plan.views.len());
+    seen.nearest = in_input.into_iter().zip(elsewhere).map(|(first, other)| first.or(other)).collect();
+    Ok(seen)
+}
+
+/// Adds a finding where a view is of little use: no pixel is valid, or a surface is too near to the camera.
+fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut Seen) {
+    let mut warn = |code: &str, message: String, action: &str| {
+        seen.findings.push(Finding {
+            severity: Severity::Warning,
+            code: code.to_owned(),
+            file: plan.file.clone(),
+            place: format!("view '{view}'"),
+            message,
+            action: action.to_owned(),
+        });
+    };
+    let nearest = geometry.depth.pixels().iter().copied().filter(|depth| *depth > 0.0).reduce(f32::min);
+    if let Some(nearest) = nearest.filter(|nearest| f64::from(*nearest) < TOO_NEAR_M) {
+        let message = format!("a surface is {nearest:.1e} m in front of the camera, expected {TOO_NEAR_M} m or more");
+        warn("camera_too_near", message, "kept the view; choose another camera, since so near a surface may be noise");
+    }
+    let shows_something = geometry.valid.pixels().contains(&true);
+    if view.as_str() == INPUT {
+        seen.input_shows_something = shows_something;
+    } else if !shows_something {
+        let message = "the camera sees nothing that is scored: no pixel is valid".to_owned();
+        warn("nothing_seen", message, "kept the view; it adds nothing to any score");
+    }
+}
+
+/// Lowers the nearest depth of every instance that the view shows.
+fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
+    for (instance, depth) in geometry.instance.pixels().iter().zip(geometry.depth.pixels()) {
+        if let Some(place) = usize::from(*instance).checked_sub(1) {
+            let depth = f64::from(*depth);
+            nearest[place] = Some(nearest[place].map_or(depth, |other: f64| other.min(depth)));
+        }
+    }
+}
+
+fn write_view(
+    folder: &SceneFolder,
+    view: &ViewId,
+    geometry: &GeometryPictures,
+    truth: &TruthPictures,
+) -> Result<(), PrepError> {
+    let shown = folder.view(view);
+    exr_io::write_scalar(&shown.join("depth.exr"), &geometry.depth, Precision::Float)?;
+    exr_io::write_normal(&shown.join("normal.exr"), &geometry.normal, Precision::Half)?;
+    png_io::write_ids(&shown.join("instance.png"), &geometry.instance)?;
+    png_io::write_mask(&shown.join("valid.png"), &geometry.valid)?;
+    if view.as_str() != INPUT {
+        png_io::write_mask(&shown.join("unobserved.png"), &geometry.unobserved)?;
+    }
+    let hidden = folder.truth_view(view);
+    exr_io::write_linear(&hidden.join("albedo.exr"), &truth.albedo, Precision::Float)?;
+    exr_io::write_linear(&hidden.join("diffuse_albedo.exr"), &truth.diffuse_albedo, Precision::Float)?;
+    exr_io::write_scalar(&hidden.join("roughness.exr"), &truth.roughness, Precision::Float)?;
+    exr_io::write_scalar(&hidden.join("metallic.exr"), &truth.metallic, Precision::Float)?;
+    png_io::write_mask(&hidden.join("specular_region.png"), &truth.specular_region)?;
+    Ok(())
+}
+
+/// Writes the picture of each set of parts. `parts` holds the name of its file and its value for every triangle.
+fn write_parts(shown: &Path, geometry: &GeometryPictures, parts: &[(String, Vec<Vec<u16>>)]) -> Result<(), PrepError> {
+    for (file, values) in parts {
+        let picture = geometry.triangle.map(|seen| SeenTriangle::value_in(seen, values));
+        png_io::write_ids(&shown.join(file), &picture)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,177 @@
+//! One scene of a recipe: its source, where the source's files are, and the settings of the scene.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::{PartSetId, SceneId};
+use serde::Deserialize;
+
+use super::camera::RecipeCamera;
+use super::fault::{RecipeFault, RecipeSceneFault};
+use super::sizes::check_sizes;
+
+/// One scene of a recipe.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeScene {
+    /// Its id.
+    pub id: SceneId,
+    /// The scene's Mitsuba XML; either this or `front3d`.
+    pub bitterli: Option<PathBuf>,
+    /// A room of a 3D-FRONT house; either this or `bitterli`.
+    pub front3d: Option<Front3dRoom>,
+    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder or the house's uid.
+    pub house: Option<String>,
+    /// The input camera; if absent, the camera of the Mitsuba scene.
+    pub camera: Option<RecipeCamera>,
+    /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
+    #[serde(default)]
+    pub part_labels: BTreeMap<PartSetId, PathBuf>,
+    /// SHA-256 of every file that the scene is made of, by its path as `scene.json` lists it under `source`. If any other
+    /// byte is read, the scene is refused. Not checked if empty.
+    #[serde(default)]
+    pub inputs: BTreeMap<String, String>,
+    /// Overrides the recipe's.
+    pub resolution: Option<[u32; 2]>,
+    /// Overrides the recipe's.
+    pub atlas_size: Option<u32>,
+    /// Multiplies every RGB picture before clipping.
+    #[serde(default = "default_exposure")]
+    pub exposure: f64,
+}
+
+/// A room of a 3D-FRONT house, and the paths of everything that it needs.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Front3dRoom {
+    /// The house's JSON.
+    pub house: PathBuf,
+    /// The room's instanceid, as in `LivingDiningRoom-1912`.
+    pub room: String,
+    /// The folder of 3D-FUTURE's models.
+    pub models: PathBuf,
+    /// The folder of the layout's textures; if absent, the architecture has colours only.
+    pub textures: Option<PathBuf>,
+    /// A file of designers' cameras for the house.
+    pub cameras: Option<PathBuf>,
+    /// Mirror the layout as BlenderProc does.
+    #[serde(default)]
+    pub blenderproc_compat: bool,
+}
+
+/// The source of a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RecipeSource<'a> {
+    /// A Mitsuba XML.
+    Bitterli(&'a Path),
+    /// A room of a 3D-FRONT house.
+    Front3d(&'a Front3dRoom),
+}
+
+/// A path that a scene's source needs.
+pub(crate) struct SourcePath {
+    /// The key in the recipe.
+    pub(crate) key: &'static str,
+    /// The path as the recipe states it.
+    pub(crate) path: PathBuf,
+    /// Whether the path must be a folder; otherwise it must be an ordinary file.
+    pub(crate) is_folder: bool,
+}
+
+fn default_exposure() -> f64 {
+    1.0
+}
+
+impl RecipeScene {
+    /// The source of the scene. Fails unless the recipe names exactly one.
+    pub fn source(&self) -> Result<RecipeSource<'_>, RecipeSceneFault> {
+        match (&self.bitterli, &self.front3d) {
+            (Some(xml), None) => Ok(RecipeSource::Bitterli(xml)),
+            (None, Some(room)) => Ok(RecipeSource::Front3d(room)),
+            _ => Err(RecipeSceneFault::NotOneSource),
+        }
+    }
+
+    /// The folder that the paths of the scene's files are relative to: the XML's folder, or else `source`, the folder that
+    /// the recipe's paths are relative to.
+    pub fn root(&self, source: &Path) -> PathBuf {
+        match &self.bitterli {
+            Some(xml) => source.join(xml).parent().map(Path::to_owned).unwrap_or_default(),
+            None => source.to_owned(),
+        }
+    }
+
+    /// The paths that the source needs, relative to the folder of the recipe's paths.
+    pub(crate) fn source_paths(&self) -> Vec<SourcePath> {
+        let path = |key, path: &Path, is_folder| SourcePath { key, path: path.to_owned(), is_folder };
+        let mut paths: Vec<SourcePath> = self.bitterli.iter().map(|xml| path("bitterli", xml, false)).collect();
+        if let Some(room) = &self.front3d {
+            paths.push(path("house", &room.house, false));
+            paths.push(path("models", &room.models, true));
+            paths.extend(room.textures.as_deref().map(|textures| path("textures", textures, true)));
+            paths.extend(room.cameras.as_deref().map(|cameras| path("cameras", cameras, false)));
+        }
+        paths
+    }
+
+    /// The paths that `scene.json` records, with their keys. They must be relative to the folder of the recipe's paths.
+    pub(crate) fn recorded_paths(&mut self) -> Vec<(&'static str, &mut PathBuf)> {
+        let Some(room) = &mut self.front3d else { return Vec::new() };
+        let optional = [("textures", room.textures.as_mut()), ("cameras", room.cameras.as_mut())];
+        let mut paths = vec![("house", &mut room.house), ("models", &mut room.models)];
+        paths.extend(optional.into_iter().filter_map(|(key, path)| Some((key, path?))));
+        paths
+    }
+
+    /// Adds a [`RecipeFault`] for everything that is wrong with the scene.
+    pub(super) fn check(&self, faults: &mut Vec<RecipeFault>) {
+        check_sizes(&format!("scene '{}'", self.id), self.resolution, self.atlas_size, faults);
+        let mut own = Vec::new();
+        own.extend(self.check_source().err());
+        self.check_label_folders(&mut own);
+        if !(self.exposure > 0.0 && self.exposure.is_finite()) {
+            own.push(RecipeSceneFault::Exposure { found: self.exposure });
+        }
+        self.check_inputs(&mut own);
+        if !self.camera.as_ref().is_none_or(RecipeCamera::is_in_range) {
+            own.push(RecipeSceneFault::CameraRange);
+        }
+        faults.extend(own.into_iter().map(|fault| RecipeFault::Scene { scene: self.id.clone(), fault }));
+    }
+
+    /// The scene has one source, and a camera that the source can provide.
+    fn check_source(&self) -> Result<(), RecipeSceneFault> {
+        match (self.source()?, &self.camera) {
+            (RecipeSource::Front3d(_), None) => Err(RecipeSceneFault::NoCamera),
+            (RecipeSource::Bitterli(_), Some(RecipeCamera::Seed { .. } | RecipeCamera::Designer(_))) => {
+                Err(RecipeSceneFault::CameraOfRooms)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_label_folders(&self, faults: &mut Vec<RecipeSceneFault>) {
+        let root = if self.bitterli.is_some() {
+            "the XML's folder"
+        } else {
+            "the folder that the recipe's paths are relative to"
+        };
+        for (set, folder) in &self.part_labels {
+            if SourceFolder::relative(&folder.to_string_lossy()).is_err() {
+                faults.push(RecipeSceneFault::LabelFolder { set: set.clone(), folder: folder.clone(), root });
+            }
+        }
+    }
+
+    fn check_inputs(&self, faults: &mut Vec<RecipeSceneFault>) {
+        for (file, hash) in &self.inputs {
+            if SourceFolder::relative(file).is_err() {
+                faults.push(RecipeSceneFault::InputPath { file: file.clone() });
+            }
+            if hash.len() != 64 || !hash.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f')) {
+                faults.push(RecipeSceneFault::InputHash { file: file.clone(), found: hash.clone() });
+            }
+        }
+    }
+}
