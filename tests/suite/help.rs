@@ -51,8 +51,8 @@ fn inputs_that_do_not_exist() {
 
 #[test]
 fn a_folder_that_is_no_dataset() {
-    let error = "error: cannot verify 'nowhere': 'nowhere' holds no dataset.json: no dataset, or an unfinished \
-                 `prep build` (run it again)\n";
+    let error = "error: cannot verify 'nowhere': 'nowhere' has no dataset.json: it is not a dataset, or its build did not \
+                 finish and `prep build` must be run again\n";
     check(&["prep", "verify", "nowhere"], 2, "", error);
 }
 

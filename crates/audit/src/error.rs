@@ -19,7 +19,7 @@ pub enum AuditError {
         source: std::io::Error,
     },
     /// The folder contains no finished dataset.
-    #[error("'{}' holds no dataset.json: no dataset, or an unfinished `prep build` (run it again)", path.display())]
+    #[error("'{}' has no dataset.json: it is not a dataset, or its build did not finish and `prep build` must be run again", path.display())]
     NotADataset {
         /// The folder.
         path: PathBuf,

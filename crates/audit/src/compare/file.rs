@@ -50,7 +50,7 @@ pub struct SceneComparison {
     pub scene: SceneId,
     /// The kinds of material that its surfaces have, sorted.
     pub kinds: Vec<MaterialKind>,
-    /// How far a tile of light may be off, as a share of the mean ([`LightComparison::means`]); smaller where all surfaces are
+    /// How far a tile of light may be off, as a share of the built-in tracer's mean in `means`; smaller where all surfaces are
     /// Lambertian.
     pub tile_bound: f64,
     /// Samples per pixel of each half that the built-in tracer rendered; 0 where no view was compared.

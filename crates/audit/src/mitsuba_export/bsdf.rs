@@ -94,6 +94,14 @@ impl Writer<'_, '_> {
                 let bsdf = self.files.scalar(bsdf, "roughness", roughness)?;
                 self.files.scalar(bsdf, "metallic", metallic)
             }
+            #[allow(
+                unreachable_patterns,
+                reason = "every model is written today; a new one must not need a change here"
+            )]
+            _ => {
+                self.warn("unknown_material", "the export does not know this material", "wrote a grey diffuse one");
+                Ok(Element::plugin("bsdf", "diffuse").rgb("reflectance", [0.5; 3]))
+            }
         }
     }
 

@@ -31,9 +31,9 @@ pub enum ImportError {
     /// A uri is not UTF-8 once it is percent-decoded.
     #[error("the uri '{}' is not UTF-8: {source}", shortened(.uri))]
     Uri {
-        /// As the file has it.
+        /// The uri as the file has it.
         uri: String,
-        /// Where it fails.
+        /// Where its bytes are not UTF-8.
         source: std::str::Utf8Error,
     },
     /// The file has more of something than is read.
@@ -122,24 +122,24 @@ pub enum ImportError {
     Materials(Vec<MaterialFault>),
 }
 
-/// What a file has a limited number of.
+/// A quantity of which a file may have a limited number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Limited {
-    /// All buffers of a glTF together.
+    /// Bytes of all buffers of a glTF together.
     #[error("bytes in its buffers")]
     BufferBytes,
-    /// All textures together.
+    /// Texels of all textures together.
     #[error("texels in its textures")]
     Texels,
-    /// All meshes together.
+    /// Triangles of all meshes together.
     #[error("triangles")]
     Triangles,
-    /// All meshes together; a mesh that several nodes share counts for each of them.
+    /// Vertices of all meshes together. A mesh that several nodes share counts for each of them.
     #[error("vertices, counted for each node that has them")]
     Vertices,
 }
 
-/// What is not read.
+/// A feature that is not read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
     /// Data inside a uri.
@@ -159,16 +159,16 @@ pub enum Unsupported {
     TextureOptions(String),
 }
 
-/// Where a number is not finite.
+/// A number of a file that is not finite.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Place {
-    /// Of an OBJ.
+    /// A texture coordinate of an OBJ.
     #[error("a texture coordinate")]
     TextureCoordinate,
-    /// Of an OBJ's group of this name.
+    /// A corner of the OBJ's group of this name.
     #[error("a corner of group '{}'", shortened(.0))]
     GroupCorner(String),
-    /// Of a glTF, in world space.
+    /// A position of a glTF, in world space.
     #[error("a position, once its node's transform is applied,")]
     WorldPosition,
 }
