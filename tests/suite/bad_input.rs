@@ -265,3 +265,25 @@ fn a_dataset_with_a_truncated_picture() {
     run(&mut score(&submission, copy.path(), &result)).ends_with(2).says("up_left/albedo.exr");
     assert!(!result.exists());
 }
+
+/// Every reader of results refuses a key that it does not know and names its place. The twin is the result as published.
+#[test]
+fn a_result_with_an_unknown_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let published = include_str!("../../dataset_spec/examples/result.json");
+    let changed = published.replacen("\"albedo.input.mse\"", "\"albedo.input.mze\"", 1);
+    assert_ne!(changed, published);
+    std::fs::write(path("published.json"), published).unwrap();
+    std::fs::write(path("changed.json"), changed).unwrap();
+    run(mateval().args(["eval", "tables"]).arg(path("published.json"))).ends_with(0);
+    for words in [
+        &["tables", "changed.json"][..],
+        &["leaderboard", "changed.json", "--out", "site"],
+        &["explain", "changed.json", "--scene", "room", "--dataset", "dataset", "--submission", "submission"],
+    ] {
+        let refused = run(mateval().current_dir(folder.path()).arg("eval").args(words)).ends_with(2);
+        refused.says("'albedo.input.mze' is no key of a result").says("/protocols/mateval-1/summary");
+    }
+    assert!(!path("site").exists());
+}

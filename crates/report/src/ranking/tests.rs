@@ -66,17 +66,28 @@ fn simulate(houses: usize, seed: u64) -> Simulated {
     board
 }
 
-/// Share, over boards and methods, of intervals that hold the truth.
-fn coverage(boards: u64, houses: usize, kind: IntervalKind, by: impl Fn(Simulated) -> Clusters) -> f64 {
-    let mut held = 0;
+/// What the bootstrap concludes over many boards of equally good methods.
+struct Conclusions {
+    /// The share of intervals that hold the true mean.
+    coverage: f64,
+    /// The share of p-values below 5 %.
+    rejected: f64,
+}
+
+fn conclusions(boards: u64, houses: usize, kind: IntervalKind, by: fn(&Simulated) -> Clusters) -> Conclusions {
+    let (mut held, mut rejected) = (0, 0);
     for board in 0..boards {
-        let clusters = by(simulate(houses, board));
+        let clusters = by(&simulate(houses, board));
         let draws = Draws::new(board, BOARD_DRAWS, clusters.len());
-        let found = intervals(&clusters, &draws, kind);
-        held +=
-            found.iter().filter_map(|(_, interval)| *interval).filter(|i| i.low <= TRUTH && TRUTH <= i.high).count();
+        let found = intervals(&clusters, &draws, kind).into_iter().filter_map(|(_, interval)| interval);
+        held += found.filter(|interval| interval.low <= TRUTH && TRUTH <= interval.high).count();
+        rejected += duels(&clusters, &[(0, 1), (2, 3)], &draws, kind).iter().filter(|duel| duel.p < 0.05).count();
     }
-    held as f64 / (boards as usize * METHODS) as f64
+    let boards = boards as usize;
+    Conclusions {
+        coverage: held as f64 / (boards * METHODS) as f64,
+        rejected: rejected as f64 / (boards * METHODS / 2) as f64,
+    }
 }
 
 const BOARDS: u64 = 1000;
@@ -87,52 +98,36 @@ const FEW_BOARDS: u64 = 200;
 /// Fewer than [`DRAWS`], to save time: the ends of an interval vary a little more from board to board.
 const BOARD_DRAWS: usize = 1000;
 
-fn by_house(board: Simulated) -> Clusters {
+fn by_house(board: &Simulated) -> Clusters {
     Clusters::gather(&board.scenes, &board.houses)
 }
 
-fn by_picture(board: Simulated) -> Clusters {
+fn by_picture(board: &Simulated) -> Clusters {
     let pictures: Vec<usize> = (0..board.pictures[0].len()).collect();
     Clusters::gather(&board.pictures, &pictures)
 }
 
 #[test]
-fn intervals_cover_the_truth() {
-    let covered = coverage(BOARDS, 60, IntervalKind::Percentile, by_house);
-    assert!((0.93..=0.97).contains(&covered), "{covered}");
+fn intervals_and_p_values_of_many_houses() {
+    let found = conclusions(BOARDS, 60, IntervalKind::Percentile, by_house);
+    assert!((0.93..=0.97).contains(&found.coverage), "{}", found.coverage);
+    assert!((0.03..=0.07).contains(&found.rejected), "{}", found.rejected);
     // The twin draws pictures as if those of one house were independent.
-    let covered = coverage(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
-    assert!(covered < 0.7, "{covered}");
+    let found = conclusions(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
+    assert!(found.coverage < 0.7, "{}", found.coverage);
+    assert!(found.rejected > 0.15, "{}", found.rejected);
 }
 
 #[test]
-fn students_intervals_cover_the_truth_of_few_houses() {
-    let covered = coverage(BOARDS, 12, IntervalKind::Student, by_house);
-    assert!((0.92..=0.98).contains(&covered), "{covered}");
+fn intervals_and_p_values_of_few_houses() {
+    let found = conclusions(BOARDS, 12, IntervalKind::Student, by_house);
+    assert!((0.92..=0.98).contains(&found.coverage), "{}", found.coverage);
+    assert!((0.03..=0.07).contains(&found.rejected), "{}", found.rejected);
     // The twins: percentiles, which need more houses, and pictures.
-    let covered = coverage(BOARDS, 12, IntervalKind::Percentile, by_house);
-    assert!(covered < 0.92, "{covered}");
-    let covered = coverage(FEW_BOARDS, 12, IntervalKind::Student, by_picture);
-    assert!(covered < 0.7, "{covered}");
-}
-
-/// Equal methods differ significantly in one pair of twenty; if pictures are drawn, in many more.
-#[test]
-fn p_values_of_equal_methods_are_uniform() {
-    let refused = |boards: u64, houses, kind, by: fn(Simulated) -> Clusters| {
-        let one = |board| {
-            let clusters = by(simulate(houses, board));
-            let draws = Draws::new(board, BOARD_DRAWS, clusters.len());
-            duels(&clusters, &[(0, 1), (2, 3)], &draws, kind).iter().filter(|duel| duel.p < 0.05).count()
-        };
-        (0..boards).map(one).sum::<usize>() as f64 / (2 * boards) as f64
-    };
-    for (houses, kind) in [(60, IntervalKind::Percentile), (12, IntervalKind::Student)] {
-        let share = refused(BOARDS, houses, kind, by_house);
-        assert!((0.03..=0.07).contains(&share), "{houses} houses: {share}");
-    }
-    let share = refused(FEW_BOARDS, 60, IntervalKind::Percentile, by_picture);
-    assert!(share > 0.15, "{share}");
+    let found = conclusions(BOARDS, 12, IntervalKind::Percentile, by_house);
+    assert!(found.coverage < 0.92, "{}", found.coverage);
+    let found = conclusions(FEW_BOARDS, 12, IntervalKind::Student, by_picture);
+    assert!(found.coverage < 0.7, "{}", found.coverage);
 }
 
 fn scene(number: usize) -> SceneId {
