@@ -13,7 +13,7 @@ pub struct Repairs {
     pub not_finite: usize,
     /// Triangles without area, which are kept.
     pub degenerate: usize,
-    /// Normals computed anew because they were zero or not finite.
+    /// Normals that were recomputed because they were zero or not finite.
     pub normals: usize,
     /// Texture coordinates set to 0 because they were not finite.
     pub uvs: usize,

@@ -1,5 +1,5 @@
-//! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from `map_Pr`
-//! or `Pr`, metallic from `map_Pm` or `Pm`.
+//! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from
+//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -82,7 +82,7 @@ impl Reader<'_> {
         Ok(SourceFolder::relative(&name)?)
     }
 
-    /// The bytes of an `mtllib` line's file. Where no file has the name as it stands, blanks separate several files, whose
+    /// The bytes of an `mtllib` line's file. Where no file has the unchanged name, blanks separate several files, whose
     /// bytes are joined.
     fn material_file(&mut self, name: &str) -> Result<Vec<u8>, ImportError> {
         let whole = self.relative(name)?;

@@ -1,12 +1,12 @@
 //! The non-negative weights of columns whose sum is nearest to a target by the sum of absolute differences.
 //!
-//! min over r >= 0 of ||B r - t||_1. Of all best r the shortest is wanted, each column's weight counted by what it brings to
-//! the sum, so that units do not matter: (eps / 2) ||r||^2 is added, where columns have mean 1. If eps is small enough, the
-//! minimum is the shortest of the best exactly (Mangasarian and Meyer, "Nonlinear perturbation of linear
-//! programs", SIAM J. Control Optim. 17, 1979). Solved by Mehrotra's primal-dual interior-point method ("On the
+//! min over r >= 0 of ||B r - t||_1. Of all best r the shortest is wanted, each column's weight counted by what it
+//! brings to the sum, so that units do not matter: (eps / 2) ||r||^2 is added, where columns have mean 1. If eps is
+//! small enough, the minimum is the shortest of the best exactly (Mangasarian and Meyer, "Nonlinear perturbation of
+//! linear programs", SIAM J. Control Optim. 17, 1979). Solved by Mehrotra's primal-dual interior-point method ("On the
 //! implementation of a primal-dual interior point method", SIAM J. Optim. 2, 1992); what is left to solve in each step
-//! has as many unknowns as there are columns. The dual, max t.y over |y_i| <= 1 with B^T y <= 0, bounds the sum from below
-//! and so certifies the answer: anybody can check it with two products.
+//! has as many unknowns as there are columns. The dual, max t.y over |y_i| <= 1 with B^T y <= 0, bounds the sum from
+//! below and so certifies the answer: anybody can check it with two products.
 //!
 //! Only +, -, *, / and square roots of f64 in a fixed order: the same bytes on every machine.
 
@@ -33,8 +33,8 @@ impl NonnegativeL1 {
     }
 }
 
-/// Of the square of the weights' length, for a target and columns of mean 1: at most this, times half the squared length,
-/// is lost of the mean.
+/// Of the square of the weights' length, for a target and columns of mean 1: at most this, times half the squared
+/// length, is lost of the mean.
 const SHORTNESS: f64 = 1e-6;
 /// Mean complementarity at which the steps end, for a mean target of 1.
 const ENOUGH: f64 = 1e-12;
@@ -69,8 +69,8 @@ pub fn solve(columns: &[Vec<f64>], target: &[f64], start: Option<f64>) -> Nonneg
 
 /// Makes the dual feasible and works out both sums.
 ///
-/// Columns are not negative, so y - d, where d is the largest share by which a column's product is too large, brings all
-/// products to 0 or less; dividing by 1 + d brings it back within -1..1.
+/// Columns are not negative, so y - d, where d is the largest share by which a column's product is too large, brings
+/// all products to 0 or less; dividing by 1 + d brings it back within -1..1.
 fn certify(columns: &[Vec<f64>], target: &[f64], weights: Vec<f64>, found: &Point) -> NonnegativeL1 {
     let excess = |column: &Vec<f64>| {
         let sum: f64 = column.iter().sum();
@@ -340,7 +340,7 @@ mod tests {
         found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / largest
     }
 
-    /// Checks weights and dual by their definitions alone; what is wrong is told.
+    /// Checks weights and dual by their definitions alone; returns the first violation.
     fn check(columns: &[Vec<f64>], target: &[f64], found: &NonnegativeL1) -> Result<(), String> {
         if found.weights.iter().any(|&r| r < 0.0) || found.dual.iter().any(|y| y.abs() > 1.0) {
             return Err("out of bounds".into());

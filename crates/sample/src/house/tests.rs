@@ -126,7 +126,7 @@ fn meshes_are_sound_but_where_the_table_says() {
     for (place, mesh) in house.list("/mesh").iter().enumerate() {
         found.extend(mesh_faults(mesh, &materials).into_iter().map(|name| (place, name)));
     }
-    let told: BTreeSet<_> = FAULTS
+    let described: BTreeSet<_> = FAULTS
         .iter()
         .filter_map(|fault| match fault.place {
             Place::Json { pointer } => {
@@ -136,11 +136,11 @@ fn meshes_are_sound_but_where_the_table_says() {
             Place::File { .. } => None,
         })
         .collect();
-    assert!(told.len() > 10, "{told:?}");
-    assert_eq!(found, told);
+    assert!(described.len() > 10, "{described:?}");
+    assert_eq!(found, described);
     // They are in the third room, but for normals.
     let third: Vec<&Value> = house.list("/scene/room/2/children").iter().map(|child| &child["ref"]).collect();
-    let elsewhere = told.iter().filter(|(place, _)| !third.contains(&&house.list("/mesh")[*place]["uid"]));
+    let elsewhere = described.iter().filter(|(place, _)| !third.contains(&&house.list("/mesh")[*place]["uid"]));
     assert!(elsewhere.map(|(_, name)| *name).all(|name| name == "mesh_normals_not_unit"));
 }
 

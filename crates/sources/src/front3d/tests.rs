@@ -1,4 +1,5 @@
-//! The reader against the sample house and its faults, made houses, hostile files, and real data where there is some.
+//! Tests the reader on the sample house and its faults, on generated houses, on hostile files, and on real data if it
+//! exists.
 
 mod cameras;
 mod faults;
@@ -37,7 +38,7 @@ impl Disk {
         Self::written(true)
     }
 
-    /// Without pictures, which take the most time: every piece and wall is there, in plain colours.
+    /// Without pictures, which take the most time: every piece and wall exists, in plain colours.
     fn bare() -> Self {
         Self::written(false)
     }
@@ -69,25 +70,25 @@ impl Disk {
         self.folder.path().join("house/3D-FUTURE-model").join(jid(number))
     }
 
-    /// As it is on disk.
+    /// The house as it is on disk.
     fn furnish(&self) -> FurnishedHouse {
         furnish(&self.files(), &Limits::default()).unwrap()
     }
 
-    /// With another JSON.
+    /// The house with another JSON.
     fn furnish_json(&self, json: &Value) -> Result<FurnishedHouse, SourceError> {
         std::fs::write(self.folder.path().join(HOUSE), json.to_string()).unwrap();
         furnish(&self.files(), &Limits::default())
     }
 }
 
-/// The sample with all its faults, made once a process.
+/// The sample with all its faults, made once for each process.
 fn furnished() -> &'static FurnishedHouse {
     static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
     HOUSE.get_or_init(|| Disk::new().furnish())
 }
 
-/// The same without pictures, for what is about shapes.
+/// The same without pictures, for tests of shapes.
 fn bare() -> &'static FurnishedHouse {
     static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
     HOUSE.get_or_init(|| Disk::bare().furnish())
@@ -130,7 +131,8 @@ fn size(mesh: &TriangleMesh) -> Vec3 {
     high - low
 }
 
-/// Positive where triangles look outwards. Seen from the middle, so that a mesh that is not quite closed has one too.
+/// Positive if triangles face outwards. It is measured from the middle, so that it also exists for a mesh that is not
+/// quite closed.
 fn signed_volume(mesh: &TriangleMesh) -> f64 {
     let [low, high] = bounds(mesh);
     let middle = (low + high).as_dvec3() / 2.0;
@@ -141,7 +143,7 @@ fn signed_volume(mesh: &TriangleMesh) -> f64 {
     (0..mesh.triangles.len()).map(of).sum()
 }
 
-/// Everything that whoever takes a furnished house relies on.
+/// Asserts everything that users of a furnished house rely on.
 fn assert_sound(house: &FurnishedHouse) {
     let scene = &house.scene;
     assert_eq!(house.placed.len(), scene.surfaces.len());

@@ -1,4 +1,4 @@
-//! Two real houses, from the shared data.
+//! Tests on two real houses from the shared data.
 
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::material::{ColorInput, MaterialModel};
@@ -35,7 +35,7 @@ fn heights(house: &FurnishedHouse, surface: usize) -> [f32; 2] {
     [all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max)]
 }
 
-/// What a piece may stand on: the plan's box of one touches that of the other.
+/// Whether a piece may stand on another: their boxes overlap in plan.
 fn is_above(house: &FurnishedHouse, surface: usize, other: usize) -> bool {
     let plan = |at: usize| {
         let mesh = &house.scene.surfaces[at].mesh;
@@ -60,7 +60,7 @@ fn assert_house(house: &FurnishedHouse, pieces: usize, cameras: usize) {
     }
 }
 
-/// A room with furniture is a scene from any camera; here from above its middle.
+/// A room with furniture can be a scene from any camera; here from above its middle.
 fn assert_room(house: &FurnishedHouse, world: &World, room: usize) {
     if house.wanted_pieces[room] == 0 {
         return;
@@ -78,7 +78,8 @@ fn assert_room(house: &FurnishedHouse, world: &World, room: usize) {
     assert_eq!(scene.house, house.house.uid);
 }
 
-/// On the floor, on another piece, or on a wall or ceiling as lamps, pictures and curtains are.
+/// Asserts that a piece is on the floor, on another piece, or on a wall or ceiling, as lamps, pictures and curtains
+/// are.
 fn assert_stands(house: &FurnishedHouse, surface: usize) {
     let placed = &house.placed[surface];
     let hangs = |placed: &PlacedSurface| placed.origin.super_category.as_deref() == Some("Lighting");
@@ -109,17 +110,17 @@ fn storage() {
     assert_house(&house, 24, 19);
 }
 
-/// 6934dea0-...'s picture is truncated in the original: its piece is there, in linear mid-grey.
+/// The picture of 6934dea0-... is truncated in the original: its piece exists, in linear mid-grey.
 #[test]
-fn a_truncated_picture_is_told() {
+fn a_truncated_picture_is_reported() {
     let mut seen = 0;
     for uid in [TWO_BEDROOMS, STORAGE] {
         let Some(house) = real(uid) else { return };
         let is_it =
             |placed: &PlacedSurface| placed.model.as_ref().is_some_and(|model| model.jid.starts_with("6934dea0-"));
         let pieces: Vec<usize> = (0..house.placed.len()).filter(|at| is_it(&house.placed[*at])).collect();
-        let told = house.findings.iter().filter(|f| f.code == "unreadable_texture");
-        let files: Vec<&str> = told.map(|finding| finding.file.as_str()).collect();
+        let unreadable = house.findings.iter().filter(|f| f.code == "unreadable_texture");
+        let files: Vec<&str> = unreadable.map(|finding| finding.file.as_str()).collect();
         assert_eq!(files.len(), usize::from(!pieces.is_empty()), "{files:?}");
         assert!(files.iter().all(|file| file.contains("/6934dea0-")));
         for piece in pieces {

@@ -1,4 +1,4 @@
-//! Cameras that the sampler finds keep to the rules, by code that is not its own.
+//! Checks, with independent code, that cameras found by the sampler satisfy the rules.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use mateval_tracer::{Ray, World};
 use super::*;
 use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusals, RoomSampler, SamplerRules, score};
 
-/// The recipe's own.
+/// The default intrinsics of a recipe.
 const TURNS: [[f64; 2]; 4] = [[5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
 
 fn intrinsics() -> Intrinsics {
@@ -21,19 +21,19 @@ fn world() -> World {
     World::new(bare().scene.clone()).unwrap()
 }
 
-/// The living room's camera of a seed.
+/// The living room's camera for a seed.
 fn sample(house: &FurnishedHouse, rules: &SamplerRules, seed: u64) -> Result<FoundCamera, CameraError> {
     let world = World::new(house.scene.clone()).unwrap();
     RoomSampler::new(house, &world, LIVING)?.sample(intrinsics(), &TURNS, rules, seed)
 }
 
-/// A few cameras of a room; the seeds that find one.
+/// A few cameras of a room, from the seeds that find one.
 fn found(world: &World, room: usize, rules: &SamplerRules) -> Vec<FoundCamera> {
     let sampler = RoomSampler::new(bare(), world, room).unwrap();
     (0..6).filter_map(|seed| sampler.sample(intrinsics(), &TURNS, rules, seed).ok()).collect()
 }
 
-/// The point of a triangle nearest to another: by thousands of tries that get closer, not by a formula.
+/// The distance to a triangle, by a search with thousands of tries instead of a formula.
 fn nearest_by_search([a, b, c]: [DVec3; 3], from: DVec3) -> f64 {
     let at = |u: f64, v: f64| (a + (b - a) * u + (c - a) * v).distance(from);
     let (mut best, mut step) = ([1.0_f64 / 3.0; 2], 0.5);
@@ -54,7 +54,7 @@ fn nearest_by_search([a, b, c]: [DVec3; 3], from: DVec3) -> f64 {
     at(best[0], best[1])
 }
 
-/// Metres to the nearest thing that the picture shows, by `side` x `side` rays.
+/// The distance to the nearest surface in the picture in metres, by `side` x `side` rays.
 fn nearest_seen(world: &World, camera: &Camera, side: u32) -> f64 {
     let mut nearest = f64::INFINITY;
     for k in 0..side * side {
@@ -75,7 +75,8 @@ fn same_seed_same_camera() {
     assert_ne!(one.camera, other.camera);
 }
 
-/// Above its own floor, inside its room, level, as high and as steep as the rules say, and nothing within the clearance.
+/// Cameras are above their own floor, inside their room and level, have the height and pitch that the rules state, and
+/// have nothing within the clearance.
 #[test]
 fn cameras_stand_free_in_their_room() {
     let (house, world) = (bare(), world());
@@ -109,7 +110,7 @@ fn cameras_stand_free_in_their_room() {
     assert!(seen >= 4, "{seen}");
 }
 
-/// All five views, by ten times as many rays a side: what is between the sampler's rays is not much nearer.
+/// With ten times as many rays a side in all five views, surfaces between the sampler's rays are not much nearer.
 #[test]
 fn nothing_near_is_seen() {
     let world = world();
@@ -126,7 +127,7 @@ fn nothing_near_is_seen() {
     assert!(worst >= rules.min_distance_m, "{worst}");
 }
 
-/// Twin: without the rule something near is seen.
+/// The twin: without the rule, near surfaces are seen.
 #[test]
 fn without_the_rule_near_things_are_seen() {
     let world = world();
@@ -167,7 +168,7 @@ fn rooms_without_a_camera_are_reported() {
     assert_eq!(error, CameraError::NoFloor { room: "LivingDiningRoom-101".to_owned() });
 }
 
-/// BlenderProc's sum, by hand: 50 rays at a sofa, 30 at walls, 20 at the floor:
+/// BlenderProc's sum, computed by hand: 50 rays at a sofa, 30 at walls, 20 at the floor:
 /// (500 + 30 + 20) / 100 * 3 / 3 * (0.5 * 0.7 * 0.8) = 1.54.
 #[test]
 fn scores_are_those_of_the_formula() {
@@ -184,13 +185,13 @@ fn scores_are_those_of_the_formula() {
     let (sofa, wall, floor) = (of_name("sofa"), of_kind("WallInner"), of_kind("Floor"));
     let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]));
     assert!((found - 1.54).abs() < 1e-12, "{found}");
-    // Rays that meet nothing thin it out: (200 + 0) / 100 * 1 / 3 * 0.8.
+    // Rays that hit nothing lower the score: (200 + 0) / 100 * 1 / 3 * 0.8.
     let mut open = rays(&[(sofa, 20)]);
     open.resize(100, None);
     assert!((score(house, &open) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
-    // One kind fills all: nothing is left of it.
+    // If one kind fills the picture, the score is 0.
     assert_eq!(score(house, &rays(&[(wall, 100)])), 0.0);
-    // Two surfaces of one kind are one kind: 100 / 100 * 2 / 3 * 0.4 * 0.6.
+    // Two surfaces of one kind count as one: 100 / 100 * 2 / 3 * 0.4 * 0.6.
     let walls: Vec<usize> = (0..house.placed.len())
         .filter(|at| house.placed[*at].origin.role.architecture_kind() == Some("WallInner"))
         .collect();

@@ -1,17 +1,17 @@
-//! Every fault of the sample house has the finding that it should have, and nothing else has one.
+//! Every fault of the sample house has its expected finding, and there are no other findings.
 
 use std::collections::BTreeSet;
 
 use super::*;
 use mateval_sample::house::faults::{FAULTS, Fault, Place};
 
-/// Code of the finding, and its place beyond the fault's own.
+/// The code of the expected finding, and where it is.
 enum Expected {
-    /// At the fault's pointer, or about its file.
+    /// At the fault's pointer, or for its file.
     Here(&'static str),
-    /// Elsewhere: the file's end and the place.
+    /// Elsewhere: the end of the file's path, and the place.
     There(&'static str, &'static str, &'static str),
-    /// Nothing to tell; another test asserts the effect.
+    /// No finding; another test asserts the effect.
     Silent,
 }
 use Expected::{Here, Silent, There};
@@ -61,9 +61,9 @@ fn wanted(fault: &Fault) -> Option<[String; 3]> {
 }
 
 #[test]
-fn every_fault_is_told_and_nothing_else() {
+fn every_fault_is_reported_and_nothing_else() {
     let house = furnished();
-    let mut told = BTreeSet::new();
+    let mut reported = BTreeSet::new();
     for fault in &FAULTS {
         let Some([code, file, place]) = wanted(fault) else { continue };
         let is_it = |(_, finding): &(usize, &mateval_scene::Finding)| {
@@ -71,18 +71,20 @@ fn every_fault_is_told_and_nothing_else() {
         };
         let found: Vec<usize> = house.findings.iter().enumerate().filter(is_it).map(|(at, _)| at).collect();
         assert_eq!(found.len(), 1, "{}: {code} {file} {place}", fault.name);
-        told.extend(found);
+        reported.extend(found);
     }
-    assert!(told.len() > 20);
+    assert!(reported.len() > 20);
     let others: Vec<_> =
-        (0..house.findings.len()).filter(|at| !told.contains(at)).map(|at| &house.findings[at]).collect();
-    // The model that no list knows is placed twice: two records, one finding each. The piece without a folder is one of
-    // three models whose folder is missing, but the other two are not valid. Thresholds lie in floors, as in real houses.
+        (0..house.findings.len()).filter(|at| !reported.contains(at)).map(|at| &house.findings[at]).collect();
+    // The model that is missing from the list is placed twice: two records, one finding each. The piece without a
+    // folder is one of three models whose folder is missing, but the other two are not valid. Thresholds intersect
+    // floors, as in real houses.
     let others: Vec<String> = others.iter().map(|f| format!("{} {}", f.code, f.place)).collect();
     assert_eq!(others, ["coincident_sheets /mesh", "unlisted_model /furniture/24"]);
 }
 
-/// What has no finding has an effect: the piece is there and is what the list of models says, in its own colours.
+/// Faults without a finding have an effect: the piece exists and has the category of the list of models and its own
+/// colours.
 #[test]
 fn silent_faults_have_their_effect() {
     let house = furnished();
@@ -98,22 +100,22 @@ fn silent_faults_have_their_effect() {
     let chest = origin(15);
     assert_eq!((chest.0.as_str(), chest.2.as_str(), chest.3), ("Cabinet/Shelf/Desk", "抽屉柜", false));
     assert!(chest.1.starts_with("Drawer Chest"), "{}", chest.1);
-    // Null as category: the list has none either, so that the title says it.
+    // Null as category: the list has none either, so the title decides.
     let picture = origin(8);
     assert_eq!((picture.0.as_str(), picture.1.as_str(), picture.3), ("Others", "picture", true));
-    // No opacity, and grey with opacity, are pictures all the same.
+    // Pictures without opacity, and grey ones with opacity, are read.
     assert!(origin(14).3 && origin(19).3);
-    // Neither in the list nor with a picture.
+    // Neither in the list nor with a picture of its own.
     let crate_box = origin(21);
     assert_eq!((crate_box.0.as_str(), crate_box.3), ("Others", false));
-    // Two that intersect are both there.
+    // Of two pieces that intersect, both are kept.
     assert_eq!(pieces_of(house, LIBRARY, 21).len(), 2);
     assert!(house.placed.iter().any(|p| p.room == LIBRARY && p.origin.role.architecture_kind() == Some("Other")));
     let ceilings = house.placed.iter().filter(|p| p.origin.role.architecture_kind() == Some("Ceiling"));
     assert_eq!(ceilings.map(|p| p.room).collect::<Vec<_>>(), [0, 1]);
 }
 
-/// Twin: the same house made sound gives not one warning.
+/// The twin: the same house without faults has no warning.
 #[test]
 fn a_sound_house_has_no_warning() {
     let disk = Disk::new();
@@ -126,9 +128,10 @@ fn a_sound_house_has_no_warning() {
     assert_eq!(warnings(&house), [""; 0]);
     assert_sound(&house);
     let codes: BTreeSet<&str> = house.findings.iter().map(|finding| finding.code.as_str()).collect();
-    // What the models' own files have, and what is not public; and no real house is without sheets in one another.
+    // Findings about the models' own files and about models that are not public remain, and every real house has
+    // coincident sheets.
     let expected = ["centimetres", "coincident_sheets", "not_public", "shadow_group", "unlisted_model"];
     assert_eq!(codes, BTreeSet::from(expected));
-    // Twin of the twin: the house as it is has warnings.
+    // The twin of this: the house with its faults has warnings.
     assert!(warnings(furnished()).len() > 5);
 }

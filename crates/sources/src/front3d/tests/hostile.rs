@@ -1,4 +1,4 @@
-//! Files of strangers: whatever they hold, there is an error in words or a house that is sound.
+//! Untrusted files: for any content, the result is an error with a message or a sound house.
 
 use std::io::Write as _;
 
@@ -69,7 +69,7 @@ fn any_json() -> impl Strategy<Value = Value> {
     })
 }
 
-/// A way down into a tree, and what is put there.
+/// A path into a tree, and the value that is put there.
 fn any_mutation() -> impl Strategy<Value = (Vec<usize>, Value)> {
     let value = prop_oneof![
         2 => select(vec![json!(null), json!("text"), json!(1e300), json!(-1), json!(-7.5), json!([]), json!({})]),
@@ -163,11 +163,11 @@ proptest! {
     }
 }
 
-/// Also furnished, and as something to trace rays in.
+/// The house is also furnished, and rays are traced in it.
 #[test]
 fn mutated_houses_are_furnished_or_refused() {
     let disk = Disk::bare();
-    // Half of all changes in what rooms hold.
+    // Half of all changes concern the content of rooms.
     let in_rooms = (prop::collection::vec(any::<usize>(), 3..6), any_mutation().prop_map(|(_, value)| value));
     let strategy = prop::collection::vec(prop_oneof![any_mutation(), in_rooms], 1..4);
     let config = ProptestConfig { cases: 40, failure_persistence: None, ..ProptestConfig::default() };
@@ -195,9 +195,9 @@ fn mutated_houses_are_furnished_or_refused() {
     assert!(furnished > 10, "{furnished}");
 }
 
-/// Transforms that each pass, and together lead nowhere.
+/// Transforms that are each valid, but together lead beyond all limits.
 #[test]
-fn what_is_absurdly_far_is_left_out() {
+fn pieces_that_are_too_far_away_are_left_out() {
     let disk = Disk::bare();
     let mut json = disk.json.clone();
     json["scene"]["scale"] = json!([99_999, 99_999, 99_999]);
@@ -206,7 +206,7 @@ fn what_is_absurdly_far_is_left_out() {
     assert_sound(&house);
     assert!(house.placed.iter().all(|placed| placed.room != LIVING));
     assert!(house.findings.iter().any(|f| f.code == "bad_placement" && f.place.starts_with("/scene/room/0/children/")));
-    // Twin: one of them alone leads somewhere.
+    // Twin: each of them alone is valid.
     json["scene"]["scale"] = json!([1, 1, 1]);
     assert!(disk.furnish_json(&json).unwrap().placed.iter().any(|placed| placed.room == LIVING));
 }
@@ -215,20 +215,20 @@ fn refusal(files: &HouseFiles) -> String {
     furnish(files, &Limits::default()).unwrap_err().to_string()
 }
 
-/// 200 MB, of which not one is read: the file's size tells.
+/// A file of 200 MB, which is refused by its size without being read.
 #[test]
 fn huge_files_are_refused_by_their_size() {
     let folder = tempfile::tempdir().unwrap();
     let files = lone_house(folder.path(), b"[[[[");
     let file = std::fs::OpenOptions::new().write(true).open(folder.path().join("h.json")).unwrap();
     file.set_len(200_000_000).unwrap();
-    let told = refusal(&files);
-    assert!(told.contains("h.json") && told.contains("found 200000000"), "{told}");
+    let found = refusal(&files);
+    assert!(found.contains("h.json") && found.contains("found 200000000"), "{found}");
 }
 
-/// 100 MB of empty objects, a hundredfold in memory if they were read.
+/// 100 MB of empty objects, which would take a hundred times as much memory if they were read.
 #[test]
-fn many_small_things_are_refused_by_count() {
+fn many_small_values_are_refused_by_count() {
     let folder = tempfile::tempdir().unwrap();
     let files = lone_house(folder.path(), b"");
     let mut file = std::io::BufWriter::new(std::fs::File::create(folder.path().join("h.json")).unwrap());
@@ -238,15 +238,15 @@ fn many_small_things_are_refused_by_count() {
     }
     file.write_all(b"{}]}}").unwrap();
     drop(file);
-    let told = refusal(&files);
-    assert!(told.contains("lists and objects") && told.contains("33333"), "{told}");
+    let found = refusal(&files);
+    assert!(found.contains("lists and objects") && found.contains("33333"), "{found}");
 }
 
 #[test]
-fn deep_and_broken_files_are_told() {
+fn deep_and_broken_files_are_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let deep = "[".repeat(1_000_000);
-    for (text, told) in [
+    for (text, expected) in [
         (deep.as_bytes(), "expected JSON"),
         (b"", "expected JSON"),
         (b"\xff\xfe{", "expected JSON"),
@@ -255,24 +255,24 @@ fn deep_and_broken_files_are_told() {
         (b"[]", "found a list"),
     ] {
         let found = refusal(&lone_house(folder.path(), text));
-        assert!(found.contains(told) && found.contains("h.json"), "{found}");
+        assert!(found.contains(expected) && found.contains("h.json"), "{found}");
     }
     let missing = HouseFiles { house: "none.json".into(), ..lone_house(folder.path(), b"{}") };
     assert!(refusal(&missing).contains("none.json"));
     let is_folder = HouseFiles { house: "models".into(), ..lone_house(folder.path(), b"{}") };
     assert!(refusal(&is_folder).contains("models"));
-    // Twin: the small house is one.
+    // Twin: the small house can be read.
     let files = lone_house(folder.path(), small_house().to_string().as_bytes());
     assert_eq!(furnish(&files, &Limits::default()).unwrap().scene.surfaces.len(), 1);
 }
 
-/// Every limit of counts, against a sample that is within none of them.
+/// Every limit on counts refuses a sample that exceeds it.
 #[test]
 fn limits_hold() {
     let disk = Disk::new();
     let with = |limits: Limits| furnish(&disk.files(), &limits);
     let all = Limits::default();
-    for (limits, told) in [
+    for (limits, expected) in [
         (Limits { rooms: 2, ..all }, "at most 2 rooms"),
         (Limits { children: 50, ..all }, "at most 50 children"),
         (Limits { json_bytes: 1000, ..all }, "at most 1000 bytes"),
@@ -280,9 +280,9 @@ fn limits_hold() {
         (Limits { triangles: 100, ..all }, "at most 100 triangles"),
     ] {
         let error = with(limits).unwrap_err().to_string();
-        assert!(error.contains(told), "{error}");
+        assert!(error.contains(expected), "{error}");
     }
-    // Enough for the architecture and for some of the models.
+    // Sufficient for the architecture and for some of the models.
     let architecture: usize = bare().house.meshes.iter().map(|mesh| mesh.mesh.triangles.len()).sum();
     let tight = with(Limits { triangles: architecture + 3000, ..all }).unwrap();
     assert_sound(&tight);

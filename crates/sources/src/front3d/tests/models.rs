@@ -1,4 +1,4 @@
-//! Models of strangers: faulty OBJ files and ids that are paths; and the parts of a sound one.
+//! Untrusted models: faulty OBJ files, ids that are paths, and the parts of a sound model.
 
 use super::*;
 
@@ -18,7 +18,7 @@ fn furnished_with(jid: &str, obj: &[u8]) -> FurnishedHouse {
     let files = lone_house(folder.path(), with_piece(jid).to_string().as_bytes());
     std::fs::create_dir(folder.path().join("models/x")).unwrap();
     std::fs::write(folder.path().join("models/x/raw_model.obj"), obj).unwrap();
-    // Outside of the models' folder, where no id leads.
+    // Outside the models' folder, where no id may lead.
     std::fs::create_dir(folder.path().join("y")).unwrap();
     std::fs::write(folder.path().join("y/raw_model.obj"), SOUND).unwrap();
     let house = furnish(&files, &Limits::default()).unwrap();
@@ -60,7 +60,7 @@ fn faulty_models_are_findings() {
     assert!(house.findings.iter().all(|finding| finding.code != "bad_model"));
 }
 
-/// One vertex that is nowhere does not make centimetres of the others' metres.
+/// One vertex that is far away does not cause the others' metres to be read as centimetres.
 #[test]
 fn a_wild_vertex_does_not_shrink_a_model() {
     for wild in ["1e30 0 0", "0 -1e20 0", "nan 0 0"] {
@@ -69,7 +69,7 @@ fn a_wild_vertex_does_not_shrink_a_model() {
         assert!((size(mesh) - Vec3::ONE).length() < 1e-6, "{wild} {}", size(mesh));
         assert!(house.findings.iter().any(|finding| finding.code == "zero_area"), "{wild}");
     }
-    // Twin: one that is large altogether is in centimetres.
+    // Twin: a model that is large as a whole is in centimetres.
     let large: String = SOUND
         .lines()
         .map(|line| {
@@ -96,7 +96,7 @@ fn ids_are_no_paths() {
     assert!(house.files.iter().any(|(file, _)| file == "models/x/raw_model.obj"));
 }
 
-/// A textures' id is as strange as a model's.
+/// Ids of textures are as untrusted as those of models.
 #[test]
 fn ids_of_textures_are_no_paths() {
     for jid in ["../y", "/etc", "..", "x\0", "a/b"] {
@@ -123,9 +123,9 @@ fn links_do_not_lead_out() {
     assert!(house.findings.iter().any(|f| f.code == "path_escapes"));
 }
 
-/// Two groups, the first of which falls into two pieces: three parts, the largest first.
+/// Two groups, of which the first has two components: three parts, the largest first.
 #[test]
-fn parts_are_by_group_and_then_by_what_hangs_together() {
+fn parts_are_the_connected_components_of_groups() {
     let quad = |x: f64, size: f64, first: usize| {
         let (a, b, c, d) = (first, first + 1, first + 2, first + 3);
         let corner = |u: f64, v: f64| format!("v {} {} 0\n", x + u * size, v * size);
@@ -137,6 +137,6 @@ fn parts_are_by_group_and_then_by_what_hangs_together() {
     let obj = format!("{corners}g one\n{}{}g two\n{}", quads[0].1, quads[1].1, quads[2].1);
     let house = furnished_with("x", obj.as_bytes());
     let at = house.placed.iter().position(|placed| placed.origin.role.is_furniture()).unwrap();
-    // Group two lies where the second quad of group one does, and is a part of its own.
+    // Group two lies where the second quad of group one does, but is a separate part.
     assert_eq!(house.placed[at].origin.part_of_triangle.as_deref(), Some(&[2, 2, 0, 0, 1, 1][..]));
 }

@@ -11,7 +11,7 @@ fn color_of(material: &Material) -> &ColorInput {
     base_color
 }
 
-/// The colour of the layout's material with this number, if anything is made of it.
+/// The colour of the layout's material with this number, if any surface uses it.
 fn layout_color(house: &FurnishedHouse, number: usize) -> Option<&ColorInput> {
     let uid = format!("101000000003/{number:05}");
     house.scene.materials.iter().find(|material| material.name == uid).map(color_of)
@@ -22,7 +22,7 @@ fn texture_name<'a>(house: &'a FurnishedHouse, color: &ColorInput) -> &'a str {
     &house.scene.textures[texture.0].name
 }
 
-/// 31 places: three whose models are not there, one of them valid; and one valid piece the size of a speck.
+/// 31 placements, of which three have no model (one of these is valid) and one is a valid piece of almost no size.
 #[test]
 fn all_valid_pieces_are_placed() {
     let house = furnished();
@@ -37,7 +37,7 @@ fn all_valid_pieces_are_placed() {
 
 /// /furniture/21 is a lounge chair; the record that repeats its uid would make a shelf of it.
 #[test]
-fn of_two_records_the_first_counts() {
+fn the_first_of_two_records_is_used() {
     let house = furnished();
     let all: Vec<&str> = house.house.furniture.iter().map(|record| record.uid.as_str()).collect();
     assert_eq!(all.len(), 30);
@@ -48,7 +48,7 @@ fn of_two_records_the_first_counts() {
     assert!(matches!(layout_color(house, 0), Some(ColorInput::Texture { .. })));
 }
 
-/// Sizes by the numbers in the files: the stool's are centimetres, the shelf has a shadow of six metres.
+/// Sizes follow from the numbers in the files: the stool's are centimetres, the shelf has a shadow of six metres.
 #[test]
 fn models_have_their_size_in_metres() {
     let house = bare();
@@ -64,8 +64,8 @@ fn models_have_their_size_in_metres() {
     assert!(signed_volume(&shelf.mesh) > 0.0);
 }
 
-/// Quads are fanned: the side table, which is closed, still has the volume of its parts and looks outwards. Lamps' shades
-/// are open, and so have none.
+/// Quads are split into fans: the side table, which is closed, still has the volume of its parts and faces outwards.
+/// Shades of lamps are open and therefore have no volume.
 #[test]
 fn closed_models_look_outwards() {
     let house = bare();
@@ -86,8 +86,8 @@ fn closed_models_look_outwards() {
     assert!(table.uvs.is_some() && table.normals.is_some() && table.triangles.len() > 20);
 }
 
-/// The picture on the library's wall is scaled by -1 along x: the same box as its unmirrored twin, its letters backwards,
-/// its front still in front, its normals with its triangles.
+/// The picture on the library's wall is scaled by -1 along x. It has the same box as its unmirrored twin, mirrored
+/// letters, the same front, and normals that agree with its triangles.
 #[test]
 fn a_mirrored_piece_is_mirrored_and_looks_outwards() {
     let disk = Disk::bare();
@@ -104,11 +104,11 @@ fn a_mirrored_piece_is_mirrored_and_looks_outwards() {
             assert!((b - a).cross(c - a).dot(normals[triangle[0] as usize]) > 0.0);
         }
     }
-    // The way of u along z turns round: it looks west, so that its own x is the room's z.
+    // The direction of u along z is reversed: the picture faces west, so its own x is the room's z.
     assert!(slope_of_u(one) * slope_of_u(other) < 0.0);
 }
 
-/// Whether u grows with z over the triangles whose uv are spread most.
+/// Positive if u grows with z on the triangle with the largest area in uv.
 fn slope_of_u(mesh: &TriangleMesh) -> f32 {
     let uvs = mesh.uvs.as_ref().unwrap();
     let largest = |t: &&[u32; 3]| {
@@ -120,7 +120,7 @@ fn slope_of_u(mesh: &TriangleMesh) -> f32 {
     gradient(a, b) + gradient(b, c) + gradient(a, c)
 }
 
-/// children/24 is the bookcase, 1.3 wide and 0.9 deep; it looks north, so that its width lies along x.
+/// children/24 is the bookcase, scaled by 1.3 in width and 0.9 in depth; it faces north, so its width is along x.
 #[test]
 fn uneven_scales_act_along_the_models_axes() {
     let disk = Disk::bare();
@@ -150,7 +150,7 @@ fn quaternions_are_made_unit() {
     assert!(size(mesh).y < 1.5, "{}", size(mesh));
 }
 
-/// A truncated or missing picture leaves a piece in mid-grey; black, glowing .mtl files say nothing.
+/// A piece with a truncated or missing picture is mid-grey; black, emitting .mtl files are ignored.
 #[test]
 fn materials_of_models_are_their_pictures() {
     let house = furnished();
@@ -163,7 +163,7 @@ fn materials_of_models_are_their_pictures() {
     }
     for number in (1..=14).chain(16..=20) {
         let name = format!("house/3D-FUTURE-model/{}/texture.png", jid(number));
-        // Every other name is of the model's own file.
+        // Every other name belongs to the model's own file.
         assert_eq!(texture_name(house, color(number)), name);
         let texture = house.scene.textures.iter().find(|texture| texture.name == name).unwrap();
         assert_eq!(texture.sha256.as_ref().map(String::len), Some(64));
@@ -171,7 +171,7 @@ fn materials_of_models_are_their_pictures() {
     }
 }
 
-/// The layout's: what `useColor`, `local`, "" and a missing folder come to; colours are decoded as sRGB.
+/// Materials of the layout: the effects of `useColor`, `local`, "" and a missing folder; colours are decoded as sRGB.
 #[test]
 fn materials_of_the_layout_follow_the_rules() {
     let house = furnished();
@@ -190,12 +190,12 @@ fn materials_of_the_layout_follow_the_rules() {
         assert_ne!(*uv, UvTransform::default());
         assert_eq!(*uv, house.house.materials[textured].uv);
     }
-    // Of the mesh that names no material.
+    // The material of the mesh that names none.
     let none = house.scene.materials.iter().find(|material| material.name == "none").unwrap();
     assert_eq!(*color_of(none), GREY);
 }
 
-/// Each rule alone. Trescope: colorMode before useColor, and only where there is a texture.
+/// Each rule alone. As in Trescope, colorMode takes precedence over useColor, and only if there is a texture.
 #[test]
 fn each_material_rule_alone() {
     let read = |change: Value| {
@@ -238,7 +238,7 @@ fn each_material_rule_alone() {
     }
 }
 
-/// The whole matrix acts, its translation too: a texel that lies a quarter further on is what is looked up.
+/// The whole matrix is applied, including its translation: the lookup reads a texel a quarter further on.
 #[test]
 fn uv_transforms_move_too() {
     let uv = UvTransform([[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]);
@@ -246,15 +246,15 @@ fn uv_transforms_move_too() {
     assert!((place - glam::Vec2::new(1.25, -2.5)).length() < 1e-6, "{place}");
 }
 
-/// Without the folder of textures the architecture has its colours, and one finding says so.
+/// Without the folder of textures the architecture has its colours, which one finding reports.
 #[test]
 fn textures_may_be_missing_altogether() {
     let disk = Disk::new();
     let house = furnish(&HouseFiles { textures: None, ..disk.files() }, &Limits::default()).unwrap();
     assert!(house.scene.textures.iter().all(|texture| texture.name.contains("3D-FUTURE-model")));
-    let told: Vec<&str> =
+    let messages: Vec<&str> =
         house.findings.iter().filter(|f| f.code == "no_textures").map(|f| f.message.as_str()).collect();
-    assert_eq!(told, ["7 materials have a texture, and no folder of textures was given"]);
+    assert_eq!(messages, ["7 materials have a texture, and no folder of textures was given"]);
     assert_sound(&house);
     // The twin: with the folder there is no such finding.
     let house = furnish(&disk.files(), &Limits::default()).unwrap();

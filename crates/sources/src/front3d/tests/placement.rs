@@ -1,4 +1,4 @@
-//! Where things stand: `T * R * S`, and BlenderProc's mirrored world.
+//! The placement of pieces: `T * R * S`, and BlenderProc's mirrored world.
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
@@ -25,7 +25,8 @@ fn assert_near(a: DMat3, b: DMat3) {
     assert!((a - b).to_cols_array().iter().all(|v| v.abs() < 1e-4), "{a} {b}");
 }
 
-/// x, y, z, w, scale first: by hand. The turn takes x to y, y to z, z to x.
+/// Quaternions are x, y, z, w and the scale is applied first; computed by hand. The rotation takes x to y, y to z, z to
+/// x.
 #[test]
 fn world_is_translation_rotation_scale() {
     let record =
@@ -38,14 +39,14 @@ fn world_is_translation_rotation_scale() {
     assert!((place - DVec3::new(5.0, 4.0, 6.0)).length() < 1e-12, "{place}");
     let place = placement.mirrored_matrix().transform_point3(DVec3::ONE);
     assert!((place - DVec3::new(5.0, 0.0, 6.0)).length() < 1e-12, "{place}");
-    // Twin: x, y, z, w taken for w, x, y, z, of a turn where that shows.
+    // Twin: x, y, z, w read as w, x, y, z, for a rotation where this matters.
     let turn = DQuat::from_xyzw(0.0, 0.6, 0.0, 0.8);
     let misread = DQuat::from_xyzw(0.6, 0.0, 0.8, 0.0);
     assert!((turn * DVec3::X - misread * DVec3::X).length() > 0.1);
 }
 
-/// BlenderProc's `Front3DLoader`, step by step in Blender's axes: location `.xzy`, a quarter turn back about x, x, y, z, w
-/// read as w, x, y, z, the scale as it is.
+/// BlenderProc's `Front3DLoader`, step by step in Blender's axes: location `.xzy`, a quarter turn back about x, x, y,
+/// z, w read as w, x, y, z, the scale as it is.
 #[test]
 fn compat_is_blenderprocs_matrix() {
     let ours_in_blender = DMat4::from_rotation_x(std::f64::consts::FRAC_PI_2);
@@ -53,20 +54,21 @@ fn compat_is_blenderprocs_matrix() {
         let [x, y, z, w] = [0.0, (angle / 2.0).sin(), 0.0, (angle / 2.0).cos()];
         let (position, scale) = (DVec3::new(1.5, 0.2, -4.0), DVec3::new(2.0, 1.0, 3.0));
         let own = Placement { position, rotation: DQuat::from_xyzw(x, y, z, w), scale };
-        // Its first number is taken for w, its last for z.
+        // Its first number is read as w, its last as z.
         let misread = DQuat::from_xyzw(y, z, w, x);
         let turn = DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2) * misread;
         let theirs = DMat4::from_scale_rotation_translation(scale, turn, DVec3::new(1.5, -4.0, 0.2));
         let mirror = DMat4::from_scale(DVec3::new(1.0, 1.0, -1.0));
         let ours = ours_in_blender * mirror * own.mirrored_matrix();
         assert!(theirs.abs_diff_eq(ours, 1e-12), "{angle}: {theirs} {ours}");
-        // Twin: without the mirror of the piece it is another one.
+        // Twin: without mirroring the piece, the matrix differs.
         assert!(!theirs.abs_diff_eq(ours_in_blender * mirror * own.matrix(), 0.1), "{angle}");
     }
 }
 
-/// The L-sofa stands with its back to the north in the living room. In the source's world its long seat is on the west,
-/// under compat on the east of a room whose x stays as it was: wrong against the layout, as in BlenderProc's pictures.
+/// The L-sofa stands with its back to the north in the living room. In the source's world its long seat is in the west;
+/// under compat it is in the east of a room whose x is unchanged, which contradicts the layout, as in BlenderProc's
+/// pictures.
 #[test]
 fn compat_mirrors_the_layout_and_not_the_sofa() {
     let disk = Disk::bare();
@@ -85,7 +87,7 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
         house.scene.surfaces[at.unwrap()].mesh.clone()
     };
 
-    // The sofa against its source: half a turn; and half a turn, M_z and the mirror of its own x.
+    // The sofa relative to its source: half a turn; with compat half a turn, M_z and the mirror of its own x.
     assert_near(
         linear_map(&source.positions, &sofa(&normal).positions),
         DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)),
@@ -96,24 +98,24 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
         linear_map(&wall(&normal).positions, &wall(&compat).positions),
         DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)),
     );
-    // Both look outwards, and nothing else changed.
+    // Both face outwards, and nothing else changed.
     let volumes = [sofa(&normal), sofa(&compat)].map(signed_volume);
     assert!((volumes[0] - volumes[1]).abs() < 1e-4 && volumes[0] > 0.0, "{volumes:?}");
 
-    // The long seat: where the sofa reaches far from the north wall's side, as x in the room.
+    // The long seat is where the sofa extends far from the north wall; its x in the room is compared.
     let long_seat = |mesh: &TriangleMesh, south: f32| {
         let [low, high] = bounds(mesh);
         let front = if south > 0.0 { high.z } else { low.z };
         let at_front: Vec<f32> = mesh.positions.iter().filter(|p| (p.z - front).abs() < 0.3).map(|p| p.x).collect();
         at_front.iter().sum::<f32>() / at_front.len() as f32 - (low.x + high.x) / 2.0
     };
-    // It looks north: its front is at the least z; mirrored, at the greatest.
+    // It faces north: its front is at the smallest z, and at the largest if mirrored.
     let (one, other) = (long_seat(sofa(&normal), -1.0), long_seat(sofa(&compat), 1.0));
     assert!(one < -0.5 && other > 0.5, "{one} {other}");
     assert!((one + other).abs() < 1e-3);
 }
 
-/// The designers' cameras go with the layout, so that they see the same walls.
+/// The designers' cameras are mirrored with the layout, so that they see the same walls.
 #[test]
 fn compat_mirrors_cameras_too() {
     let disk = Disk::bare();
@@ -130,13 +132,13 @@ fn compat_mirrors_cameras_too() {
 
 /// Two negative factors are half a turn, three and one a mirror.
 #[test]
-fn only_mirrors_are_told() {
+fn only_mirrors_are_reported() {
     let disk = Disk::bare();
-    for (scale, told) in [(json!([-1, 1, -1]), false), (json!([-1, -1, -1]), true), (json!([1, 1, -1]), true)] {
+    for (scale, is_reported) in [(json!([-1, 1, -1]), false), (json!([-1, -1, -1]), true), (json!([1, 1, -1]), true)] {
         let mut json = disk.json.clone();
         json["scene"]["room"][2]["children"][33]["scale"] = scale.clone();
         let house = disk.furnish_json(&json).unwrap();
-        assert_eq!(house.findings.iter().any(|f| f.code == "mirrored_piece"), told, "{scale}");
+        assert_eq!(house.findings.iter().any(|f| f.code == "mirrored_piece"), is_reported, "{scale}");
         assert!(signed_volume(&pieces_of(&house, LIBRARY, 8)[0].mesh) > 0.0);
     }
 }

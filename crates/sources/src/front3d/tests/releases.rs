@@ -1,4 +1,4 @@
-//! Three releases, and every key that one of them lacks.
+//! The three releases of the data, and every key that one of them lacks.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ fn release_of(change: Value) -> Release {
 }
 
 #[test]
-fn releases_are_told_apart() {
+fn releases_are_recognised() {
     assert_eq!(release_of(json!({"design_version": "0.1", "code_version": "0.11"})), Release::R1);
     assert_eq!(release_of(json!({"version": "2.0"})), Release::R2);
     assert_eq!(release_of(json!({"version": "2.0", "jobid": "j", "lights": [], "materialList": []})), Release::R3);
@@ -61,7 +61,7 @@ const OPTIONAL: [(&str, &[&str]); 6] = [
     ("/scene/room", &["size", "empty", "type", "pos", "rot", "scale"]),
 ];
 
-/// Takes the key from the object or from each of the list's.
+/// Removes the key from the object, or from each object of the list.
 fn remove(json: &mut Value, holder: &str, key: &str) {
     let own = |value: &mut Value| value.as_object_mut().unwrap().remove(key);
     match json.pointer_mut(holder).unwrap() {
@@ -70,14 +70,14 @@ fn remove(json: &mut Value, holder: &str, key: &str) {
     }
 }
 
-/// What a house has to show: its rooms' children and triangles.
+/// A summary of a house: the children and triangles of its rooms.
 fn summary(house: &House) -> (usize, usize, usize, Vec<Child>) {
     let triangles = house.meshes.iter().map(|mesh| mesh.mesh.triangles.len()).sum();
     let children = house.rooms.iter().flat_map(|room| room.children.clone()).collect();
     (house.furniture.len(), house.materials.len(), triangles, children)
 }
 
-/// None of these keys matters for what there is and where; none of them is missed.
+/// None of these keys affects the content or its placement, and none of them is required.
 #[test]
 fn optional_keys_may_be_missing() {
     let whole = sample_house::sound_house();
@@ -107,9 +107,9 @@ fn optional_keys_may_be_missing() {
     assert!(house.meshes.iter().all(|mesh| mesh.kind == "Other"));
 }
 
-/// Twin: these do matter, and are missed where they are gone.
+/// The twin: these keys matter, and their absence is reported.
 #[test]
-fn keys_that_matter_are_missed() {
+fn missing_keys_that_matter_are_reported() {
     let whole = sample_house::sound_house();
     let expected = summary(&read_house(&whole).0.unwrap());
     let keys = [("/furniture", "uid"), ("/mesh", "uid"), ("/mesh", "xyz"), ("/mesh", "faces"), ("/mesh", "material")];
@@ -134,9 +134,9 @@ fn keys_that_matter_are_missed() {
     assert!(matches!(read_house(&json).0, Err(HouseError::NoScene)));
 }
 
-/// A replaced model's jid is in its record already.
+/// The record already holds the jid of a replaced model.
 #[test]
-fn what_was_replaced_is_ignored() {
+fn lists_of_replacements_are_ignored() {
     let mut json = sample_house::sound_house();
     let expected = summary(&read_house(&json).0.unwrap());
     let more = json!({"replace_jid": "x", "replace_bbox": {"xLen": 100, "yLen": 50, "zLen": 1}, "componentModifiers": [],
@@ -151,9 +151,9 @@ fn what_was_replaced_is_ignored() {
     assert_eq!(summary(&house.unwrap()), expected);
 }
 
-/// The scene's, then the room's, then the child's: by hand, the corner at (4, 0, 0) of a floor.
+/// The transforms of scene, room and child are all applied; computed by hand for the corner of a floor at (4, 0, 0).
 #[test]
-fn transforms_of_scene_and_room_act() {
+fn transforms_of_scene_and_room_are_applied() {
     let quarter = std::f64::consts::FRAC_1_SQRT_2;
     let mut json = small_house();
     json["scene"]["pos"] = json!([10, 0, 0]);
@@ -178,7 +178,7 @@ fn transforms_of_scene_and_room_act() {
 
 /// Repeated ids of rooms become different, even where the new name is taken as well.
 #[test]
-fn rooms_have_ids_of_their_own() {
+fn rooms_have_unique_ids() {
     let room = |id: Value| json!({"type": "Bedroom", "instanceid": id, "children": []});
     let mut json = small_house();
     json["scene"]["room"] =

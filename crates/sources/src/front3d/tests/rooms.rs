@@ -1,4 +1,4 @@
-//! One room as a scene: what is kept of the others, names, lights; and that it can be rendered.
+//! One room as a scene: the parts of other rooms that are kept, names, lights, and a render.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
@@ -21,7 +21,7 @@ fn snapshot(number: usize) -> Camera {
     Camera::look_at(own.position, own.target, DVec3::Y, intrinsics).unwrap()
 }
 
-/// The furnished house ready for rays, made once a process.
+/// The furnished house ready for rays, made once for each process.
 fn world() -> &'static World {
     static WORLD: OnceLock<World> = OnceLock::new();
     WORLD.get_or_init(|| World::new(furnished().scene.clone()).unwrap())
@@ -31,14 +31,14 @@ fn scene_from(number: usize) -> SourceScene {
     room_scene::room_scene(furnished(), world(), LIVING, &[snapshot(number)])
 }
 
-/// What a surface of the scene is in the house: by its mesh, which nobody changed.
+/// The house's index of each surface of the scene, found by its mesh, which is unchanged.
 fn in_house(scene: &SourceScene) -> Vec<usize> {
     let house = furnished();
     let of = |surface: &Surface| house.scene.surfaces.iter().position(|own| own.mesh == surface.mesh).unwrap();
     scene.scene.surfaces.iter().map(of).collect()
 }
 
-/// Surfaces that a grid of single rays through the picture meets.
+/// The surfaces that a grid of single rays through the picture hits.
 fn met(camera: &Camera, side: u32) -> BTreeSet<usize> {
     let world = world();
     let origin = camera.position().as_vec3();
@@ -54,7 +54,7 @@ fn met(camera: &Camera, side: u32) -> BTreeSet<usize> {
 
 /// Camera 1 looks from the living room through the passage into the bedroom; camera 0 looks the other way.
 #[test]
-fn of_other_rooms_only_what_is_seen() {
+fn only_visible_parts_of_other_rooms_are_kept() {
     let house = furnished();
     let scene = scene_from(1);
     let kept = in_house(&scene);
@@ -63,17 +63,17 @@ fn of_other_rooms_only_what_is_seen() {
     let is_furniture = |at: &usize| house.placed[*at].origin.role.is_furniture();
     let of_room = |room: usize| (0..house.placed.len()).filter(move |at| house.placed[*at].room == room);
 
-    // All of its own, all walls of the bedroom, nothing of the library.
+    // The whole living room, all walls of the bedroom, nothing of the library.
     assert!(of_room(LIVING).all(|at| kept.contains(&at)));
     assert!(of_room(1).filter(|at| !is_furniture(at)).all(|at| kept.contains(&at)));
     assert!(of_room(LIBRARY).all(|at| !kept.contains(&at)), "the library cannot be seen");
-    // Of the bedroom's furniture what is met, and not all.
+    // Only the furniture of the bedroom that rays hit, which is not all of it.
     let bedroom = |all: &mut dyn Iterator<Item = usize>| -> BTreeSet<usize> {
         all.filter(|at| house.placed[*at].room == 1).filter(is_furniture).collect()
     };
     let (kept_pieces, met_pieces) = (bedroom(&mut kept.iter().copied()), bedroom(&mut met.iter().copied()));
     assert!(!kept_pieces.is_empty() && kept_pieces.len() < 6, "{kept_pieces:?}");
-    // A finer grid may meet a sliver more than the picture's places.
+    // A finer grid may hit slivers that the picture's rays miss.
     assert!(kept_pieces.is_subset(&met_pieces), "{kept_pieces:?} {met_pieces:?}");
     let coarse = self::met(&snapshot(1), 24);
     assert!(coarse.iter().all(|at| kept.contains(at)));
@@ -95,9 +95,10 @@ fn names_are_unique_as_ids() {
     assert_eq!(lights.len(), scene.scene.lights.len());
 }
 
-/// Names of strangers that are each other's numbers, as long as an id is cut at, or the world's.
+/// Untrusted names that collide with each other's numbered form, that have the maximum length of an id, or that equal
+/// the world's.
 #[test]
-fn names_of_strangers_are_unique_too() {
+fn untrusted_names_are_unique_too() {
     let mut house = furnished().clone();
     let long = "x".repeat(60);
     let names = ["world", "a", "a", "a 2", "a-2", "", "-", "object 2", long.as_str(), long.as_str(), long.as_str()];
@@ -113,8 +114,8 @@ fn names_of_strangers_are_unique_too() {
     assert_eq!(lights.len(), scene.scene.lights.len());
 }
 
-/// One group a ceiling's colour and room, one a lamp, and the world, which alone is seen as it glows. Radiances are
-/// BlenderProc's: 0.8 times the colour, 7, 0.05.
+/// One group for each colour of ceiling and room, one for each lamp, and the world, whose emission alone is visible to
+/// the camera. Radiances are BlenderProc's: 0.8 times the colour, 7, 0.05.
 #[test]
 fn lights_are_ceilings_lamps_and_the_world() {
     let house = furnished();
@@ -161,7 +162,7 @@ fn lights_are_ceilings_lamps_and_the_world() {
     }
 }
 
-/// Indices lead to what they led to in the house, and the picture has light in it.
+/// Indices refer to the same things as in the house, and the picture is not black.
 #[test]
 fn a_room_can_be_rendered() {
     let house = furnished();
@@ -180,7 +181,7 @@ fn a_room_can_be_rendered() {
         );
         assert_eq!(names.0, names.1);
     }
-    // Nothing is kept that nobody uses.
+    // Unused materials and textures are removed.
     assert!(scene.scene.textures.len() < house.scene.textures.len());
     let world = World::new(Arc::new(scene.scene)).unwrap();
     let settings = RenderSettings { samples: 1, ..RenderSettings::default() };
