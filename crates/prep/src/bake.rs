@@ -1,4 +1,4 @@
-//! Source materials baked to an atlas.
+//! Bakes a source material to the textures of an atlas.
 
 use glam::{DVec2, Vec2};
 use mateval_image::transfer::{byte_from_unit, srgb_from_linear, word_from_unit};
@@ -9,13 +9,13 @@ use mateval_scene::uv_atlas::UvAtlas;
 
 use crate::atlas::Unwrapped;
 
-/// Most lookups along a texel's side: a source that is finer still is undersampled.
+/// The most lookups along a texel's side. A source with finer detail is undersampled.
 const MAX_LOOKUPS: f64 = 8.0;
 
 /// A material's three maps, as a submission holds them.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BakedMaterial {
-    /// The same everywhere: 16 bits, since the rounding of one value does not average out.
+    /// Constant, in 16 bits, since the rounding of a single value does not average out.
     Constant {
         /// sRGB words.
         base_color: [u16; 3],
@@ -24,7 +24,7 @@ pub enum BakedMaterial {
         /// Linear word.
         metallic: u16,
     },
-    /// From a texture: 8 bits, as the source's.
+    /// From a texture, in 8 bits like the source.
     Textured {
         /// sRGB bytes.
         base_color: Picture<[u8; 3]>,
@@ -35,17 +35,17 @@ pub enum BakedMaterial {
     },
 }
 
-/// What came of baking.
+/// The result of baking.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Baked {
     /// The maps.
     pub material: BakedMaterial,
-    /// Whether some base colour left 0..1 and had to be clipped.
+    /// Whether a base colour exceeded 0..1 and was clipped.
     pub clipped: bool,
 }
 
-/// Bakes `material`, laid out by the source mesh's own uv, to the atlas. Each texel is the mean over its own square;
-/// texels that no triangle owns take their neighbour's value. None for dielectrics.
+/// Bakes `material`, which is laid out by the uv of the source mesh, to the atlas. Each texel is the mean over its own
+/// square; texels outside all triangles take the value of a neighbour. Returns none for dielectrics.
 pub fn bake(unwrapped: &Unwrapped, source: &TriangleMesh, material: &Material, textures: &[Texture]) -> Option<Baked> {
     if !material.has_appearance() {
         return None;
@@ -106,7 +106,7 @@ fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearanc
     Baked { material: BakedMaterial::Textured { base_color, roughness, metallic }, clipped }
 }
 
-/// The most texels that any of the material's lookups has along one unit of the surface's uv.
+/// The largest number of texels that any texture of the material has along one unit of the surface's uv.
 fn finest(material: &Material, textures: &[Texture]) -> f64 {
     material
         .lookups()
@@ -120,7 +120,7 @@ fn finest(material: &Material, textures: &[Texture]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Lookups along a texel's side, so that neighbouring ones lie half a source texel apart.
+/// The number of lookups along a texel's side, so that neighbouring lookups are half a source texel apart.
 fn lookups_a_side(atlas: &UvAtlas, triangle: usize, corners: [Vec2; 3], source_texels: f64) -> usize {
     let [a, b, c] = corners.map(|uv| uv.as_dvec2());
     let uv_area = ((b - a).perp_dot(c - a) / 2.0).abs();
@@ -138,7 +138,7 @@ fn mean_appearance(
     for row in 0..lookups {
         for column in 0..lookups {
             let place = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) / lookups as f64;
-            // `bake` has asked whether the material has an appearance.
+            // `bake` returns early for materials without an appearance.
             let Some(seen) = material.appearance(textures, source_uv(place)) else { continue };
             let [r, g, b] = seen.base_color;
             for (sum, value) in sum.iter_mut().zip([r, g, b, seen.roughness, seen.metallic]) {
@@ -173,9 +173,9 @@ mod tests {
         Material { name: "m".to_owned(), model, two_sided: true, opacity: None, bump: None }
     }
 
-    /// Red grows with u, green with v: the baked atlas must give the same back at the same place of the surface.
+    /// Red increases with u, green with v: the baked atlas must have the same values at the same points of the surface.
     #[test]
-    fn a_ramp_is_found_again_through_the_atlas() {
+    fn a_ramp_is_the_same_through_the_atlas() {
         let ramp = (0..64 * 64).map(|at| [(at % 64) as f32 / 64.0, 1.0 - (at / 64) as f32 / 64.0, 0.5]).collect();
         let textures = [Texture::new(64, 64, Texels::Linear(ramp), Wrap::Clamp).unwrap()];
         let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texel_is_the_mean_of_what_it_covers() {
+    fn a_texel_is_the_mean_over_its_square() {
         let checker = (0..256 * 256).map(|at| if (at % 256 + at / 256) % 2 == 0 { 0.0 } else { 1.0 }).collect();
         let textures = [Texture::new(256, 256, Texels::Grey(checker), Wrap::Repeat).unwrap()];
         let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
@@ -225,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn glass_has_nothing_to_bake() {
+    fn glass_is_not_baked() {
         let model = MaterialModel::ThinDielectric {
             eta: 1.5,
             specular_reflectance: ColorInput::Constant([1.0; 3]),

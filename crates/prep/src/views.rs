@@ -1,4 +1,4 @@
-//! The pictures of one view: geometry for methods, material truth for the scorer; all from one camera matrix.
+//! Makes the pictures of one view from one camera matrix: geometry for methods, and material truth for the scorer.
 
 use glam::{DVec2, Vec2};
 use mateval_image::{LinearRgb, Mask, Normal, Picture, Texture};
@@ -9,44 +9,44 @@ use mateval_tracer::World;
 use mateval_tracer::aov::{PixelHit, hit_through, subpixels};
 use rayon::prelude::*;
 
-/// Below this roughness a surface counts as specular.
+/// Surfaces of a lower roughness count as specular.
 const SPECULAR_ROUGHNESS: f32 = 0.2;
-/// From this metallic on a surface counts as metal.
+/// Surfaces with at least this metallic count as metal.
 const SPECULAR_METALLIC: f32 = 0.999;
 
-/// A scene made ready for its pictures.
+/// A scene prepared for its pictures.
 pub struct ViewScene<'a> {
     reference: &'a ReferenceScene,
     world: &'a World,
     textures: Vec<Texture>,
     /// The value in `instance.png` of every surface.
     instances: &'a [u16],
-    /// Whether a surface is scored at all.
+    /// Whether each surface is scored.
     scored: &'a [bool],
     glow: Vec<Glow>,
 }
 
-/// On which sides a surface glows towards the camera.
+/// The sides on which a surface visibly emits light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Glow {
     front: bool,
     back: bool,
 }
 
-/// What methods may see of a view, RGB apart.
+/// The pictures of a view that methods receive, except RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeometryPictures {
-    /// Metres along the camera's axis at pixel centres; 0 where there is nothing.
+    /// Metres along the camera's axis at pixel centres; 0 where the ray hits no surface.
     pub depth: Picture<f32>,
-    /// World-space shading normal towards the camera at pixel centres; 0 where there is nothing.
+    /// World-space shading normal towards the camera at pixel centres; 0 where the ray hits no surface.
     pub normal: Picture<Normal>,
-    /// Instance index at pixel centres; 0 where there is nothing.
+    /// Instance index at pixel centres; 0 where the ray hits no surface.
     pub instance: Picture<u16>,
-    /// The triangle at pixel centres; none where there is nothing.
+    /// The triangle at pixel centres; none where the ray hits no surface.
     pub triangle: Picture<Option<SeenTriangle>>,
-    /// Pixels whose centre and every sub-pixel show a surface that is scored.
+    /// Pixels of which the centre and every sub-pixel show a scored surface.
     pub valid: Mask,
-    /// Valid pixels whose centre the input view did not see.
+    /// Valid pixels whose centre the input view does not show.
     pub unobserved: Mask,
 }
 
@@ -55,18 +55,18 @@ pub struct GeometryPictures {
 pub struct SeenTriangle {
     /// Its surface.
     pub surface: SurfaceIndex,
-    /// Its place among the surface's triangles.
+    /// Its index among the surface's triangles.
     pub triangle: usize,
 }
 
 impl SeenTriangle {
-    /// Its entry in a table of one value a triangle of every surface; 0 where there is no triangle.
+    /// Its entry in a table with a value for each triangle of each surface; 0 without a triangle.
     pub fn value_in(triangle: Option<Self>, values: &[Vec<u16>]) -> u16 {
         triangle.map_or(0, |seen| values[seen.surface.0][seen.triangle])
     }
 }
 
-/// What a view should look like without light, from the source materials: means over the sub-pixels.
+/// The true material in every pixel of a view, from the source materials, as means over the sub-pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TruthPictures {
     /// base_color, linear.
@@ -77,11 +77,11 @@ pub struct TruthPictures {
     pub roughness: Picture<f32>,
     /// Metallic.
     pub metallic: Picture<f32>,
-    /// Valid pixels whose centre is metallic or of a roughness under 0.2.
+    /// Valid pixels whose centre is metallic or has a roughness below 0.2.
     pub specular_region: Mask,
 }
 
-/// One pixel of all pictures; the names are those of the pictures.
+/// One pixel of all pictures, with the names of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewPixel {
     /// See [`GeometryPictures::depth`].
@@ -102,7 +102,7 @@ pub struct ViewPixel {
     pub specular: bool,
 }
 
-/// Means over a pixel; the names are those of [`TruthPictures`].
+/// Means over a pixel, with the names of [`TruthPictures`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelTruth {
     /// base_color, linear.
@@ -116,13 +116,14 @@ pub struct PixelTruth {
 }
 
 impl<'a> ViewScene<'a> {
-    /// `instances` and `scored` hold an entry a surface.
+    /// Prepares a scene. `instances` and `scored` hold an entry for each surface.
     pub fn new(reference: &'a ReferenceScene, world: &'a World, instances: &'a [u16], scored: &'a [bool]) -> Self {
         let textures = reference.texture_list();
         Self { reference, world, textures, instances, scored, glow: glow_of_surfaces(reference) }
     }
 
-    /// The pictures of the view of `camera`; what `input` did not see is unobserved (nothing, for the input view itself).
+    /// The pictures that `camera` sees. Pixels whose surface point `input` does not show are unobserved; the input view itself
+    /// has none.
     pub fn pictures(&self, camera: &Camera, input: &Camera) -> (GeometryPictures, TruthPictures) {
         let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
         let pixels: Vec<ViewPixel> = (0..height)
@@ -148,7 +149,7 @@ impl<'a> ViewScene<'a> {
         (geometry, truth)
     }
 
-    /// Pixel (x, y) of the pictures of `camera`'s view.
+    /// Pixel (x, y) of the pictures that `camera` sees.
     pub fn pixel(&self, camera: &Camera, input: &Camera, x: usize, y: usize) -> ViewPixel {
         let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
         let hit = hit_through(self.world, camera, centre);
@@ -171,7 +172,7 @@ impl<'a> ViewScene<'a> {
         }
     }
 
-    /// The means over the sub-pixels that show a scored surface, and whether all do.
+    /// The means over the sub-pixels that show a scored surface, and whether all sub-pixels do.
     fn truth(&self, camera: &Camera, x: usize, y: usize) -> (PixelTruth, bool) {
         let mut sum = [0.0_f64; 8];
         let mut count = 0_usize;
@@ -196,7 +197,7 @@ impl<'a> ViewScene<'a> {
         (truth, count == places.len())
     }
 
-    /// base_color, roughness and metallic where the hit is on a surface that is scored: not glass, not glowing.
+    /// base_color, roughness and metallic, if the hit surface is scored: it is neither glass nor visibly emits light.
     fn scored_appearance(&self, hit: &PixelHit) -> Option<Appearance> {
         let glow = self.glow[hit.surface.0];
         let glows = if hit.front { glow.front } else { glow.back };
@@ -206,7 +207,7 @@ impl<'a> ViewScene<'a> {
         appearance(self.reference, &self.textures, hit)
     }
 
-    /// Whether the surface point at `pixel` of `camera` shows in the input view: inside its frame and not hidden.
+    /// Whether the input view shows the surface point at `pixel` of `camera`: it is within the frame and not hidden.
     fn is_seen_by(&self, input: &Camera, camera: &Camera, pixel: DVec2, hit: &PixelHit) -> bool {
         let Some((place, depth)) = input.project(camera.unproject(pixel, hit.depth)) else {
             return false;
@@ -214,20 +215,20 @@ impl<'a> ViewScene<'a> {
         if !input.holds(place) {
             return false;
         }
-        // From one centre the same ray reaches the same point.
+        // From the same centre, the same ray hits the same point.
         camera.position() == input.position()
             || hit_through(self.world, input, place).is_some_and(|first| first.depth >= depth * (1.0 - OCCLUSION_SLACK))
     }
 }
 
-/// base_color, roughness and metallic of the surface that is hit.
+/// base_color, roughness and metallic of the hit surface.
 fn appearance(reference: &ReferenceScene, textures: &[Texture], hit: &PixelHit) -> Option<Appearance> {
     let surface = &reference.surfaces[hit.surface.0];
     let uv = surface.mesh.uvs.as_deref().map_or(Vec2::ZERO, |uvs| hit.interpolate(&surface.mesh.triangles, uvs));
     reference.materials[surface.material.0].appearance(textures, uv)
 }
 
-/// base_color at pixel centres, linear, of whatever has one, glowing or not; 0 elsewhere.
+/// Linear base_color at pixel centres, also of surfaces that emit light; 0 where the surface has none.
 pub fn base_color_at_centres(world: &World, camera: &Camera) -> Picture<LinearRgb> {
     let textures = world.scene().texture_list();
     let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
@@ -241,13 +242,13 @@ pub fn base_color_at_centres(world: &World, camera: &Camera) -> Picture<LinearRg
     Picture::new(width, height, pixels.collect()).expect("there is a pixel for every place")
 }
 
-/// A point counts as hidden where something is nearer by more than this share of its depth.
+/// A point counts as hidden if a surface is nearer by more than this share of its depth.
 const OCCLUSION_SLACK: f64 = 1e-3;
 
 fn glow_of_surfaces(reference: &ReferenceScene) -> Vec<Glow> {
     let mut glow = vec![Glow::default(); reference.surfaces.len()];
     for group in reference.lights.iter().filter(|group| group.camera_visible) {
-        // Wherever a map is black: such a surface is a lamp all over.
+        // Even where a map is black, the surface counts as a lamp.
         if let Emission::Area { surfaces, radiance, two_sided, map: _ } = &group.emission
             && radiance.iter().any(|v| *v > 0.0)
         {
@@ -268,9 +269,9 @@ mod tests {
 
     use super::*;
 
-    /// A lamp with a map glows on the sides that one without glows on; one of no radiance, or hidden, on none.
+    /// A lamp with a map emits on the same sides as one without; a lamp without radiance, or hidden from the camera, on none.
     #[test]
-    fn a_map_changes_no_glow() {
+    fn maps_do_not_change_the_sides_that_emit() {
         let glow = |radiance: f32, mapped: bool, two_sided: bool, camera_visible: bool| {
             let map = mapped.then(|| EmissionMap { texture: TextureIndex(0), uv: Default::default() });
             let emission = Emission::Area { surfaces: vec![SurfaceIndex(0)], radiance: [radiance; 3], map, two_sided };

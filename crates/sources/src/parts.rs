@@ -75,7 +75,6 @@ fn component_of_triangles(mesh: &TriangleMesh, labels: &[usize]) -> Vec<usize> {
         .collect()
 }
 
-/// The component's least vertex; halves the path on the way.
 /// The root of a vertex's component. Shortens the path to it.
 fn find(parent: &mut [u32], mut vertex: u32) -> u32 {
     while parent[vertex as usize] != vertex {

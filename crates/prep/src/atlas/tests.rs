@@ -20,8 +20,8 @@ fn texels_of(unwrapped: &Unwrapped, triangle: usize) -> [Vec2; 3] {
     unwrapped.mesh.triangles[triangle].map(|v| uvs[v as usize] * unwrapped.size as f32)
 }
 
-/// xatlas' own threads can miss their last wake-up and hang; `.cargo/config.toml` builds it without. Threads bear
-/// the name of the one that made them.
+/// The threads of xatlas can miss their last wake-up and hang, so `.cargo/config.toml` builds it without threads. A thread
+/// has the name of the thread that started it.
 #[cfg(target_os = "linux")]
 #[test]
 fn xatlas_has_no_threads_of_its_own() {
@@ -110,19 +110,19 @@ fn degenerate_faces_are_counted_and_placed() {
 }
 
 #[test]
-fn nothing_to_unwrap_is_an_error() {
+fn meshes_without_area_are_refused() {
     let flat = TriangleMesh { positions: vec![Vec3::ZERO; 3], triangles: vec![[0, 1, 2]], ..Default::default() };
     assert_eq!(unwrap(&flat, SizeWish::Fixed(64)).unwrap_err(), AtlasError::NoArea);
     assert_eq!(unwrap(&TriangleMesh::default(), SizeWish::Fixed(64)).unwrap_err(), AtlasError::NoArea);
 }
 
 #[test]
-fn the_same_twice() {
+fn the_result_is_deterministic() {
     let unwrap_once = || unwrap(&cuboid(Vec3::new(1.0, 2.0, 3.0)), SizeWish::Texel(0.01)).unwrap();
     assert_eq!(unwrap_once().mesh, unwrap_once().mesh);
 }
 
-/// A sheet of cells, each apart from its neighbours and turned another way, so that it is a chart of its own.
+/// A sheet of cells, each separate from its neighbours and turned in another direction, so that each is a chart.
 fn cells(count: u32, length: f32, width: f32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for at in 0..count {
@@ -148,7 +148,7 @@ fn hoop(corners: u32, height: f32) -> TriangleMesh {
     }
 }
 
-/// Triangles across each other, some more than once, some of a single corner.
+/// Triangles that intersect each other, some of them repeated, some with only one distinct corner.
 fn soup(corners: &[[f32; 3]], count: u32, size: Vec3) -> TriangleMesh {
     let corner = |at: u32| at.wrapping_mul(2_654_435_761).rotate_left(9) % corners.len() as u32;
     TriangleMesh {
@@ -158,9 +158,9 @@ fn soup(corners: &[[f32; 3]], count: u32, size: Vec3) -> TriangleMesh {
     }
 }
 
-/// As a camera at a wall wishes it: xatlas once aborted the program.
+/// The wish of a camera close to a wall. xatlas once aborted the program on it.
 #[test]
-fn a_wish_that_no_atlas_grants_gets_the_largest() {
+fn a_wish_beyond_the_largest_atlas_gets_the_largest() {
     for mesh in [cuboid(Vec3::new(4.0, 2.6, 0.1)), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)] {
         for texel_m in [1e-5, 1e-12] {
             let unwrapped = unwrap(&mesh, SizeWish::Texel(texel_m)).unwrap();
@@ -173,7 +173,7 @@ fn a_wish_that_no_atlas_grants_gets_the_largest() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// Whatever is wished of whatever shape, there is an answer, on which everything has its place.
+    /// Every wish for every shape has a result in which each triangle has its place, or one of the expected errors.
     #[test]
     fn every_wish_has_an_answer(
         kind in 0..4,

@@ -1,4 +1,4 @@
-//! Whole scenes, built here, with and without faults.
+//! Tests on whole scenes, built here, with and without faults.
 
 use mateval_scene::obj;
 use std::path::Path;
@@ -40,7 +40,7 @@ fn read_inner(inner: &str) -> BitterliScene {
     read_xml(&format!("<scene version='0.6.0'>{SENSOR}{inner}</scene>")).unwrap()
 }
 
-/// Codes of the findings above notes.
+/// The codes of the findings above notes.
 fn codes(scene: &BitterliScene) -> Vec<&str> {
     scene.findings.iter().filter(|f| f.severity != Severity::Note).map(|f| f.code.as_str()).collect()
 }
@@ -101,7 +101,7 @@ fn the_three_versions_spell_one_scene() {
 }
 
 #[test]
-fn what_the_scene_says_is_there() {
+fn surfaces_lights_and_camera_are_those_of_the_xml() {
     let BitterliScene { scene, camera, source_files, .. } = read_xml(SCENE).unwrap();
     assert_eq!((camera.intrinsics.width, camera.intrinsics.height), (64, 32));
     assert_eq!(camera.position(), glam::DVec3::new(1.0, 2.0, 3.0));
@@ -147,7 +147,7 @@ fn wrappers_may_nest_in_any_order() {
 }
 
 #[test]
-fn an_id_within_a_bumpmap_means_what_has_it() {
+fn an_id_within_a_bumpmap_refers_to_the_inner_bsdf() {
     let bsdf = "<bsdf type='bumpmap'><texture name='map' type='bitmap'><string name='filename' value='a b.png'/>\
                 </texture><bsdf type='twosided' id='Floor'><bsdf type='diffuse'/></bsdf></bsdf>";
     let scene = read_inner(&format!("{bsdf}<shape type='rectangle'><ref id='Floor'/></shape>"));
@@ -187,7 +187,7 @@ fn a_shape_without_bsdf_is_grey_and_a_lamp_black() {
 }
 
 #[test]
-fn each_fault_is_a_finding_and_the_scene_goes_on() {
+fn each_fault_is_a_finding_and_the_rest_is_read() {
     for (inner, code) in [
         ("<shape type='teapot'/>", "unknown_plugin"),
         ("<shape type='obj'><string name='filename' value='models/none.obj'/></shape>", "missing_file"),
@@ -282,13 +282,13 @@ fn textures_are_decoded_shared_and_turned_upright() {
     // Mitsuba's v is one minus ours: ours 0.2 is its 0.8, scaled and shifted 0.65, so ours 0.35.
     let at = uv.apply(glam::Vec2::new(0.1, 0.2));
     assert!((at - glam::Vec2::new(0.2, 0.35)).length() < 1e-6, "{at}");
-    // Mitsuba looks the picture's top row up at the rectangle's lower edge.
+    // In Mitsuba the picture's top row is at the rectangle's lower edge.
     let mesh = &scene.surfaces[0].mesh;
     let lower_left = mesh.uvs.as_ref().unwrap()[0] + glam::Vec2::new(0.25, -0.25);
     assert_eq!(scene.textures[0].texture.sample(lower_left.to_array()), [1.0, 0.0, 0.0]);
 }
 
-/// A shape's textured radiance is 1 times the texture, looked up as a material's would be; a world's is its mean.
+/// A shape's textured radiance is 1 times the texture, looked up like a material's. An environment's is the texture's mean.
 #[test]
 fn a_texture_as_radiance() {
     let texture = "<texture name='radiance' type='bitmap'><string name='filename' value='a b.png'/>\
@@ -311,7 +311,7 @@ fn a_texture_as_radiance() {
 }
 
 #[test]
-fn opacity_is_luminance_unless_alpha_says_more() {
+fn opacity_is_luminance_unless_alpha_varies() {
     let folder = folder_with("");
     let write = |alpha: u8| {
         let file = std::fs::File::create(folder.path().join("leaf.png")).unwrap();
@@ -340,7 +340,7 @@ fn opacity_is_luminance_unless_alpha_says_more() {
 }
 
 #[test]
-fn the_licence_travels_and_names_the_scene() {
+fn the_licence_is_kept_and_names_the_scene() {
     let folder = folder_with(&format!("<scene version='0.6.0'>{SENSOR}</scene>"));
     let text = "This is the Mitsuba version of 'A Room' by Somebody, downloaded from there\nCC0\n";
     std::fs::write(folder.path().join("LICENSE.txt"), text).unwrap();
@@ -364,7 +364,7 @@ fn limits_hold() {
 }
 
 #[test]
-fn lights_have_names_of_their_own_however_many() {
+fn names_of_many_lights_are_unique() {
     let lamp = "<shape type='rectangle'><emitter type='area'/></shape>";
     let scene = read_inner(&lamp.repeat(3000)).scene;
     let names: std::collections::BTreeSet<_> = scene.lights.iter().map(|light| &light.name).collect();
@@ -395,7 +395,7 @@ proptest! {
         let _ = read(&path, &Limits { triangles: 10_000, ..Limits::default() });
     }
 
-    /// Words of the format in any order, which a change of bytes would hardly reach.
+    /// Words of the format in any order, which a change of single bytes would rarely produce.
     #[test]
     fn shuffled_xml_never_panics(words in prop::collection::vec(0_usize..WORDS.len(), 0..40)) {
         let body: String = words.iter().map(|&word| WORDS[word]).collect();
