@@ -69,7 +69,7 @@ fn main() {
         let start = Instant::now();
         let basis = basis(samples, 7);
         let seconds = start.elapsed().as_secs_f64();
-        let fit = fit_lights(&basis, &photo_of_lights, Some(&valid), Some(1.0)).unwrap();
+        let fit = fit_lights(&rules.fit, &basis, &photo_of_lights, Some(&valid)).unwrap();
         let (errors, shares) = (errors(&fit.weights, &weights), shares(&basis, &weights));
         println!(
             "basis {samples} ({seconds:.1} s): median {:.3}, by share of the photo's light {:.3}",
@@ -78,7 +78,7 @@ fn main() {
         );
         for light in 0..weights.len() {
             let share = (0..3).map(|c| shares[3 * light + c]).sum::<f64>() / shares.iter().sum::<f64>();
-            let pair = [&basis, &photo].map(|basis| pooled(&basis.pictures()[light], Some(&valid)));
+            let pair = [&basis, &photo].map(|basis| pooled(&rules.fit, &basis.pictures()[light], Some(&valid)));
             println!(
                 "  light {light}: share {share:.3}, noise of its squares {:.4}, found {:.3?}, planted {:.3?}",
                 noise(&pair[0][1], &pair[1][1]),

@@ -9,6 +9,7 @@
 
 pub mod alignment;
 pub mod error;
+pub mod fixed_rules;
 pub mod instance_errors;
 pub mod light_rules;
 pub mod light_score;
@@ -17,7 +18,7 @@ pub mod measure;
 pub mod metric;
 pub mod noise_blocks;
 pub mod open_scene;
-mod pilot;
+pub mod pilot;
 pub mod predicted_light;
 pub mod protocol;
 pub mod relit;
@@ -26,6 +27,7 @@ pub mod result_key;
 pub mod rgb;
 mod scene_score;
 pub mod score;
+mod seeds;
 pub mod shown_scene;
 pub mod texture_space;
 pub mod truth;

@@ -44,8 +44,6 @@ pub struct LightRules {
     pub roulette_start: u32,
     /// The probability to go on then.
     pub roulette_survival: f32,
-    /// Facets below this roughness do not show the lights of a stage.
-    pub stage_roughness: f32,
     /// Where the lights of a stage are.
     pub stage: StageRules,
     /// How radiances are fitted.
@@ -99,15 +97,8 @@ impl LightRules {
             max_bounces: settings.max_bounces,
             roulette_start: settings.roulette_start,
             roulette_survival: settings.roulette_survival,
-            stage_roughness: mateval_tracer::bsdf::STAGE_ROUGHNESS,
             stage: StageRules::default(),
-            fit: FitRules {
-                pool: mateval_light::light_fit::POOL as u32,
-                samples: 64,
-                start_radiances: vec![0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0],
-                start_grey: 0.5,
-                start_samples: 2,
-            },
+            fit: FitRules::default(),
             relit: RelitRules { dim: 0.3, warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3 },
             noise: NoiseRules {
                 pilot_samples: 4,

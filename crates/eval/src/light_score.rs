@@ -107,7 +107,7 @@ impl<'a> LightBench<'a> {
             photo,
             regions: truths.iter().map(regions).collect(),
             references: references(order, renderer, protocol, &own, &lightings)?,
-            blocks: noise_blocks(&cameras, protocol.light.noise.block_pixels),
+            blocks: noise_blocks(&protocol.light.noise, &cameras),
             lightings,
         })
     }
@@ -202,13 +202,10 @@ impl<'a> LightBench<'a> {
 }
 
 fn photo<'a>(order: &SceneOrder<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
-    let id = &order.scene.id;
-    let unsound = || EvalError::Invalid(format!("scene '{id}' has no input view; run `mateval prep verify`"));
-    let view = order.scene.view(INPUT).ok_or_else(unsound)?;
-    let place = order.views.iter().position(|scored| scored.id == view.id).ok_or_else(|| {
-        let what = format!("scene '{id}': targets.json leaves out the input view, which light is fitted to");
-        EvalError::Invalid(what)
-    })?;
+    let scene = || order.scene.id.clone();
+    let view = order.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene() })?;
+    let place = order.views.iter().position(|scored| scored.id == view.id);
+    let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: scene() })?;
     Ok(Photo { view, light: own[place].shown.clone(), valid: &truths[place].valid })
 }
 

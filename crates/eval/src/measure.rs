@@ -120,7 +120,7 @@ fn ssim_metric<P: Pixel>(
 }
 
 /// LPIPS as it is stored: its last bits depend on the processor.
-pub(crate) fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) -> Measured {
+pub fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) -> Measured {
     let steps = 10_f64.powi(protocol.lpips_decimals as i32);
     let rounded = distance.map(|distance| (distance * steps).round() / steps);
     Measured::plain(Metric::LpipsAlex, rounded, pixels)

@@ -1,5 +1,6 @@
 //! The metrics of results: their words, which way is better, and how they are shown.
 
+use mateval_metrics::Net;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,6 +38,9 @@ word_enum! {
     /// LPIPS by AlexNet.
     LpipsAlex = "lpips_alex",
 }
+
+/// The network of [`Metric::LpipsAlex`].
+pub const LPIPS_NET: Net = Net::Alex;
 
 /// How a number is shown to people.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +94,6 @@ mod tests {
 
     #[test]
     fn lpips_has_its_networks_word() {
-        assert_eq!(Metric::LpipsAlex.word(), mateval_metrics::Net::Alex.key());
+        assert_eq!(Metric::LpipsAlex.word(), LPIPS_NET.key());
     }
 }

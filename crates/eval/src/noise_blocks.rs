@@ -5,11 +5,14 @@ use mateval_image::Picture;
 use mateval_scene::Camera;
 use mateval_tracer::shared_centre::share_centre;
 
+use crate::light_rules::NoiseRules;
+
 /// For each view the block of each of its pixels: pixels of one block, whatever their view, may see the same paths.
 ///
-/// Where the cameras share a centre a path is put into every view that holds its direction, so blocks are squares of
-/// `side` pixels of the first camera's image plane; else each view has blocks of its own.
-pub fn noise_blocks(cameras: &[Camera], side: u32) -> Vec<Picture<u32>> {
+/// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
+/// of [`NoiseRules::block_pixels`] pixels of the first camera's image plane. Other cameras have blocks of their own.
+pub fn noise_blocks(rules: &NoiseRules, cameras: &[Camera]) -> Vec<Picture<u32>> {
+    let side = rules.block_pixels;
     let shared = share_centre(cameras);
     let views = cameras.iter().zip(0_u32..);
     views
@@ -43,6 +46,10 @@ mod tests {
 
     use super::*;
 
+    fn rules() -> NoiseRules {
+        crate::protocol::Protocol::named("mateval-1").unwrap().light.noise
+    }
+
     fn cameras() -> Vec<Camera> {
         let intrinsics = Intrinsics::from_fov_x(96, 64, 1.0);
         let input = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::new(1.0, 2.0, 3.0), intrinsics);
@@ -53,7 +60,7 @@ mod tests {
     #[test]
     fn one_direction_is_of_one_block() {
         let cameras = cameras();
-        let blocks = noise_blocks(&cameras, 16);
+        let blocks = noise_blocks(&rules(), &cameras);
         assert_eq!(blocks[0].get(0, 0), blocks[0].get(15, 15));
         assert_ne!(blocks[0].get(15, 0), blocks[0].get(16, 0));
         let mut distinct = blocks[0].pixels().to_vec();
@@ -76,7 +83,7 @@ mod tests {
     fn views_from_elsewhere_share_nothing() {
         let mut cameras = cameras();
         cameras[1] = Camera::from_rotation(glam::DMat3::IDENTITY, DVec3::ZERO, cameras[1].intrinsics);
-        let blocks = noise_blocks(&cameras, 16);
+        let blocks = noise_blocks(&rules(), &cameras);
         assert!(blocks[0].pixels().iter().all(|block| !blocks[1].pixels().contains(block)));
     }
 }

@@ -16,8 +16,7 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     let is_target = |view: &&View| targets.iter().any(|t| t.scene == scene.id && t.view == view.id);
     let views: Vec<&View> = scene.views.iter().filter(is_target).collect();
     if views.is_empty() {
-        let what = format!("scene '{}': targets.json names no view of it; run `mateval prep verify`", scene.id);
-        return Err(EvalError::Invalid(what));
+        return Err(EvalError::NoTargets { scene: scene.id.clone() });
     }
     Ok(views)
 }

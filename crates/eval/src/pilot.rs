@@ -23,8 +23,8 @@ pub(crate) fn enough_samples(
         let [a, b] = halves.map(|half| EncodedLight::half(half, lit.scene.exposure));
         let prediction = mateval_metrics::Halves { a: &a, b: &b };
         let mse = noise_free_mse(prediction, lit.references[at].halves(), &lit.truths[at].valid, &lit.blocks[at]);
-        let what = || format!("scene '{}', view '{}'", lit.scene.id, view.id);
-        let mse = mse.map_err(|source| EvalError::Metric { what: what(), source })?;
+        let (scene, view_id) = (lit.scene.id.clone(), view.id.clone());
+        let mse = mse.map_err(|source| EvalError::Metric { scene, view: view_id, source })?;
         kinds[usize::from(view.id.as_str() != INPUT)].extend(mse);
     }
     let kinds = kinds.iter().filter(|mses| !mses.is_empty());
@@ -32,8 +32,9 @@ pub(crate) fn enough_samples(
     Ok(needed.max().unwrap_or(rules.least_samples))
 }
 
-/// Variance falls as samples rise. A `pilot` that is none saw an error that is nothing but noise.
-fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>) -> u32 {
+/// Samples that bring the noise under its bound: variance falls as samples rise. A `pilot` of none saw an error that is
+/// nothing but noise.
+pub fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>) -> u32 {
     let Some(NoisePsnr { prediction, reference, .. }) = pilot else { return rules.most_samples };
     let bound = rules.target_db.max(rules.truth_share * reference);
     let needed = f64::from(rules.pilot_samples) * (prediction / bound) * (prediction / bound);

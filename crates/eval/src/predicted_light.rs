@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::{Camera, Progress, SceneLights, TriangleMesh};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{
@@ -24,6 +23,7 @@ use crate::light_rules::{LightRules, Track};
 use crate::pilot::enough_samples;
 use crate::relit::{LightingName, RelitLighting};
 use crate::rgb::LightReference;
+use crate::seeds::seed;
 use crate::truth::ViewTruth;
 use mateval_light::light_fit::{LightFit, fit_lights};
 use mateval_light::light_stage;
@@ -92,8 +92,6 @@ pub struct FittedRadiances {
     pub stage: bool,
     /// Light by light.
     pub lights: Vec<FittedRadiance>,
-    /// What the fit started from.
-    pub start_radiance: f64,
     /// Mean absolute difference of the averaged pictures, linear, by channel.
     pub mean_absolute_error: [f64; 3],
     /// No other radiances can have less than this.
@@ -237,7 +235,6 @@ impl Renderer<'_> {
         let Photo { view, light, valid } = &self.lit.photo;
         let lights = self.pass.lights.len();
         let groups = LightGroups::apart(lights);
-        let start = self.start_radiance(&groups)?;
         let mut fits = BTreeMap::new();
         let samples = self.rules.fit.samples;
         for batch in self.batches(all, |_| samples, lights) {
@@ -245,14 +242,14 @@ impl Renderer<'_> {
             let renders = self.trace(&batch, &[view.camera], Lighting::Apart(&groups), samples, &["fit"], &what)?;
             for (&index, render) in batch.iter().zip(renders) {
                 let basis = &render.views[0].halves[0].basis;
-                let fit = fit_lights(basis, light, Some(valid), Some(start))?;
-                fits.insert(index, self.radiances(fit, start));
+                let fit = fit_lights(&self.rules.fit, basis, light, Some(valid))?;
+                fits.insert(index, self.radiances(fit));
             }
         }
         Ok(fits.into_values().collect())
     }
 
-    fn radiances(&self, fit: LightFit, start: f64) -> FittedRadiances {
+    fn radiances(&self, fit: LightFit) -> FittedRadiances {
         let lights = self.pass.lights.iter().zip(&fit.weights);
         let rows = |channel: usize| fit.channels[channel].dual.len().max(1) as f64;
         FittedRadiances {
@@ -260,35 +257,9 @@ impl Renderer<'_> {
             lights: lights
                 .map(|(light, radiance)| FittedRadiance { light: light.clone(), radiance: *radiance })
                 .collect(),
-            start_radiance: start,
             mean_absolute_error: [0, 1, 2].map(|c| fit.channels[c].sum / rows(c)),
             lower_bound: [0, 1, 2].map(|c| fit.channels[c].bound / rows(c)),
         }
-    }
-
-    /// The radiance whose picture of grey surfaces is nearest to the photo, by the mean square of luminance.
-    fn start_radiance(&self, groups: &LightGroups) -> Result<f64, EvalError> {
-        let Photo { view, light, valid } = &self.lit.photo;
-        let scattering = &self.rules.fit;
-        let repaint = self.grey(scattering.start_grey)?;
-        let settings = self.rules.settings(scattering.start_samples);
-        let seeds = [self.seed("start")];
-        let lighting = Lighting::Apart(groups);
-        let what = format!("scene {}: start of the fit", self.lit.scene.id);
-        let shown = |done: usize, all: usize| (self.progress)(&what, done, all);
-        let renders =
-            render_repainted(self.pass.world, &repaint, 0..1, &[view.camera], lighting, &settings, &seeds, &shown)?;
-        let grey = renders[0].views[0].halves[0].basis.sum();
-        let error = |radiance: f64| -> f64 {
-            let pairs = grey.pixels().iter().zip(light.pixels()).zip(valid.pixels()).filter(|(_, valid)| **valid);
-            pairs
-                .map(|((g, t), _)| radiance * g.luminance() - t.luminance())
-                .map(|difference| difference * difference)
-                .sum()
-        };
-        let starts = &scattering.start_radiances;
-        let best = starts.iter().min_by(|a, b| error(**a).total_cmp(&error(**b)));
-        Ok(best.copied().unwrap_or(1.0))
     }
 
     /// Samples a pixel of each half that each prediction needs.
@@ -342,7 +313,7 @@ impl Renderer<'_> {
         what: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let repaint = self.repaint(batch)?;
-        let seeds: Vec<u64> = streams.iter().map(|stream| self.seed(stream)).collect();
+        let seeds: Vec<u64> = streams.iter().map(|stream| seed(&self.lit.scene.id, self.pass.name, stream)).collect();
         let settings = self.rules.settings(samples);
         let shown = |done: usize, all: usize| (self.progress)(what, done, all);
         let which = 0..batch.len();
@@ -361,25 +332,5 @@ impl Renderer<'_> {
         };
         let coats = (0..self.lit.atlases.len()).map(coat).collect();
         Ok(Repaint::new(self.pass.world, self.lit.atlases, coats, self.rules.flavour)?)
-    }
-
-    /// All that has an atlas in one grey.
-    fn grey(&self, grey: f32) -> Result<Repaint, EvalError> {
-        let flat = |value: f32| {
-            let texels = mateval_image::Texels::Grey(vec![value]);
-            mateval_image::Texture::new(1, 1, texels, mateval_image::Wrap::Clamp)
-                .expect("one texel is what one pixel needs")
-        };
-        let (rough, metallic) =
-            (mateval_submission::prediction::MISSING_ROUGHNESS, mateval_submission::prediction::MISSING_METALLIC);
-        let coat = Coat { base_colors: vec![flat(grey)], roughness: flat(rough), metallic: flat(metallic) };
-        let coats = self.lit.scene.instances.iter().map(|instance| instance.atlas.as_ref().map(|_| coat.clone()));
-        Ok(Repaint::new(self.pass.world, self.lit.atlases, coats.collect(), self.rules.flavour)?)
-    }
-
-    /// The same for every prediction, so that they can share paths; another for every scene, pass and stream.
-    fn seed(&self, stream: &str) -> u64 {
-        let text = format!("mateval/{}/{}/{stream}", self.lit.scene.id, self.pass.name);
-        u64::from_str_radix(&sha256_of_bytes(text.as_bytes())[..16], 16).expect("a hash is hexadecimal")
     }
 }

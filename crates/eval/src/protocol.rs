@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
+use crate::fixed_rules::FixedRules;
 use crate::light_rules::{LightRules, Track};
 
 /// What is done outside a mask by the metrics whose windows look across its edge.
@@ -39,28 +40,18 @@ pub struct Protocol {
     pub mask_rule: MaskRule,
     /// In which space albedo's MSE and PSNR are taken.
     pub albedo_space: AlbedoSpace,
-    /// The network of LPIPS.
-    pub lpips_net: String,
     /// Decimals that LPIPS is rounded to: its last bits depend on the processor.
     pub lpips_decimals: u32,
-    /// Places, in a regular square, at which a pixel of the truth and of the prediction is looked at.
-    pub subpixels: usize,
-    /// What PSNR is capped at, in dB.
-    pub psnr_cap_db: f64,
-    /// What a missing or unsound base colour scores as, linear.
-    pub missing_base_color: f32,
-    /// What a missing or unsound roughness scores as.
-    pub missing_roughness: f32,
-    /// What a missing or unsound metallic scores as.
-    pub missing_metallic: f32,
     /// By what light predictions are looked at.
     pub light: LightRules,
+    /// Constants that all protocols share because the code holds them.
+    pub fixed: FixedRules,
     /// [`SCORER_VERSION`].
     pub scorer_version: u32,
 }
 
 /// Raised whenever a number could change for the same inputs.
-pub const SCORER_VERSION: u32 = 3;
+pub const SCORER_VERSION: u32 = 4;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.
@@ -78,24 +69,33 @@ impl Protocol {
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
             _ => {
-                let known = Self::NAMES.join("', '");
-                return Err(EvalError::Invalid(format!("there is no protocol '{name}'; known are '{known}'")));
+                return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES });
             }
         };
         Ok(Self {
             name: name.to_owned(),
             mask_rule,
             albedo_space,
-            lpips_net: "alex".to_owned(),
             lpips_decimals: 6,
-            subpixels: mateval_tracer::aov::SUBPIXELS,
-            psnr_cap_db: mateval_metrics::Psnr::CAP_DB,
-            missing_base_color: mateval_scene::submission::GREY,
-            missing_roughness: mateval_submission::prediction::MISSING_ROUGHNESS,
-            missing_metallic: mateval_submission::prediction::MISSING_METALLIC,
             light,
+            fixed: FixedRules::of_this_scorer(),
             scorer_version: SCORER_VERSION,
         })
+    }
+
+    /// Fails if this scorer cannot score under the protocol: it is of another version, or its code holds other constants.
+    pub fn check(&self) -> Result<(), EvalError> {
+        let protocol = || self.name.clone();
+        if self.scorer_version != SCORER_VERSION {
+            let (expected, found) = (SCORER_VERSION, self.scorer_version);
+            return Err(EvalError::ScorerVersion { protocol: protocol(), expected, found });
+        }
+        match self.fixed.first_difference(&FixedRules::of_this_scorer()) {
+            Some((rule, [found, expected])) => {
+                Err(EvalError::FixedRule { protocol: protocol(), rule, expected, found })
+            }
+            None => Ok(()),
+        }
     }
 
     /// SHA-256, hex, of the protocol alone: what `dataset_spec/PROTOCOL.md` publishes.
@@ -144,7 +144,7 @@ mod tests {
             print(&Protocol::named("paper").unwrap()),
             print(&Protocol { albedo_space: AlbedoSpace::Srgb, ..base.clone() }),
             print(&Protocol { mask_rule: MaskRule::BlackFill, ..base.clone() }),
-            print(&Protocol { missing_base_color: 0.4, ..base.clone() }),
+            print(&Protocol { lpips_decimals: 5, ..base.clone() }),
         ];
         prints.sort();
         prints.dedup();
@@ -181,6 +181,7 @@ mod tests {
                     "blender" => "mitsuba".into(),
                     "fitted" | "true" => "relit".into(),
                     "relit" => "true".into(),
+                    "lpips_alex" => "lpips_vgg".into(),
                     other => format!("{other}x").into(),
                 },
                 other => panic!("{pointer}: {other}"),

@@ -210,10 +210,7 @@ impl SceneOrder<'_> {
 
     /// An error of a metric, with where it was.
     pub(crate) fn or_named<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
-        found.map_err(|source| EvalError::Metric {
-            what: format!("scene '{}', view '{}'", self.scene.id, view.id),
-            source,
-        })
+        found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })
     }
 }
 

@@ -15,7 +15,7 @@ use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
 use crate::error::EvalError;
 use crate::light_rules::Track;
-use crate::metric::Metric;
+use crate::metric::{LPIPS_NET, Metric};
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::result::{
@@ -88,6 +88,7 @@ struct Outcome {
 /// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them, and so
 /// are paths of light for those that agree in roughness and metallic.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
+    plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
@@ -152,6 +153,13 @@ fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) ->
 }
 
 impl ScorePlan<'_> {
+    /// Fails if this scorer cannot follow a protocol, or LPIPS has another network.
+    fn check(&self) -> Result<(), EvalError> {
+        self.protocols.iter().try_for_each(Protocol::check)?;
+        let (expected, found) = (LPIPS_NET.name(), self.lpips.network().map_or(LPIPS_NET, Lpips::net).name());
+        if expected == found { Ok(()) } else { Err(EvalError::LpipsNet { expected, found }) }
+    }
+
     fn score_fresh(
         &self,
         scene: &SceneFile,
@@ -242,7 +250,7 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
             cost: entry.file.cost,
         },
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),
-        lpips_weights: BTreeMap::from([("alex".to_owned(), weights.map(str::to_owned))]),
+        lpips_weights: BTreeMap::from([(LPIPS_NET.name().to_owned(), weights.map(str::to_owned))]),
         protocols,
         missing,
         findings: entry.findings,

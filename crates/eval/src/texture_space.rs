@@ -83,7 +83,7 @@ pub fn texture_space(
     submissions: &[PredictedScene],
     progress: Progress<'_>,
 ) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
-    let input = scene.view(INPUT).ok_or_else(|| unsound(folder, "it has no input view"))?;
+    let input = scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene.id.clone() })?;
     let mut compared = vec![Vec::new(); submissions.len()];
     for (at, instance) in scene.instances.iter().enumerate() {
         let Some(size) = atlas_size(folder, instance)? else { continue };
@@ -109,12 +109,8 @@ fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>
     if MAP_SIZES.contains(&size) {
         return Ok(Some(size));
     }
-    Err(unsound(folder, &format!("instance '{}' has an atlas of {size} texels", instance.id)))
-}
-
-fn unsound(folder: &SceneFolder, what: &str) -> EvalError {
-    let path = folder.scene_file();
-    EvalError::Invalid(format!("'{}': {what}; run `mateval prep verify`", path.display()))
+    let (path, instance) = (folder.scene_file(), instance.id.clone());
+    Err(EvalError::AtlasSize { path, instance, expected: MAP_SIZES, found: size })
 }
 
 /// The squared errors of a prediction against the truth, weighted by area: observed, then unobserved.

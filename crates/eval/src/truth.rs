@@ -134,9 +134,12 @@ fn size<T: Copy>(picture: &Picture<T>) -> (usize, usize) {
 
 fn check_sizes(view: &View, sizes: &[(usize, usize)]) -> Result<(), EvalError> {
     let expected = (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize);
-    if sizes.iter().all(|found| *found == expected) {
-        return Ok(());
+    match sizes.iter().find(|found| **found != expected) {
+        None => Ok(()),
+        Some(found) => Err(EvalError::TruthPictureSize {
+            view: view.id.clone(),
+            expected: expected.into(),
+            found: (*found).into(),
+        }),
     }
-    let what = format!("view '{}': the truth's pictures are not of the camera's size", view.id);
-    Err(EvalError::Invalid(format!("{what}; run `mateval prep verify`")))
 }

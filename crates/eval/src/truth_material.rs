@@ -38,7 +38,5 @@ fn read_truth(folder: &SceneFolder, instance: &InstanceId, map: Map, size: usize
     if (texture.width(), texture.height()) == (size, size) {
         return Ok(texture.collapsed());
     }
-    let found = format!("{}x{} texels", texture.width(), texture.height());
-    let what = format!("'{}': {found}, scene.json says {size} a side; run `mateval prep verify`", png.display());
-    Err(EvalError::Invalid(what))
+    Err(EvalError::TruthMapSize { path: png, expected: size, found: [texture.width(), texture.height()] })
 }

@@ -19,6 +19,7 @@ mod suite {
     mod noisy_room;
     mod packed;
     mod planted_light;
+    mod protocol_rules;
     mod relit;
     mod same_bytes;
     mod sample;

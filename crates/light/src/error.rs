@@ -1,7 +1,7 @@
 //! The one error of this crate.
 
 /// Why lights could not be fitted to a photo.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LightError {
     /// Mask and photo differ in size.
     #[error("cannot fit lights: the mask has {}x{} pixels, the photo {}x{}", mask[0], mask[1], photo[0], photo[1])]
@@ -19,16 +19,36 @@ pub enum LightError {
         /// Width and height of the photo.
         photo: [usize; 2],
     },
-    /// The photo holds infinities or NaN.
-    #[error("cannot fit lights: the photo holds numbers that are not finite")]
-    PhotoNotFinite,
-    /// A light's picture holds what no light sends.
-    #[error("cannot fit lights: the picture of light group {group} holds negative or not finite numbers")]
+    /// The photo holds an infinity or NaN.
+    #[error("cannot fit lights: pixel ({}, {}) of the photo is {value:?}, expected finite numbers", at[0], at[1])]
+    PhotoNotFinite {
+        /// Column and row of the first such pixel.
+        at: [usize; 2],
+        /// Its value.
+        value: [f32; 3],
+    },
+    /// A light's picture holds values that light cannot have.
+    #[error(
+        "cannot fit lights: pixel ({}, {}) of light group {group} is {value:?}, expected finite numbers of at least 0",
+        at[0], at[1]
+    )]
     BasisPicture {
         /// The group's place in the basis.
         group: usize,
+        /// Column and row of the first such pixel.
+        at: [usize; 2],
+        /// Its value.
+        value: [f32; 3],
     },
     /// The solver found no finite weights.
-    #[error("cannot fit lights: the solver found no finite weights; please report this basis")]
-    NoSolution,
+    #[error(
+        "cannot fit lights: no finite weights of {lights} lights found for {squares} averaged squares; please report this \
+         scene"
+    )]
+    NoSolution {
+        /// Number of lights.
+        lights: usize,
+        /// Number of averaged squares of pixels.
+        squares: usize,
+    },
 }

@@ -3,32 +3,45 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where the lights of a stage are; metres. Ours: nobody has published theirs.
+/// Where the lights of a stage are; lengths in metres. The values are ours: nobody has published theirs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageRules {
-    /// About the side of a ceiling cell; cells fill the rectangle that is seen from the camera at its height.
+    /// Number of horizontal directions along which the extent of the room is measured from the camera.
+    pub extent_directions: u32,
+    /// Approximate side of a ceiling cell. Cells fill the rectangle that the camera sees at its own height.
     pub cell_m: f64,
-    /// The side of a cell's light over the cell's own.
+    /// Side of a cell's light, as a share of the cell's side.
     pub cell_share: f64,
-    /// How far ceiling lights hang under the ceiling.
+    /// Distance from the ceiling down to its lights.
     pub ceiling_gap_m: f64,
-    /// The side of the light behind the camera.
+    /// Side of the light behind the camera.
     pub camera_side_m: f64,
-    /// How far behind the camera it stands.
+    /// Distance from the camera back to that light.
     pub camera_distance_m: f64,
-    /// Width and height of a wall's light over the wall's own.
+    /// Width and height of a wall's light, as a share of the wall's own.
     pub wall_share: f64,
-    /// How far wall lights stand before their wall.
+    /// Distance from a wall to its light.
     pub wall_gap_m: f64,
-    /// Plane pieces of the architecture narrower or lower than this are no walls.
+    /// Pieces of the architecture that are narrower or lower than this are not walls.
     pub least_wall_m: f64,
+    /// A wall is looked at in a grid of this many places along each of its sides.
+    pub wall_samples: u32,
+    /// Sine of the largest angle between a ceiling's normal and the vertical, and between a wall's normal and the
+    /// horizontal. Triangles of one wall agree in the rounded multiples of this of their normals' coordinates.
+    pub upright_sine: f64,
+    /// Triangles belong to one wall where the distances of their planes from the camera round to the same multiple of
+    /// this.
+    pub same_plane_m: f64,
+    /// A place is visible if nothing is nearer to the camera than the place by more than this.
+    pub visible_within_m: f64,
 }
 
 impl Default for StageRules {
-    /// What every protocol has today.
+    /// The values of every protocol today.
     fn default() -> Self {
         Self {
+            extent_directions: 64,
             cell_m: 1.0,
             cell_share: 0.5,
             ceiling_gap_m: 1e-3,
@@ -37,6 +50,10 @@ impl Default for StageRules {
             wall_share: 0.8,
             wall_gap_m: 1e-3,
             least_wall_m: 0.5,
+            wall_samples: 16,
+            upright_sine: 0.05,
+            same_plane_m: 0.01,
+            visible_within_m: 2e-3,
         }
     }
 }
@@ -45,14 +62,15 @@ impl Default for StageRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitRules {
-    /// Pixels along the side of the squares that are averaged.
+    /// Side of the squares of pixels whose averages are compared, at least 1.
     pub pool: u32,
-    /// Samples a pixel of the light basis that the fit is made on; a stream of its own.
+    /// Samples per pixel of the light basis that the fit is made on; they come from a random stream of their own.
     pub samples: u32,
-    /// Radiances one of which the fit starts from: the one whose picture with grey materials is nearest by luminance.
-    pub start_radiances: Vec<f64>,
-    /// Base colour, linear, of those grey materials.
-    pub start_grey: f32,
-    /// Samples a pixel of that picture: few, since the start does not move where the fit ends.
-    pub start_samples: u32,
+}
+
+impl Default for FitRules {
+    /// The values of every protocol today.
+    fn default() -> Self {
+        Self { pool: 8, samples: 64 }
+    }
 }

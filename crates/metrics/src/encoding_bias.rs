@@ -24,10 +24,10 @@ pub struct EncodingBias {
 }
 
 /// The number of standard errors of the estimate that the bound includes.
-const STANDARD_ERRORS: f64 = 3.0;
+pub const STANDARD_ERRORS: f64 = 3.0;
 /// The share of the mean squared bias that the bound includes for terms of second order in 1 / samples. In simulations
 /// of Gaussian and heavy-tailed noise at 4 to 256 samples, 0.7 sufficed.
-const SECOND_ORDER: f64 = 1.0;
+pub const SECOND_ORDER: f64 = 1.0;
 
 /// Estimates the bias of [`noise_free_mse`](crate::noise_free_mse()) over the mask when it is given halves that went
 /// through `encode`. The halves given here are in linear light.

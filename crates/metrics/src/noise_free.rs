@@ -162,7 +162,7 @@ impl NoiseFreeMse {
 }
 
 /// A Gaussian value exceeds its mean by more than this many standard deviations in 5 % of all cases.
-const ONE_SIDED_95: f64 = 1.645;
+pub const ONE_SIDED_95: f64 = 1.645;
 
 /// The PSNR of a [`NoiseFreeMse`], capped at [`Psnr::CAP_DB`] as [`Psnr`] is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -19,9 +19,14 @@ use crate::pixel::{Pixel, check_finite, check_pair, check_sizes, size_of};
 const RADIUS: usize = 5;
 /// Width and height of the window; pictures must be at least as large.
 pub const WINDOW: usize = 2 * RADIUS + 1;
-pub(crate) const SIGMA: f64 = 1.5;
-pub(crate) const C1: f64 = 0.01 * 0.01;
-pub(crate) const C2: f64 = 0.03 * 0.03;
+/// Standard deviation of the Gaussian window, in pixels.
+pub const SIGMA: f64 = 1.5;
+/// The constant that stabilises the comparison of means.
+pub const K1: f64 = 0.01;
+/// The constant that stabilises the comparison of variances.
+pub const K2: f64 = 0.03;
+pub(crate) const C1: f64 = K1 * K1;
+pub(crate) const C2: f64 = K2 * K2;
 
 /// SSIM over the windows that lie wholly inside a mask.
 #[derive(Clone, Copy, Debug, PartialEq)]

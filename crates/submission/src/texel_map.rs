@@ -13,11 +13,11 @@ use crate::coverage::{Coverage, Part};
 /// How far before a place, across the surface that is hit, another may lie without hiding it, in roundings of the largest
 /// coordinate: 0.01 mm at 10 m. Enough for what rays round; a tenth of what `prep` puts between sheets that lay in one
 /// another.
-const SAME_PLACE_ROUNDINGS: f64 = 16.0;
+pub const SAME_PLACE_ROUNDINGS: f64 = 16.0;
 /// Half the spacing of f32 at 1.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 /// Surfaces at a sharper angle to the ray count as at this cosine.
-const LEAST_COSINE: f64 = 1e-3;
+pub const LEAST_COSINE: f64 = 1e-3;
 
 /// A texel of an atlas that lies on the surface, in whole or in part.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -57,7 +57,7 @@ struct Painted<'w> {
 }
 
 /// Disney's `specular` of predictions, an index of refraction of 1.5.
-const SPECULAR: f32 = 0.5;
+pub const SPECULAR: f32 = 0.5;
 
 impl Repaint {
     /// Predictions for `world`. Both `atlases` and `coats` hold one entry per surface; coats are looked up at the uvs

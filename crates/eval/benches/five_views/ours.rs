@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use mateval_image::{LinearRgb, Picture};
 use mateval_light::light_fit::fit_lights;
+use mateval_light::rules::FitRules;
 use mateval_scene::Camera;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
@@ -39,8 +40,9 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
         Stage::measure("stream C", STREAM_C_SAMPLES, || render(&[input], STREAM_C_SAMPLES, &[seed]));
     let mut stages = vec![stage];
     let photo = photo(folder);
-    let (fit, stage) =
-        Stage::measure("fit", 0, || fit_lights(&stream_c[0].halves[0].basis, &photo, None, None).unwrap());
+    let (fit, stage) = Stage::measure("fit", 0, || {
+        fit_lights(&FitRules::default(), &stream_c[0].halves[0].basis, &photo, None).unwrap()
+    });
     stages.push(stage);
     let mut errors: Vec<f64> = fit.weights.iter().flatten().map(|weight| (weight - 1.0).abs()).collect();
     errors.sort_by(f64::total_cmp);

@@ -120,7 +120,7 @@ fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
 /// Of each view, the pair's error without noise.
 fn noise_free(room: &Room, pair: &Pair, masks: &[Mask]) -> Vec<NoiseFreeMse> {
     let exposure = room.scene.exposure as f32;
-    let blocks = noise_blocks(&room.cameras(), room.protocol.light.noise.block_pixels);
+    let blocks = noise_blocks(&room.protocol.light.noise, &room.cameras());
     let mse = |view: usize| {
         let [a, b] = [0, 1].map(|k| encoded(&pair[k][view], exposure));
         let [truth_a, truth_b] = [0, 1].map(|k| encoded(&room.light[view].halves[k], exposure));

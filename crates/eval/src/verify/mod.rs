@@ -88,8 +88,7 @@ fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
 }
 
 fn to_value(result: &ResultFile) -> Result<serde_json::Value, EvalError> {
-    let invalid = |error: serde_json::Error| EvalError::Invalid(format!("cannot compare results: {error}"));
-    serde_json::to_value(result).map_err(invalid)
+    serde_json::to_value(result).map_err(EvalError::Compare)
 }
 
 fn finding(file: &str, difference: &Difference) -> Finding {

@@ -5,6 +5,7 @@ use mateval_scene::{Finding, Severity};
 use super::differences::differences;
 use super::{VerifyPlan, file_name};
 use crate::error::EvalError;
+use crate::metric::LPIPS_NET;
 use crate::protocol::Protocol;
 use crate::result::{RESULT_FORMAT, ResultFile};
 use crate::score::LpipsWeights;
@@ -52,7 +53,6 @@ pub(super) fn findings(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec
 type MakeFinding<'a> = dyn Fn(&str, &str, String, &str) -> Finding + 'a;
 
 fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>, EvalError> {
-    let invalid = |error: serde_json::Error| EvalError::Invalid(format!("cannot compare protocols: {error}"));
     let mut findings = Vec::new();
     for (name, scores) in &result.protocols {
         let place = format!("/protocols/{name}/protocol");
@@ -61,7 +61,8 @@ fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>,
             findings.push(finding("other_protocol", &place, message, "verify it with the version that made it"));
             continue;
         };
-        let values = [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(invalid));
+        let values =
+            [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(EvalError::Compare));
         let [said, known] = values;
         for difference in differences(&said?, &known?) {
             let message = format!("the result says {}; protocol '{name}' has {}", difference.said, difference.found);
@@ -77,11 +78,10 @@ fn weights(
     result: &ResultFile,
     finding: &MakeFinding<'_>,
 ) -> Result<Option<Finding>, EvalError> {
-    let Some(said) = result.lpips_weights.get("alex").and_then(Option::as_ref) else { return Ok(None) };
+    let Some(said) = result.lpips_weights.get(LPIPS_NET.name()).and_then(Option::as_ref) else { return Ok(None) };
     match &plan.lpips {
         LpipsWeights::Missing { reason, fix } => {
-            let what = format!("the result has LPIPS, and its weights are not here: {reason}; run: {fix}");
-            Err(EvalError::Invalid(what))
+            Err(EvalError::LpipsWeights { reason: reason.clone(), fix: fix.clone() })
         }
         LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),
         LpipsWeights::Loaded(lpips) => {

@@ -91,7 +91,7 @@ impl Room {
             Mask::from_fn(k.width as usize, k.height as usize, |x, y| valid.get(place(x), place(y)))
         });
         let valid = valid.collect();
-        let blocks = noise_blocks(&cameras, hasty().light.noise.block_pixels);
+        let blocks = noise_blocks(&hasty().light.noise, &cameras);
         Self { cameras, valid, blocks, world, repaint }
     }
 

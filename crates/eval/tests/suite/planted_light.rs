@@ -1,15 +1,11 @@
-//! Radiances that were planted on the stage are found again, wherever the search begins.
+//! Radiances that were planted on the stage are found again.
 //!
 //! Only by the basis that made the photo: at 64x48 pixels nine lights, some of a sixtieth of others' light, stand against 48
 //! averaged squares, and between two streams of samples most radiances are off by half their value or more.
 
 use std::sync::{Arc, LazyLock};
 
-use mateval_eval::light_rules::{LightRules, Track};
-use mateval_eval::noise_blocks::noise_blocks;
-use mateval_eval::predicted_light::{FittedRadiances, LitScene, Photo, predicted_light};
-use mateval_eval::rgb::LightReference;
-use mateval_eval::truth::{RgbTruth, ViewTruth};
+use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Picture};
 use mateval_light::light_fit::fit_lights;
 use mateval_light::light_stage::{self, NamedLight};
@@ -88,44 +84,10 @@ impl Staged {
         let world = self.world.on_stage(&quads).unwrap();
         basis_of((&world, &self.atlases, &self.prediction), self.scene.views[0].camera, samples, seed)
     }
-
-    /// What scoring fits to `photo`.
-    fn fitted(&self, photo: &Picture<LinearRgb>, rules: &LightRules) -> FittedRadiances {
-        let view = &self.scene.views[0];
-        let truth = RgbTruth { halves: [photo.clone(), photo.clone()], shown: photo.clone() };
-        let protocol = hasty();
-        let reference = LightReference::new(&protocol, None, &truth, self.scene.exposure).unwrap();
-        let lit = LitScene {
-            scene: self.scene,
-            world: &self.world,
-            atlases: &self.atlases,
-            views: vec![view],
-            truths: std::slice::from_ref(&self.truth),
-            references: &[reference],
-            blocks: &noise_blocks(&[view.camera], protocol.light.noise.block_pixels),
-            photo: Photo { view, light: photo.clone(), valid: &self.truth.valid },
-            lightings: Vec::new(),
-        };
-        let mut fits = Vec::new();
-        let predictions = std::slice::from_ref(&self.prediction);
-        predicted_light(&lit, rules, predictions, &|_, _, _| (), &mut |_, light| {
-            fits.extend(light.fit);
-            Ok(())
-        })
-        .unwrap();
-        fits.remove(0)
-    }
 }
 
 fn flavour() -> mateval_scene::material::PrincipledFlavour {
     hasty().light.flavour
-}
-
-fn rules() -> LightRules {
-    let mut rules = hasty().light;
-    rules.tracks = vec![Track::Fitted];
-    rules.fit.samples = 32;
-    rules
 }
 
 /// Relative errors, of all lights and channels, in order.
@@ -141,8 +103,9 @@ fn the_basis_that_made_the_photo_gives_its_radiances() {
     let staged = &*STAGED;
     let mix: LightMix = (0..staged.stage.len()).map(planted).collect();
     let basis = staged.basis(|_| [1.0; 3], 32, 1);
-    let fit =
-        |photo: &Picture<LinearRgb>| fit_lights(&basis, photo, Some(&staged.truth.valid), Some(1.0)).unwrap().weights;
+    let fit = |photo: &Picture<LinearRgb>| {
+        fit_lights(&hasty().light.fit, &basis, photo, Some(&staged.truth.valid)).unwrap().weights
+    };
     let found = errors(&fit(&basis.weighted(&mix).unwrap()));
     assert!(found.len() == 27 && found[26] < 1e-3, "{found:?}");
     // The twin: all lights alike.
@@ -161,28 +124,10 @@ fn a_noisy_photo_gives_the_radiances_of_a_rooms_own_lights() {
     let mix: LightMix = (0..world.emitters().groups()).map(planted).collect();
     let photo = basis(256, 2).weighted(&mix).unwrap();
     let median = |samples: u32| {
-        let errors = errors(&fit_lights(&basis(samples, 1), &photo, Some(&truth.valid), Some(1.0)).unwrap().weights);
+        let errors =
+            errors(&fit_lights(&hasty().light.fit, &basis(samples, 1), &photo, Some(&truth.valid)).unwrap().weights);
         errors[errors.len() / 2]
     };
     let [found, twin] = [256, 1].map(median);
     assert!(found < 0.02 && twin > 0.02, "{found} {twin}");
-}
-
-/// Of a photo with noise of its own, so that no radiances explain all of it.
-#[test]
-fn the_start_changes_nothing() {
-    let staged = &*STAGED;
-    let photo = staged.basis(planted, 16, 99).sum();
-    let from = |start: f64| {
-        let mut rules = rules();
-        rules.fit.start_radiances = vec![start];
-        let fit = staged.fitted(&photo, &rules);
-        assert_eq!(fit.start_radiance, start);
-        fit.lights.iter().flat_map(|light| light.radiance).collect::<Vec<_>>()
-    };
-    let first = from(0.5);
-    for start in [1.5, 4.0] {
-        let apart = first.iter().zip(from(start)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(apart < 1e-6, "{apart} from {start}");
-    }
 }

@@ -1,8 +1,8 @@
 //! The radiances under which a scene looks most like its photo.
 //!
-//! In: a light basis of the input view and the photo. Out: one weight a light group and channel, the non-negative ones of
-//! the least sum of absolute differences, with a proof that they are ([`NonnegativeL1`]). Between: both are averaged over
-//! squares of 8 x 8 pixels, because L1 on noisy pixels is biased: towards the median of the noise, not its mean.
+//! In: a light basis of the input view and the photo. Out: one weight for each light group and channel, the non-negative
+//! ones with the least sum of absolute differences, and a proof that they are ([`NonnegativeL1`]). Both are first averaged
+//! over squares of [`FitRules::pool`] pixels, because L1 on noisy pixels is biased towards the median of the noise.
 
 mod nonnegative_l1;
 
@@ -10,15 +10,13 @@ use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_tracer::LightBasis;
 
 use crate::error::LightError;
-pub use nonnegative_l1::{NonnegativeL1, solve};
-
-/// Pixels along the side of the squares that are averaged.
-pub const POOL: usize = 8;
+use crate::rules::FitRules;
+pub use nonnegative_l1::{MOST_STEPS, NonnegativeL1, SHORTNESS, STEP_SHARE, TOLERANCE, ZERO_BELOW, solve};
 
 /// Weights for a light basis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightFit {
-    /// One a group of lights, red, green and blue, not negative; they multiply the scene's own radiances.
+    /// Red, green and blue of each light group, not negative; they multiply the scene's own radiances.
     pub weights: Vec<[f64; 3]>,
     /// Red, green, blue: how well the weights fit, and the proof that no others fit better.
     pub channels: [NonnegativeL1; 3],
@@ -26,44 +24,45 @@ pub struct LightFit {
     pub relative_gap: f64,
 }
 
-/// Fits the basis to `target`, by the pixels in `mask` if there is one. The search begins with all weights at `start`
-/// (where absent, at what makes the brightness right); the weights found do not depend on it.
+/// Fits the basis to `target`, by the pixels in `mask` if there is one.
 ///
-/// Fails where sizes differ, where no weights are found, or where a picture holds what no light sends: not finite numbers, or negative ones in the basis.
+/// Fails if sizes differ, if no weights are found, or if a picture holds values that light cannot have: values that are not
+/// finite, or negative ones in the basis.
 pub fn fit_lights(
+    rules: &FitRules,
     basis: &LightBasis,
     target: &Picture<LinearRgb>,
     mask: Option<&Mask>,
-    start: Option<f64>,
 ) -> Result<LightFit, LightError> {
     check(basis, target, mask)?;
-    let target = pooled(target, mask);
-    let columns: Vec<[Vec<f64>; 3]> = basis.pictures().iter().map(|picture| pooled(picture, mask)).collect();
+    let target = pooled(rules, target, mask);
+    let columns: Vec<[Vec<f64>; 3]> = basis.pictures().iter().map(|picture| pooled(rules, picture, mask)).collect();
     let channels = [0, 1, 2].map(|channel| {
         let columns: Vec<Vec<f64>> = columns.iter().map(|column| column[channel].clone()).collect();
-        solve(&columns, &target[channel], start)
+        solve(&columns, &target[channel])
     });
     let gaps = [0, 1, 2].map(|channel| channels[channel].relative_gap(&target[channel]));
     let numbers = channels.iter().flat_map(|fit| &fit.weights).chain(&gaps);
     if !numbers.into_iter().all(|v| v.is_finite()) {
-        return Err(LightError::NoSolution);
+        return Err(LightError::NoSolution { lights: columns.len(), squares: target[0].len() });
     }
     let relative_gap = gaps.into_iter().fold(0.0, f64::max);
     let weights = (0..columns.len()).map(|group| [0, 1, 2].map(|channel| channels[channel].weights[group]));
     Ok(LightFit { weights: weights.collect(), channels, relative_gap })
 }
 
-/// Averages over squares of [`POOL`] pixels, by channel; what lies outside the mask or the picture counts as black, so
-/// that every pixel counts alike.
-pub fn pooled(picture: &Picture<LinearRgb>, mask: Option<&Mask>) -> [Vec<f64>; 3] {
-    let (columns, rows) = (picture.width().div_ceil(POOL), picture.height().div_ceil(POOL));
+/// Averages over squares of [`FitRules::pool`] pixels, by channel. Pixels outside the mask or the picture count as black,
+/// so that every pixel has the same weight.
+pub fn pooled(rules: &FitRules, picture: &Picture<LinearRgb>, mask: Option<&Mask>) -> [Vec<f64>; 3] {
+    let pool = rules.pool.max(1) as usize;
+    let (columns, rows) = (picture.width().div_ceil(pool), picture.height().div_ceil(pool));
     let mut sums = [0, 1, 2].map(|_| vec![0.0; columns * rows]);
     for y in 0..picture.height() {
         for x in 0..picture.width() {
             if mask.is_none_or(|mask| mask.get(x, y)) {
-                let square = y / POOL * columns + x / POOL;
+                let square = y / pool * columns + x / pool;
                 for (sums, value) in sums.iter_mut().zip(picture.get(x, y).0) {
-                    sums[square] += f64::from(value) / (POOL * POOL) as f64;
+                    sums[square] += f64::from(value) / (pool * pool) as f64;
                 }
             }
         }
@@ -76,18 +75,24 @@ fn check(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>) -
     if let Some(mask) = mask.filter(|mask| !mask.same_size(target)) {
         return Err(LightError::MaskSize { mask: [mask.width(), mask.height()], photo });
     }
-    if target.pixels().iter().any(|pixel| pixel.0.iter().any(|v| !v.is_finite())) {
-        return Err(LightError::PhotoNotFinite);
+    if let Some((at, value)) = first_pixel(target, |v| !v.is_finite()) {
+        return Err(LightError::PhotoNotFinite { at, value });
     }
     for (group, picture) in basis.pictures().iter().enumerate() {
         if !picture.same_size(target) {
             return Err(LightError::BasisSize { basis: [picture.width(), picture.height()], photo });
         }
-        if picture.pixels().iter().any(|pixel| pixel.0.iter().any(|v| !v.is_finite() || *v < 0.0)) {
-            return Err(LightError::BasisPicture { group });
+        if let Some((at, value)) = first_pixel(picture, |v| !v.is_finite() || v < 0.0) {
+            return Err(LightError::BasisPicture { group, at, value });
         }
     }
     Ok(())
+}
+
+/// The first pixel of which a channel is `wrong`.
+fn first_pixel(picture: &Picture<LinearRgb>, wrong: impl Fn(f32) -> bool) -> Option<([usize; 2], [f32; 3])> {
+    let at = picture.pixels().iter().position(|pixel| pixel.0.iter().any(|v| wrong(*v)))?;
+    Some(([at % picture.width(), at / picture.width()], picture.pixels()[at].0))
 }
 
 #[cfg(test)]
@@ -106,6 +111,10 @@ mod tests {
         LightBasis::new(30, 20, pictures).unwrap()
     }
 
+    fn rules() -> FitRules {
+        FitRules::default()
+    }
+
     const WEIGHTS: [[f64; 3]; 3] = [[0.5, 2.0, 0.0], [1.0, 0.0, 3.0], [0.0, 0.25, 1.0]];
 
     fn error(fit: &LightFit) -> f64 {
@@ -115,24 +124,9 @@ mod tests {
 
     #[test]
     fn weights_of_each_channel_are_found() {
-        let fit = fit_lights(&basis(), &basis().weighted(&WEIGHTS).unwrap(), None, None).unwrap();
+        let fit = fit_lights(&rules(), &basis(), &basis().weighted(&WEIGHTS).unwrap(), None).unwrap();
         assert!(error(&fit) < 1e-5, "{:?}", fit.weights);
         assert!(fit.relative_gap < 1e-6, "{}", fit.relative_gap);
-    }
-
-    /// Wherever the search begins, it ends in one place.
-    #[test]
-    fn the_start_changes_nothing() {
-        let mut target = basis().weighted(&WEIGHTS).unwrap();
-        // Such as no weights explain, so that the end is decided by the sum and not by a fit.
-        (0..30).for_each(|x| target.set(x, 3, LinearRgb([0.7, 0.1, 0.9])));
-        let fits = [None, Some(0.5), Some(4.0), Some(1e-3), Some(50.0)]
-            .map(|start| fit_lights(&basis(), &target, None, start).unwrap().weights);
-        let weights = || fits[0].iter().flatten();
-        for fit in &fits[1..] {
-            let apart = fit.iter().flatten().zip(weights()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(apart < 1e-6, "{apart}");
-        }
     }
 
     /// A window that no light of the basis explains does not count when it is masked out, and does when it fills half.
@@ -143,21 +137,21 @@ mod tests {
         for y in 0..20 {
             (13..30).for_each(|x| target.set(x, y, LinearRgb([9.0; 3])));
         }
-        assert!(error(&fit_lights(&basis(), &target, Some(&mask), None).unwrap()) < 1e-5);
-        assert!(error(&fit_lights(&basis(), &target, None, None).unwrap()) > 0.1, "the twin passes");
+        assert!(error(&fit_lights(&rules(), &basis(), &target, Some(&mask)).unwrap()) < 1e-5);
+        assert!(error(&fit_lights(&rules(), &basis(), &target, None).unwrap()) > 0.1, "the twin passes");
     }
 
     #[test]
     fn squares_are_averaged_and_edges_count_by_area() {
         let picture = Picture::from_fn(12, 8, |x, y| LinearRgb([(x + y) as f32, 1.0, 0.0]));
-        let [red, green, blue] = pooled(&picture, None);
+        let [red, green, blue] = pooled(&rules(), &picture, None);
         assert_eq!((red[0], &green[..], &blue[..]), (7.0, &[1.0, 0.5][..], &[0.0, 0.0][..]));
     }
 
     #[test]
     fn what_cannot_be_fitted_is_refused() {
         let message = |basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>| {
-            fit_lights(basis, target, mask, None).unwrap_err().to_string()
+            fit_lights(&rules(), basis, target, mask).unwrap_err().to_string()
         };
         let target = basis().sum();
         let small = Picture::filled(4, 4, LinearRgb([1.0; 3]));
@@ -165,7 +159,7 @@ mod tests {
         assert!(message(&basis(), &target, Some(&Mask::filled(4, 4, true))).contains("the mask"));
         let mut broken = target.clone();
         broken.set(3, 3, LinearRgb([f32::NAN; 3]));
-        assert!(message(&basis(), &broken, None).contains("not finite"));
+        assert!(message(&basis(), &broken, None).contains("pixel (3, 3) of the photo is [NaN"));
         let mut negative = basis().pictures().to_vec();
         negative[1].set(0, 0, LinearRgb([-1e-9; 3]));
         let negative = LightBasis::new(30, 20, negative).unwrap();
@@ -175,10 +169,10 @@ mod tests {
     /// Black photos and no lights at all are fitted, by nothing.
     #[test]
     fn nothing_is_fitted_by_nothing() {
-        let black = fit_lights(&basis(), &Picture::filled(30, 20, LinearRgb::default()), None, None).unwrap();
+        let black = fit_lights(&rules(), &basis(), &Picture::filled(30, 20, LinearRgb::default()), None).unwrap();
         assert_eq!((black.weights, black.relative_gap), (vec![[0.0; 3]; 3], 0.0));
         let none = LightBasis::new(30, 20, Vec::new()).unwrap();
-        let fit = fit_lights(&none, &basis().sum(), None, None).unwrap();
+        let fit = fit_lights(&rules(), &none, &basis().sum(), None).unwrap();
         assert!(fit.weights.is_empty() && fit.relative_gap == 0.0, "{fit:?}");
     }
 }

@@ -33,18 +33,20 @@ impl NonnegativeL1 {
     }
 }
 
-/// Of the square of the weights' length, for a target and columns of mean 1: at most this, times half the squared
-/// length, is lost of the mean.
-const SHORTNESS: f64 = 1e-6;
+/// The factor of half the squared length of the weights in the objective, for a target and columns of mean 1. The mean
+/// absolute difference grows by at most this factor times half the squared length.
+pub const SHORTNESS: f64 = 1e-6;
 /// Mean complementarity at which the steps end, for a mean target of 1.
-const ENOUGH: f64 = 1e-12;
-const MOST_STEPS: u32 = 100;
-/// How far towards the nearest bound a step goes.
-const STEP_SHARE: f64 = 0.9995;
+pub const TOLERANCE: f64 = 1e-12;
+/// The largest number of steps.
+pub const MOST_STEPS: u32 = 100;
+/// The share of the way to the nearest bound that a step covers.
+pub const STEP_SHARE: f64 = 0.9995;
+/// A weight below this becomes 0 if its multiplier is the larger of the two.
+pub const ZERO_BELOW: f64 = 1e-6;
 
-/// Solves the problem for columns of one length, all finite and not negative, and a finite target. `start` is where all
-/// weights begin, above 0; where absent they share the target's mean.
-pub fn solve(columns: &[Vec<f64>], target: &[f64], start: Option<f64>) -> NonnegativeL1 {
+/// Solves the problem for columns of one length, all finite and not negative, and a finite target.
+pub fn solve(columns: &[Vec<f64>], target: &[f64]) -> NonnegativeL1 {
     let rows = target.len().max(1) as f64;
     let target_scale = target.iter().map(|v| v.abs()).sum::<f64>() / rows;
     let brightness: Vec<f64> = columns.iter().map(|column| column.iter().sum::<f64>() / rows).collect();
@@ -58,8 +60,7 @@ pub fn solve(columns: &[Vec<f64>], target: &[f64], start: Option<f64>) -> Nonneg
             columns: lit.iter().map(|&e| scaled(&columns[e], brightness[e])).collect(),
             target: scaled(target, target_scale),
         };
-        let begin = |&e: &usize| start.map_or(1.0 / lit.len() as f64, |start| start * brightness[e] / target_scale);
-        found = problem.solve(lit.iter().map(begin).collect());
+        found = problem.solve();
         for (&e, weight) in lit.iter().zip(problem.rounded_to_zero(&found)) {
             weights[e] = weight * target_scale / brightness[e];
         }
@@ -120,11 +121,12 @@ impl Problem {
         SHORTNESS * self.target.len() as f64
     }
 
-    fn solve(&self, weights: Vec<f64>) -> Point {
-        let mut at = self.start(weights);
+    fn solve(&self) -> Point {
+        let mut at = self.start();
         while at.steps < MOST_STEPS {
             let complementarity = at.complementarity();
-            if complementarity < ENOUGH && self.dual_residual(&at).iter().all(|r| r.abs() < 1e-9 * at.y.len() as f64) {
+            if complementarity < TOLERANCE && self.dual_residual(&at).iter().all(|r| r.abs() < 1e-9 * at.y.len() as f64)
+            {
                 break;
             }
             let Some(step) = self.step(&at, complementarity) else { break };
@@ -134,8 +136,10 @@ impl Problem {
         at
     }
 
-    fn start(&self, r: Vec<f64>) -> Point {
+    /// Weights that share the target's mean, with multipliers well inside their bounds.
+    fn start(&self) -> Point {
         let (lights, rows) = (self.columns.len(), self.target.len());
+        let r = vec![1.0 / lights as f64; lights];
         let rest: Vec<f64> = self.target.iter().zip(product(&self.columns, &r, rows)).map(|(t, p)| t - p).collect();
         let part = |sign: f64| rest.iter().map(|s| (sign * s).max(0.0) + 1.0).collect();
         Point { r, z: vec![rows as f64; lights], u: part(1.0), v: part(-1.0), y: vec![0.0; rows], steps: 0 }
@@ -198,7 +202,7 @@ impl Problem {
     /// The weights, with 0 for those that the multipliers hold there.
     fn rounded_to_zero(&self, at: &Point) -> Vec<f64> {
         let rows = at.y.len() as f64;
-        at.r.iter().zip(&at.z).map(|(&r, &z)| if r < z / rows && r < 1e-6 { 0.0 } else { r }).collect()
+        at.r.iter().zip(&at.z).map(|(&r, &z)| if r < z / rows && r < ZERO_BELOW { 0.0 } else { r }).collect()
     }
 }
 
@@ -365,7 +369,7 @@ mod tests {
             let columns = columns(lights, rows);
             let weights = if lights == 1 { vec![0.7] } else { planted(lights) };
             let target = product(&columns, &weights, rows);
-            let found = solve(&columns, &target, None);
+            let found = solve(&columns, &target);
             assert!(error(&found.weights, &weights) < 1e-6);
             assert!(found.weights.iter().zip(&weights).all(|(found, planted)| *planted > 0.0 || *found == 0.0));
             check(&columns, &target, &found).unwrap();
@@ -379,7 +383,7 @@ mod tests {
         for (i, number) in numbers(5, 1000).into_iter().enumerate().filter(|(_, v)| *v < 0.1) {
             target[i] += 100.0 * number;
         }
-        let found = solve(&columns, &target, None);
+        let found = solve(&columns, &target);
         check(&columns, &target, &found).unwrap();
         assert!(error(&found.weights, &weights) < 1e-5);
     }
@@ -391,7 +395,7 @@ mod tests {
             let noise = numbers(9, 2040);
             let mut target = product(&columns, &planted(lights), 2040);
             target.iter_mut().zip(&noise).for_each(|(t, n)| *t += 0.3 * (n - 0.5));
-            let found = solve(&columns, &target, None);
+            let found = solve(&columns, &target);
             check(&columns, &target, &found).unwrap();
         }
     }
@@ -405,7 +409,7 @@ mod tests {
         let column = |e: usize| (0..12).map(|i| ((7 * e + 3) * (i + 1) % 11) as f64 / 10.0).collect();
         let columns: Vec<Vec<f64>> = (0..3).map(column).collect();
         let target: Vec<f64> = (0..12).map(|i| ((5 * i + 2) % 7) as f64 / 3.0).collect();
-        let found = solve(&columns, &target, None);
+        let found = solve(&columns, &target);
         check(&columns, &target, &found).unwrap();
         assert!((found.sum / HIGHS_SUM - 1.0).abs() < 1e-6 && found.bound <= HIGHS_SUM * (1.0 + 1e-12), "{found:?}");
         assert!(error(&found.weights, &HIGHS_WEIGHTS) < 1e-5, "{:?}", found.weights);
@@ -417,7 +421,7 @@ mod tests {
         let columns = columns(5, 100);
         let mut target = product(&columns, &planted(5), 100);
         target.iter_mut().zip(numbers(9, 100)).for_each(|(t, n)| *t += 0.3 * (n - 0.5));
-        let found = solve(&columns, &target, None);
+        let found = solve(&columns, &target);
         check(&columns, &target, &found).unwrap();
         let passes = |change: fn(&mut NonnegativeL1)| {
             let mut changed = found.clone();
@@ -437,7 +441,7 @@ mod tests {
         let target = product(&columns, &weights, 300);
         columns.push(columns[1].clone());
         columns.insert(0, vec![0.0; 300]);
-        let found = solve(&columns, &target, None);
+        let found = solve(&columns, &target);
         assert!(error(&found.weights, &[0.0, 1.0, 1.0, 0.5, 1.5, 1.0]) < 1e-5, "{:?}", found.weights);
         assert_eq!(found.weights[0], 0.0);
         check(&columns, &target, &found).unwrap();

@@ -1,52 +1,15 @@
-//! A room of 4 x 2.5 x 6 metres.
+//! The stage of a plain closed room.
 
 use std::sync::Arc;
 
-use glam::Vec2;
 use mateval_scene::dataset::{FORMAT, Instance, SceneSource, View};
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_scene::{InstanceId, InstanceIndex, Intrinsics, Role, SceneId, SceneLights, SourceKind, ViewId};
+use mateval_scene::{InstanceId, InstanceIndex, Role, SceneId, SceneLights, SourceKind, TriangleMesh, ViewId};
+use mateval_testkit::box_room::{WALLS, box_room, camera, quad};
 
 use super::*;
 
-fn quad(corner: [f32; 3], u: [f32; 3], v: [f32; 3]) -> TriangleMesh {
-    let (corner, u, v) = (Vec3::from(corner), Vec3::from(u), Vec3::from(v));
-    TriangleMesh {
-        positions: vec![corner, corner + u, corner + u + v, corner + v],
-        uvs: Some(vec![Vec2::ZERO; 4]),
-        triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..Default::default()
-    }
-}
-
-/// Floor, ceiling, walls at x = 0 and 4, z = 0 and 6; then `more`.
 fn world(more: Vec<TriangleMesh>) -> World {
-    let [x, y, z] = [[4.0, 0.0, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 6.0]];
-    let mut meshes = vec![
-        quad([0.0; 3], x, z),
-        quad([0.0, 2.5, 0.0], x, z),
-        quad([0.0; 3], y, z),
-        quad([4.0, 0.0, 0.0], y, z),
-        quad([0.0; 3], x, y),
-        quad([0.0, 0.0, 6.0], x, y),
-    ];
-    meshes.extend(more);
-    let model = MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None };
-    let material = Material { name: String::new(), model, two_sided: true, opacity: None, bump: None };
-    let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
-    let scene = ReferenceScene {
-        surfaces: meshes.into_iter().map(surface).collect(),
-        materials: vec![material],
-        ..Default::default()
-    };
-    World::new(Arc::new(scene)).unwrap()
-}
-
-/// At the back of the room, looking along -z to the far wall, 60 degrees wide.
-fn camera() -> Camera {
-    let intrinsics = Intrinsics::from_fov_x(320, 180, 60_f64.to_radians());
-    Camera::look_at(DVec3::new(2.0, 1.2, 5.5), DVec3::new(2.0, 1.2, 0.0), DVec3::Y, intrinsics).unwrap()
+    World::new(Arc::new(box_room(more))).unwrap()
 }
 
 fn rules() -> StageRules {
@@ -64,7 +27,7 @@ fn normal(light: &StageLight) -> Vec3 {
 
 #[test]
 fn an_empty_room() {
-    let lights = lights(&rules(), &world(Vec::new()), &[2, 3, 4, 5], &[camera()]);
+    let lights = lights(&rules(), &world(Vec::new()), &WALLS, &[camera()]);
     // Four columns; the picture's upper edge rises by 0.325 a metre: the ceiling, 1.3 above, is in view from 4 metres
     // before the camera on. Cells end 0.25 beyond their middles, which are at 0.5, 1.5, ...
     let ceiling = named(&lights, "ceiling");
@@ -85,19 +48,19 @@ fn an_empty_room() {
     assert!((a.z - 5.999).abs() < 1e-5 && normal(&walls[0].light).z < -0.999);
 }
 
-/// What any view sees is dark: turned views take cells and walls away.
+/// Turned views see more of the room, so that fewer cells and walls get a light.
 #[test]
-fn every_view_counts() {
+fn no_light_lies_in_any_view() {
     let turned = camera().turned(5.0, 5.0);
     let room = world(Vec::new());
-    let one = lights(&rules(), &room, &[2, 3, 4, 5], &[camera()]);
-    let two = lights(&rules(), &room, &[2, 3, 4, 5], &[camera(), turned]);
+    let one = lights(&rules(), &room, &WALLS, &[camera()]);
+    let two = lights(&rules(), &room, &WALLS, &[camera(), turned]);
     assert!(named(&two, "ceiling").len() < named(&one, "ceiling").len());
 }
 
-/// A screen across the room hides the far part, and pieces that are too small or not upright are no walls.
+/// A screen across the room hides its far part, and a low ledge is not a wall.
 #[test]
-fn what_is_hidden_or_small_takes_no_part() {
+fn hidden_and_low_pieces_get_no_light() {
     let screen = quad([0.0, 0.0, 3.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0]);
     let ledge = quad([0.0, 1.0, 5.9], [4.0, 0.0, 0.0], [0.0, 0.2, 0.0]);
     let lights = lights(&rules(), &world(vec![screen, ledge]), &[2, 3, 4, 5, 6, 7], &[camera()]);
@@ -157,17 +120,4 @@ fn only_architecture_gets_wall_lights() {
     // The twin: the same quad as architecture.
     let walls = named(&lights_with_screen(&Role::Architecture { kind: "Other".to_owned() }), "wall");
     assert!(walls.iter().any(|wall| (wall.light.mesh.positions[0].z - 5.799).abs() < 1e-4), "{walls:?}");
-}
-
-#[test]
-fn frusta_are_met_exactly() {
-    let camera = camera();
-    // At depth 5 the picture reaches 5 tan 30 = 2.887 to each side.
-    let beside = |x: f64| Rectangle { corner: DVec3::new(2.0 + x, 1.0, 0.5), sides: [DVec3::X, DVec3::Y * 0.1] };
-    assert!(meets_frustum(&camera, &beside(2.88)) && !meets_frustum(&camera, &beside(2.89)));
-    // Larger than the picture, with every corner outside.
-    let large = Rectangle { corner: DVec3::new(-50.0, -50.0, 0.5), sides: [DVec3::X * 100.0, DVec3::Y * 100.0] };
-    assert!(meets_frustum(&camera, &large));
-    let behind = Rectangle { corner: DVec3::new(2.0, 1.0, 5.6), sides: [DVec3::X * 0.1, DVec3::Y * 0.1] };
-    assert!(!meets_frustum(&camera, &behind));
 }

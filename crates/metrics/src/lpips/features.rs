@@ -11,10 +11,11 @@ use crate::pixel::{check_finite, size_of};
 
 /// LPIPS' scaling layer, for a picture in -1..1: `SHIFT` is subtracted from each channel, the result is divided by
 /// `SCALE`. They are ImageNet's mean and standard deviation, converted from 0..1 to -1..1.
-const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
-const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
+pub const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
+/// See [`SHIFT`].
+pub const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
 /// Keeps a pixel at zero where all channels are zero.
-const EPSILON: f64 = 1e-10;
+pub const EPSILON: f64 = 1e-10;
 
 /// The responses of the five stages to one picture, the channels of every pixel normalised to unit length.
 #[derive(Clone, Debug)]

@@ -24,7 +24,7 @@ use std::path::Path;
 use mateval_image::{Mask, Picture, SrgbRgb};
 
 pub use extrapolated::{ExtrapolatedLpips, MeanAndHalves};
-pub use features::Features;
+pub use features::{EPSILON, Features, SCALE, SHIFT};
 pub use net::{ALEX_FILE_NAME, ALEX_SHA256, Net, VGG_FILE_NAME, VGG_SHA256};
 
 use crate::MetricError;

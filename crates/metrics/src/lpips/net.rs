@@ -30,6 +30,14 @@ impl Net {
         }
     }
 
+    /// The network's name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Alex => "alex",
+            Self::Vgg => "vgg",
+        }
+    }
+
     /// Name of the weights file.
     pub const fn file_name(self) -> &'static str {
         match self {

@@ -32,7 +32,7 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
     let intervals = board.ranking().keys.values().flat_map(|key| &key.standings);
     let page = ProtocolPage {
         dataset: &board.file.dataset,
-        weights: result.lpips_weights.get(&scores.protocol.lpips_net).and_then(Option::as_ref),
+        weights: result.lpips_weights.get(&scores.protocol.fixed.lpips_net).and_then(Option::as_ref),
         renderer: result.dataset.scored_renderer.as_ref().map(mateval_scene::RendererId::as_str),
         protocol_sha256: scores.protocol.sha256(),
         rules: rules_of(&scores.protocol),

@@ -1,0 +1,134 @@
+//! The part of a protocol that the code holds: constants that move numbers and that no protocol can change.
+//!
+//! Each value is taken from the constant that the code uses, so that what a result publishes cannot differ from what was
+//! computed. Constants of published definitions are not listed: sRGB's curve, Rec. 709's luminance, the weights and layers
+//! of LPIPS' network (whose hash is in the result). Nor are those of the path tracer, which estimates an integral that does
+//! not depend on them.
+
+use mateval_light::light_fit;
+use mateval_metrics::{Psnr, encoding_bias, lpips, noise_free, ssim};
+use mateval_submission::{map_file, memory_budget, prediction, texel_map};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::metric::LPIPS_NET;
+
+/// Constants that all protocols share. Each entry says why no protocol can change it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixedRules {
+    /// Number of places, in a regular square, whose mean is a pixel of a map. The dataset's pictures are made with them.
+    pub subpixels: usize,
+    /// Surfaces of lower opacity are looked through in those pictures, as in the dataset's.
+    pub cut_out_below_opacity: f32,
+    /// Score of a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
+    pub missing_base_color: f32,
+    /// Score of a missing or unsound roughness, as the format promises.
+    pub missing_roughness: f32,
+    /// Score of a missing or unsound metallic, as the format promises.
+    pub missing_metallic: f32,
+    /// A base colour with values outside this range is unsound, by the format.
+    pub base_color_range: [f32; 2],
+    /// A roughness or metallic with values outside this range is unsound, by the format.
+    pub scalar_range: [f32; 2],
+    /// A map whose file is larger than this, in bytes, is unsound, by the format.
+    pub most_map_bytes: u64,
+    /// An EXR map of more numbers than this is unsound, by the format.
+    pub most_exr_numbers: usize,
+    /// Maps of a scene that take more memory than this together, in bytes, are unsound, by the format.
+    pub most_scene_bytes: usize,
+    /// `specular` of predictions, which submissions do not hold.
+    pub predicted_specular: f32,
+    /// Facets below this roughness do not reflect the lights of a stage; the tracer's definition of such lights.
+    pub stage_roughness: f32,
+    /// The largest PSNR, in dB, which an MSE of 1e-10 or less has. Results of all protocols are shown in one table.
+    pub psnr_cap_db: f64,
+    /// Number of standard errors below which an MSE of light may be 0, so that its PSNR is a lower bound: one-sided 95 %.
+    pub lower_bound_standard_errors: f64,
+    /// Number of standard errors that the bound of the encoding bias includes.
+    pub bias_standard_errors: f64,
+    /// Share of the mean squared bias that this bound includes for terms of second order.
+    pub bias_second_order: f64,
+    /// Width and height of the window of SSIM, in pixels, by its definition.
+    pub ssim_window: usize,
+    /// Standard deviation of that window, in pixels, by the definition of SSIM.
+    pub ssim_sigma: f64,
+    /// K1 in the definition of SSIM.
+    pub ssim_k1: f64,
+    /// K2 in the definition of SSIM.
+    pub ssim_k2: f64,
+    /// The network of LPIPS. A key of a result names it, so that another network would be another metric.
+    pub lpips_net: String,
+    /// Subtracted from the channels of a picture in -1..1, by the definition of LPIPS.
+    pub lpips_shift: [f32; 3],
+    /// Divides the channels of that picture, by the definition of LPIPS.
+    pub lpips_scale: [f32; 3],
+    /// Added to the length of a feature vector, by the definition of LPIPS.
+    pub lpips_epsilon: f64,
+    /// How far in front of a texel another surface may lie without hiding it, in roundings of the largest coordinate.
+    pub observed_roundings: f64,
+    /// The least cosine between ray and surface in that comparison.
+    pub observed_least_cosine: f64,
+    /// Factor of the squared length of radiances in the objective of the fit, which chooses among equally good ones.
+    pub fit_shortness: f64,
+    /// Mean complementarity at which the fit ends.
+    pub fit_tolerance: f64,
+    /// The largest number of steps of the fit.
+    pub fit_most_steps: u32,
+    /// Share of the way to the nearest bound that a step of the fit covers.
+    pub fit_step_share: f64,
+    /// Fitted radiances below this, relative to the target's mean, may become 0.
+    pub fit_zero_below: f64,
+    /// First word of the texts whose hashes seed the paths.
+    pub seed_prefix: String,
+}
+
+impl FixedRules {
+    /// The constants of this code.
+    pub fn of_this_scorer() -> Self {
+        let range = |range: std::ops::RangeInclusive<f32>| [*range.start(), *range.end()];
+        Self {
+            subpixels: mateval_tracer::aov::SUBPIXELS,
+            cut_out_below_opacity: mateval_scene::material::CUT_OUT_BELOW_OPACITY,
+            missing_base_color: mateval_scene::submission::GREY,
+            missing_roughness: prediction::MISSING_ROUGHNESS,
+            missing_metallic: prediction::MISSING_METALLIC,
+            base_color_range: range(map_file::BASE_COLOR_RANGE),
+            scalar_range: range(map_file::SCALAR_RANGE),
+            most_map_bytes: map_file::MAX_MAP_BYTES,
+            most_exr_numbers: map_file::MAX_EXR_NUMBERS,
+            most_scene_bytes: memory_budget::MAX_SCENE_BYTES,
+            predicted_specular: mateval_tracer::repaint::SPECULAR,
+            stage_roughness: mateval_tracer::bsdf::STAGE_ROUGHNESS,
+            psnr_cap_db: Psnr::CAP_DB,
+            lower_bound_standard_errors: noise_free::ONE_SIDED_95,
+            bias_standard_errors: encoding_bias::STANDARD_ERRORS,
+            bias_second_order: encoding_bias::SECOND_ORDER,
+            ssim_window: ssim::WINDOW,
+            ssim_sigma: ssim::SIGMA,
+            ssim_k1: ssim::K1,
+            ssim_k2: ssim::K2,
+            lpips_net: LPIPS_NET.name().to_owned(),
+            lpips_shift: lpips::SHIFT,
+            lpips_scale: lpips::SCALE,
+            lpips_epsilon: lpips::EPSILON,
+            observed_roundings: texel_map::SAME_PLACE_ROUNDINGS,
+            observed_least_cosine: texel_map::LEAST_COSINE,
+            fit_shortness: light_fit::SHORTNESS,
+            fit_tolerance: light_fit::TOLERANCE,
+            fit_most_steps: light_fit::MOST_STEPS,
+            fit_step_share: light_fit::STEP_SHARE,
+            fit_zero_below: light_fit::ZERO_BELOW,
+            seed_prefix: crate::seeds::SEED_PREFIX.to_owned(),
+        }
+    }
+
+    /// The first constant, by name, in which the two differ, and both of its values as JSON.
+    pub fn first_difference(&self, other: &Self) -> Option<(String, [String; 2])> {
+        let values = |rules: &Self| serde_json::to_value(rules).expect("numbers and words become JSON");
+        let (ours, theirs) = (values(self), values(other));
+        let map = ours.as_object().expect("a struct becomes an object");
+        let (rule, value) = map.iter().find(|(rule, value)| theirs[rule.as_str()] != **value)?;
+        Some((rule.clone(), [value.to_string(), theirs[rule.as_str()].to_string()]))
+    }
+}
