@@ -1,4 +1,4 @@
-//! Where the squared error lies, by instance.
+//! Squared errors of pixels, summed by instance.
 
 use std::collections::BTreeMap;
 

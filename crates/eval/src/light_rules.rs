@@ -1,4 +1,4 @@
-//! The part of a protocol that says by what light predictions are looked at, and how sure the numbers are to be.
+//! The part of a protocol that defines the light under which predictions are compared, and the precision of the numbers.
 
 use mateval_light::rules::{FitRules, StageRules};
 use mateval_scene::material::PrincipledFlavour;
@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::result_key::PictureKind;
 
-/// Under what light a prediction is rendered.
+/// The light under which a prediction is rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Track {
-    /// The paper's: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters (Bitterli).
+    /// The paper's track: radiances fitted to the input view, of a light stage (3D-FRONT) or the scene's own emitters (Bitterli).
     Fitted,
     /// The reference's own emitters.
     True,
-    /// The same emitters under weights that no method saw.
+    /// The same emitters with weights that no method has seen.
     Relit,
 }
 
@@ -34,61 +34,62 @@ impl Track {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightRules {
-    /// Under what light.
+    /// The lights.
     pub tracks: Vec<Track>,
-    /// Whose `principled` predictions are made of; specular 0.5, two-sided, without bumps.
+    /// The renderer whose `principled` material predictions are; specular 0.5, two-sided, without bumps.
     pub flavour: PrincipledFlavour,
-    /// Scatterings after the first hit after which a path is cut.
+    /// The largest number of scatterings after the first hit.
     pub max_bounces: u32,
-    /// From this bounce on paths end by chance.
+    /// The bounce from which on Russian roulette ends paths.
     pub roulette_start: u32,
-    /// The probability to go on then.
+    /// The probability that a path survives Russian roulette.
     pub roulette_survival: f32,
-    /// Where the lights of a stage are.
+    /// The positions of a stage's lights.
     pub stage: StageRules,
-    /// How radiances are fitted.
+    /// The fit of radiances.
     pub fit: FitRules,
     /// The weights of track `relit`.
     pub relit: RelitRules,
-    /// How many samples are taken.
+    /// The numbers of samples.
     pub noise: NoiseRules,
 }
 
 /// The weights of track `relit`. Groups are ordered by the luminance of the truth's input view under each alone, over valid
-/// pixels, brightest first; groups that light nothing there take no part.
+/// pixels, brightest first; groups that light nothing there are left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RelitRules {
-    /// Lighting `dim`: of all groups.
+    /// Lighting `dim`: the weight of all groups.
     pub dim: f64,
-    /// Lighting `warm_cool`: of the first, third, ... group, by channel.
+    /// Lighting `warm_cool`: the weights of the first, third, ... group, by channel.
     pub warm: [f64; 3],
-    /// Of the second, fourth, ... group.
+    /// Lighting `warm_cool`: the weights of the second, fourth, ... group.
     pub cool: [f64; 3],
-    /// Lightings `alone_1`, `alone_2`, ...: that group alone, 1; at most so many, and none in scenes of one group.
+    /// The largest number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of
+    /// one group have none.
     pub alone_at_most: usize,
 }
 
-/// How many samples are taken, by a pilot of its own samples.
+/// The numbers of samples, which follow from a pilot render with samples of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseRules {
-    /// Samples a pixel of each of the pilot's halves.
+    /// Samples per pixel of each of the pilot's halves.
     pub pilot_samples: u32,
-    /// The least samples a pixel of each half; doubled until `target_db` or `most_samples`.
+    /// The smallest number of samples per pixel of each half; doubled until `target_db` or `most_samples` is reached.
     pub least_samples: u32,
-    /// The most samples a pixel of each half.
+    /// The largest number of samples per pixel of each half.
     pub most_samples: u32,
-    /// What the standard error of a scene's mean PSNR by our own noise shall be at most.
+    /// The largest standard error of a scene's mean PSNR that our own noise may cause, in dB.
     pub target_db: f64,
-    /// Where the truth's own noise is larger than `target_db`, ours need only be this share of it.
+    /// Where the truth's own noise is larger than `target_db`, ours may be this share of it.
     pub truth_share: f64,
-    /// Side of the blocks of pixels within which noise is taken to be correlated, in pixels of the input view.
+    /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the input view.
     pub block_pixels: u32,
 }
 
 impl LightRules {
-    /// What both protocols have in common.
+    /// Rules with the values that all protocols share.
     pub fn new(tracks: Vec<Track>, flavour: PrincipledFlavour) -> Self {
         let settings = mateval_tracer::RenderSettings::default();
         Self {
@@ -111,7 +112,7 @@ impl LightRules {
         }
     }
 
-    /// Settings of a picture of `samples` a pixel.
+    /// Settings of a render with `samples` per pixel.
     pub fn settings(&self, samples: u32) -> mateval_tracer::RenderSettings {
         mateval_tracer::RenderSettings {
             samples,

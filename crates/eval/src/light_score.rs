@@ -12,18 +12,19 @@ use rayon::prelude::*;
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
 use crate::light_rules::{NoiseRules, Track};
-use crate::metric::Metric;
+use crate::lit_scene::{LitScene, Photo};
 use crate::noise_blocks::noise_blocks;
-use crate::predicted_light::{LitPicture, LitScene, Photo, PredictedLight, predicted_light};
+use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
 use crate::relit::{LightingName, RelitLighting, lightings};
 use crate::result::{NoiseState, PsnrNoise};
-use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
+use crate::result_key::{PictureKind, PictureName, Region, Views};
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
-use crate::scene_score::{MaskedRegion, SceneOrder, Sheet, regions};
+use crate::scene_order::{MaskedRegion, SceneOrder, regions};
+use crate::scene_score::{NoiseScore, Sheet};
 use crate::truth::{RgbTruth, ViewTruth};
 
-/// Scores everything under the lights of protocol `at`; `renderer` made the truth's pictures.
+/// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures.
 pub(crate) fn score_light(
     order: &SceneOrder<'_>,
     renderer: &RendererId,
@@ -35,22 +36,22 @@ pub(crate) fn score_light(
     bench.predict(&mut |submission, light| bench.measure(light, &mut sheets[submission][at]))
 }
 
-/// A view's light as people see it.
+/// A view's light, exposed, clipped and encoded for display.
 pub struct ShownLight {
-    /// The truth, exposed and encoded.
+    /// The truth.
     pub truth: Picture<SrgbRgb>,
-    /// One a submission.
+    /// One for each submission.
     pub predicted: Vec<Picture<SrgbRgb>>,
 }
 
-/// View by view the truth's light and every submission's as people see it, in the first track of the first protocol.
+/// The truth's light and every submission's in each view, for display, in the first track of the first protocol.
 pub(crate) fn shown_light(
     order: &SceneOrder<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
 ) -> Result<Vec<ShownLight>, EvalError> {
     let bench = LightBench::new(order, renderer, truths, &order.protocols[0])?;
-    // Predictions come in any order.
+    // Predictions arrive in any order.
     let mut predicted = BTreeMap::new();
     bench.predict(&mut |submission, light| {
         let first = light.pictures.first().into_iter().flat_map(|picture| &picture.views);
@@ -67,18 +68,18 @@ pub(crate) fn shown_light(
     Ok(references.map(shown).collect())
 }
 
-/// Where pictures of light are measured.
+/// What pictures of light are measured against.
 struct LightBench<'a> {
     order: &'a SceneOrder<'a>,
     protocol: &'a Protocol,
     truths: &'a [ViewTruth],
     photo: Photo<'a>,
     lightings: Vec<RelitLighting>,
-    /// Of each view.
+    /// The regions of each view.
     regions: Vec<Vec<MaskedRegion>>,
-    /// What each light's pictures are compared with, by lighting (none is the scene's own) and view.
+    /// The references of each lighting (none: the scene's own lights) and view.
     references: BTreeMap<Option<LightingName>, Vec<LightReference>>,
-    /// Of each view.
+    /// The noise blocks of each view.
     blocks: Vec<Picture<u32>>,
 }
 
@@ -112,7 +113,7 @@ impl<'a> LightBench<'a> {
         })
     }
 
-    /// Renders every submission and hands it on with its number.
+    /// Renders every submission and passes it to `each` with its number.
     fn predict(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
         let order = self.order;
         let lit = LitScene {
@@ -160,24 +161,22 @@ impl<'a> LightBench<'a> {
                 rgb_metrics(self.protocol, order.lpips, light, reference, &region.mask, blocks)
             })
             .collect();
-        let mut errors: BTreeMap<ResultKey, Vec<NoiseFreeMse>> = BTreeMap::new();
+        let mut errors: BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>> = BTreeMap::new();
         for (&(view, region), measured) in jobs.iter().zip(measured) {
             let view = order.views[view];
             let RgbMeasured { values, mse } = order.or_named(view, measured)?;
-            sheet.score.pictures.extend(order.values(view, region, kind, picture.lighting, values));
-            let key = ResultKey {
-                picture: PictureName { kind, surfaces: region.surfaces },
-                views: Views::of(&view.id, region.region),
-                metric: Metric::Psnr,
-            };
-            errors.entry(key).or_default().extend(mse);
+            let score = region.score(kind, picture.lighting, values);
+            errors.entry((score.picture, Views::of(&view.id, region.region))).or_default().extend(mse);
+            sheet.score.add(&view.id, vec![score]);
         }
         if picture.track != Track::Relit {
-            let noise = errors.into_iter().filter(|(_, views)| !views.is_empty());
-            sheet
-                .score
-                .noise
-                .extend(noise.map(|(key, views)| (key, psnr_noise(&self.protocol.light.noise, &views, samples))));
+            let rules = &self.protocol.light.noise;
+            let measured = errors.into_iter().filter(|(_, mses)| !mses.is_empty());
+            sheet.score.noise.extend(measured.map(|((picture, views), mses)| NoiseScore {
+                picture,
+                views,
+                noise: psnr_noise(rules, &mses, samples),
+            }));
             self.add_errors(kind, &lights, references, &mut sheet.errors);
         }
         Ok(())
@@ -231,7 +230,7 @@ fn references(
     Ok(references)
 }
 
-/// How sure the mean PSNR of some views is, and why.
+/// The noise in the mean PSNR of some views, and why it is as large as it is.
 fn psnr_noise(rules: &NoiseRules, views: &[NoiseFreeMse], samples: u32) -> PsnrNoise {
     let noise = psnr_mean_error(&views.iter().collect::<Vec<_>>());
     let state = match &noise {

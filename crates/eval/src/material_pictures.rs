@@ -1,4 +1,4 @@
-//! Pictures of what submissions predict, seen through the truth's own first hits.
+//! Pictures of submissions' maps, looked up at the truth's own first hits.
 
 use glam::Vec2;
 use mateval_image::{LinearRgb, Picture};
@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use mateval_submission::prediction::PredictedScene;
 
-/// A submission's maps as a view shows them, each pixel a mean; the names are those of the truth's pictures.
+/// A submission's maps as a view shows them; each pixel is a mean over its sub-pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialPictures {
-    /// Linear Rec. 709; the truth's is called `albedo`.
+    /// Linear Rec. 709; the file of the truth is called `albedo`.
     pub base_color: Picture<LinearRgb>,
     /// Perceptual, 0 to 1.
     pub roughness: Picture<f32>,

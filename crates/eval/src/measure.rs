@@ -1,46 +1,48 @@
 //! The metrics of one picture under one protocol.
 
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_metrics::{Lpips, MetricError, Pixel, Psnr, mse, ssim_black_fill, ssim_valid_windows};
+use mateval_metrics::{Lpips, MetricError, Psnr, mse};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::mask_rule::Counted;
 use crate::metric::Metric;
-use crate::protocol::{AlbedoSpace, MaskRule, Protocol};
+use crate::protocol::{AlbedoSpace, Protocol};
 
 /// One metric's value.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Measured {
-    /// By which metric.
+    /// The metric.
     pub metric: Metric,
     /// None where nothing counts.
     pub value: Option<f64>,
-    /// For PSNR: there was no error at all.
+    /// For PSNR: the MSE was exactly 0.
     pub exact: bool,
-    /// For MSE and PSNR of light.
+    /// The noise, for MSE and PSNR of light.
     pub noise: Option<ValueNoise>,
-    /// Pixels or windows that it is a mean over.
+    /// The number of pixels or windows that it is a mean over.
     pub count: usize,
 }
 
-/// How uncertain render noise makes a value.
+/// The uncertainty of a value due to render noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValueNoise {
-    /// Standard error, in the value's own unit; of PSNR to first order, at most the cap.
+    /// Standard error, in the value's own unit; of a PSNR to first order, and at most the cap.
     pub standard_error: f64,
-    /// Of an MSE: what clipping and encoding noisy pixels adds to it, as estimated; the value is left as it is.
+    /// Of an MSE: the estimated bias from clipping and encoding noisy pixels; the value is not corrected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bias: Option<f64>,
-    /// What that is at most, up or down.
+    /// Upper bound of the absolute value of that bias.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub bias_bound: Option<f64>,
-    /// Of a PSNR: the error may be no more than noise; the value is what PSNR is at least, with 95 %.
+    /// Of a PSNR: the error may be noise alone; the value is a lower bound with a confidence of 95 %.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub lower_bound: bool,
 }
 
-/// MSE, PSNR, SSIM and (where its weights are there) LPIPS of an albedo picture over the mask; linear pictures.
+/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of an albedo picture over the mask; linear pictures.
 pub fn albedo_metrics(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
@@ -51,17 +53,9 @@ pub fn albedo_metrics(
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let (encoded, reference_encoded) = (prediction.to_srgb(), reference.to_srgb());
     let mut measured = error_metrics(albedo_mse(protocol, prediction, reference, mask)?, pixels)?;
-    measured.push(ssim_metric(protocol.mask_rule, &encoded, &reference_encoded, mask, pixels)?);
+    measured.push(ssim_metric(protocol.mask_rule.ssim(&encoded, &reference_encoded, mask)?));
     if let Some(lpips) = lpips {
-        let distance = match protocol.mask_rule {
-            MaskRule::BlackFill => lpips.black_fill(&encoded, &reference_encoded, mask),
-            MaskRule::Inside => lpips.masked(&encoded, &reference_encoded, mask),
-        };
-        let distance = match distance {
-            // The network has no value for so small a picture: missing, not wrong.
-            Err(MetricError::TooSmall { .. }) => None,
-            other => other?,
-        };
+        let distance = protocol.mask_rule.lpips(lpips, &encoded, &reference_encoded, mask)?;
         measured.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(measured)
@@ -80,9 +74,9 @@ pub fn albedo_mse(
     }
 }
 
-/// MSE, PSNR and SSIM of a picture of roughness or metallic over the mask, all of the values as they are: they are no light
-/// and have no sRGB. No LPIPS: its networks and its weights were trained on colour photographs, and people were asked about
-/// those; of a parameter's picture its distance would say nothing.
+/// MSE, PSNR and SSIM of a picture of roughness or metallic over the mask, of the values as they are: they are not light and
+/// have no sRGB encoding. There is no LPIPS: its networks were trained on colour photographs and its weights on people's
+/// judgement of those, so its distance between pictures of a parameter has no meaning.
 pub fn scalar_metrics(
     protocol: &Protocol,
     prediction: &Picture<f32>,
@@ -91,7 +85,7 @@ pub fn scalar_metrics(
 ) -> Result<Vec<Measured>, MetricError> {
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let mut measured = error_metrics(mse(prediction, reference, Some(mask))?, pixels)?;
-    measured.push(ssim_metric(protocol.mask_rule, prediction, reference, mask, pixels)?);
+    measured.push(ssim_metric(protocol.mask_rule.ssim(prediction, reference, mask)?));
     Ok(measured)
 }
 
@@ -103,23 +97,12 @@ fn error_metrics(error: Option<f64>, pixels: usize) -> Result<Vec<Measured>, Met
     Ok(vec![Measured::plain(Metric::Mse, error, pixels), psnr])
 }
 
-fn ssim_metric<P: Pixel>(
-    rule: MaskRule,
-    prediction: &Picture<P>,
-    reference: &Picture<P>,
-    mask: &Mask,
-    pixels: usize,
-) -> Result<Measured, MetricError> {
-    Ok(match rule {
-        MaskRule::BlackFill => Measured::plain(Metric::Ssim, ssim_black_fill(prediction, reference, mask)?, pixels),
-        MaskRule::Inside => {
-            let inside = ssim_valid_windows(prediction, reference, mask)?;
-            Measured::plain(Metric::Ssim, inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
-        }
-    })
+/// An SSIM as a measured value.
+pub(crate) fn ssim_metric((value, count): Counted) -> Measured {
+    Measured::plain(Metric::Ssim, value, count)
 }
 
-/// LPIPS as it is stored: its last bits depend on the processor.
+/// LPIPS rounded for storage: its last bits depend on the processor.
 pub fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) -> Measured {
     let steps = 10_f64.powi(protocol.lpips_decimals as i32);
     let rounded = distance.map(|distance| (distance * steps).round() / steps);
@@ -127,7 +110,7 @@ pub fn rounded_lpips(protocol: &Protocol, distance: Option<f64>, pixels: usize) 
 }
 
 impl Measured {
-    /// A value and no more.
+    /// A value without noise.
     pub(crate) fn plain(metric: Metric, value: Option<f64>, count: usize) -> Self {
         Self { metric, value, exact: false, noise: None, count }
     }
@@ -148,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn the_protocols_differ_as_they_say() {
+    fn the_protocols_differ_in_masks_and_encoding() {
         let (prediction, reference, mask) = pictures();
         let [ours, paper] = ["mateval-1", "paper"]
             .map(|name| albedo_metrics(&Protocol::named(name).unwrap(), None, &prediction, &reference, &mask).unwrap());

@@ -1,4 +1,4 @@
-//! The metrics of results: their words, which way is better, and how they are shown.
+//! The metrics of results: their names, which direction is better, and how they are displayed.
 
 use mateval_metrics::Net;
 use schemars::JsonSchema;
@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::word_enum::word_enum;
 
-/// Whether more is better.
+/// The better direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Better {
-    /// As with errors.
+    /// Lower is better, as with errors.
     Lower,
-    /// As with similarities.
+    /// Higher is better, as with similarities.
     Higher,
 }
 
@@ -42,26 +42,26 @@ word_enum! {
 /// The network of [`Metric::LpipsAlex`].
 pub const LPIPS_NET: Net = Net::Alex;
 
-/// How a number is shown to people.
+/// How a number is displayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NumberStyle {
-    /// As a table's head has it, with the unit.
+    /// Title of a table's column, with the unit.
     pub title: &'static str,
-    /// The factor that values are shown with.
+    /// The factor by which values are multiplied for display.
     pub scale: f64,
     /// Digits after the point.
     pub digits: usize,
 }
 
 impl NumberStyle {
-    /// The value as tables show it.
+    /// The value as text.
     pub fn text(&self, value: f64) -> String {
         format!("{:.*}", self.digits, value * self.scale)
     }
 }
 
 impl Metric {
-    /// Which way is better.
+    /// The better direction.
     pub const fn better(self) -> Better {
         match self {
             Self::Mse | Self::LpipsAlex => Better::Lower,
@@ -79,7 +79,7 @@ impl Metric {
         }
     }
 
-    /// By how much a value may differ between two processors: LPIPS depends on them in its last digits.
+    /// The largest difference of a value between two processors: the last digits of LPIPS depend on them.
     pub const fn tolerance(self) -> f64 {
         match self {
             Self::Mse | Self::Psnr | Self::Ssim => 0.0,

@@ -1,4 +1,4 @@
-//! Which pixels of a scene's views share noise.
+//! Blocks of pixels, across a scene's views, that may share noise.
 
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
@@ -7,7 +7,7 @@ use mateval_tracer::shared_centre::share_centre;
 
 use crate::light_rules::NoiseRules;
 
-/// For each view the block of each of its pixels: pixels of one block, whatever their view, may see the same paths.
+/// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
 ///
 /// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
 /// of [`NoiseRules::block_pixels`] pixels of the first camera's image plane. Other cameras have blocks of their own.

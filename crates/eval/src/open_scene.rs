@@ -1,4 +1,4 @@
-//! Scenes of a dataset, ready to be looked at.
+//! Scenes of a dataset, opened for scoring.
 
 use std::sync::Arc;
 
@@ -21,19 +21,19 @@ pub fn scored_views<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Result<Vec<&
     Ok(views)
 }
 
-/// A scene, ready to be looked at.
+/// A scene, opened for scoring.
 pub struct OpenScene {
     /// Its folder.
     pub folder: SceneFolder,
-    /// Its truth, ready for rays.
+    /// Its true geometry, materials and lights, ready for ray tracing.
     pub world: World,
-    /// The meshes of `instances.glb`, one a surface of the world.
+    /// The meshes of `instances.glb`, one for each surface of the world.
     pub atlases: Vec<TriangleMesh>,
 }
 
 impl OpenScene {
-    /// Fails where a file is not what the dataset's manifest says, or does not fit the others. `renderer` is the one whose
-    /// pictures will be looked at.
+    /// Fails if a file differs from the dataset's manifest or does not fit the others. `renderer` is the one whose pictures
+    /// will be read.
     pub fn read(dataset: &Dataset, scene: &SceneFile, renderer: Option<&RendererId>) -> Result<Self, EvalError> {
         let render = renderer.map(|renderer| format!("ground_truth/renders/{renderer}/"));
         let is_light = |file: &str| {
@@ -42,7 +42,7 @@ impl OpenScene {
                 && name.ends_with(".exr")
                 && (name.starts_with("rgb") || name.starts_with("group_"))
         };
-        // Numbers carry the dataset's fingerprint: what they are made of must be what it says.
+        // Numbers carry the dataset's fingerprint, so they must come from the files that it covers.
         dataset.check_files(&scene.id, |file| !file.contains("/renders/") || is_light(file))?;
         let folder = dataset.folder(&scene.id);
         let world = World::new(Arc::new(reference_io::read(&folder)?))?;

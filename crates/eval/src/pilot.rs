@@ -1,4 +1,4 @@
-//! How many samples a prediction needs, by the noise of a few of its own.
+//! The number of samples that a prediction needs, estimated from the noise of a few.
 
 use mateval_metrics::{NoiseFreeMse, NoisePsnr, noise_free_mse, psnr_mean_error};
 use mateval_scene::layout::INPUT;
@@ -6,11 +6,11 @@ use mateval_tracer::ViewsRender;
 
 use crate::error::EvalError;
 use crate::light_rules::NoiseRules;
-use crate::predicted_light::LitScene;
+use crate::lit_scene::LitScene;
 use crate::rgb::EncodedLight;
 
-/// Samples a pixel of each half that bring the noise of picture number `picture` of the pilot's render under its bound, in
-/// the mean over the input view and in that over the novel ones.
+/// Samples per pixel of each half that bring the noise of picture number `picture` of the pilot's render under its bound,
+/// in the mean PSNR of the input view and in that of the novel views.
 pub(crate) fn enough_samples(
     rules: &NoiseRules,
     lit: &LitScene<'_>,

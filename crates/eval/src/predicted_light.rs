@@ -1,16 +1,17 @@
-//! What predictions look like under each light of a protocol.
+//! Renders of predictions under each light of a protocol.
 //!
-//! In: a scene with its truth, predictions, the rules. Out, prediction by prediction: two independent halves of every view
-//! under every light, and the radiances that were fitted. Between: predictions that agree in roughness and metallic are
-//! followed by the same paths; a pilot of its own samples says how many each needs; radiances are fitted on a third
-//! stream, so that they do not make the halves depend on each other. A prediction's pictures are the same, bit for bit,
-//! whatever others are looked at beside it.
+//! In: a scene with its truth, predictions, the rules. Out, for each prediction: two independent halves of every view under
+//! every light, and the radiances that were fitted.
+//!
+//! Predictions that agree in roughness and metallic share paths. A pilot render, with samples of its own, determines how
+//! many samples each prediction needs. Radiances are fitted on a third stream of samples, so that the fit does not make the
+//! two halves depend on each other. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
 
 use std::collections::BTreeMap;
 
-use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_scene::dataset::{SceneFile, View};
-use mateval_scene::{Camera, Progress, SceneLights, TriangleMesh};
+use mateval_image::{LinearRgb, Picture};
+use mateval_scene::dataset::View;
+use mateval_scene::{Camera, Progress, SceneLights};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, Repaint, StageLight, ViewsRender, World, render_repainted,
@@ -20,81 +21,47 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::EvalError;
 use crate::light_rules::{LightRules, Track};
+use crate::lit_scene::{LitScene, Photo};
 use crate::pilot::enough_samples;
-use crate::relit::{LightingName, RelitLighting};
-use crate::rgb::LightReference;
+use crate::relit::LightingName;
 use crate::seeds::seed;
-use crate::truth::ViewTruth;
 use mateval_light::light_fit::{LightFit, fit_lights};
 use mateval_light::light_stage;
 use mateval_submission::prediction::PredictedScene;
 
-/// A scene and the truth of its light.
-pub struct LitScene<'a> {
-    /// `scene.json`.
-    pub scene: &'a SceneFile,
-    /// Its true surfaces, materials and lights.
-    pub world: &'a World,
-    /// The meshes of `instances.glb`, one a surface of the world.
-    pub atlases: &'a [TriangleMesh],
-    /// The views that are scored.
-    pub views: Vec<&'a View>,
-    /// Of each view.
-    pub truths: &'a [ViewTruth],
-    /// Of each view, under the scene's own lights.
-    pub references: &'a [LightReference],
-    /// Of each view, as [`crate::noise_blocks`] says.
-    pub blocks: &'a [Picture<u32>],
-    /// What radiances are fitted to.
-    pub photo: Photo<'a>,
-    /// The lightings of track `relit`.
-    pub lightings: Vec<RelitLighting>,
-}
-
-/// The input view as the truth shows it.
-#[derive(Clone)]
-pub struct Photo<'a> {
-    /// The view.
-    pub view: &'a View,
-    /// Its picture, linear, before exposure.
-    pub light: Picture<LinearRgb>,
-    /// The pixels that count.
-    pub valid: &'a Mask,
-}
-
-/// A prediction under some of the lights.
+/// A prediction rendered under some of the lights.
 pub struct PredictedLight {
-    /// One a light.
+    /// One for each light.
     pub pictures: Vec<LitPicture>,
-    /// Where radiances were fitted.
+    /// The fitted radiances; none where no picture needs them.
     pub fit: Option<FittedRadiances>,
-    /// Samples a pixel of each half.
+    /// Samples per pixel of each half.
     pub samples: u32,
-    /// Contributions that were not finite and count as none: of all its pictures, pilot and fit aside.
+    /// Number of contributions that were not finite and count as no light, in all its pictures except pilot and fit.
     pub not_finite: u64,
 }
 
 /// A prediction under one light.
 pub struct LitPicture {
-    /// Which.
+    /// Its track.
     pub track: Track,
-    /// For track `relit` its name.
+    /// The name of the lighting, for track `relit`.
     pub lighting: Option<LightingName>,
-    /// For each view two independent halves, linear, before exposure.
+    /// Two independent halves of each view, linear, before exposure.
     pub views: Vec<[Picture<LinearRgb>; 2]>,
 }
 
-/// Radiances fitted to the input view, with the proof that none are better.
+/// Radiances fitted to the input view, with the proof that no others fit better.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FittedRadiances {
-    /// Whether they are of a light stage; else they multiply what the scene's own emitters send.
+    /// Whether they belong to a light stage; otherwise they multiply the radiances of the scene's own emitters.
     pub stage: bool,
-    /// Light by light.
+    /// The radiance of each light.
     pub lights: Vec<FittedRadiance>,
-    /// Mean absolute difference of the averaged pictures, linear, by channel.
+    /// Mean absolute difference of the averaged pictures, linear, for each channel.
     pub mean_absolute_error: [f64; 3],
-    /// No other radiances can have less than this.
+    /// Lower bound of that error: no other radiances can have less.
     pub lower_bound: [f64; 3],
 }
 
@@ -108,26 +75,26 @@ pub struct FittedRadiance {
     pub radiance: [f64; 3],
 }
 
-/// Pictures that come from one set of paths a prediction.
+/// Pictures of a prediction that come from one set of paths.
 struct Pass<'a> {
-    /// Goes into the seeds.
+    /// Part of the seeds.
     name: &'static str,
     world: &'a World,
-    /// Of each light its name.
+    /// The name of each light.
     lights: Vec<String>,
     on_stage: bool,
-    /// What pictures are made, and whether the pilot watches them.
+    /// Track and lighting of each picture.
     pictures: Vec<(Track, Option<LightingName>)>,
 }
 
-/// How a prediction's pictures of one pass are mixed, and where that came from.
+/// The weights of a prediction's lights in each picture of a pass, and the fit that they come from.
 struct Mixing {
     mixes: Vec<LightMix>,
     fit: Option<FittedRadiances>,
 }
 
-/// Renders all predictions under the lights of `rules` and hands them on, pass by pass, with their place among
-/// `predictions`. At most [`DEFAULT_BASIS_BYTES`] of pictures are held at once, or one prediction's if that is more.
+/// Renders all predictions under the lights of `rules` and passes each to `each`, pass by pass, with its index in
+/// `predictions`. Holds at most [`DEFAULT_BASIS_BYTES`] of pictures at once, or one prediction's if that is more.
 pub fn predicted_light(
     lit: &LitScene<'_>,
     rules: &LightRules,
@@ -207,7 +174,7 @@ impl Renderer<'_> {
             .collect()
     }
 
-    /// How each prediction's pictures are mixed; fits radiances where a picture wants them.
+    /// The weights of each prediction's lights; fits radiances where a picture needs them.
     fn mixings(&self, all: &[usize]) -> Result<Vec<Mixing>, EvalError> {
         let fits = if self.pass.pictures.iter().any(|(track, _)| *track == Track::Fitted) {
             self.fits(all)?.into_iter().map(Some).collect()
@@ -230,7 +197,7 @@ impl Renderer<'_> {
         Ok(fits.into_iter().map(mixing).collect())
     }
 
-    /// Radiances of each prediction, from stream `fit` of the input view.
+    /// The fitted radiances of each prediction, from stream `fit` of the input view.
     fn fits(&self, all: &[usize]) -> Result<Vec<FittedRadiances>, EvalError> {
         let Photo { view, light, valid } = &self.lit.photo;
         let lights = self.pass.lights.len();
@@ -262,11 +229,11 @@ impl Renderer<'_> {
         }
     }
 
-    /// Samples a pixel of each half that each prediction needs.
+    /// Samples per pixel of each half that each prediction needs.
     fn samples(&self, all: &[usize], mixings: &[Mixing]) -> Result<Vec<u32>, EvalError> {
         let noise = &self.rules.noise;
         let cameras: Vec<Camera> = self.lit.views.iter().map(|view| view.camera).collect();
-        // Relit pictures are sums of the same paths: they take what the others need.
+        // Relit pictures are sums of the same paths: the samples that the others need are enough.
         let watched: Vec<usize> =
             (0..self.pass.pictures.len()).filter(|&at| self.pass.pictures[at].0 != Track::Relit).collect();
         if watched.is_empty() || noise.least_samples >= noise.most_samples {
@@ -289,8 +256,8 @@ impl Renderer<'_> {
         Ok(samples)
     }
 
-    /// Predictions that are followed together: of one roughness and metallic, of one number of samples, as many as their
-    /// pictures (`pictures` of all views each) fit in memory.
+    /// Predictions that share paths: they agree in roughness, metallic and number of samples. A batch holds as many as fit in
+    /// memory, with `pictures` of all views each.
     fn batches(&self, all: &[usize], samples: impl Fn(usize) -> u32, pictures: usize) -> Vec<Vec<usize>> {
         let mut alike: BTreeMap<(&str, u32), Vec<usize>> = BTreeMap::new();
         for &index in all {

@@ -1,4 +1,4 @@
-//! Protocols: every rule that a number depends on, as data with a fingerprint.
+//! Protocols: the rules that every number depends on, as data with a fingerprint.
 
 use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::{RendererId, SceneId};
@@ -8,17 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::EvalError;
 use crate::fixed_rules::FixedRules;
 use crate::light_rules::{LightRules, Track};
-
-/// What is done outside a mask by the metrics whose windows look across its edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MaskRule {
-    /// Both pictures black outside; SSIM and LPIPS are averaged over the whole frame.
-    BlackFill,
-    /// SSIM over windows wholly inside; LPIPS of the prediction with the truth's pixels outside, its map summed over the
-    /// picture and divided by the mask's pixels.
-    Inside,
-}
+pub use crate::mask_rule::MaskRule;
 
 /// Colour space in which MSE and PSNR of albedo are taken. SSIM and LPIPS always see sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -30,19 +20,19 @@ pub enum AlbedoSpace {
     Srgb,
 }
 
-/// A protocol. Its fingerprint is the hash of this and of all that a number depends on.
+/// A protocol. Its fingerprint is the hash of it and of everything else that a number depends on.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Protocol {
     /// Its name.
     pub name: String,
-    /// How masks are treated.
+    /// The treatment of pixels outside a mask.
     pub mask_rule: MaskRule,
-    /// In which space albedo's MSE and PSNR are taken.
+    /// The colour space of albedo's MSE and PSNR.
     pub albedo_space: AlbedoSpace,
-    /// Decimals that LPIPS is rounded to: its last bits depend on the processor.
+    /// The number of decimals to which LPIPS is rounded: its last bits depend on the processor.
     pub lpips_decimals: u32,
-    /// By what light predictions are looked at.
+    /// The light under which predictions are compared.
     pub light: LightRules,
     /// Constants that all protocols share because the code holds them.
     pub fixed: FixedRules,
@@ -50,7 +40,7 @@ pub struct Protocol {
     pub scorer_version: u32,
 }
 
-/// Raised whenever a number could change for the same inputs.
+/// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
 pub const SCORER_VERSION: u32 = 4;
 
 impl Protocol {
@@ -98,13 +88,13 @@ impl Protocol {
         }
     }
 
-    /// SHA-256, hex, of the protocol alone: what `dataset_spec/PROTOCOL.md` publishes.
+    /// SHA-256, hex, of the protocol alone, as `dataset_spec/PROTOCOL.md` publishes it.
     pub fn sha256(&self) -> String {
         mateval_scene::manifest::sha256_of_bytes(mateval_scene::json::to_text(self).as_bytes())
     }
 
-    /// SHA-256, hex, over this protocol, the dataset's manifest, the scenes that are scored, the renderer whose pictures
-    /// light is compared with and the weights of LPIPS (or a word for their absence).
+    /// SHA-256, hex, over this protocol, the dataset's manifest, the scored scenes, the renderer whose pictures light is
+    /// compared with, and the weights of LPIPS; the last two may be missing.
     pub fn fingerprint(
         &self,
         dataset_manifest_sha256: &str,

@@ -1,4 +1,4 @@
-//! Lightings that no method saw: the reference's own emitters under other weights.
+//! Lightings that no method has seen: the reference's own emitters with other weights.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -18,9 +18,9 @@ use crate::word_enum::UnknownWord;
 pub enum LightingName {
     /// `dim`: all groups dimmed.
     Dim,
-    /// `warm_cool`: warm and cool groups in turn.
+    /// `warm_cool`: alternately warm and cool groups.
     WarmCool,
-    /// `alone_1`, `alone_2`, ...: the group of that place among the brightest, from 1, alone.
+    /// `alone_1`, `alone_2`, ...: one group alone, by its place among the brightest, from 1.
     Alone(usize),
 }
 
@@ -44,7 +44,7 @@ impl FromStr for LightingName {
     fn from_str(word: &str) -> Result<Self, UnknownWord> {
         let alone = || word.strip_prefix(ALONE)?.parse().ok().map(Self::Alone);
         let known = [Some(Self::Dim), Some(Self::WarmCool), alone()];
-        // Only what is printed is parsed: `alone_01` is not.
+        // Only the printed form is accepted: `alone_01` is not.
         known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {
             what: "lighting",
             word: word.to_owned(),
@@ -77,19 +77,19 @@ impl JsonSchema for LightingName {
     }
 }
 
-/// One of them.
+/// A lighting of track `relit`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RelitLighting {
     /// Its name.
     pub name: LightingName,
-    /// Of each light group.
+    /// The weight of each light group and channel.
     pub weights: LightMix,
 }
 
 /// The lightings of a scene, by the rule of [`RelitRules`].
 ///
-/// `groups` are the truth's pictures of the input view, linear, one a light group in the scene's order; `valid` its mask.
-/// A scene whose groups light nothing there has none.
+/// `groups` are the truth's pictures of the input view, linear, one for each light group in the scene's order; `valid` is
+/// that view's mask. A scene whose groups light nothing there has no lightings.
 pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<RelitLighting> {
     let order = by_brightness(groups, valid);
     if order.is_empty() {
@@ -112,7 +112,7 @@ pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask
     lightings
 }
 
-/// Groups that light anything, brightest first; of equal ones the first.
+/// Groups that light anything, brightest first; equally bright groups keep their order.
 fn by_brightness(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<usize> {
     let luminance = |picture: &Picture<LinearRgb>| -> f64 {
         let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);

@@ -1,8 +1,7 @@
-//! `RESULT.json`: every number, what it was made of, and what is missing.
+//! The types of `RESULT.json`: every number, its inputs, and what is missing.
 
 use std::collections::BTreeMap;
 
-use mateval_metrics::Psnr;
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::submission::Cost;
 use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
@@ -26,13 +25,13 @@ pub const RESULT_FORMAT: &str = "mateval-result/3";
 pub struct ResultFile {
     /// Always `mateval-result/3`.
     pub format: String,
-    /// What made it, as in `mateval 0.1.0`.
+    /// Program and version, as in `mateval 0.1.0`.
     pub tool: String,
     /// The method's name, from submission.json.
     pub method: String,
-    /// What was scored.
+    /// The submission.
     pub submission: SubmissionId,
-    /// What it was scored on.
+    /// The dataset and the scored scenes.
     pub dataset: DatasetId,
     /// SHA-256 of the weights of each network; null where they were missing.
     pub lpips_weights: BTreeMap<String, Option<String>>,
@@ -40,11 +39,11 @@ pub struct ResultFile {
     pub protocols: BTreeMap<String, ProtocolResult>,
     /// Metrics that could not be computed, each with the command that makes it available.
     pub missing: Vec<MissingMetric>,
-    /// What was wrong with the submission and what was scored instead, sorted.
+    /// Faults of the submission and what was scored instead, sorted.
     pub findings: Vec<Finding>,
 }
 
-/// What was scored.
+/// A submission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SubmissionId {
@@ -52,13 +51,13 @@ pub struct SubmissionId {
     pub sha256: String,
     /// Its own description.
     pub description: String,
-    /// Where to read about it, as it says.
+    /// Where to read about it, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
-    /// The method's licence, as it says.
+    /// The method's licence, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
-    /// What the method takes, as it says.
+    /// What the method costs to run, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
 }
@@ -69,43 +68,43 @@ pub struct SubmissionId {
 pub struct ProtocolResult {
     /// The protocol itself.
     pub protocol: Protocol,
-    /// Numbers of different fingerprints are never to be compared.
+    /// Numbers of different fingerprints must not be compared.
     pub fingerprint: String,
     /// Mean over scenes.
     pub summary: BTreeMap<ResultKey, f64>,
     /// Mean over pictures of each scene, by the same keys.
     pub scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>>,
-    /// Standard errors of the means of PSNR in `summary` that render noise makes, in dB.
+    /// Standard errors of the means of PSNR in `summary` due to render noise, in dB.
     pub summary_noise: BTreeMap<ResultKey, f64>,
-    /// How sure the means of PSNR of each scene are that render noise touches, by the same keys.
+    /// The uncertainty of each scene's mean PSNR of light due to render noise, by the same keys.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>,
     /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// Every single value.
     pub pictures: Vec<PictureValue>,
-    /// What each instance's texels are off by.
+    /// The errors of each instance's texels.
     pub texels: Vec<InstanceTexelErrors>,
-    /// What each instance's pixels are off by.
+    /// The errors of each instance's pixels.
     pub instances: Vec<InstancePixelErrors>,
 }
 
-/// How sure a scene's mean PSNR is.
+/// The uncertainty of a scene's mean PSNR.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PsnrNoise {
-    /// Standard error by all noise, in dB; null where the error is no more than noise, so that PSNR is a lower bound.
+    /// Standard error due to all noise, in dB; null where the error may be noise alone, so that PSNR is a lower bound.
     pub standard_error_db: Option<f64>,
-    /// By our own renders' noise.
+    /// The part due to the noise of our own renders.
     pub own_db: Option<f64>,
-    /// By the truth's noise.
+    /// The part due to the noise of the truth.
     pub truth_db: Option<f64>,
-    /// Samples a pixel of each of our halves.
+    /// Samples per pixel of each of our halves.
     pub samples: u32,
-    /// How it ended.
+    /// Whether the samples were enough.
     pub state: NoiseState,
 }
 
-/// How a scene's samples were enough, or not.
+/// Whether the samples of a scene were enough.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseState {
@@ -115,7 +114,7 @@ pub enum NoiseState {
     LimitedByTruth,
     /// The most samples were taken, and our noise is above the bound.
     SampleCap,
-    /// The pilot thought that fewer samples were enough; they were not quite.
+    /// The number of samples that the pilot estimated was too small.
     AboveTarget,
 }
 
@@ -127,9 +126,9 @@ pub struct InstanceTexelErrors {
     pub scene: SceneId,
     /// The instance.
     pub instance: InstanceId,
-    /// What the input view sees of it.
+    /// Texels that the input view sees.
     pub observed: TexelErrors,
-    /// What it does not see.
+    /// All other texels.
     pub unobserved: TexelErrors,
 }
 
@@ -177,12 +176,12 @@ pub struct PictureValue {
     pub scene: SceneId,
     /// Its view.
     pub view: ViewId,
-    /// What was compared, with `_specular` behind it where only what is metal or smooth in truth counts.
+    /// What was compared; ends with `_specular` where only pixels that are metal or smooth in truth count.
     pub picture: PictureName,
     /// The lighting of a picture of kind `rgb_relit`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lighting: Option<LightingName>,
-    /// Which pixels count.
+    /// The pixels that count.
     pub region: Region,
     /// The metric, by the last word of its keys.
     #[schemars(with = "String", regex(pattern = "^[a-z0-9_]+$"))]
@@ -192,18 +191,18 @@ pub struct PictureValue {
     /// For PSNR: the MSE was exactly zero, the value is the cap.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub exact: bool,
-    /// For MSE and PSNR of light: how uncertain it is.
+    /// For MSE and PSNR of light: the uncertainty.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<ValueNoise>,
     /// Pixels (for SSIM inside a mask: windows) that the value is a mean over.
     pub count: usize,
 }
 
-/// Numbers that could not be taken.
+/// Numbers that could not be computed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissingMetric {
-    /// Which.
+    /// The numbers.
     pub metric: MissingNumbers,
     /// Why.
     pub reason: String,
@@ -215,9 +214,9 @@ pub struct MissingMetric {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum MissingNumbers {
-    /// By that metric, of any picture.
+    /// All numbers of that metric.
     Metric(Metric),
-    /// Of that kind of picture, by any metric.
+    /// All numbers of that kind of picture.
     Picture(PictureKind),
 }
 
@@ -254,170 +253,9 @@ impl JsonSchema for MissingNumbers {
     }
 }
 
-/// Takes the means: of pictures to scenes (of texels by area), of scenes to the dataset. A value that is missing is left
-/// out of its mean; a scene without any value of a key is left out of that key's.
-pub fn means(
-    pictures: &[PictureValue],
-    texels: &[InstanceTexelErrors],
-) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
-    let mut of_scene: BTreeMap<SceneId, BTreeMap<ResultKey, Mean>> = BTreeMap::new();
-    for picture in pictures {
-        if let Some(value) = picture.value {
-            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key()).or_default().add(value);
-        }
-    }
-    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = of_scene
-        .into_iter()
-        .map(|(scene, keys)| (scene, keys.into_iter().map(|(key, mean)| (key, mean.value())).collect()))
-        .collect();
-    for (scene, values) in texel_means(texels) {
-        scenes.entry(scene).or_default().extend(values);
-    }
-    let mut of_dataset: BTreeMap<ResultKey, Mean> = BTreeMap::new();
-    for (key, value) in scenes.values().flatten() {
-        of_dataset.entry(*key).or_default().add(*value);
-    }
-    let summary = of_dataset.into_iter().map(|(key, mean)| (key, mean.value())).collect();
-    (scenes, summary)
-}
-
 impl PictureValue {
     /// The mean that it counts for.
     pub fn key(&self) -> ResultKey {
         ResultKey { picture: self.picture, views: Views::of(&self.view, self.region), metric: self.metric }
-    }
-}
-
-/// Texels of each map, seen or unseen, in each scene: the mean of their squared errors by area, and its PSNR.
-fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
-    type Part = (Views, fn(&InstanceTexelErrors) -> &TexelErrors);
-    type Map = (PictureKind, fn(&TexelErrors) -> Option<f64>);
-    let parts: [Part; 2] = [(Views::Observed, |t| &t.observed), (Views::Unobserved, |t| &t.unobserved)];
-    let maps: [Map; 3] = [
-        (PictureKind::TextureBaseColor, |errors| errors.base_color_mse),
-        (PictureKind::TextureRoughness, |errors| errors.roughness_mse),
-        (PictureKind::TextureMetallic, |errors| errors.metallic_mse),
-    ];
-    let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
-    for instance in texels {
-        for (part, errors) in parts.map(|(part, of)| (part, of(instance))) {
-            for (map, mse) in maps.map(|(map, of)| (map, of(errors))) {
-                let Some(mse) = mse else { continue };
-                let key = ResultKey::whole(map, part, Metric::Mse);
-                let sums = sums.entry((instance.scene.clone(), key)).or_default();
-                sums[0] += errors.area_m2 * mse;
-                sums[1] += errors.area_m2;
-            }
-        }
-    }
-    let mut means: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
-    for ((scene, key), [sum, area]) in sums {
-        let values = means.entry(scene).or_default();
-        let mse = sum / area;
-        if let Ok(psnr) = Psnr::from_mse(mse) {
-            values.insert(key, mse);
-            values.insert(key.with(Metric::Psnr), psnr.db);
-        }
-    }
-    means
-}
-
-/// The standard error of the dataset's mean of each key that all its scenes have one of: scenes are independent.
-pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>) -> BTreeMap<ResultKey, f64> {
-    let mut sums: BTreeMap<ResultKey, (usize, Option<f64>)> = BTreeMap::new();
-    for (key, of_scene) in noise.values().flatten() {
-        let (count, squares) = sums.entry(*key).or_insert((0, Some(0.0)));
-        *count += 1;
-        *squares = squares.zip(of_scene.standard_error_db).map(|(sum, error)| sum + error * error);
-    }
-    sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64))).collect()
-}
-
-#[derive(Default)]
-struct Mean {
-    sum: f64,
-    count: usize,
-}
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        self.sum += value;
-        self.count += 1;
-    }
-
-    fn value(&self) -> f64 {
-        self.sum / self.count as f64
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn key(text: &str) -> ResultKey {
-        text.parse().unwrap()
-    }
-
-    fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValue {
-        PictureValue {
-            scene: SceneId::new(scene).unwrap(),
-            view: ViewId::new(view).unwrap(),
-            picture: PictureName::whole(PictureKind::Albedo),
-            region,
-            metric: Metric::Psnr,
-            lighting: None,
-            noise: None,
-            value,
-            exact: false,
-            count: 1,
-        }
-    }
-
-    /// Two instances of 1 and 3 square metres.
-    #[test]
-    fn texels_count_by_area() {
-        let texels = |name: &str, area_m2: f64, mse: f64| InstanceTexelErrors {
-            scene: SceneId::new("a").unwrap(),
-            instance: InstanceId::new(name).unwrap(),
-            observed: TexelErrors { area_m2, base_color_mse: Some(mse), ..Default::default() },
-            unobserved: TexelErrors::default(),
-        };
-        let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
-        assert!((summary[&key("texture_base_color.observed.mse")] - 0.01).abs() < 1e-15);
-        assert!((summary[&key("texture_base_color.observed.psnr")] - 20.0).abs() < 1e-12);
-        assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
-    }
-
-    #[test]
-    fn noise_of_scenes_is_independent() {
-        let noise = |error: Option<f64>| PsnrNoise {
-            standard_error_db: error,
-            own_db: error,
-            truth_db: None,
-            samples: 16,
-            state: NoiseState::Certified,
-        };
-        let key = key("rgb_true.input.psnr");
-        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, noise(error))]));
-        let both = BTreeMap::from([scene("a", Some(0.03)), scene("b", Some(0.04))]);
-        assert!((summary_noise(&both)[&key] - 0.025).abs() < 1e-15);
-        assert!(summary_noise(&BTreeMap::from([scene("a", Some(0.1)), scene("b", None)])).is_empty());
-    }
-
-    /// Scene a has two novel views, scene b one: each scene weighs the same.
-    #[test]
-    fn pictures_then_scenes() {
-        let all = [
-            value("a", "up_left", Region::Valid, Some(10.0)),
-            value("a", "up_right", Region::Valid, Some(20.0)),
-            value("b", "up_left", Region::Valid, Some(35.0)),
-            value("a", "up_left", Region::Unobserved, None),
-            value("a", "input", Region::Valid, Some(1.0)),
-        ];
-        let (scenes, summary) = means(&all, &[]);
-        assert_eq!(summary[&key("albedo.novel.psnr")], 25.0);
-        assert_eq!(summary[&key("albedo.input.psnr")], 1.0);
-        assert!(!summary.contains_key(&key("albedo.unobserved.psnr")));
-        assert_eq!(scenes[&SceneId::new("a").unwrap()][&key("albedo.novel.psnr")], 15.0);
     }
 }

@@ -1,40 +1,37 @@
-//! Renders compared with the truth's: everything that is measured on light, freed of noise.
+//! Metrics of rendered light, without the effect of render noise.
 //!
-//! Pictures come as two independent halves. They are multiplied by the scene's exposure, clipped to 0..1 and sRGB-encoded.
-//! MSE and PSNR come from the halves of both; SSIM and LPIPS compare the prediction's halves with the truth's denoised
-//! picture.
+//! Prediction and truth are two independent halves each, multiplied by the scene's exposure, clipped to 0..1 and
+//! sRGB-encoded. MSE and PSNR use the halves of both; SSIM and LPIPS compare the prediction's halves with the truth's
+//! denoised picture.
 
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::lpips::MeanAndHalves;
-use mateval_metrics::{
-    Features, Halves, Lpips, MetricError, NoiseFreeMse, Psnr, encoding_bias, noise_free_mse, ssim_halves_black_fill,
-    ssim_halves_valid_windows,
-};
+use mateval_metrics::{Features, Halves, Lpips, MetricError, NoiseFreeMse, Psnr, encoding_bias, noise_free_mse};
 
-use crate::measure::{Measured, ValueNoise, rounded_lpips};
+use crate::measure::{Measured, ValueNoise, rounded_lpips, ssim_metric};
 use crate::metric::Metric;
-use crate::protocol::{MaskRule, Protocol};
+use crate::protocol::Protocol;
 use crate::truth::RgbTruth;
 
-/// One light's picture as two halves and as people see it.
+/// A picture under one light: two halves, and one picture for display.
 pub struct EncodedLight {
     /// Linear, multiplied by the exposure.
     linear: [Picture<LinearRgb>; 2],
     halves: [Picture<SrgbRgb>; 2],
-    /// Of a prediction the halves' mean, of a truth its denoised picture.
+    /// The mean of a prediction's halves, or the truth's denoised picture.
     shown: Picture<SrgbRgb>,
 }
 
-/// A truth, with what LPIPS sees in it.
+/// A truth, with the features that LPIPS compares.
 pub struct LightReference {
     light: EncodedLight,
-    /// None without the network, where the mask rule wants others, or for a picture that is too small.
+    /// None without the network, where the mask rule needs other features, or for a picture that is too small.
     features: Option<Features>,
 }
 
-/// What was measured of one picture and mask, and the MSE with its noise by block.
+/// The metrics of one picture over one mask, and the MSE with its noise by block.
 pub struct RgbMeasured {
-    /// Metric by metric.
+    /// One value for each metric.
     pub values: Vec<Measured>,
     /// None where no pixel counts.
     pub mse: Option<NoiseFreeMse>,
@@ -45,7 +42,7 @@ fn exposed(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<LinearRgb> {
 }
 
 impl EncodedLight {
-    /// A prediction's, from its halves.
+    /// A prediction, from its halves.
     pub fn of_prediction(halves: &[Picture<LinearRgb>; 2], exposure: f64) -> Self {
         let mean = Picture::from_fn(halves[0].width(), halves[0].height(), |x, y| {
             let (LinearRgb(a), LinearRgb(b)) = (halves[0].get(x, y), halves[1].get(x, y));
@@ -54,12 +51,12 @@ impl EncodedLight {
         Self::new(halves, &mean, exposure)
     }
 
-    /// As people see it.
+    /// The picture for display.
     pub(crate) fn shown(self) -> Picture<SrgbRgb> {
         self.shown
     }
 
-    /// One half alone, as it is compared.
+    /// One half alone, exposed and encoded.
     pub(crate) fn half(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<SrgbRgb> {
         exposed(picture, exposure).to_srgb()
     }
@@ -89,7 +86,7 @@ impl EncodedLight {
 }
 
 impl LightReference {
-    /// A truth's. Fails where a value is not finite.
+    /// Encodes a truth. Fails if a value is not finite.
     pub fn new(
         protocol: &Protocol,
         lpips: Option<&Lpips>,
@@ -97,26 +94,26 @@ impl LightReference {
         exposure: f64,
     ) -> Result<Self, MetricError> {
         let light = EncodedLight::new(&truth.halves, &truth.shown, exposure);
-        let features = match (lpips, protocol.mask_rule) {
-            (Some(lpips), MaskRule::Inside) => or_too_small(lpips.features(&light.shown))?,
-            _ => None,
+        let features = match lpips {
+            Some(lpips) => protocol.mask_rule.shared_features(lpips, &light.shown)?,
+            None => None,
         };
         Ok(Self { light, features })
     }
 
-    /// The truth as people see it.
+    /// The truth's picture for display.
     pub(crate) fn shown(&self) -> &Picture<SrgbRgb> {
         &self.light.shown
     }
 
-    /// The truth's halves, as they are compared.
+    /// The truth's halves, exposed and encoded.
     pub(crate) fn halves(&self) -> Halves<'_, SrgbRgb> {
         self.light.halves()
     }
 }
 
-/// MSE, PSNR, SSIM and (where its weights are there) LPIPS of a picture of light over the mask. `blocks` are those of
-/// [`crate::noise_blocks`]. Fails where sizes differ or a value that counts is not finite.
+/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of a picture of light over the mask. `blocks` come from
+/// [`crate::noise_blocks`]. Fails if sizes differ or a value that counts is not finite.
 pub fn rgb_metrics(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
@@ -132,27 +129,12 @@ pub fn rgb_metrics(
     let bias = encoding_bias(prediction.linear(), truth.linear(), encode, mask, blocks)?;
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let mut values = noise_free_values(mse.as_ref(), bias.map(|bias| (bias.estimate, bias.bound)), pixels)?;
-    values.push(match protocol.mask_rule {
-        MaskRule::BlackFill => {
-            let value = ssim_halves_black_fill(prediction.halves(), &truth.shown, mask)?;
-            Measured::plain(Metric::Ssim, value, pixels)
-        }
-        MaskRule::Inside => {
-            let inside = ssim_halves_valid_windows(prediction.halves(), &truth.shown, mask)?;
-            Measured::plain(Metric::Ssim, inside.as_ref().map(|s| s.ssim), inside.map_or(0, |s| s.windows))
-        }
-    });
+    values.push(ssim_metric(protocol.mask_rule.ssim_halves(prediction.halves(), &truth.shown, mask)?));
     if let Some(lpips) = lpips {
         let seen = MeanAndHalves { mean: &prediction.shown, a: &prediction.halves[0], b: &prediction.halves[1] };
-        let distance = match (protocol.mask_rule, &reference.features) {
-            (MaskRule::BlackFill, _) => match or_too_small(lpips.black_filled_features(&truth.shown, mask))? {
-                Some(features) => lpips.extrapolated_black_fill(seen, &features, mask)?,
-                None => None,
-            },
-            (MaskRule::Inside, Some(features)) => lpips.extrapolated_masked(seen, &truth.shown, features, mask)?,
-            (MaskRule::Inside, None) => None,
-        };
-        values.push(rounded_lpips(protocol, distance.map(|distance| distance.lpips), pixels));
+        let shared = reference.features.as_ref();
+        let distance = protocol.mask_rule.lpips_halves(lpips, seen, &truth.shown, shared, mask)?;
+        values.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(RgbMeasured { values, mse })
 }
@@ -167,7 +149,7 @@ fn noise_free_values(
     };
     let noise = |standard_error: f64| ValueNoise { standard_error, bias: None, bias_bound: None, lower_bound: false };
     let psnr = mse.psnr()?;
-    // To first order, where the error is more than noise.
+    // To first order, if the error exceeds the noise.
     let slope = 10.0 / std::f64::consts::LN_10;
     let psnr_error = if mse.mse > 0.0 { slope * mse.standard_error() / mse.mse } else { Psnr::CAP_DB };
     Ok(vec![
@@ -181,12 +163,4 @@ fn noise_free_values(
             ..Measured::plain(Metric::Psnr, Some(psnr.db), pixels)
         },
     ])
-}
-
-/// The network has no value for a picture that is too small: missing, not wrong.
-fn or_too_small<T>(found: Result<T, MetricError>) -> Result<Option<T>, MetricError> {
-    match found {
-        Err(MetricError::TooSmall { .. }) => Ok(None),
-        other => other.map(Some),
-    }
 }

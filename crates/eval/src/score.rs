@@ -18,19 +18,20 @@ use crate::light_rules::Track;
 use crate::metric::{LPIPS_NET, Metric};
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
-use crate::result::{
-    MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId, means, summary_noise,
-};
-use crate::scene_score::{SceneOrder, SceneScore, score_scene};
+use crate::result::{MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId};
+use crate::result_writer::protocol_result;
+use crate::scene_order::SceneOrder;
+use crate::scene_score::SceneScore;
+use crate::scene_scorer::score_scene;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::submission_json::SubmissionJson;
 
-/// The network that scores use, or why it is not there.
+/// The network of LPIPS, or why it is missing.
 pub enum LpipsWeights {
     /// Loaded.
     Loaded(Box<Lpips>),
-    /// Not to be had.
+    /// Missing.
     Missing {
         /// Why.
         reason: String,
@@ -50,25 +51,25 @@ impl LpipsWeights {
 
 /// What to score.
 pub struct ScorePlan<'a> {
-    /// On what.
+    /// The dataset.
     pub dataset: &'a Dataset,
     /// Submission folders.
     pub submissions: Vec<&'a Path>,
-    /// Under which rules.
+    /// The rules.
     pub protocols: Vec<Protocol>,
-    /// Only these scenes; all where empty.
+    /// The scenes to score; all if empty.
     pub scenes: Vec<SceneId>,
     /// The network of LPIPS.
     pub lpips: LpipsWeights,
     /// Name and version of the tool, for the result.
     pub tool: String,
-    /// Scenes that are scored at once; each is worked on by all threads anyway.
+    /// Number of scenes that are scored at once; each of them uses all threads anyway.
     pub jobs: usize,
-    /// A folder that scores of scenes are kept in by what they depend on, so that a killed run goes on.
+    /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run resumes.
     pub cache: Option<&'a Path>,
 }
 
-/// One submission on its way to a result.
+/// One submission while it is being scored.
 struct Entry {
     file: SubmissionFile,
     findings: Vec<Finding>,
@@ -77,7 +78,7 @@ struct Entry {
     scores: Vec<Vec<(SceneId, SceneScore)>>,
 }
 
-/// What one submission got in one scene.
+/// The scores of one submission in one scene.
 struct Outcome {
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
@@ -85,8 +86,8 @@ struct Outcome {
     scores: Vec<SceneScore>,
 }
 
-/// Scores every submission; gives their results in the same order. A scene's rays are traced once for all of them, and so
-/// are paths of light for those that agree in roughness and metallic.
+/// Scores every submission and returns their results in the same order. The camera rays of a scene are traced once for all
+/// submissions, and paths of light once for those that agree in roughness and metallic.
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
     plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
@@ -104,7 +105,7 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
 }
 
-/// By scene, then by submission; some scenes at a time. The first failure ends it.
+/// Outcomes by scene, then by submission. Scores several scenes at a time; the first failure ends the work.
 fn score_scenes(
     plan: &ScorePlan<'_>,
     scenes: &[&SceneFile],
@@ -120,7 +121,7 @@ fn score_scenes(
             if outcome.is_err() {
                 next.store(scenes.len(), Ordering::Relaxed);
             }
-            // Each place is filled by the one worker that drew its number.
+            // Only the worker that drew a scene's number fills its place.
             let _ = done[at].set(outcome);
         }
     };
@@ -128,7 +129,7 @@ fn score_scenes(
         (1..plan.jobs.max(1)).for_each(|_| drop(scope.spawn(work)));
         work();
     });
-    // Scenes that a failure left out come after it or are as yet empty.
+    // Scenes that were not scored because of a failure are empty.
     done.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
@@ -182,7 +183,7 @@ impl ScorePlan<'_> {
         })
     }
 
-    /// Where scores of a scene under a protocol are kept: everything that they depend on is in the name.
+    /// The file of a scene's scores under a protocol; its name is the hash of everything that they depend on.
     fn place(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;
@@ -191,9 +192,9 @@ impl ScorePlan<'_> {
         Some(self.cache?.join(format!("{key}.json")))
     }
 
-    /// The scores that an earlier run has kept, if it has all of them.
+    /// The scores that an earlier run kept, if all of them can be read.
     fn kept(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
-        // A file that is half written or of another kind is none.
+        // A truncated or foreign file counts as missing.
         self.protocols.iter().map(|protocol| json::read(&self.place(scene, prediction, protocol)?).ok()).collect()
     }
 
@@ -218,7 +219,7 @@ fn open_submission(path: &Path, plan: &ScorePlan<'_>) -> Result<Entry, EvalError
             file: SUBMISSION.to_owned(),
             place: "/dataset_manifest_sha256".to_owned(),
             message: format!("made for the dataset {}, scored on {expected}", file.dataset_manifest_sha256),
-            action: "scored all the same; make it anew for this dataset".to_owned(),
+            action: "scored nevertheless; make the submission again for this dataset".to_owned(),
         });
     }
     Ok(Entry { file, findings, files: vec![hashed], scores: vec![Vec::new(); plan.protocols.len()] })
@@ -257,7 +258,7 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     }
 }
 
-/// A finding for each scene in which light of the prediction could not be counted.
+/// A finding for each scene in which some of the prediction's light was not finite.
 fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
     let lost = scores.iter().filter(|(_, score)| score.not_finite > 0);
     lost.map(|(scene, score)| Finding {
@@ -271,35 +272,7 @@ fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Find
     .collect()
 }
 
-/// All scenes' scores in one.
-fn protocol_result(protocol: &Protocol, fingerprint: String, scores: Vec<(SceneId, SceneScore)>) -> ProtocolResult {
-    let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
-    for (scene, score) in scores {
-        pictures.extend(score.pictures);
-        texels.extend(score.texels);
-        instances.extend(score.instances);
-        if !score.noise.is_empty() {
-            noise.insert(scene.clone(), score.noise);
-        }
-        fits.extend(score.fit.map(|fit| (scene, fit)));
-    }
-    let (scenes, summary) = means(&pictures, &texels);
-    ProtocolResult {
-        protocol: protocol.clone(),
-        fingerprint,
-        summary,
-        scenes,
-        summary_noise: summary_noise(&noise),
-        noise,
-        fits,
-        pictures,
-        texels,
-        instances,
-    }
-}
-
-/// What could not be measured for want of weights or renders.
+/// The metrics that lack weights or renders.
 fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
     let mut missing = Vec::new();
     if let LpipsWeights::Missing { reason, fix } = &plan.lpips {

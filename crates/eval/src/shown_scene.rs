@@ -1,4 +1,4 @@
-//! What people see of a scene: the truth and every submission.
+//! Pictures of a scene for display: the truth and every submission.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use crate::light_score::{ShownLight, shown_light};
 use crate::material_pictures::material_pictures;
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
-use crate::scene_score::SceneOrder;
+use crate::scene_order::SceneOrder;
 use crate::truth::ViewTruth;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
@@ -20,7 +20,7 @@ use mateval_submission::prediction::{PredictedScene, read_scene};
 pub struct SceneAlbedo {
     /// The truth's pictures and masks.
     pub truth: ViewTruth,
-    /// In the plan's order.
+    /// One for each submission, in the given order.
     pub predicted: Vec<Picture<LinearRgb>>,
 }
 
@@ -40,11 +40,11 @@ pub fn scene_albedo(
     scored_views(dataset, scene)?.into_iter().map(view).collect()
 }
 
-/// The truth's light and every submission's of one view, as people see it.
+/// The truth's light and every submission's of one view, for display.
 pub struct SceneLight {
     /// The truth's pictures and masks.
     pub truth: ViewTruth,
-    /// Submissions in the plan's order.
+    /// Truth and submissions, the latter in the given order.
     pub shown: ShownLight,
 }
 

@@ -1,11 +1,11 @@
 //! Submissions compared with the truth texel by texel, on the surface itself: every place counts by its area, whether or
 //! not a view shows it.
 //!
-//! In: the baked truth of an instance, the maps of every submission. Out: an [`InstanceTexels`] for each, sums of which
-//! errors of a scene or a category can be made.
+//! In: the baked truth of an instance, the maps of every submission. Out: an [`InstanceTexels`] for each submission, whose
+//! sums add up to the errors of a scene or a category.
 //!
-//! Between: a [`TexelMap`] says once for all submissions where each texel of the truth's atlas lies, how large it is and
-//! whether the input camera sees it. One instance is in memory at a time.
+//! A [`TexelMap`], shared by all submissions, holds where each texel of the truth's atlas lies, how large it is and whether
+//! the input camera sees it. One instance is in memory at a time.
 
 use mateval_image::Texture;
 use mateval_metrics::{MetricError, Psnr};
@@ -22,7 +22,7 @@ use crate::truth_material::TruthMaterial;
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_submission::texel_map::{SurfaceTexel, TexelMap};
 
-/// Weighted squares over the texels of an instance (or several) that are seen, or that are not.
+/// Weighted squared errors over the observed, or the unobserved, texels of one or several instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TexelSums {
     /// The sum of the weights: the texels' area on the surface, in square metres.
@@ -36,7 +36,7 @@ pub struct TexelSums {
 }
 
 impl TexelSums {
-    /// Adds what another has seen; the order of additions decides the last bits.
+    /// Adds other sums. The order of additions determines the last bits.
     pub fn add(&mut self, other: &Self) {
         self.area_m2 += other.area_m2;
         self.base_color += other.base_color;
@@ -44,7 +44,7 @@ impl TexelSums {
         self.metallic += other.metallic;
     }
 
-    /// The mean squared error over the area; none where there is none.
+    /// The mean squared error over the area; none where the area is zero.
     pub fn mse(&self, map: Map) -> Option<f64> {
         let sum = match map {
             Map::BaseColor => self.base_color,
@@ -54,13 +54,13 @@ impl TexelSums {
         (self.area_m2 > 0.0).then(|| sum / self.area_m2)
     }
 
-    /// The PSNR of [`Self::mse`]. Fails where that is not finite, as an area may make it that is beyond all measure.
+    /// The PSNR of [`Self::mse`]. Fails if that is not finite, as with an immense area.
     pub fn psnr(&self, map: Map) -> Result<Option<Psnr>, MetricError> {
         self.mse(map).map(Psnr::from_mse).transpose()
     }
 }
 
-/// What a submission says of an instance against what is true, over all texels that lie on its surface.
+/// The errors of a submission on one instance, over all texels on its surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InstanceTexels {
     /// The instance.
@@ -71,7 +71,7 @@ pub struct InstanceTexels {
     pub unobserved: TexelSums,
 }
 
-/// Compares every instance with an atlas, in the scene's order; gives a list a submission, in theirs.
+/// Compares every instance that has an atlas, in the scene's order. Returns a list for each submission, in their order.
 ///
 /// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces and the scene's instances. Fails where
 /// the truth cannot be read or `scene.json` is unsound.
@@ -105,7 +105,7 @@ pub fn texture_space(
 fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>, EvalError> {
     let Some(atlas) = &instance.atlas else { return Ok(None) };
     let size = atlas.size as usize;
-    // No more memory than a submission may ask for.
+    // The sizes that a submission may have bound the memory of the truth, too.
     if MAP_SIZES.contains(&size) {
         return Ok(Some(size));
     }
@@ -113,10 +113,10 @@ fn atlas_size(folder: &SceneFolder, instance: &Instance) -> Result<Option<usize>
     Err(EvalError::AtlasSize { path, instance, expected: MAP_SIZES, found: size })
 }
 
-/// The squared errors of a prediction against the truth, weighted by area: observed, then unobserved.
+/// The squared errors of a prediction, weighted by area: of observed texels, then of unobserved ones.
 ///
 /// Both are looked up at the texels' places, bilinearly, whatever the prediction's size: at a centre the truth is its texel
-/// itself. Both are linear and as they are: nothing is clipped. The same sums for any number of threads.
+/// itself. Both are linear; nothing is clipped. The sums are the same for any number of threads.
 pub fn compare(map: &TexelMap, prediction: &PredictedMaterial, truth: &TruthMaterial) -> [TexelSums; 2] {
     let rows: Vec<[TexelSums; 2]> =
         (0..map.size()).into_par_iter().map(|y| compare_row(map, prediction, truth, y)).collect();

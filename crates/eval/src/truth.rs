@@ -1,4 +1,4 @@
-//! What views are compared with.
+//! The ground truth of views: maps, masks and light.
 
 use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
 use mateval_scene::RendererId;
@@ -17,11 +17,11 @@ pub struct ViewTruth {
     pub roughness: Picture<f32>,
     /// 0 to 1.
     pub metallic: Picture<f32>,
-    /// What is scored.
+    /// The pixels that are scored.
     pub valid: Mask,
-    /// Valid and not seen by the input view; none for the input view.
+    /// Valid pixels that the input view does not see; none for the input view.
     pub unobserved: Option<Mask>,
-    /// Valid and metal or smooth in truth; none where nothing is.
+    /// Valid pixels that are metal or smooth in truth; none if there are no such pixels.
     pub specular: Option<Mask>,
     /// Instance index of each pixel's centre, 0 for nothing.
     pub instances: Picture<u16>,
@@ -59,7 +59,7 @@ impl ViewTruth {
     }
 }
 
-/// A view's light: two independent halves and what SSIM, LPIPS and the fit look at; linear, before exposure.
+/// A view's light, linear, before exposure: two independent halves, and the picture for SSIM, LPIPS and the fit.
 #[derive(Clone, Debug)]
 pub struct RgbTruth {
     /// The halves.
@@ -75,7 +75,7 @@ impl RgbTruth {
         Ok(Self { halves: [part("rgb_a")?, part("rgb_b")?], shown: part("rgb")? })
     }
 
-    /// What is shown of the view under one light group alone.
+    /// The denoised picture of the view under one light group alone.
     pub fn shown_of_group(
         folder: &SceneFolder,
         renderer: &RendererId,
@@ -85,7 +85,7 @@ impl RgbTruth {
         Self::read_part(folder, renderer, view, &group_name(group))
     }
 
-    /// The view under each of `lightings`: weighted sums of the groups' pictures, which are read once.
+    /// The view under each of `lightings`: weighted sums of the groups' pictures, each of which is read once.
     pub fn relit(
         folder: &SceneFolder,
         renderer: &RendererId,

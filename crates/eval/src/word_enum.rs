@@ -1,10 +1,10 @@
-//! A macro for enums whose every variant is one word of a file: it is printed and parsed here and nowhere else.
+//! A macro for enums whose variants are words in files. It generates the only code that prints and parses them.
 
 /// A word that an enum does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} is no {what}; expected one of: {expected}", quoted(.word))]
 pub struct UnknownWord {
-    /// What it should have been, as in "metric".
+    /// The kind of word that was expected, as in "metric".
     pub what: &'static str,
     /// The word.
     pub word: String,
@@ -34,7 +34,7 @@ macro_rules! word_enum {
         }
 
         impl $name {
-            /// Every variant, in the order in which people are shown them.
+            /// Every variant, in the order of display.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             /// The word for it in files.

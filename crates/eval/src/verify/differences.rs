@@ -107,19 +107,19 @@ mod tests {
         assert!(places(&value(0.0), &value(9e-6)).is_empty());
         let both = ["/pictures/0/value", "/summary/albedo.input.lpips_alex"];
         assert_eq!(places(&value(0.0), &value(1.1e-5)), both);
-        // Only LPIPS is forgiven.
+        // The twin: other metrics have no tolerance.
         let mse = |by: f64| json!({"pictures": [{"metric": "mse", "value": 0.25 + by}]});
         assert_eq!(places(&mse(0.0), &mse(1e-9)), ["/pictures/0/value"]);
     }
 
     #[test]
-    fn what_is_missing_or_of_another_kind_differs() {
+    fn missing_values_and_other_types_differ() {
         let said = json!({"a": [1, 2], "b": "x", "c": 1});
         let found = json!({"a": [1], "b": 2, "d": 1});
-        let told: Vec<[String; 3]> =
+        let found: Vec<[String; 3]> =
             differences(&said, &found).into_iter().map(|d| [d.place, d.said, d.found]).collect();
         let expected =
             [["/a", "a list of 2", "a list of 1"], ["/b", "\"x\"", "2"], ["/c", "1", "null"], ["/d", "null", "1"]];
-        assert_eq!(told, expected.map(|row| row.map(str::to_owned)));
+        assert_eq!(found, expected.map(|row| row.map(str::to_owned)));
     }
 }

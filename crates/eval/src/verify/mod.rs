@@ -1,16 +1,14 @@
-//! A result held against itself: every number of it made anew from the same dataset and submission.
+//! Verification of a result: every number is computed again from the same dataset and submission.
 //!
 //! In: a result file, the submission and the dataset that it names. Out: a [`VerificationFile`]. Before anything is
-//! rendered, hashes and rules are compared: where they differ, numbers must too, and the findings say what has changed.
+//! rendered, hashes and rules are compared: where they differ, numbers would too, and the findings state what has changed.
 
 mod differences;
 pub mod file;
+mod plan;
 mod sameness;
 
-use std::path::Path;
-
 use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Progress, Severity, json};
 
 use crate::error::EvalError;
@@ -20,25 +18,11 @@ use crate::result::{MissingNumbers, ResultFile};
 use crate::score::{LpipsWeights, ScorePlan, score};
 use differences::{Difference, differences};
 pub use file::{VERIFICATION_FORMAT, VerificationFile};
+pub use plan::VerifyPlan;
+use plan::file_name;
 
-/// So many numbers that differ are told; all are counted.
-const TOLD: usize = 20;
-
-/// What to verify.
-pub struct VerifyPlan<'a> {
-    /// RESULT.json.
-    pub result: &'a Path,
-    /// The submission folder that it was made of.
-    pub submission: &'a Path,
-    /// The dataset that it was made on.
-    pub dataset: &'a Dataset,
-    /// The network of LPIPS; not asked for where the result has none.
-    pub lpips: LpipsWeights,
-    /// Name and version of this tool.
-    pub tool: String,
-    /// Scenes that are scored at once.
-    pub jobs: usize,
-}
+/// The most differences that are listed; all are counted.
+const MOST_LISTED: usize = 20;
 
 /// Verifies a result. Fails where that cannot be done: files that cannot be read, weights of LPIPS that are missing.
 pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<VerificationFile, EvalError> {
@@ -59,7 +43,7 @@ pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<Verificati
     let name = file_name(plan.result);
     let again = scored_again(plan, &result, progress)?;
     let found = differences(&to_value(&result)?, &to_value(&again)?);
-    let findings = found.iter().take(TOLD).map(|difference| finding(&name, difference)).collect();
+    let findings = found.iter().take(MOST_LISTED).map(|difference| finding(&name, difference)).collect();
     Ok(VerificationFile { confirmed: found.is_empty(), differences: found.len(), findings, ..verification })
 }
 
@@ -71,7 +55,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
         protocols,
         scenes: result.dataset.scenes.clone(),
         lpips: as_in_the_result(plan.lpips, result),
-        // Which version it was is compared by the rules' own version.
+        // Versions are compared by the version of the rules.
         tool: result.tool.clone(),
         jobs: plan.jobs,
         cache: None,
@@ -79,7 +63,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
     Ok(score(&plan, progress)?.remove(0))
 }
 
-/// A result without LPIPS is made anew without it.
+/// A result without LPIPS is computed again without it.
 fn as_in_the_result(lpips: LpipsWeights, result: &ResultFile) -> LpipsWeights {
     match result.missing.iter().find(|missing| missing.metric == MissingNumbers::Metric(Metric::LpipsAlex)) {
         Some(missing) => LpipsWeights::Missing { reason: missing.reason.clone(), fix: missing.fix.clone() },
@@ -97,11 +81,7 @@ fn finding(file: &str, difference: &Difference) -> Finding {
         code: "differs".to_owned(),
         file: file.to_owned(),
         place: difference.place.clone(),
-        message: format!("the result says {}, made anew it is {}", difference.said, difference.found),
+        message: format!("the result states {}, computed again it is {}", difference.said, difference.found),
         action: "the result was changed, or made by another version; score it again".to_owned(),
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
 }

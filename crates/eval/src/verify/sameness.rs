@@ -1,9 +1,9 @@
-//! Whether a result can be made anew at all: same format, rules, dataset, submission and network.
+//! Whether a result can be computed again: same format, rules, dataset, submission and network.
 
 use mateval_scene::{Finding, Severity};
 
 use super::differences::differences;
-use super::{VerifyPlan, file_name};
+use super::plan::{VerifyPlan, file_name};
 use crate::error::EvalError;
 use crate::metric::LPIPS_NET;
 use crate::protocol::Protocol;
@@ -11,8 +11,8 @@ use crate::result::{RESULT_FORMAT, ResultFile};
 use crate::score::LpipsWeights;
 use mateval_submission::hashed_submission::hashed_submission;
 
-/// Everything that has changed; numbers must be made anew only where this is empty. Fails where weights of LPIPS that the
-/// result was made with are missing.
+/// Everything that has changed; numbers are computed again only if this is empty. Fails if the result holds LPIPS and its
+/// weights are missing.
 pub(super) fn findings(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec<Finding>, EvalError> {
     let name = file_name(plan.result);
     let finding = |code: &str, place: &str, message: String, action: &str| Finding {
@@ -65,7 +65,7 @@ fn rules(result: &ResultFile, finding: &MakeFinding<'_>) -> Result<Vec<Finding>,
             [&scores.protocol, &known].map(|protocol| serde_json::to_value(protocol).map_err(EvalError::Compare));
         let [said, known] = values;
         for difference in differences(&said?, &known?) {
-            let message = format!("the result says {}; protocol '{name}' has {}", difference.said, difference.found);
+            let message = format!("the result states {}; protocol '{name}' has {}", difference.said, difference.found);
             let place = format!("{place}{}", difference.place);
             findings.push(finding("other_protocol", &place, message, "score it again by the published rules"));
         }

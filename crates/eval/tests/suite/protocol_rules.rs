@@ -3,10 +3,11 @@
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::EvalError;
+use mateval_eval::lit_scene::{LitScene, Photo};
 use mateval_eval::measure::rounded_lpips;
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::pilot::samples_under_bound;
-use mateval_eval::predicted_light::{LitScene, Photo, predicted_light};
+use mateval_eval::predicted_light::predicted_light;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::relit::lightings;
 use mateval_eval::rgb::LightReference;

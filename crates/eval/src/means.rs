@@ -1,0 +1,175 @@
+//! Means of a result: of pictures to scenes, of scenes to the dataset.
+
+use std::collections::BTreeMap;
+
+use mateval_metrics::Psnr;
+use mateval_scene::SceneId;
+
+use crate::metric::Metric;
+use crate::result::{InstanceTexelErrors, PictureValue, PsnrNoise, TexelErrors};
+use crate::result_key::{PictureKind, ResultKey, Views};
+
+/// The means of each scene over its pictures (over texels by area), and of the dataset over its scenes. A missing value is
+/// left out of its mean; a scene without any value of a key is left out of the key's mean.
+pub fn means(
+    pictures: &[PictureValue],
+    texels: &[InstanceTexelErrors],
+) -> (BTreeMap<SceneId, BTreeMap<ResultKey, f64>>, BTreeMap<ResultKey, f64>) {
+    let mut of_scene: BTreeMap<SceneId, BTreeMap<ResultKey, Mean>> = BTreeMap::new();
+    for picture in pictures {
+        if let Some(value) = picture.value {
+            of_scene.entry(picture.scene.clone()).or_default().entry(picture.key()).or_default().add(value);
+        }
+    }
+    let mut scenes: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = of_scene
+        .into_iter()
+        .map(|(scene, keys)| (scene, keys.into_iter().map(|(key, mean)| (key, mean.value())).collect()))
+        .collect();
+    for (scene, values) in texel_means(texels) {
+        scenes.entry(scene).or_default().extend(values);
+    }
+    let mut of_dataset: BTreeMap<ResultKey, Mean> = BTreeMap::new();
+    for (key, value) in scenes.values().flatten() {
+        of_dataset.entry(*key).or_default().add(*value);
+    }
+    let summary = of_dataset.into_iter().map(|(key, mean)| (key, mean.value())).collect();
+    (scenes, summary)
+}
+
+/// For each scene, map, and observed or unobserved texels: the mean squared error by area, and its PSNR.
+fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
+    type Part = (Views, fn(&InstanceTexelErrors) -> &TexelErrors);
+    type Map = (PictureKind, fn(&TexelErrors) -> Option<f64>);
+    let parts: [Part; 2] = [(Views::Observed, |t| &t.observed), (Views::Unobserved, |t| &t.unobserved)];
+    let maps: [Map; 3] = [
+        (PictureKind::TextureBaseColor, |errors| errors.base_color_mse),
+        (PictureKind::TextureRoughness, |errors| errors.roughness_mse),
+        (PictureKind::TextureMetallic, |errors| errors.metallic_mse),
+    ];
+    let mut sums: BTreeMap<(SceneId, ResultKey), [f64; 2]> = BTreeMap::new();
+    for instance in texels {
+        for (part, errors) in parts.map(|(part, of)| (part, of(instance))) {
+            for (map, mse) in maps.map(|(map, of)| (map, of(errors))) {
+                let Some(mse) = mse else { continue };
+                let key = ResultKey::whole(map, part, Metric::Mse);
+                let sums = sums.entry((instance.scene.clone(), key)).or_default();
+                sums[0] += errors.area_m2 * mse;
+                sums[1] += errors.area_m2;
+            }
+        }
+    }
+    let mut means: BTreeMap<SceneId, BTreeMap<ResultKey, f64>> = BTreeMap::new();
+    for ((scene, key), [sum, area]) in sums {
+        let values = means.entry(scene).or_default();
+        let mse = sum / area;
+        if let Ok(psnr) = Psnr::from_mse(mse) {
+            values.insert(key, mse);
+            values.insert(key.with(Metric::Psnr), psnr.db);
+        }
+    }
+    means
+}
+
+/// The standard error of the dataset's mean of each key that all its scenes have one of: scenes are independent.
+pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>) -> BTreeMap<ResultKey, f64> {
+    let mut sums: BTreeMap<ResultKey, (usize, Option<f64>)> = BTreeMap::new();
+    for (key, of_scene) in noise.values().flatten() {
+        let (count, squares) = sums.entry(*key).or_insert((0, Some(0.0)));
+        *count += 1;
+        *squares = squares.zip(of_scene.standard_error_db).map(|(sum, error)| sum + error * error);
+    }
+    sums.into_iter().filter_map(|(key, (count, squares))| Some((key, squares?.sqrt() / count as f64))).collect()
+}
+
+#[derive(Default)]
+struct Mean {
+    sum: f64,
+    count: usize,
+}
+
+impl Mean {
+    fn add(&mut self, value: f64) {
+        self.sum += value;
+        self.count += 1;
+    }
+
+    fn value(&self) -> f64 {
+        self.sum / self.count as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::{InstanceId, ViewId};
+
+    use super::*;
+    use crate::result::NoiseState;
+    use crate::result_key::{PictureName, Region};
+
+    fn key(text: &str) -> ResultKey {
+        text.parse().unwrap()
+    }
+
+    fn value(scene: &str, view: &str, region: Region, value: Option<f64>) -> PictureValue {
+        PictureValue {
+            scene: SceneId::new(scene).unwrap(),
+            view: ViewId::new(view).unwrap(),
+            picture: PictureName::whole(PictureKind::Albedo),
+            region,
+            metric: Metric::Psnr,
+            lighting: None,
+            noise: None,
+            value,
+            exact: false,
+            count: 1,
+        }
+    }
+
+    /// Two instances of 1 and 3 square metres.
+    #[test]
+    fn texels_count_by_area() {
+        let texels = |name: &str, area_m2: f64, mse: f64| InstanceTexelErrors {
+            scene: SceneId::new("a").unwrap(),
+            instance: InstanceId::new(name).unwrap(),
+            observed: TexelErrors { area_m2, base_color_mse: Some(mse), ..Default::default() },
+            unobserved: TexelErrors::default(),
+        };
+        let (scenes, summary) = means(&[], &[texels("x", 1.0, 0.04), texels("y", 3.0, 0.0)]);
+        assert!((summary[&key("texture_base_color.observed.mse")] - 0.01).abs() < 1e-15);
+        assert!((summary[&key("texture_base_color.observed.psnr")] - 20.0).abs() < 1e-12);
+        assert_eq!(scenes.values().next().map(BTreeMap::len), Some(2));
+    }
+
+    #[test]
+    fn noise_of_scenes_is_independent() {
+        let noise = |error: Option<f64>| PsnrNoise {
+            standard_error_db: error,
+            own_db: error,
+            truth_db: None,
+            samples: 16,
+            state: NoiseState::Certified,
+        };
+        let key = key("rgb_true.input.psnr");
+        let scene = |name: &str, error| (SceneId::new(name).unwrap(), BTreeMap::from([(key, noise(error))]));
+        let both = BTreeMap::from([scene("a", Some(0.03)), scene("b", Some(0.04))]);
+        assert!((summary_noise(&both)[&key] - 0.025).abs() < 1e-15);
+        assert!(summary_noise(&BTreeMap::from([scene("a", Some(0.1)), scene("b", None)])).is_empty());
+    }
+
+    /// Scene a has two novel views, scene b one: each scene weighs the same.
+    #[test]
+    fn pictures_then_scenes() {
+        let all = [
+            value("a", "up_left", Region::Valid, Some(10.0)),
+            value("a", "up_right", Region::Valid, Some(20.0)),
+            value("b", "up_left", Region::Valid, Some(35.0)),
+            value("a", "up_left", Region::Unobserved, None),
+            value("a", "input", Region::Valid, Some(1.0)),
+        ];
+        let (scenes, summary) = means(&all, &[]);
+        assert_eq!(summary[&key("albedo.novel.psnr")], 25.0);
+        assert_eq!(summary[&key("albedo.input.psnr")], 1.0);
+        assert!(!summary.contains_key(&key("albedo.unobserved.psnr")));
+        assert_eq!(scenes[&SceneId::new("a").unwrap()][&key("albedo.novel.psnr")], 15.0);
+    }
+}

@@ -1,0 +1,64 @@
+//! A scene with its predictions and the rules: what is scored, and the regions of its views.
+
+use mateval_image::Mask;
+use mateval_metrics::{Lpips, MetricError};
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::SceneFolder;
+use mateval_scene::{Progress, RendererId, TriangleMesh};
+use mateval_submission::prediction::PredictedScene;
+use mateval_tracer::World;
+
+use crate::error::EvalError;
+use crate::protocol::Protocol;
+use crate::result_key::{Region, Surfaces};
+use crate::truth::{ViewTruth, intersection};
+
+/// A scene, its predictions and the rules.
+pub(crate) struct SceneOrder<'a> {
+    pub(crate) scene: &'a SceneFile,
+    pub(crate) folder: &'a SceneFolder,
+    pub(crate) world: &'a World,
+    pub(crate) atlases: &'a [TriangleMesh],
+    /// The views that are scored.
+    pub(crate) views: Vec<&'a View>,
+    pub(crate) predictions: &'a [PredictedScene],
+    pub(crate) protocols: &'a [Protocol],
+    pub(crate) lpips: Option<&'a Lpips>,
+    /// The renderer of the pictures that light is compared with; none leaves light out.
+    pub(crate) renderer: Option<&'a RendererId>,
+    pub(crate) progress: Progress<'a>,
+}
+
+/// Some of a view's pixels.
+pub(crate) struct MaskedRegion {
+    pub(crate) region: Region,
+    pub(crate) surfaces: Surfaces,
+    pub(crate) mask: Mask,
+}
+
+impl SceneOrder<'_> {
+    /// Adds scene and view to an error of a metric.
+    pub(crate) fn or_named<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
+        found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })
+    }
+}
+
+/// The regions of a view that have values of their own.
+pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
+    let mut regions = vec![MaskedRegion { region: Region::Valid, surfaces: Surfaces::All, mask: truth.valid.clone() }];
+    let unobserved = truth.unobserved.as_ref();
+    regions.extend(unobserved.map(|mask| MaskedRegion {
+        region: Region::Unobserved,
+        surfaces: Surfaces::All,
+        mask: mask.clone(),
+    }));
+    if let Some(specular) = &truth.specular {
+        regions.push(MaskedRegion { region: Region::Valid, surfaces: Surfaces::Specular, mask: specular.clone() });
+        regions.extend(unobserved.map(|mask| MaskedRegion {
+            region: Region::Unobserved,
+            surfaces: Surfaces::Specular,
+            mask: intersection(mask, specular),
+        }));
+    }
+    regions
+}
