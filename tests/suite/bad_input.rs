@@ -235,7 +235,7 @@ fn outputs_that_exist() {
     std::fs::write(source.out().join("notes.txt"), "mine").unwrap();
     let out = source.out();
     for words in [&[][..], &["--force"]] {
-        run(build(&source.recipe, &out).args(words)).ends_with(2).says("is no dataset");
+        run(build(&source.recipe, &out).args(words)).ends_with(2).says("is not a dataset");
         run(baseline("grey", dataset(), &out).args(words)).ends_with(2).says("dataset'");
     }
     run(mateval().arg("sample").arg(&out)).ends_with(2).says("already exists");
