@@ -1,11 +1,12 @@
-//! From submissions to scores: what must be trusted.
+//! Scores of submissions: the part of MatEval that must be trusted.
 //!
-//! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or with
-//! [`verify`] whether a result says what the submission scores.
+//! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or, from [`verify`],
+//! whether a result states what the submission scores.
 //!
-//! Between: [`protocol`] holds every constant, [`material_pictures`] makes pictures of a submission's maps, [`alignment`]
-//! takes out the scale, [`predicted_light`] renders the maps under every light, [`measure`] compares, [`texture_space`]
-//! compares texel by texel, [`score`] goes through the dataset.
+//! [`protocol`] holds every constant. For each scene of the dataset, [`score`] looks up a submission's maps in every view
+//! ([`material_pictures`]) and removes their scale ([`alignment`]), renders the maps under every light ([`predicted_light`]),
+//! compares pictures ([`measure`], [`rgb`]) and texels ([`texture_space`]). Scores stay nested by scene, view and picture
+//! until the result lists each by its key ([`result_key`]) and takes the means ([`means`]).
 
 pub mod alignment;
 pub mod error;

@@ -88,6 +88,34 @@ struct Outcome {
 
 /// Scores every submission and returns their results in the same order. The camera rays of a scene are traced once for all
 /// submissions, and paths of light once for those that agree in roughness and metallic.
+///
+/// # Examples
+///
+/// ```no_run
+/// use std::path::Path;
+///
+/// use mateval_eval::protocol::Protocol;
+/// use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+/// use mateval_metrics::{Lpips, Net};
+/// use mateval_scene::open::Dataset;
+///
+/// let dataset = Dataset::open(Path::new("dataset"))?;
+/// let lpips = Lpips::load(Net::Alex, Path::new("lpips-alex-v0.1.safetensors"))?;
+/// let plan = ScorePlan {
+///     dataset: &dataset,
+///     submissions: vec![Path::new("submission")],
+///     protocols: vec![Protocol::named("mateval-1")?],
+///     scenes: Vec::new(),
+///     lpips: LpipsWeights::Loaded(Box::new(lpips)),
+///     tool: "my tool 1.0".to_owned(),
+///     jobs: 1,
+///     cache: None,
+/// };
+/// for (key, value) in &score(&plan, &|_, _, _| ())?[0].protocols["mateval-1"].summary {
+///     println!("{key} {value}");
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
     plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
