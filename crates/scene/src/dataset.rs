@@ -95,7 +95,7 @@ pub struct SceneFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSource {
-    /// `bitterli` or `front3d`.
+    /// The kind of source.
     pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,

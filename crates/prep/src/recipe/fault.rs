@@ -8,9 +8,6 @@ use mateval_sources::below::BelowError;
 
 use super::limits::{ATLAS_SIZES, FARTHEST_M, RESOLUTION};
 
-/// The keys that name a scene's source, as messages list them.
-const SOURCES: &str = "`bitterli` and `front3d`";
-
 /// One fault of a recipe.
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeFault {
@@ -18,7 +15,7 @@ pub enum RecipeFault {
     #[error("{}", .0.to_string().trim_end())]
     Syntax(Box<toml::de::Error>),
     /// The recipe has no scene.
-    #[error("it has no scene; add a [[scene]] with `id` and one of {SOURCES}")]
+    #[error("it has no scene; add a [[scene]] with `id` and the key of a source")]
     NoScenes,
     /// The number of samples is out of range.
     #[error("samples = {found}: expected 1 to {most}")]
@@ -80,8 +77,11 @@ pub enum RecipeFault {
 #[derive(Debug, thiserror::Error)]
 pub enum RecipeSceneFault {
     /// The scene names no source, or more than one.
-    #[error("expected exactly one of {SOURCES}")]
-    NotOneSource,
+    #[error("expected exactly one of the keys `{}`", keys.join("`, `"))]
+    NotOneSource {
+        /// The keys that name a source.
+        keys: &'static [&'static str],
+    },
     /// The source has no camera of its own.
     #[error("a room needs a camera, as in `camera = {{ seed = 1 }}`")]
     NoCamera,

@@ -11,6 +11,9 @@ use super::camera::RecipeCamera;
 use super::fault::{RecipeFault, RecipeSceneFault};
 use super::sizes::check_sizes;
 
+/// The keys of a scene that name its source.
+const SOURCE_KEYS: [&str; 2] = ["bitterli", "front3d"];
+
 /// One scene of a recipe.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -89,7 +92,7 @@ impl RecipeScene {
         match (&self.bitterli, &self.front3d) {
             (Some(xml), None) => Ok(RecipeSource::Bitterli(xml)),
             (None, Some(room)) => Ok(RecipeSource::Front3d(room)),
-            _ => Err(RecipeSceneFault::NotOneSource),
+            _ => Err(RecipeSceneFault::NotOneSource { keys: &SOURCE_KEYS }),
         }
     }
 
