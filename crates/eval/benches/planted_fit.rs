@@ -1,9 +1,10 @@
-//! How well planted radiances are found again in a noisy photo of a real room, by samples of the light basis.
+//! Measures how well planted radiances are recovered from a noisy photo of a real room, by samples of the light basis.
 //!
-//! `cargo bench --workspace --bench planted_fit -- DATASET SCENE SUBMISSION`. Radiances of 0.5 to 3.5, another for every
-//! light and channel, are planted on the light stage of a 3D-FRONT room, on the own emitters of another scene. The photo
-//! is rendered with one seed, the basis with another, both of the submission's materials, so that noise alone moves the fit. Light by light
-//! it tells the share of the photo, the noise of the averaged squares between photo and basis, and what was found.
+//! `cargo bench --workspace --bench planted_fit -- DATASET SCENE SUBMISSION`. Radiances of 0.5 to 3.5, different for
+//! every light and channel, are planted on the light stage of a 3D-FRONT room, or on the own emitters of another scene.
+//! The photo is rendered with one seed and the basis with another, both with the submission's materials, so that only
+//! noise affects the fit. For each light the bench prints its share of the photo, the noise of the averaged squares
+//! between photo and basis, and the radiances that were found.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 use std::path::Path;
@@ -89,7 +90,7 @@ fn main() {
     }
 }
 
-/// Root mean square of the difference of two pictures of squares over the mean of the second.
+/// Root mean square of the difference of two pictures of squares, divided by the mean of the second.
 fn noise(a: &[f64], b: &[f64]) -> f64 {
     let squares: f64 = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum();
     (squares / a.len() as f64).sqrt() / (b.iter().sum::<f64>() / b.len() as f64)
@@ -99,12 +100,12 @@ fn planted(light: usize) -> [f64; 3] {
     [0, 1, 2].map(|c| 0.5 + 3.0 * ((light * 7 + c * 5) % 11) as f64 / 10.0)
 }
 
-/// Of every light and channel.
+/// Values for every light and channel.
 fn errors(found: &[[f64; 3]], planted: &[[f64; 3]]) -> Vec<f64> {
     found.iter().flatten().zip(planted.iter().flatten()).map(|(found, planted)| (found / planted - 1.0).abs()).collect()
 }
 
-/// What each light and channel brings to the photo.
+/// The contribution of each light and channel to the photo.
 fn shares(basis: &LightBasis, weights: &[[f64; 3]]) -> Vec<f64> {
     let sum = |at: usize, c: usize| {
         let pixels = basis.pictures()[at].pixels();

@@ -1,9 +1,11 @@
-//! What it costs to look at eight submissions together, against eight apart: submissions that differ in base colour alone
-//! are followed by the same paths. And what five lightings more cost: track `relit` is sums over the same paths.
+//! Measures the cost of rendering eight submissions together and separately: submissions that differ only in base
+//! colour share the same paths. It also measures the cost of five additional lightings: track `relit` consists of sums
+//! over the same paths.
 //!
 //! `cargo bench --workspace --bench sharing -- DATASET SCENE SUBMISSION [SAMPLES [lightings]]`. The eight are the
-//! submission's own maps, each with its own copies of the textures, so that none finds another's in the caches. Runs
-//! alternate; tracing only, CPU seconds of all threads. With `lightings` behind SAMPLES the eight are left out.
+//! submission's own maps, each with its own copy of the textures, so that none benefits from another's in the caches.
+//! Runs alternate; only tracing is measured, in CPU seconds of all threads. With `lightings` after SAMPLES the eight
+//! are left out.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 use std::path::Path;
@@ -78,7 +80,7 @@ fn main() {
     println!("together over apart: {:.3}", together / apart);
 }
 
-/// The same texels elsewhere in memory.
+/// A copy of the texels in other memory.
 fn copied(texture: &Texture) -> Texture {
     Texture::new(texture.width(), texture.height(), texture.texels().clone(), texture.wrap()).unwrap()
 }

@@ -1,4 +1,4 @@
-//! What the comparison in texture space costs, scene by scene:
+//! Measures the cost of the comparison in texture space, scene by scene:
 //! `cargo bench --workspace --bench texture_space -- DATASET SUBMISSION...`.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a table, of files that the caller names
 
@@ -47,7 +47,7 @@ fn bench_scene(folder: &SceneFolder, scene: &SceneFile, submissions: &[PathBuf])
     }
 }
 
-/// Seconds of each step alone, one instance after the other.
+/// Seconds of each step, one instance after the other.
 fn print_steps(
     folder: &SceneFolder,
     scene: &SceneFile,

@@ -1,15 +1,16 @@
-//! What a scene's five views cost, with their lights fitted: ours, and the same with Mitsuba.
+//! Measures the cost of a scene's five views with fitted lights, with our tracer and with Mitsuba.
 //!
 //! `MATEVAL_PEERS_PYTHON=... cargo bench --workspace --bench five_views -- [quick|full]` on `bench/dense` (864,036
 //! triangles, 15 emitters), 480 x 270 pixels, 6 bounces (Mitsuba's max_depth 8). Ours: a light basis of the input view
-//! at 256 x 256 pixels (stream C), the fit, and two halves of all five views' light bases in one pass. Mitsuba's: radiances fitted by `prb` and
-//! Adam, 100 iterations at 256 x 256 pixels and 16 samples (our assumption: nobody published a number), then five renders.
-//! `quick` times 10 iterations and scales; `scalar_rgb` cannot fit, so only its renders count. Tools take turns.
+//! at 256 x 256 pixels (stream C), the fit, and two halves of all five views' light bases in one pass. Mitsuba's:
+//! radiances fitted by `prb` and Adam, with 100 iterations at 256 x 256 pixels and 16 samples (our assumption, since no
+//! number is published), then five renders. `quick` times 10 iterations and scales the result; `scalar_rgb` cannot fit,
+//! so only its renders count. The tools run alternately.
 //!
-//! Times are compared at equal noise: MSE falls as 1 / samples, so Mitsuba's renders count times its MSE over ours. That
-//! is checked with a quarter of the samples. A tool's MSE against the picture that it converges to is half the mean square
-//! of the difference of two independent pictures, which needs no converged picture; that both converge to one picture is
-//! told by the mean product of differences of independent pairs.
+//! Times are compared at equal noise: MSE falls as 1 / samples, so the time of Mitsuba's renders is multiplied by its
+//! MSE divided by ours. A quarter of the samples is used to check this. A tool's MSE relative to the picture that it
+//! converges to is half the mean square of the difference of two independent pictures, which needs no converged
+//! picture. The mean product of differences of independent pairs shows whether both tools converge to the same picture.
 
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints")]
@@ -25,17 +26,17 @@ use mateval_scene::{Camera, Intrinsics};
 use noise::{Noise, disagreement};
 use stage::{Stage, find};
 
-/// Pixels of a view: the datasets' default.
+/// Pixels of a view, as in datasets by default.
 pub const SIZE: [usize; 2] = [480, 270];
 /// Pixels of the pictures that Mitsuba fits.
 pub const FIT_SIZE: usize = 256;
-/// A pixel, all halves together.
+/// Samples a pixel, both halves together.
 const SAMPLES: [u32; 2] = [16, 64];
 const OFFSETS: [[f64; 2]; 5] = [[0.0, 0.0], [5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
 
-/// One tool's way through a scene, once.
+/// One run of a tool on a scene.
 pub struct Run {
-    /// What took how long.
+    /// The stages and their times.
     pub stages: Vec<Stage>,
     /// For each of [`SAMPLES`], all views' pictures one after the other, linear RGB.
     pub pictures: Vec<Vec<f32>>,
@@ -60,7 +61,7 @@ fn main() {
     for round in 0..2 {
         own.push(ours::run(&world, &folder, input, &cameras, round));
         for (runs, variant) in theirs.iter_mut().zip(variants) {
-            // Scalar is slow: its renders of the fewer samples alone are timed, and scale.
+            // Scalar is slow, so only its renders with fewer samples are timed and then scaled.
             let fits = round == 0 && *variant != "scalar_rgb";
             let iterations = if fits { if full { 100 } else { 10 } } else { 0 };
             let samples = if *variant == "scalar_rgb" && !full { &SAMPLES[..1] } else { &SAMPLES };
@@ -70,7 +71,7 @@ fn main() {
     report(&own, variants, &theirs);
 }
 
-/// The same view in other pixels, as wide.
+/// The same view with other pixels and the same horizontal field of view.
 fn sized(camera: Camera) -> Camera {
     let [width, height] = SIZE.map(|v| v as u32);
     let own = camera.intrinsics;
@@ -110,7 +111,7 @@ fn noise_rows(tool: &str, noise: &[Noise]) {
     }
 }
 
-/// Both ways at the noise of ours, for both numbers of samples.
+/// Times of both tools at the noise of ours, for both numbers of samples.
 fn compare(own: &[Run], own_noise: &[Noise], variant: &str, runs: &[Run], noise: &[Noise]) {
     let fit = find(&runs[0].stages, "fit", None).map(|stage| stage.scaled_to_iterations(100));
     for (k, samples) in SAMPLES.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! The five views by Mitsuba, in a process of its own.
+//! The five views by Mitsuba, in a separate process.
 
 use std::ffi::OsStr;
 use std::path::Path;

@@ -1,26 +1,26 @@
-//! How noisy pictures are.
+//! The noise of pictures.
 
 use mateval_image::LinearRgb;
 use mateval_image::Picture;
 
-/// The mean squared error of a tool's picture against what it converges to.
+/// The mean squared error of a tool's picture relative to the picture that it converges to.
 #[derive(Clone, Copy, Debug)]
 pub struct Noise {
     pub linear: f64,
-    /// Clipped to 0..1 and sRGB-encoded, as scores see it.
+    /// Clipped to 0..1 and sRGB-encoded, as for scores.
     pub srgb: f64,
 }
 
 impl Noise {
-    /// From two independent pictures: half the mean square of their difference.
+    /// Estimates it from two independent pictures: half the mean square of their difference.
     pub fn of(a: &[f32], b: &[f32]) -> Self {
         let half_square = |a: &[f32], b: &[f32]| mean(a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2) / 2.0));
         Self { linear: half_square(a, b), srgb: half_square(&srgb(a), &srgb(b)) }
     }
 }
 
-/// The mean squared difference between what two tools converge to, linear and in sRGB, from two independent pictures of
-/// each, free of their noise; and the ratio of their means.
+/// The mean squared difference between the pictures that two tools converge to, linear and in sRGB, estimated without
+/// noise from two independent pictures of each; and the ratio of their means.
 pub fn disagreement(a: [Vec<f32>; 2], b: [Vec<f32>; 2]) -> String {
     let product = |a: [&[f32]; 2], b: [&[f32]; 2]| {
         mean((0..a[0].len()).map(|i| f64::from(a[0][i] - b[0][i]) * f64::from(a[1][i] - b[1][i])))

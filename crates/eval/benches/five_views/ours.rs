@@ -15,10 +15,10 @@ use crate::SAMPLES;
 use crate::bench_scene;
 use crate::stage::Stage;
 
-/// A pixel of the pictures that the fit sees.
+/// Samples a pixel of the pictures that the fit uses.
 pub const STREAM_C_SAMPLES: u32 = 16;
 
-/// The scene, ready for rays, and its camera; told what that took.
+/// The scene, ready for rays, and its camera; prints the time that this took.
 pub fn load(folder: &Path) -> (World, Camera) {
     let ((scene, camera), read) = Stage::measure("read", 0, || bench_scene::read(folder, FIT_SIZE as u32));
     let (world, build) = Stage::measure("hierarchy", 0, || World::new(Arc::new(scene)).unwrap());
@@ -57,7 +57,7 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
         let seeds = [seed + u64::from(samples) + 1, seed + u64::from(samples) + 2];
         let (views, stage) = Stage::measure("two halves", samples, || {
             let views = render(cameras, samples / 2, &seeds);
-            // The pictures that are scored; their noise is compared under the scene's own radiances.
+            // The scored pictures; their noise is compared under the scene's own radiances.
             let halves = views.iter().flat_map(|view| &view.halves);
             let scored: Vec<_> = halves.map(|half| half.basis.weighted(&fit.weights).unwrap()).collect();
             std::hint::black_box(scored);

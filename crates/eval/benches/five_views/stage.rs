@@ -1,4 +1,4 @@
-//! How long a stage took.
+//! The time of a stage.
 
 use std::time::Instant;
 
@@ -11,14 +11,14 @@ use crate::Run;
 pub struct Stage {
     pub name: String,
     pub samples: u32,
-    /// Of an optimiser; 0 where there is none.
+    /// Iterations of an optimiser; 0 without one.
     pub iterations: u32,
     pub cpu: f64,
     pub wall: f64,
 }
 
 impl Stage {
-    /// Does `work` and tells what it took.
+    /// Does `work` and measures its time.
     pub fn measure<T>(name: &str, samples: u32, work: impl FnOnce() -> T) -> (T, Self) {
         let (cpu, wall) = (ProcessTime::now(), Instant::now());
         let done = work();
@@ -26,7 +26,7 @@ impl Stage {
         (done, Self { name: name.to_owned(), samples, iterations: 0, cpu, wall })
     }
 
-    /// The mean of all runs' stages of that name and number of samples.
+    /// The mean over all runs of the stage with this name and number of samples.
     pub fn mean(runs: &[Run], name: &str, samples: u32) -> Self {
         let found: Vec<&Self> = runs.iter().filter_map(|run| find(&run.stages, name, Some(samples))).collect();
         let sum = found[1..].iter().fold(found[0].clone(), |sum, stage| sum.plus(stage));
@@ -41,13 +41,13 @@ impl Stage {
         Self { cpu: self.cpu + other.cpu, wall: self.wall + other.wall, ..self.clone() }
     }
 
-    /// What more iterations, or fewer, would take.
+    /// The time for another number of iterations.
     pub fn scaled_to_iterations(&self, iterations: u32) -> Self {
         self.times(f64::from(iterations) / f64::from(self.iterations))
     }
 }
 
-/// The stage of that name, and of that number of samples if one is given.
+/// The stage with this name, and with this number of samples if one is given.
 pub fn find<'a>(stages: &'a [Stage], name: &str, samples: Option<u32>) -> Option<&'a Stage> {
     stages.iter().find(|stage| stage.name == name && samples.is_none_or(|samples| stage.samples == samples))
 }

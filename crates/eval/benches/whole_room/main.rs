@@ -1,29 +1,32 @@
-//! What it costs to score one submission in one room in full: ours, and the same with other projects' parts.
+//! Measures the cost of scoring one submission in one room completely, with MatEval and with other projects' software.
 //!
 //! `MATEVAL_PEERS_PYTHON=... cargo bench --workspace --bench whole_room -- DATASET SCENE SUBMISSION [full]`;
-//! `tools/bench_whole_room.sh` makes all three of the shared data and runs it. Ours: `score`, protocol `mateval-1` with
-//! everything in it, from opening the dataset to the result. Theirs, by `tests/peers/score_room_mitsuba.py`: both tracks'
-//! five views by Mitsuba, radiances fitted by `prb` and Adam, albedo by its `aov`; MSE, PSNR and SSIM by scikit-image and
-//! LPIPS by `lpips` of both tracks and of albedo, raw and aligned. Theirs has no track `relit`, no texture space, no
-//! roughness and metallic, no specular regions, no halves. Importing and compiling is not counted for theirs. Tools take turns.
+//! `tools/bench_whole_room.sh` makes all three arguments from the shared data and runs the bench. Ours: `score` under
+//! protocol `mateval-1` with everything in it, from opening the dataset to the result. Theirs, by
+//! `tests/peers/score_room_mitsuba.py`: both tracks' five views by Mitsuba, radiances fitted by `prb` and Adam, albedo
+//! by its `aov`; MSE, PSNR and SSIM by scikit-image and LPIPS by `lpips`, for both tracks and for albedo, raw and
+//! aligned. Theirs has no track `relit`, no texture space, no roughness and metallic, no specular regions and no
+//! halves. Importing and compiling is not counted for theirs. The tools run alternately.
 //!
-//! **The fit**: 100 iterations of 8 samples a pixel of the photo as it is: at 480 x 270 pixels as many paths as
-//! `five_views` takes, our assumption there. PSDR-Room, whose stage this is, publishes 201 iterations of 128 samples
-//! forward and 4 backward at 800 x 600 pixels, for materials and lights together.
+//! **The fit**: 100 iterations of 8 samples a pixel at the photo's size. At 480 x 270 pixels these are as many paths as
+//! in `five_views`, where the number is our assumption. PSDR-Room, whose stage this is, publishes 201 iterations of 128
+//! samples forward and 4 backward at 800 x 600 pixels, for materials and lights together.
 //!
-//! **What is scaled**: with `full` nothing but for noise. Else theirs is timed for 5 iterations and a quarter of the samples,
-//! and the times of the fit and of the renders are multiplied.
+//! **Scaling**: with `full` times are scaled only for equal noise. Otherwise theirs is timed for 5 iterations and a
+//! quarter of the samples, and the times of the fit and of the renders are multiplied.
 //!
-//! **Equal noise**: theirs takes as many samples a pixel as ours took, both halves together; then the time of its renders,
-//! and of nothing else, is multiplied. Three times, since noise may mean three things. By its noise over ours: the variance
-//! of a pixel, clipped and sRGB-encoded; and the square of the standard error that results certify, of the mean PSNR, the
-//! larger of the input view's and the novel views'. Both are what a script would need that measured its error from halves as
-//! ours does. A script that hands its pictures to scikit-image as they are, as this one does, gets an MSE that is too
-//! large by the variance of a pixel: the third is how many samples bring that bias down to the standard error that ours
-//! certifies. Ours makes five views of one set of paths, so their noise is not independent; the second and third know that.
-//! Noise is compared between pictures of as many samples, of our fitted radiances and of Mitsuba's `principled`, which both
-//! can make, so that the tools converge to one picture (how nearly is told); pixels that show lights that only ours can
-//! hide from the camera are left out, and lights with a map have its mean in both.
+//! **Equal noise**: theirs takes as many samples a pixel as ours, both halves together; then the time of its renders,
+//! and of nothing else, is multiplied by a factor. Three factors are computed, since noise can be defined in three
+//! ways. The first two are ratios of its noise to ours: of the variance of a pixel, clipped and sRGB-encoded; and of
+//! the squared standard error of the mean PSNR that results certify, the larger of the input view's and the novel
+//! views'. A script that measured its error from halves, as ours does, would need these numbers of samples. A script
+//! that passes noisy pictures to scikit-image, as this one does, gets an MSE that is too large by the variance of a
+//! pixel: the third factor is the number of samples that reduces this bias to the standard error that ours certifies.
+//! Ours renders five views from one set of paths, so their noise is not independent; the second and third factors
+//! account for this. Noise is compared between pictures with the same number of samples, of our fitted radiances and of
+//! Mitsuba's `principled`, which both can render, so that the tools converge to the same picture (the remaining
+//! difference is printed). Pixels that show lights which only ours can hide from the camera are left out, and lights
+//! with a map have its mean in both.
 
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints")]
@@ -46,20 +49,20 @@ use std::path::Path;
 use room::Room;
 use stage::Stage;
 
-/// Iterations of the fit that count, and those that are timed unless `full`.
+/// Iterations of the fit, and those that are timed unless `full`.
 pub const ITERATIONS: [u32; 2] = [100, 5];
-/// Of ours samples over theirs that are timed, with `full` and without.
+/// Our samples divided by theirs that are timed, with `full` and without.
 const FEWER: [u32; 2] = [1, 4];
 const ROUNDS: u64 = 2;
 
 /// The pictures that both tools render.
 pub const TRACKS: [&str; 2] = ["true", "fitted"];
 
-/// One tool's way through the room, once.
+/// One run of a tool on the room.
 pub struct Run {
-    /// What took how long.
+    /// The stages and their times.
     pub stages: Vec<Stage>,
-    /// Of each of [`TRACKS`] all views; none of ours, whose result holds no pictures.
+    /// All views of each of [`TRACKS`]; empty for ours, whose result holds no pictures.
     pub pictures: [Vec<pictures::Linear>; 2],
 }
 
@@ -78,7 +81,7 @@ fn main() {
         std::env::var_os("MATEVAL_CACHE").map(|cache| Path::new(&cache).join(mateval_metrics::Net::Alex.file_name()));
     let room = Room::open(Path::new(dataset), scene, Path::new(submission), weights);
     let (mut own, mut theirs) = (Vec::new(), Vec::new());
-    // The first says how many samples theirs is to take.
+    // The first run determines the number of samples that theirs takes.
     let mut scored = None;
     for round in 0..ROUNDS {
         let (run, result) = ours::score(&room);

@@ -1,4 +1,4 @@
-//! The room scored by this project.
+//! Scores the room with this project.
 
 use std::sync::Mutex;
 use std::time::Instant;
@@ -13,7 +13,7 @@ use crate::Run;
 use crate::room::Room;
 use crate::stage::Stage;
 
-/// Scores the submission in the room; every step that scoring tells of is a stage.
+/// Scores the submission in the room; every step whose progress scoring reports is a stage.
 pub fn score(room: &Room) -> (Run, ResultFile) {
     let clock = Clock::start();
     let dataset = Dataset::open(&room.dataset).unwrap();
@@ -32,16 +32,16 @@ pub fn score(room: &Room) -> (Run, ResultFile) {
         cache: None,
     };
     let prefix = format!("scene {}: ", room.scene.id);
-    let tell = |step: &str, done: usize, all: usize| {
+    let report = |step: &str, done: usize, all: usize| {
         let step = step.strip_prefix(&prefix).unwrap_or(step);
-        // A step that is done is followed by what tells nothing of itself.
+        // After a finished step follows work that reports no progress.
         clock.enter(&if done < all { step.to_owned() } else { format!("after {step}") });
     };
-    let result = score_plan(&plan, &tell).unwrap().remove(0);
+    let result = score_plan(&plan, &report).unwrap().remove(0);
     (Run { stages: clock.stop(), pictures: Default::default() }, result)
 }
 
-/// Tells the stages of work apart that says what it is at.
+/// Measures the stages of work that reports its current step.
 struct Clock(Mutex<Times>);
 
 struct Times {
@@ -58,7 +58,7 @@ impl Clock {
 
     fn enter(&self, name: &str) {
         let mut times = self.0.lock().unwrap();
-        // Tiles may tell of themselves out of order: the end of a step is not taken back.
+        // Tiles may report out of order: a finished step stays finished.
         if times.name != name && times.name != format!("after {name}") {
             times.close();
             name.clone_into(&mut times.name);

@@ -1,4 +1,4 @@
-//! The submission as a scene that Mitsuba can be given: its maps on the surfaces, under the lights of either track.
+//! The submission as a scene that Mitsuba can represent: its maps on the surfaces, under the lights of either track.
 
 use std::collections::BTreeMap;
 
@@ -16,8 +16,9 @@ use mateval_submission::prediction::PredictedMaterial;
 
 use crate::room::Room;
 
-/// Under the reference's own emitters, each group's radiance times its `weights`. Lamps that are hidden from the camera
-/// reflect nothing: all but the camera see them so in our tracer, and Mitsuba cannot tell the camera apart.
+/// The scene under the reference's own emitters, with each group's radiance multiplied by its `weights`. Lamps that are
+/// hidden from the camera reflect nothing: in our tracer all other rays see them like this, and Mitsuba cannot treat
+/// camera rays differently.
 pub fn under_own_lights(room: &Room, weights: Option<&[[f64; 3]]>) -> ReferenceScene {
     let mut scene = painted(room);
     for surface in room.hidden_lights() {
@@ -33,7 +34,7 @@ pub fn under_own_lights(room: &Room, weights: Option<&[[f64; 3]]>) -> ReferenceS
     scene
 }
 
-/// Under a light stage: its quads as black surfaces that glow; the room's own lights are out.
+/// The scene under a light stage: its quads are black surfaces that emit; the room's own lights do not emit.
 pub fn on_stage(room: &Room, stage: &[NamedLight], radiances: &[[f64; 3]]) -> ReferenceScene {
     let mut scene = painted(room);
     scene.lights.clear();
@@ -48,8 +49,8 @@ pub fn on_stage(room: &Room, stage: &[NamedLight], radiances: &[[f64; 3]]) -> Re
     scene
 }
 
-/// The room in the submission's materials, of Mitsuba's flavour. What has no atlas stays as it is, and so do surfaces with
-/// opacities, which are looked up by uv of their own.
+/// The room with the submission's materials, of Mitsuba's flavour. Surfaces without an atlas are unchanged, and so are
+/// surfaces with opacities, which are looked up by their own uv.
 fn painted(room: &Room) -> ReferenceScene {
     let mut scene = room.world.scene().clone();
     scene.lights = without_maps(&scene);
@@ -70,8 +71,8 @@ fn painted(room: &Room) -> ReferenceScene {
     scene
 }
 
-/// The lights with the mean of their maps in the place of these: Mitsuba finds places on a mapped light by their uv, which
-/// lamps' are not made for.
+/// The lights with the mean of their maps in place of the maps: Mitsuba samples points on a mapped light by uv, for
+/// which the uv of lamps are not suitable.
 pub fn without_maps(scene: &ReferenceScene) -> Vec<LightGroup> {
     let textures = scene.texture_list();
     let mut lights = scene.lights.clone();
@@ -107,7 +108,7 @@ fn mean_of_map<'a>(
     sum.map(|v| v / whole)
 }
 
-/// The surface's own vertices with the atlas's uv; corners share nothing.
+/// The surface's own vertices with the atlas's uv, without vertices shared between corners.
 fn unwrapped(own: &TriangleMesh, atlas: &TriangleMesh) -> TriangleMesh {
     let corners = || own.triangles.iter().flatten().map(|vertex| *vertex as usize);
     let uvs = atlas.uvs.as_ref().unwrap();
@@ -120,7 +121,7 @@ fn unwrapped(own: &TriangleMesh, atlas: &TriangleMesh) -> TriangleMesh {
 }
 
 fn model(textures: &mut Vec<SourceTexture>, predicted: &PredictedMaterial) -> MaterialModel {
-    // One texel twice would be one file twice.
+    // Equal texels would otherwise be written to two files.
     let mut places = BTreeMap::new();
     let mut place = |texture: &Texture| {
         *places.entry(texture.bytes().as_ptr()).or_insert_with(|| {
@@ -142,7 +143,7 @@ fn model(textures: &mut Vec<SourceTexture>, predicted: &PredictedMaterial) -> Ma
     MaterialModel::Principled { base_color, roughness, metallic, specular: 0.5, flavour: PrincipledFlavour::Mitsuba }
 }
 
-/// The texture's value where it is the same everywhere.
+/// The texture's value if it is constant.
 fn flat(texture: &Texture) -> Option<[f32; 3]> {
     (texture.width() * texture.height() == 1).then(|| texture.texel(0, 0))
 }

@@ -1,4 +1,4 @@
-//! The room scored with other projects' parts, in a process of its own.
+//! Scores the room with other projects' software, in a separate process.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -22,8 +22,8 @@ use crate::stage::Stage;
 /// Samples a pixel and iteration of the fit.
 const FIT_SAMPLES: u32 = 8;
 
-/// Runs `tests/peers/score_room_mitsuba.py` once, with so many samples a pixel of each track; no iterations leave the fit
-/// out.
+/// Runs `tests/peers/score_room_mitsuba.py` once, with these numbers of samples a pixel for the tracks; without
+/// iterations the fit is left out.
 pub fn run(python: &OsStr, room: &Room, scored: &ResultFile, round: u64, iterations: u32, samples: [u32; 2]) -> Run {
     let out = tempfile::tempdir().unwrap();
     let scenes = write_scenes(room, scored, out.path());
@@ -45,7 +45,7 @@ pub fn run(python: &OsStr, room: &Room, scored: &ResultFile, round: u64, iterati
     Run { stages: stages(&result, iterations), pictures }
 }
 
-/// Both tracks' scenes as Mitsuba's XML; what it cannot say is told once.
+/// Both tracks' scenes as Mitsuba's XML; what it cannot represent is printed once.
 fn write_scenes(room: &Room, scored: &ResultFile, out: &Path) -> Value {
     let radiances = radiances(room, scored);
     let fitted = match room.stage().as_slice() {
@@ -73,7 +73,7 @@ fn job(room: &Room, out: &Path, round: u64, iterations: u32, samples: [u32; 2], 
     let photo = room.light[0].shown.pixels().iter().flat_map(|pixel| pixel.0).flat_map(f32::to_le_bytes);
     std::fs::write(&target, photo.collect::<Vec<u8>>()).unwrap();
     let fov_x_deg = 2.0 * libm::atan(f64::from(k.width) / 2.0 / k.fx).to_degrees();
-    // Mitsuba counts the camera's ray and the last piece of direct light too.
+    // Mitsuba also counts the camera's ray and the last segment of direct light.
     let max_depth = room.protocol.light.max_bounces + 2;
     let matrices: Vec<[[f64; 4]; 4]> = room.cameras().iter().map(|camera| camera.world_from_camera).collect();
     let [own, fitted] = samples;
@@ -105,7 +105,7 @@ fn view_files(room: &Room, view: &View) -> Value {
     })
 }
 
-/// Both packages give the same LPIPS of the same whole pictures, or the bench has failed.
+/// Asserts that both packages compute the same LPIPS for the same whole pictures.
 fn tell_lpips(room: &Room, pictures: &[Linear], result: &Value) {
     let Some(weights) = &room.weights else { return };
     let lpips = Lpips::load(Net::Alex, weights).unwrap();
@@ -120,7 +120,7 @@ fn tell_lpips(room: &Room, pictures: &[Linear], result: &Value) {
     assert!(largest < 1e-4, "LPIPS differs by {largest}");
 }
 
-/// Stages of one name become one.
+/// Merges stages with the same name.
 fn stages(result: &Value, iterations: u32) -> Vec<Stage> {
     let mut stages: Vec<Stage> = Vec::new();
     for stage in result["stages"].as_array().unwrap() {

@@ -23,9 +23,9 @@ pub type Linear = Picture<LinearRgb>;
 /// Two independent pictures of every view.
 pub type Pair = [Vec<Linear>; 2];
 
-/// How noisy a tool's pictures are.
+/// The noise of a tool's pictures.
 pub struct TrackNoise {
-    /// Of a pixel, times samples a pixel.
+    /// The variance of a pixel, times samples a pixel.
     pub variance: f64,
     /// The square of the standard error of the mean PSNR, in dB squared, times samples a pixel; the larger of the input
     /// view's and the novel views'.
@@ -43,13 +43,13 @@ pub fn samples(scored: &ResultFile) -> [u32; 2] {
     [0, 1].map(|track| noise[&psnr(track, Views::Input)].samples)
 }
 
-/// What was fitted, light by light.
+/// The fitted radiances, light by light.
 pub fn radiances(room: &Room, scored: &ResultFile) -> LightMix {
     scored.protocols["mateval-1"].fits[&room.scene.id].lights.iter().map(|light| light.radiance).collect()
 }
 
-/// Two independent halves of every view under the lights of track `track` (see [`crate::TRACKS`]) of a world of the room,
-/// `samples` a pixel and half, of Mitsuba's or Blender's flavour.
+/// Two independent halves of every view under the lights of track `track` (see [`crate::TRACKS`]) of a world of the
+/// room, `samples` a pixel and half, of Mitsuba's or Blender's flavour.
 pub fn ours(
     room: &Room,
     world: &World,
@@ -100,16 +100,16 @@ fn truth_size(truth: &mateval_eval::truth::ViewTruth) -> [usize; 2] {
     [truth.valid.width(), truth.valid.height()]
 }
 
-/// How noisy pictures of `samples` a pixel each are.
+/// The noise of pictures of `samples` a pixel each.
 pub fn noise(room: &Room, pair: &Pair, masks: &[Mask], samples: u32) -> TrackNoise {
     let samples = f64::from(samples);
     let [a, b] = [0, 1].map(|k| flat(&pair[k], masks, room.scene.exposure as f32));
-    // A pair stands for pictures of twice the samples.
+    // A pair counts as pictures of twice the samples.
     let certified = certified(room, pair, masks).powi(2) * 2.0 * samples;
     TrackNoise { variance: Noise::of(&a, &b).srgb * samples, certified }
 }
 
-/// The standard error of the mean PSNR of the pair's mean, in dB, by its own noise: what the result calls `own_db`.
+/// The standard error of the mean PSNR of the pair's mean, in dB, by its own noise; `own_db` in a result.
 fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
     let views = noise_free(room, pair, masks);
     let (input, novel) = views.split_at(INPUT_VIEWS);
@@ -117,7 +117,7 @@ fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
     [input, novel].into_iter().filter_map(error).map(|noise| noise.prediction).fold(0.0, f64::max)
 }
 
-/// Of each view, the pair's error without noise.
+/// The pair's error without noise, for each view.
 fn noise_free(room: &Room, pair: &Pair, masks: &[Mask]) -> Vec<NoiseFreeMse> {
     let exposure = room.scene.exposure as f32;
     let blocks = noise_blocks(&room.protocol.light.noise, &room.cameras());
@@ -130,11 +130,12 @@ fn noise_free(room: &Room, pair: &Pair, masks: &[Mask]) -> Vec<NoiseFreeMse> {
     (0..masks.len()).map(mse).collect()
 }
 
-/// How many samples a pixel it takes until a plain mean PSNR, of pictures as they are, is off by no more than the standard
-/// error that `scored` certifies, in the input view and in the novel ones. `pair` shows how noisy `samples` are.
+/// The number of samples a pixel for which a plain mean PSNR, of noisy pictures, is off by at most the standard error
+/// that `scored` certifies, in the input view and in the novel ones. The noise of `samples` is estimated from `pair`.
 ///
-/// A plain MSE is too large by the variance of a pixel: the mean PSNR is too small by 10 / ln 10 times the mean of variance
-/// over MSE, to first order. The noise of the truth is in both; that of the plain MSE besides its bias is not counted.
+/// A plain MSE is too large by the variance of a pixel: the mean PSNR is too small by 10 / ln 10 times the mean of
+/// variance over MSE, to first order. Both contain the noise of the truth; the noise of the plain MSE beside its bias
+/// is not counted.
 pub fn plain_samples(room: &Room, pair: &Pair, masks: &[Mask], samples: u32, scored: &ResultFile, track: usize) -> f64 {
     let exposure = room.scene.exposure as f32;
     let too_small = |view: usize, mse: &NoiseFreeMse| {
@@ -152,7 +153,7 @@ pub fn plain_samples(room: &Room, pair: &Pair, masks: &[Mask], samples: u32, sco
     [(input, Views::Input), (novel, Views::Novel)].map(needed).into_iter().fold(0.0, f64::max)
 }
 
-/// As it is compared: times the exposure, clipped to 0..1 and sRGB-encoded.
+/// The picture as it is compared: times the exposure, clipped to 0..1 and sRGB-encoded.
 fn encoded(picture: &Linear, exposure: f32) -> Picture<SrgbRgb> {
     picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v * exposure))).to_srgb()
 }

@@ -1,4 +1,4 @@
-//! What was measured, as tables.
+//! The measurements as tables.
 
 use std::sync::Arc;
 
@@ -56,7 +56,7 @@ pub fn print(room: &Room, scored: &ResultFile, own: &[Run], theirs: &[Run]) {
     }
 }
 
-/// Prints each run's stages and gives their means; the fit as if all its iterations had been timed.
+/// Prints each run's stages and returns their means; the fit is scaled to all of its iterations.
 fn rows(tool: &str, runs: &[Run]) -> Vec<Stage> {
     for stage in runs.iter().flat_map(|run| &run.stages) {
         println!("| {tool} | {} | {} | {:.2} | {:.2} |", stage.name, stage.samples, stage.cpu, stage.wall);
@@ -75,9 +75,9 @@ fn total(stages: &[Stage]) -> Stage {
     stages[1..].iter().fold(stages[0].clone(), |sum, stage| sum.plus(stage))
 }
 
-/// Prints both tools' noise under the lights of a track and gives what times of their renders are multiplied by: for as many
-/// samples as ours took, for ours noise of a pixel and of the mean PSNR, and for a plain PSNR's bias. `unmapped` is the room with the lights that
-/// theirs has.
+/// Prints both tools' noise under the lights of a track and returns the factors for the times of their renders: for as
+/// many samples as ours took, for our noise of a pixel and of the mean PSNR, and for the bias of a plain PSNR.
+/// `unmapped` is the room with their lights.
 fn compare(room: &Room, unmapped: &World, scored: &ResultFile, track: usize, theirs: &[Run]) -> [f64; 4] {
     let masks = pictures::masks(room, track);
     let name = format!("render {}", TRACKS[track]);

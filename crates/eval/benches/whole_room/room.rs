@@ -1,4 +1,4 @@
-//! The room, its submission, and what both tools need to know of them.
+//! The room, its submission, and their data that both tools need.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,17 +18,17 @@ use mateval_tracer::World;
 pub struct Room {
     pub dataset: PathBuf,
     pub submission: PathBuf,
-    /// LPIPS'.
+    /// The weights of LPIPS.
     pub weights: Option<PathBuf>,
     pub scene: SceneFile,
     pub folder: SceneFolder,
     pub renderer: RendererId,
     pub world: World,
-    /// One a surface, with the uv of its atlas.
+    /// One mesh for each surface, with the uv of its atlas.
     pub atlases: Vec<TriangleMesh>,
     pub predicted: PredictedScene,
     pub protocol: Protocol,
-    /// Of each view.
+    /// One for each view.
     pub truths: Vec<ViewTruth>,
     pub light: Vec<RgbTruth>,
 }
@@ -76,7 +76,7 @@ impl Room {
         light_stage::scene_lights(&self.protocol.light.stage, &self.scene, &self.world)
     }
 
-    /// Surfaces that glow, and are hidden from the camera alone.
+    /// Surfaces that emit and are hidden only from the camera.
     pub fn hidden_lights(&self) -> Vec<usize> {
         let groups = self.world.scene().lights.iter().filter(|group| !group.camera_visible);
         let surfaces = groups.filter_map(|group| match &group.emission {
