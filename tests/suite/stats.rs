@@ -53,16 +53,16 @@ Table I of the paper, for sample 0.1.0
   Avg. Categories/Scene  unknown
 
 Further counts
-                                             min  max  scenes
-  houses                                  1
-  scenes of bitterli                      1
-  instances                              24
-    with an atlas                        23
-    objects                               0
-    architecture                          0
-    others                               24
-  different categories                    0
-    avg. per scene                  unknown
+                                 min  max  scenes
+  houses                      1
+  scenes of bitterli          1
+  instances                  24
+    with an atlas            23
+    objects                   0
+    architecture              0
+    others                   24
+  different categories        0
+    avg. per scene      unknown
 
 Objects by super-category
   super-category      objects  share
@@ -104,16 +104,16 @@ Table I of the paper, for sample 0.1.0
   Avg. Categories/Scene  3.0    3    3       1
 
 Further counts
-                                         min  max  scenes
-  houses                              1
-  scenes of bitterli                  1
-  instances                          24
-    with an atlas                    23
-    objects                           5
-    architecture                      0
-    others                           19
-  different categories                3
-    avg. per scene                  3.0    3    3       1
+                             min  max  scenes
+  houses                  1
+  scenes of bitterli      1
+  instances              24
+    with an atlas        23
+    objects               5
+    architecture          0
+    others               19
+  different categories    3
+    avg. per scene      3.0    3    3       1
 
 Objects by super-category
   super-category                 objects   share
