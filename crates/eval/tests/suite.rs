@@ -1,5 +1,5 @@
-//! What the scoring protocol promises, on rooms small enough to be scored in seconds: the truth is never beaten, noise is
-//! as large as it is said to be and moves no mean, planted light is found again, the same input gives the same bytes.
+//! Tests the promises of the scoring protocol on rooms that are scored in seconds: the truth is never beaten, noise is
+//! as large as reported and adds no bias, planted light is recovered, the same input gives the same bytes.
 
 #![allow(
     clippy::unwrap_used,

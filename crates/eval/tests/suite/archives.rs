@@ -1,4 +1,4 @@
-//! Submissions as archives: what is sound is unpacked, what is not is refused by name, and nothing is written anywhere else.
+//! Submissions as archives: sound ones are unpacked, others are refused with a code, and nothing is written elsewhere.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::packed::{ZipEntry, end, files, gzip, tar_entry, tar_header, tarred, zip, zipped};
 
-/// Opens these bytes; what was left in the folder for work must be nothing but what is open.
+/// Opens these bytes and asserts that the work folder holds nothing but the opened submission.
 fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, SubmissionError>) {
     let folder = tempfile::tempdir().unwrap();
     let archive = folder.path().join(name);
@@ -27,7 +27,7 @@ fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, Submis
     (folder, opened)
 }
 
-/// The codes of what is wrong.
+/// The codes of the faults.
 #[track_caller]
 fn codes(bytes: &[u8]) -> Vec<String> {
     match opened("a.any", bytes).1 {
@@ -45,7 +45,7 @@ fn submission() -> tempfile::TempDir {
 }
 
 #[test]
-fn what_is_sound_is_unpacked_and_removed_again() {
+fn sound_archives_are_unpacked_and_removed_again() {
     let folder = submission();
     for prefix in ["", "./", "mine/"] {
         for bytes in [zipped(folder.path(), prefix), tarred(folder.path(), prefix)] {
@@ -57,7 +57,7 @@ fn what_is_sound_is_unpacked_and_removed_again() {
             assert!(!root.exists());
         }
     }
-    // A folder is what it is.
+    // A folder is opened in place.
     assert_eq!(open(folder.path(), Path::new("nowhere")).unwrap().root(), folder.path());
 }
 
@@ -98,9 +98,9 @@ fn names_that_lead_out_links_and_devices_are_refused() {
     assert_eq!(codes(&gzip(&tar_entry("a", b'1', b""))), ["link_in_archive"]);
 }
 
-/// Everything that is wrong with entries is told at once.
+/// All faults of entries are reported at once.
 #[test]
-fn all_entries_are_looked_at() {
+fn all_entries_are_checked() {
     let entries = [
         ZipEntry::new("../a", b"1"),
         ZipEntry { flags: 1, ..ZipEntry::new("b", b"1") },
@@ -125,8 +125,8 @@ fn all_entries_are_looked_at() {
     assert_eq!(codes(&gzip(&tar)), ["duplicate_name", "duplicate_name"]);
 }
 
-/// 100 GB out of less than a megabyte: two hundred entries that share one of 500 MB of zeros; one that says to be that large; a list of
-/// comments alone.
+/// Zips of less than a megabyte that would unpack to 100 GB: two hundred entries that share one of 500 MB of zeros; one
+/// whose stated size is that large; a directory with only comments.
 #[test]
 fn bombs_in_zip() {
     let zeros = ZipEntry::new("0", &vec![0; 500 << 20]);
@@ -137,15 +137,15 @@ fn bombs_in_zip() {
     assert_eq!(codes(&bomb), ["overlapping_entries"]);
     assert_eq!(codes(&zip(&[ZipEntry { size: 100 << 30, ..ZipEntry::new("a", b"1") }], b"")), ["archive_too_large"]);
     assert_eq!(codes(&zip(std::slice::from_ref(&zeros), b"")), ["archive_bomb"]);
-    // One that says to be small ends where that ends.
+    // An entry with a small stated size is read up to that size.
     assert_eq!(codes(&zip(&[ZipEntry { size: 1000, ..zeros }], b"")), ["wrong_size"]);
     assert_eq!(codes(&[b"PK\x03\x04".to_vec(), end(9, 65 << 20, 0, b"")].concat()), ["directory_too_large"]);
     let long = [&[0xff; 20][..], &end(u16::MAX, u32::MAX, u32::MAX, b"")].concat();
     assert_eq!(codes(&[&b"PK\x03\x04"[..], &long].concat()), ["damaged_archive"]);
 }
 
-/// The same as streams: a file that says to be of 100 GB; ten megabytes of which ten gigabytes would come, as files or as what is passed
-/// over; a name of 100 GB.
+/// The same as streams: a file whose stated size is 100 GB; ten megabytes that would unpack to ten gigabytes, as files
+/// or as skipped entries; a name of 100 GB.
 #[test]
 fn bombs_in_tar_gz() {
     let zeros = gzip(&vec![0; 64 << 20]);
@@ -156,10 +156,10 @@ fn bombs_in_tar_gz() {
     assert_eq!(codes(&bomb(tar_header("a", b'0', 500 << 20))), ["archive_bomb"]);
     assert_eq!(codes(&bomb(tar_header("a", b'2', most))), ["archive_bomb"]);
     assert_eq!(codes(&bomb(tar_header("a", b'L', most))), ["directory_too_large"]);
-    // Nothing but attributes, each of as many bytes as one may have.
+    // Only attributes, each of the largest allowed size.
     let attributes = gzip(&tar_entry("a", b'g', &vec![0; 1 << 16]).repeat(64));
     assert_eq!(codes(&attributes.repeat(80)), ["archive_bomb"]);
-    // What is allowed of anything is allowed: the twin.
+    // The twin: the ratio that is always allowed.
     let least = [gzip(&tar_header("a", b'0', 64 << 20)), zeros.clone()].concat();
     let (_work, opened) = opened("a.tgz", &least);
     assert_eq!(files(opened.unwrap().root())[0].1.len(), 64 << 20);
@@ -167,14 +167,14 @@ fn bombs_in_tar_gz() {
 }
 
 #[test]
-fn cut_and_changed_archives_are_errors_that_are_told() {
+fn truncated_and_changed_archives_are_errors_with_a_reason() {
     let folder = submission();
     for bytes in [zipped(folder.path(), ""), tarred(folder.path(), "")] {
         for length in (4..bytes.len()).step_by(7) {
             assert!(!codes(&bytes[..length]).is_empty(), "{length}");
         }
     }
-    // Of a stream only the checksum behind everything tells that it was changed.
+    // In a stream only the checksum at the end reveals a change.
     let mut changed = tarred(folder.path(), "");
     let checksum = changed.len() - 8;
     changed[checksum] ^= 1;
@@ -184,7 +184,7 @@ fn cut_and_changed_archives_are_errors_that_are_told() {
 }
 
 proptest! {
-    /// Whatever is changed: it is unpacked or refused, inside its folder.
+    /// Any change is unpacked inside the folder or refused.
     #[test]
     fn any_change_ends(places in prop::collection::vec((0_usize..1 << 16, any::<u8>()), 1..6), is_zip: bool) {
         let folder = submission();

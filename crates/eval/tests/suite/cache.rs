@@ -1,4 +1,4 @@
-//! What a run keeps is used by the next where everything is the same, and nowhere else.
+//! Cached scores are used by the next run if everything that they depend on is the same, and only then.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -45,7 +45,7 @@ fn read(file: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
 }
 
-/// A copy of the cache's entries of these scenes; there is one of each.
+/// A copy of the cache's entries for these scenes; each has one.
 fn copied(scenes: &[&str]) -> tempfile::TempDir {
     let copy = tempfile::tempdir().unwrap();
     let all = files(&KEPT.cache);
@@ -59,10 +59,10 @@ fn copied(scenes: &[&str]) -> tempfile::TempDir {
     copy
 }
 
-/// What a poisoned entry says of its first value.
+/// The first value of a poisoned entry.
 const POISON: f64 = 12345.5;
 
-/// A cache whose entries all say something wrong, so that one sees whether they are used.
+/// A cache whose entries are all wrong, which shows whether they are used.
 fn poisoned(scenes: &[&str]) -> tempfile::TempDir {
     let cache = copied(scenes);
     for file in files(cache.path()) {
@@ -85,20 +85,20 @@ fn half_a_cache_gives_the_same_result() {
     let result = score_with(&KEPT.submission, cache.path(), &hasty());
     assert!(text(&result) == KEPT.result);
     assert_eq!(files(cache.path()).len(), 2, "the other scene is kept too");
-    // The twin: what is there is used indeed.
+    // The twin: an existing entry is used.
     let cache = poisoned(&["room"]);
     assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &hasty())), ["room"]);
 }
 
 #[test]
-fn what_is_half_written_is_made_anew() {
+fn half_written_entries_are_computed_again() {
     let cache = copied(&["living", "room"]);
     let whole = std::fs::read(&files(&KEPT.cache)[0]).unwrap();
     let torn = &files(cache.path())[0];
     for length in [0, 1, whole.len() / 2, whole.len() - 2] {
         std::fs::write(torn, &whole[..length]).unwrap();
         assert!(text(&score_with(&KEPT.submission, cache.path(), &hasty())) == KEPT.result, "{length} bytes");
-        assert!(std::fs::read(torn).unwrap() == whole, "{length} bytes: not mended");
+        assert!(std::fs::read(torn).unwrap() == whole, "{length} bytes: not replaced");
     }
 }
 

@@ -1,6 +1,6 @@
-//! The truth is never beaten: not by grey, and not by itself after damage, the worse the more of it.
+//! The truth is never beaten, neither by grey nor by damaged copies of itself, whose scores fall with the damage.
 //!
-//! All of them are scored together, on the same paths, so that what differs is the damage and little of the noise.
+//! All submissions are scored together, on the same paths, so that differences are due to damage and hardly to noise.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,11 +14,11 @@ use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 use super::kept_folder::kept_folder;
 use super::sample::{dataset, hasty, plan, scored, write_changed, write_grey, write_truth};
 
-/// What is done to the truth, and how many strengths of it there are.
+/// Kinds of damage to the truth, and their numbers of strengths.
 const KINDS: [(&str, usize); 7] =
     [("grey", 1), ("blurred", 2), ("tinted", 2), ("shaded", 2), ("replaced", 2), ("smoother", 2), ("metallic", 2)];
 
-/// Writes the truth after damage; 0 is the least strength.
+/// Writes the damaged truth; 0 is the smallest strength.
 fn write_damaged(kind: &str, strength: usize, out: &Path) {
     match kind {
         "grey" => write_grey(out),
@@ -31,7 +31,7 @@ fn write_damaged(kind: &str, strength: usize, out: &Path) {
     }
 }
 
-/// By a box of 2 `radius` + 1 texels a side.
+/// Blurs with a box of 2 `radius` + 1 texels a side.
 fn blurred(truth: &Picture<LinearRgb>, radius: usize) -> Picture<LinearRgb> {
     let around = |at: usize, end: usize| at.saturating_sub(radius)..(at + radius + 1).min(end);
     Picture::from_fn(truth.width(), truth.height(), |x, y| {
@@ -47,7 +47,7 @@ fn tinted(truth: &Picture<LinearRgb>, factor: [f32; 3]) -> Picture<LinearRgb> {
     truth.map(|LinearRgb(rgb)| LinearRgb([0, 1, 2].map(|c| rgb[c] * factor[c])))
 }
 
-/// By light that was left in: less of it towards one corner of the atlas, down to 1 - `depth`.
+/// Adds shading that falls towards one corner of the atlas, down to 1 - `depth`.
 fn shaded(truth: &Picture<LinearRgb>, depth: f32) -> Picture<LinearRgb> {
     let (width, height) = (truth.width() as f32, truth.height() as f32);
     Picture::from_fn(truth.width(), truth.height(), |x, y| {
@@ -56,14 +56,14 @@ fn shaded(truth: &Picture<LinearRgb>, depth: f32) -> Picture<LinearRgb> {
     })
 }
 
-/// By grey, so many of every four squares.
+/// Replaces this number of every four squares by grey.
 fn replaced(truth: &Picture<LinearRgb>, quarters: usize) -> Picture<LinearRgb> {
     Picture::from_fn(truth.width(), truth.height(), |x, y| {
         if (x / 8 + 2 * (y / 8)) % 4 < quarters { LinearRgb([0.5; 3]) } else { truth.get(x, y) }
     })
 }
 
-/// The truth with every value of `map` moved by `share` of its way to `end`.
+/// Writes the truth with every value of `map` moved towards `end` by `share` of the distance.
 fn write_moved(out: &Path, map: &str, share: f32, end: f32) {
     write_truth(out);
     for scene in &dataset().scenes {
@@ -77,7 +77,7 @@ fn write_moved(out: &Path, map: &str, share: f32, end: f32) {
     }
 }
 
-/// The truth's result, and by kind those of its strengths.
+/// The truth's result, and those of all strengths by kind.
 struct Results {
     truth: ProtocolResult,
     damaged: Vec<(&'static str, Vec<ProtocolResult>)>,
@@ -105,8 +105,8 @@ fn results() -> Results {
     Results { truth, damaged }
 }
 
-/// Standard errors of the summary's values that render noise makes: of each picture's, averaged as the values are, as if
-/// all were off by the same noise.
+/// Standard errors of the summary's values due to render noise: those of pictures, averaged like the values, as if all
+/// had the same noise.
 fn noise(result: &ProtocolResult) -> BTreeMap<ResultKey, f64> {
     let mut scenes: BTreeMap<(ResultKey, String), Vec<f64>> = BTreeMap::new();
     for picture in result.pictures.iter().filter(|picture| picture.value.is_some()) {
@@ -124,13 +124,13 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// By how much `a` is better than `b`, in the metric's own units.
+/// The amount by which `a` is better than `b`, in the metric's unit.
 fn lead(key: ResultKey, a: &ProtocolResult, b: &ProtocolResult) -> f64 {
     key.metric.better().sign() * (a.summary[&key] - b.summary[&key])
 }
 
-/// Pictures whose squared error a kind of damage has to raise, the more of it the more.
-fn told_by(kind: &str) -> &'static [PictureKind] {
+/// Pictures whose squared error must rise with a kind of damage.
+fn affected_by(kind: &str) -> &'static [PictureKind] {
     use PictureKind::*;
     match kind {
         "smoother" => &[Roughness, TextureRoughness],
@@ -154,14 +154,14 @@ fn the_truth_is_never_beaten_and_more_damage_is_worse() {
         for (strength, damage) in strengths.iter().enumerate() {
             let what = format!("{kind} {strength}");
             for &key in truth.summary.keys() {
-                // What SSIM owes to noise is not told with it.
+                // The effect of noise on SSIM is not reported.
                 let own = if key.metric == Metric::Ssim { 0.01 } else { noise.get(&key).copied().unwrap_or(0.0) };
                 hold(&what, key, lead(key, &truth, damage), -3.0 * own);
             }
             let before = strength.checked_sub(1).map_or(&truth, |less| &strengths[less]);
             for &key in truth.summary.keys().filter(|key| key.metric == Metric::Mse) {
                 let is_whole = key.picture.surfaces == Surfaces::All;
-                if is_whole && told_by(kind).contains(&key.picture.kind) {
+                if is_whole && affected_by(kind).contains(&key.picture.kind) {
                     hold(&what, key, lead(key, before, damage), f64::MIN_POSITIVE);
                 }
             }
@@ -169,7 +169,7 @@ fn the_truth_is_never_beaten_and_more_damage_is_worse() {
     }
     assert!(wrong.is_empty(), "of {compared} comparisons these fail:\n{}", wrong.join("\n"));
     assert!(compared > 1000, "{compared}");
-    // The twin: the worst damage as if it were the truth.
+    // The twin: the worst damage in the role of the truth.
     let worst = &damaged[3].1[1];
     let beaten = truth.summary.keys().filter(|key| lead(**key, worst, &truth) < -3.0 * noise.get(*key).unwrap_or(&0.0));
     assert!(beaten.count() > 20);

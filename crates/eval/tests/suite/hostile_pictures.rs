@@ -1,4 +1,4 @@
-//! Pictures that are meant to do harm, or are merely broken, read as a submission's maps: an answer each, within bounds.
+//! Malicious and broken pictures, read as a submission's maps: each is read or refused within limits.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn sound() -> [Vec<u8>; 3] {
     [bytes, words, std::fs::read(&path).unwrap()]
 }
 
-/// The twin of all below.
+/// The twin of all tests below.
 #[test]
 fn sound_pictures_are_read() {
     let [bytes, words, exr] = sound();
@@ -47,9 +47,9 @@ fn sound_pictures_are_read() {
     assert_eq!(read_exr(&exr).unwrap().texture.texel(64 - 1, 2), [126.0 / 4096.0; 3]);
 }
 
-/// However large a header says that a picture is, nothing is made for it.
+/// For any size that a header states, no memory is taken before it is checked.
 #[test]
-fn sizes_are_looked_at_before_anything_is_decoded() {
+fn sizes_are_checked_before_anything_is_decoded() {
     for side in [4097, 100_000, u32::MAX] {
         assert_eq!(code(read_png(&png(side, 16, 6, 0, b"", b""))), "too_many_texels", "{side}");
     }
@@ -57,14 +57,14 @@ fn sizes_are_looked_at_before_anything_is_decoded() {
         let header = exr_header(side, false, &[("B", 1), ("G", 1), ("R", 1)]);
         assert!(matches!(code(read_exr(&header)), "too_many_texels" | "bad_header"), "{side}");
     }
-    // As large as may be, and nothing behind the header.
+    // The largest allowed size, and no data after the header.
     assert!(matches!(code(read_png(&png(4096, 8, 0, 0, b"", b""))), "unreadable_picture"));
     assert!(read_exr(&exr_header(4096, false, &[("B", 1), ("G", 1), ("R", 1)])).is_err());
 }
 
-/// Zeros of which a thousand come of each byte: as texels beyond the picture, as a profile, as text.
+/// Zeros that unpack to a thousand times their size: as texels beyond the picture, as a profile, as text.
 #[test]
-fn what_is_packed_beside_the_texels_is_passed_over() {
+fn packed_data_beside_the_texels_is_skipped() {
     let zeros = |before: &[u8]| {
         let mut packed = flate2::write::ZlibEncoder::new(before.to_vec(), flate2::Compression::default());
         std::io::Write::write_all(&mut packed, &vec![0; 256 << 20]).unwrap();
@@ -75,7 +75,7 @@ fn what_is_packed_beside_the_texels_is_passed_over() {
         let file = read_png(&png(64, 8, 0, 0, &chunk(name, &zeros(start)), &texels)).unwrap();
         assert_eq!(file.texture.texel(9, 9), [9.0 / 255.0; 3]);
     }
-    // More rows than there are: read or refused, but not unpacked into memory.
+    // More rows than the picture has: read or refused, but not unpacked into memory.
     let _ = read_png(&png(64, 8, 0, 0, b"", &vec![0; 256 << 20]));
 }
 
@@ -113,14 +113,14 @@ fn every_depth_kind_and_order_that_png_has() {
             }
         }
     }
-    // Kinds that there are none of.
+    // Kinds that do not exist.
     for (depth, color) in [(8, 1), (8, 5), (3, 0), (16, 3), (4, 2)] {
         assert!(read_png(&png(64, depth, color, 0, &palette, &rows(64, 64, |_, _| 0))).is_err(), "{depth} {color}");
     }
 }
 
 #[test]
-fn cut_pictures_are_told_wherever_they_are_cut() {
+fn truncated_pictures_are_refused_at_every_length() {
     let [bytes, words, exr] = sound();
     for png in [bytes, words] {
         for length in 0..png.len() {
@@ -134,7 +134,7 @@ fn cut_pictures_are_told_wherever_they_are_cut() {
 }
 
 #[test]
-fn numbers_that_are_none() {
+fn numbers_that_are_not_finite() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     for (value, expected) in [(f32::NAN, "nan"), (f32::NEG_INFINITY, "infinity"), (-1e-3, "out_of_range")] {
@@ -146,7 +146,7 @@ fn numbers_that_are_none() {
 }
 
 proptest! {
-    /// Whatever is changed in a sound file, there is an answer.
+    /// Any change of a sound file is read or refused.
     #[test]
     fn any_change_has_an_answer(
         which in 0_usize..3,

@@ -1,5 +1,5 @@
-//! `eval lint` on the sample: the good submission is clean, and every planted fault is found by its own code, with no other
-//! error and no other warning.
+//! `eval lint` on the sample: the good submission is clean, and every planted fault is found by its own code, with no
+//! other error and no other warning.
 
 mod files;
 mod folder;
@@ -14,19 +14,19 @@ use mateval_submission::lint::{LintFile, LintPlan, lint};
 
 use super::sample::{dataset, write_truth};
 
-/// A code, its severity, and what is done to a good submission.
+/// A code, its severity, and the change of a good submission.
 type Fault = (&'static str, Severity, fn(&Path));
 
 const ERROR: Severity = Severity::Error;
 const WARNING: Severity = Severity::Warning;
 const NOTE: Severity = Severity::Note;
 
-/// Where faults are planted that one map is enough for: textured, and seen by the input view.
+/// The map for faults that need only one: textured, and visible in the input view.
 fn map(submission: &Path, name: &str) -> PathBuf {
     submission.join("scenes/room/rug").join(name)
 }
 
-/// Every map of a name.
+/// All maps with this name.
 fn every(submission: &Path, name: &str) -> Vec<PathBuf> {
     let scenes = ["living", "room"].map(|scene| submission.join("scenes").join(scene));
     let instances = scenes.iter().flat_map(|scene| std::fs::read_dir(scene).unwrap());
@@ -57,12 +57,12 @@ fn the_good_submission_is_clean() {
     let file = linted(&folder.path().join("gt"));
     assert!(file.good && file.maps > 60, "{file:?}");
     assert_eq!((codes(&file, ERROR), codes(&file, WARNING)), (BTreeSet::new(), BTreeSet::new()), "{file:?}");
-    // That it is the truth is no fault, but is told.
+    // Being the truth is not a fault, but is reported.
     assert_eq!(codes(&file, NOTE), BTreeSet::from(["copy_of_truth".to_owned()]));
     assert_eq!(file.method.as_deref(), Some("gt"));
 }
 
-/// Checks one table of faults. Gives how many codes there were.
+/// Checks one table of faults and returns the number of codes.
 fn check(faults: &[Fault]) {
     let mut wrong = Vec::new();
     for (at, (code, severity, plant)) in faults.iter().enumerate() {
@@ -96,7 +96,7 @@ fn faults_of_files() {
 }
 
 #[test]
-fn faults_that_only_pictures_tell() {
+fn faults_that_only_pictures_reveal() {
     check(pictures::FAULTS);
 }
 
@@ -104,12 +104,12 @@ fn faults_that_only_pictures_tell() {
 fn each_fault_has_a_code_of_its_own() {
     let all = [folder::FAULTS, files::FAULTS, pictures::FAULTS].concat();
     let distinct: BTreeSet<&str> = all.iter().map(|(code, ..)| *code).collect();
-    // A cut JSON and a key that is there twice are the same fault.
+    // A truncated JSON and a duplicate key are the same fault.
     assert_eq!(distinct.len(), all.len() - 1);
     assert!(distinct.len() >= 40, "{} codes", distinct.len());
 }
 
-/// Baselines are no mistakes: nothing but what they are is said of them.
+/// Baselines have no findings but those that state what they are.
 #[test]
 fn baselines_are_not_accused() {
     let folder = tempfile::tempdir().unwrap();
@@ -124,7 +124,7 @@ fn baselines_are_not_accused() {
     assert!(codes(&file, WARNING).contains("same_base_color"), "{file:?}");
 }
 
-/// Ground truth may be withheld: the same is found, but for copies of it.
+/// Without the ground truth lint finds the same, except copies of it.
 #[test]
 fn a_public_dataset_is_enough() {
     let (folder, public) = (good(), tempfile::tempdir().unwrap());

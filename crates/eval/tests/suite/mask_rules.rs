@@ -1,4 +1,4 @@
-//! What the paper's mask rule does to a strip: most of the frame is black in both pictures, and counts as alike.
+//! The effect of the paper's mask rule on a strip: most of the frame is black in both pictures and counts as equal.
 
 use mateval_eval::measure::{Measured, albedo_metrics};
 use mateval_eval::metric::Metric;
@@ -45,9 +45,9 @@ fn value(measured: &[Measured], metric: Metric) -> Option<f64> {
     measured.iter().find(|found| found.metric == metric)?.value
 }
 
-/// Of SSIM's windows (950 columns of them) ten columns lie across the strip's edge; each is between 0 and 1 by either
-/// account, so that the two differ by 10 / 950 at most. What LPIPS sees of a strip depends a little on what is around it,
-/// black or the truth, since its fields are larger than the strip: no bound follows, 15 % of its value was enough.
+/// Ten of the 950 columns of SSIM's windows lie across the strip's edge. Each is between 0 and 1 under both rules, so
+/// the two differ by at most 10 / 950. LPIPS of a strip depends slightly on the surroundings, black or the truth, since
+/// its receptive fields are larger than the strip. This gives no bound; 15 % of its value was sufficient.
 #[test]
 fn a_black_frame_dilutes_a_strip() {
     const ACROSS: f64 = 10.0 / (WIDTH - 10) as f64;

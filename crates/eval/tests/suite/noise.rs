@@ -1,6 +1,6 @@
-//! Render noise, of the tracer that scores: it is as large as it is said to be, and moves no mean.
+//! Render noise of the scoring tracer is as large as reported and adds no bias.
 
-#![allow(clippy::print_stdout, reason = "what was measured is told")]
+#![allow(clippy::print_stdout, reason = "measurements are printed")]
 
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
@@ -13,10 +13,10 @@ use mateval_metrics::{
 use super::noisy_room::{EXACT, LEVELS, OTHERS, Pair, ROOM, SEEDS, encoded, halves, mean_of};
 use super::sample::lpips;
 
-/// One number, found once a seed.
+/// One number, measured once for each seed.
 struct Found {
     values: Vec<f64>,
-    /// What each is said to be uncertain by.
+    /// The reported standard error of each.
     errors: Vec<f64>,
 }
 
@@ -32,17 +32,17 @@ impl Found {
         mean(&self.values)
     }
 
-    /// The mean error that is said over the spread that is there.
+    /// The mean reported error divided by the true spread.
     fn ratio(&self) -> f64 {
         mean(&self.errors) / spread(&self.values)
     }
 
-    /// How far the mean is from an exact value (which has an error too), in standard errors.
+    /// The distance of the mean from an exact value (which has an error too), in standard errors.
     fn z(&self, exact: &NoiseFreeMse) -> f64 {
         (self.mean() - exact.mse) / self.mean_error(exact)
     }
 
-    /// Standard error of that difference. Seeds of one two share paths; the twos are independent.
+    /// Standard error of that difference. Seeds of a pair share paths; pairs are independent.
     fn mean_error(&self, exact: &NoiseFreeMse) -> f64 {
         let twos: Vec<f64> = self.values.chunks(2).map(mean).collect();
         (spread(&twos).powi(2) / twos.len() as f64 + exact.standard_error().powi(2)).sqrt()
@@ -79,7 +79,7 @@ impl Space {
         }
     }
 
-    /// Of the halves' means, noise and all.
+    /// The error of the halves' means, including noise.
     fn plain(self, view: usize, prediction: &Pair, truth: &Pair) -> f64 {
         let ([p, t], valid) = ([prediction, truth].map(mean_of), Some(&ROOM.valid[view]));
         let found = match self {
@@ -97,10 +97,10 @@ impl Space {
 /// The input view, and one that is turned against it.
 const VIEWS: [usize; 2] = [0, 1];
 
-/// Of encoded pictures, as results report it. A spread of 50 seeds is itself known to a tenth or two only: what is held to
-/// the bounds is the mean over views and predictions; one alone may lie a little outside.
+/// Errors of encoded pictures, as in results. The spread of 50 seeds is itself known only to 10 or 20 %, so the bounds
+/// apply to the mean over views and predictions; a single one may lie slightly outside.
 #[test]
-fn the_error_that_is_said_is_the_spread() {
+fn the_reported_error_is_the_spread() {
     for level in &*LEVELS {
         let cells = OTHERS.iter().flat_map(|&other| VIEWS.map(|view| (other, view)));
         let ratio = |(other, view): (usize, usize)| {
@@ -114,7 +114,7 @@ fn the_error_that_is_said_is_the_spread() {
     }
 }
 
-/// The mean PSNR of the novel views, which share paths: as views that were taken to be independent it would be surer.
+/// The mean PSNR of the novel views, which share paths. Treated as independent, their error would be too small.
 #[test]
 fn of_several_views_too() {
     for level in &*LEVELS {
@@ -137,7 +137,7 @@ fn of_several_views_too() {
     }
 }
 
-/// Of the mean over all seeds; twelve means, so one in two thousand may lie beyond 3.8 standard errors.
+/// The mean over all seeds has no bias. With twelve means, one of two thousand runs may exceed 3.8 standard errors.
 #[test]
 fn linear_errors_have_no_bias() {
     for level in &*LEVELS {
@@ -155,7 +155,7 @@ fn linear_errors_have_no_bias() {
     }
 }
 
-/// The bound holds for the mean over all seeds, but for that mean's own noise.
+/// The bound holds for the mean over all seeds, apart from that mean's own noise.
 #[test]
 fn encoded_errors_are_within_their_bound() {
     for level in &*LEVELS {
@@ -187,7 +187,7 @@ fn bias(view: usize, prediction: &Pair, truth: &Pair) -> EncodingBias {
     found.unwrap().unwrap()
 }
 
-/// Of the input view, held against the truth of 4096 samples. The twin: noise and all.
+/// SSIM of the input view, compared with the truth of 4096 samples. The twin: without removing noise.
 #[test]
 fn ssim_of_64_samples_is_that_of_4096() {
     let (valid, truth) = (&ROOM.valid[0], mean_of(&EXACT[0][0]).to_srgb());
@@ -202,7 +202,7 @@ fn ssim_of_64_samples_is_that_of_4096() {
     }
 }
 
-/// The twin: 4 samples, noise and all.
+/// The twin: 4 samples, without removing noise.
 #[test]
 fn lpips_of_64_samples_is_that_of_4096() {
     let Some(lpips) = lpips() else { return };

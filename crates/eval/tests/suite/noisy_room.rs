@@ -1,7 +1,7 @@
-//! The room of the sample, rendered over and over: its own materials, and others to be compared with them.
+//! The room of the sample, rendered many times with its own materials and with others to be compared with them.
 //!
-//! All materials are rendered with every seed. Seeds come in twos: a prediction is held against the truth of the other
-//! seed of the two, so that they share no noise, and one two has nothing to do with the next.
+//! All materials are rendered with every seed. Seeds form pairs: a prediction is compared with the truth of the other
+//! seed of its pair, so that they share no noise, and pairs are independent of each other.
 
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
@@ -17,19 +17,19 @@ use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, ren
 use super::kept_folder::kept_folder;
 use super::sample::{dataset, hasty, write_truth};
 
-/// How often everything is rendered.
+/// The number of renders of everything.
 pub const SEEDS: usize = 50;
 
-/// The truth comes first; then what is compared with it: far from it (about 18 dB), and near (about 35 dB).
+/// The truth comes first, then the predictions: one far from it (about 18 dB) and one near (about 35 dB).
 pub const OTHERS: [usize; 2] = [1, 2];
 
-/// What the truth's base colours are multiplied by.
+/// Factors of the truth's base colours.
 const FACTORS: [[f32; 3]; 3] = [[1.0; 3], [0.6, 0.7, 0.8], [0.97, 0.95, 0.93]];
 
-/// Samples a pixel of each half of what stands for no noise.
+/// Samples a pixel of each half of the pictures that count as free of noise.
 const MANY: u32 = 2048;
 
-/// Of the sample's pictures, so that thousands of samples take seconds.
+/// Size relative to the sample's pictures, so that thousands of samples take seconds.
 const SCALE: f64 = 0.75;
 
 /// The input view and two more.
@@ -62,8 +62,8 @@ pub static ROOM: LazyLock<Room> = LazyLock::new(Room::new);
 /// 4, 16 and 64 samples.
 pub static LEVELS: LazyLock<[Level; 3]> = LazyLock::new(|| [4, 16, 64].map(|samples| ROOM.level(samples)));
 
-/// By prediction and view, of 4096 samples in all; one set of paths for all predictions, so that their difference has
-/// less noise still.
+/// By prediction and view, with 4096 samples together. All predictions share one set of paths, so that their
+/// differences have even less noise.
 pub static EXACT: LazyLock<Vec<Vec<Pair>>> = LazyLock::new(|| {
     let all = ROOM.pictures(0..FACTORS.len(), MANY, 0..2);
     all.into_iter().map(|views| views.into_iter().map(|view| in_pairs(view).remove(0)).collect()).collect()
@@ -95,7 +95,7 @@ impl Room {
         Self { cameras, valid, blocks, world, repaint }
     }
 
-    /// By prediction and view the pictures of every seed; one bounce is noise enough.
+    /// The pictures of every seed, by prediction and view; one bounce gives enough noise.
     fn pictures(&self, which: Range<usize>, samples: u32, seeds: Range<u64>) -> Vec<Vec<Vec<Picture<LinearRgb>>>> {
         let mut settings = hasty().light.settings(samples);
         settings.max_bounces = 1;
@@ -149,17 +149,17 @@ fn in_pairs(pictures: Vec<Picture<LinearRgb>>) -> Vec<Pair> {
     pictures.chunks(2).map(|two| [two[0].clone(), two[1].clone()]).collect()
 }
 
-/// As metrics take them.
+/// The halves as metrics take them.
 pub fn halves<P>(pair: &[Picture<P>; 2]) -> Halves<'_, P> {
     Halves { a: &pair[0], b: &pair[1] }
 }
 
-/// Clipped and sRGB-encoded.
+/// The halves, clipped and sRGB-encoded.
 pub fn encoded(pair: &Pair) -> [Picture<SrgbRgb>; 2] {
     [0, 1].map(|half| pair[half].to_srgb())
 }
 
-/// Of both halves.
+/// The mean of both halves.
 pub fn mean_of(pair: &Pair) -> Picture<LinearRgb> {
     Picture::from_fn(pair[0].width(), pair[0].height(), |x, y| {
         let [LinearRgb(a), LinearRgb(b)] = [0, 1].map(|half| pair[half].get(x, y));

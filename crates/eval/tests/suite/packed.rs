@@ -1,9 +1,9 @@
-//! Archives, sound and otherwise, byte by byte.
+//! Writes sound and faulty archives byte by byte.
 
 use std::io::Write as _;
 use std::path::Path;
 
-/// What stands for a file in a zip: `data` as they lie there, and what the list says of them.
+/// An entry of a zip: `data` as stored, and the values of the directory, which may differ from it.
 #[derive(Clone)]
 pub struct ZipEntry {
     pub name: Vec<u8>,
@@ -15,7 +15,7 @@ pub struct ZipEntry {
     pub size: u64,
     pub checksum: u32,
     pub comment: Vec<u8>,
-    /// Whose data it has; none: its own.
+    /// The entry whose data it shares; none if it has its own.
     pub shares: Option<usize>,
 }
 
@@ -44,7 +44,7 @@ impl ZipEntry {
         }
     }
 
-    /// A file as it is.
+    /// A stored file, without compression.
     pub fn stored(name: &str, bytes: &[u8]) -> Self {
         Self { data: bytes.into(), method: 0, ..Self::new(name, bytes) }
     }
@@ -103,7 +103,7 @@ fn numbers(values: &[u16]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// An entry's block in a tar, of a size that may not be that of what follows.
+/// The header of an entry in a tar; `size` may differ from that of the data that follow.
 pub fn tar_header(name: &str, kind: u8, size: u64) -> Vec<u8> {
     let mut block = vec![0; 512];
     block[..name.len()].copy_from_slice(name.as_bytes());
@@ -117,20 +117,20 @@ pub fn tar_header(name: &str, kind: u8, size: u64) -> Vec<u8> {
     block
 }
 
-/// A whole entry.
+/// An entry with header and data.
 pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
     let padding = (512 - bytes.len() % 512) % 512;
     [&tar_header(name, kind, bytes.len() as u64)[..], bytes, &vec![0; padding]].concat()
 }
 
-/// One member of a gzip; several behind one another are read as one.
+/// One member of a gzip; several in a row are read as one stream.
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     packed.write_all(bytes).unwrap();
     packed.finish().unwrap()
 }
 
-/// Names, relative, and bytes of all files of a folder, sorted.
+/// The relative names and the bytes of all files of a folder, sorted.
 pub fn files(root: &Path) -> Vec<(String, Vec<u8>)> {
     let (mut found, mut folders) = (Vec::new(), vec![root.to_owned()]);
     while let Some(folder) = folders.pop() {

@@ -1,7 +1,7 @@
-//! Radiances that were planted on the stage are found again.
+//! Radiances that were planted on the stage are recovered.
 //!
-//! Only by the basis that made the photo: at 64x48 pixels nine lights, some of a sixtieth of others' light, stand against 48
-//! averaged squares, and between two streams of samples most radiances are off by half their value or more.
+//! Only by the basis that made the photo: at 64x48 pixels nine lights, some of a sixtieth of others' light, stand
+//! against 48 averaged squares, and between two streams of samples most radiances are off by half their value or more.
 
 use std::sync::{Arc, LazyLock};
 
@@ -46,7 +46,7 @@ fn read(name: &str, scene: &SceneFile) -> (World, Vec<TriangleMesh>, PredictedSc
     (world, atlases, read_scene(&submission, scene), ViewTruth::read(&folder, &scene.views[0]).unwrap())
 }
 
-/// The input view of a prediction by each light of a world alone.
+/// The input view of a prediction under each light of a world alone.
 fn basis_of(
     (world, atlases, prediction): (&World, &[TriangleMesh], &PredictedScene),
     camera: Camera,
@@ -68,13 +68,13 @@ fn basis_of(
     done.unwrap().remove(0).views.remove(0).halves.remove(0).basis
 }
 
-/// What is planted: 0.5 to 3.5, another in every channel.
+/// The planted radiance: 0.5 to 3.5, different in every channel.
 fn planted(light: usize) -> [f64; 3] {
     [0, 1, 2].map(|c| 0.5 + 3.0 * ((light * 7 + c * 5) % 11) as f64 / 10.0)
 }
 
 impl Staged {
-    /// The input view by each light of the stage alone; `radiance` says what each sends.
+    /// The input view under each light of the stage alone, with radiances by `radiance`.
     fn basis(&self, radiance: impl Fn(usize) -> [f64; 3], samples: u32, seed: u64) -> LightBasis {
         let quad = |(at, named): (usize, &NamedLight)| StageLight {
             radiance: radiance(at).map(|v| v as f32),
@@ -90,7 +90,7 @@ fn flavour() -> mateval_scene::material::PrincipledFlavour {
     hasty().light.flavour
 }
 
-/// Relative errors, of all lights and channels, in order.
+/// The relative errors of all lights and channels, sorted.
 fn errors(found: &LightMix) -> Vec<f64> {
     let pairs = found.iter().enumerate().flat_map(|(light, found)| found.iter().copied().zip(planted(light)));
     let mut errors: Vec<f64> = pairs.map(|(found, planted)| (found / planted - 1.0).abs()).collect();
@@ -108,13 +108,13 @@ fn the_basis_that_made_the_photo_gives_its_radiances() {
     };
     let found = errors(&fit(&basis.weighted(&mix).unwrap()));
     assert!(found.len() == 27 && found[26] < 1e-3, "{found:?}");
-    // The twin: all lights alike.
+    // The twin: equal radiances for all lights.
     assert!(errors(&fit(&basis.sum()))[13] > 0.1);
 }
 
-/// The room that keeps its own lights: what is planted on them is found in a noisy photo, by other paths, to 2 %. On a stage
-/// some lights bring a hundredth of the photo's light, which its noise hides: `benches/planted_fit.rs` tells how well those
-/// are found. The twin: a basis of one sample.
+/// The room that keeps its own lights: their planted radiances are recovered from a noisy photo, with other paths, to 2
+/// %. On a stage some lights contribute a hundredth of the photo's light, which noise hides: `benches/planted_fit.rs`
+/// measures how well those are recovered. The twin: a basis of one sample.
 #[test]
 fn a_noisy_photo_gives_the_radiances_of_a_rooms_own_lights() {
     let scene = dataset().scenes.iter().find(|scene| scene.id.as_str() == "room").unwrap();

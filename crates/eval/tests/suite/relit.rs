@@ -1,4 +1,4 @@
-//! Track `relit`: weights by the rule, and a truth that is what the renderer shows under lights of those radiances.
+//! Track `relit`: weights follow the rule, and the truth agrees with a render under lights of those radiances.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ fn renderer() -> RendererId {
     RendererId::new("builtin").unwrap()
 }
 
-/// Of a scene of the sample: the truth's input view by each group alone, and the lightings.
+/// For a scene of the sample, the truth's input view under each group alone, and the lightings.
 fn groups_and_lightings(scene: &SceneFile) -> (Vec<Picture<LinearRgb>>, Vec<RelitLighting>) {
     let folder = dataset().folder(&scene.id);
     let count = reference_io::read(&folder).unwrap().lights.len();
@@ -29,7 +29,7 @@ fn groups_and_lightings(scene: &SceneFile) -> (Vec<Picture<LinearRgb>>, Vec<Reli
     (groups, lightings)
 }
 
-/// Groups by the sum of luminance over valid pixels take turns; alone_1 is the brightest of them.
+/// Groups alternate in the order of their summed luminance over valid pixels; alone_1 is the brightest.
 #[test]
 fn weights_follow_the_rule() {
     let rules = hasty().light.relit;
@@ -52,7 +52,7 @@ fn weights_follow_the_rule() {
     }
 }
 
-/// Groups by the luminance (Rec. 709) of valid pixels, the brightest first; all of them light something.
+/// Groups by the luminance (Rec. 709) of valid pixels, the brightest first; each lights some pixel.
 fn by_luminance(scene: &SceneFile, groups: &[Picture<LinearRgb>]) -> Vec<usize> {
     let valid = ViewTruth::read(&dataset().folder(&scene.id), &scene.views[0]).unwrap().valid;
     let luminance = |picture: &Picture<LinearRgb>| -> f64 {
@@ -68,8 +68,8 @@ fn by_luminance(scene: &SceneFile, groups: &[Picture<LinearRgb>]) -> Vec<usize> 
 const CASES: [[&str; 3]; 3] =
     [["living", "warm_cool", "alone_1"], ["living", "alone_2", "dim"], ["room", "alone_2", "dim"]];
 
-/// Pixels, tiles and the whole picture. The mean of t squared would be 8 / 6 for Gaussian noise; tiles share paths, and
-/// both are stratified, so that theirs spread less.
+/// Compares pixels, tiles and the whole picture. The mean of t squared would be 8 / 6 for Gaussian noise; it is smaller
+/// for tiles, which share paths, and because both renders are stratified.
 #[test]
 fn a_weighted_sum_is_a_render_under_those_lights() {
     for [id, name, other] in CASES {
@@ -84,8 +84,8 @@ fn a_weighted_sum_is_a_render_under_those_lights() {
     }
 }
 
-/// The scene with its emitters' radiances multiplied by a lighting's weights; none where it cannot say so: an environment
-/// map has one factor for all channels.
+/// The scene with its emitters' radiances multiplied by a lighting's weights; none where the scene cannot represent
+/// this, because an environment map has one factor for all channels.
 fn lit(scene: &SceneFile, lighting: &RelitLighting) -> Option<World> {
     let mut reference: ReferenceScene = reference_io::read(&dataset().folder(&scene.id)).unwrap();
     for (group, weight) in reference.lights.iter_mut().zip(&lighting.weights) {
@@ -103,9 +103,9 @@ fn lit(scene: &SceneFile, lighting: &RelitLighting) -> Option<World> {
 
 const FRESH: usize = 8;
 
-/// Means of Student's t squared over pixels and over tiles of 8 x 8, and t of the whole picture: between the truth under
-/// a lighting (two halves) and fresh renders of `world` of as many samples as a half has. One variance is taken for both,
-/// with 8 degrees of freedom, so that t squared has the mean 8 / 6.
+/// Means of Student's t squared over pixels and over tiles of 8 x 8, and t of the whole picture: between the truth
+/// under a lighting (two halves) and fresh renders of `world` of as many samples as a half has. One variance is taken
+/// for both, with 8 degrees of freedom, so that t squared has the mean 8 / 6.
 fn compare(scene: &SceneFile, lighting: &RelitLighting, fresh: &[Picture<LinearRgb>]) -> [f64; 3] {
     let (view, folder) = (&scene.views[0], dataset().folder(&scene.id));
     let truth = RgbTruth::relit(&folder, &renderer(), view, std::slice::from_ref(lighting)).unwrap().remove(0);
@@ -140,7 +140,7 @@ fn tiles(picture: &Picture<LinearRgb>, side: usize) -> Vec<f64> {
     sums
 }
 
-/// None where nothing varies.
+/// None without variance.
 fn students_t(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let squares = |values: &[f64]| values.iter().map(|v| (v - mean(values)).powi(2)).sum::<f64>();

@@ -1,4 +1,4 @@
-//! The same `RESULT.json`, byte for byte, on any number of threads, in any company, however many scenes at once.
+//! `RESULT.json` is the same, byte for byte, for any number of threads, other submissions and parallel scenes.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -43,7 +43,7 @@ fn on_any_number_of_threads() {
 }
 
 #[test]
-fn in_any_company() {
+fn with_any_other_submissions() {
     let together = &*TOGETHER;
     for (at, &submission) in all().iter().enumerate() {
         assert!(texts(&plan(&[submission], &hasty(), &[]))[0] == together[at], "{}", submission.display());
@@ -64,7 +64,7 @@ fn in_any_company() {
 }
 
 #[test]
-fn however_many_scenes_at_once() {
+fn with_any_number_of_parallel_scenes() {
     let two = ScorePlan { jobs: 2, ..plan(&all(), &hasty(), &[]) };
     assert!(texts(&two) == *TOGETHER);
 }

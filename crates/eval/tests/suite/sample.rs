@@ -26,8 +26,8 @@ use mateval_tracer::World;
 
 use super::kept_folder::kept_folder;
 
-/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is fitted
-/// by a light stage.
+/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is
+/// fitted by a light stage.
 const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\natlas_size = 128\nsamples = 64\n"];
 
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
@@ -36,7 +36,7 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     Dataset::open(&out).unwrap()
 });
 
-/// Builds it, without renders.
+/// Builds the dataset without renders.
 pub fn built() -> PathBuf {
     let folder = kept_folder("dataset");
     let (source, out) = (folder.join("source"), folder.join("dataset"));
@@ -50,7 +50,7 @@ pub fn built() -> PathBuf {
     out
 }
 
-/// The dataset, with renders of 64 samples a half; nobody writes to it.
+/// The dataset, with renders of 64 samples a half; tests must not write to it.
 pub fn dataset() -> &'static Dataset {
     &DATASET
 }
@@ -124,7 +124,7 @@ pub fn lpips() -> Option<Lpips> {
     Some(Lpips::load(Net::Alex, &lpips_weights(Net::Alex.file_name())?).unwrap())
 }
 
-/// What is scored, all of it under `protocol`.
+/// A plan that scores the submissions under `protocol`.
 pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) -> ScorePlan<'a> {
     ScorePlan {
         dataset: dataset(),
@@ -148,12 +148,12 @@ pub fn hasty() -> Protocol {
     protocol
 }
 
-/// Scores without a word.
+/// Scores without reporting progress.
 pub fn scored(plan: &ScorePlan<'_>) -> Vec<ResultFile> {
     score(plan, &|_, _, _| ()).unwrap()
 }
 
-/// `RESULT.json` as it is written.
+/// The text of `RESULT.json`.
 pub fn text(result: &ResultFile) -> String {
     mateval_scene::json::to_text(result)
 }

@@ -1,4 +1,4 @@
-//! A result is confirmed only as it was made: one digit, texel or constant more, and the reason is told.
+//! Only an unchanged result is confirmed: if a digit, texel or constant differs, the reason is reported.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -16,7 +16,7 @@ use serde_json::Value;
 use super::kept_folder::kept_folder;
 use super::sample::built;
 
-/// Without renders, so that all that a protocol asks for is measured within seconds.
+/// A dataset without renders, so that everything in a protocol is measured within seconds.
 struct Scored {
     dataset: Dataset,
     submission: PathBuf,
@@ -60,7 +60,7 @@ fn verified(result: &Value, submission: &Path) -> VerificationFile {
     verify(plan, &|_, _, _| ()).unwrap()
 }
 
-/// Code and place of all findings of what is not confirmed.
+/// Code and place of all findings of a result that is not confirmed.
 fn refused(result: &Value, submission: &Path) -> Vec<(String, String)> {
     let found = verified(result, submission);
     assert!(!found.confirmed, "{found:?}");
@@ -78,7 +78,7 @@ fn a_clean_result_is_confirmed() {
 }
 
 #[test]
-fn a_digit_more_is_found() {
+fn a_changed_digit_is_found() {
     for place in ["/protocols/mateval-1/summary/albedo.input.mse", "/protocols/mateval-1/pictures/0/value"] {
         let mut changed = SCORED.result.clone();
         let value = changed.pointer_mut(place).unwrap();

@@ -24,13 +24,13 @@ fn edit(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
     std::fs::write(path, bytes).unwrap();
 }
 
-/// An EXR of these channels in the place of the base colour or of the roughness.
+/// Replaces the base colour or the roughness by an EXR with these channels.
 fn exr(png: &Path, names: &[&str], value: f32) {
     let image = ex::Image::from_layer(layer(names, value));
     replace(png, |path| image.write().to_file(path));
 }
 
-/// What only a header says.
+/// Replaces a map by an EXR that has only a header.
 fn header(png: &Path, side: i32, deep: bool, channels: &[(&str, i32)]) {
     std::fs::remove_file(png).unwrap();
     std::fs::write(png.with_extension("exr"), exr_header(side, deep, channels)).unwrap();

@@ -1,4 +1,4 @@
-//! Faults that only pictures tell: planted in every map of both scenes, as a wrong script would.
+//! Faults that only pictures reveal, planted in every map of both scenes as a faulty script would.
 
 use std::path::Path;
 
@@ -34,7 +34,7 @@ fn turned(picture: &Picture<[u8; 3]>, place: impl Fn(usize, usize, usize) -> (us
     })
 }
 
-/// Every atlas upside down.
+/// Turns every atlas upside down.
 pub fn flip(root: &Path) {
     change(root, |picture| turned(picture, |x, y, last| (x, last - y)));
 }
@@ -48,7 +48,7 @@ fn swap_files(root: &Path) {
     }
 }
 
-/// Replaces the good submission by another.
+/// Replaces the good submission by another one.
 fn instead(root: &Path, write: impl Fn(&Path)) {
     std::fs::remove_dir_all(root).unwrap();
     write(root);
@@ -89,7 +89,7 @@ pub const FAULTS: &[Fault] = &[
     ("copy_of_truth", NOTE, |_| ()),
 ];
 
-/// What the input view does not show is black.
+/// Makes texels black that the input view does not show.
 fn empty_unobserved(root: &Path) {
     instead(root, write_nearest);
     for scene in &dataset().scenes {

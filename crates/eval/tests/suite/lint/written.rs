@@ -1,11 +1,11 @@
-//! PNG and OpenEXR files as nobody should write them.
+//! Writes unusual and faulty PNG and OpenEXR files.
 
 use std::io::Write as _;
 use std::path::Path;
 
 use exr::prelude as ex;
 
-/// A PNG's chunk.
+/// A chunk of a PNG.
 pub fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let mut sum = flate2::Crc::new();
     sum.update(name);
@@ -13,7 +13,7 @@ pub fn chunk(name: &[u8; 4], data: &[u8]) -> Vec<u8> {
     [&(data.len() as u32).to_be_bytes()[..], name, data, &sum.sum().to_be_bytes()].concat()
 }
 
-/// Puts a chunk behind the header.
+/// Inserts a chunk after the header.
 pub fn insert(path: &Path, name: &[u8; 4], data: &[u8]) {
     const HEADER_END: usize = 33;
     let bytes = std::fs::read(path).unwrap();
@@ -32,7 +32,7 @@ pub fn png(side: u32, depth: u8, color: u8, interlace: u8, before: &[u8], rows: 
     [&signature[..], &chunk(b"IHDR", &header), before, &chunk(b"IDAT", &packed), &chunk(b"IEND", b"")].concat()
 }
 
-/// Rows of so many bytes, none of them filtered.
+/// `count` rows of `bytes` bytes each, without filters.
 pub fn rows(count: usize, bytes: usize, value: impl Fn(usize, usize) -> u8) -> Vec<u8> {
     (0..count)
         .flat_map(|y| {
@@ -46,20 +46,20 @@ pub fn layer(names: &[&str], value: f32) -> ex::Layer<ex::AnyChannels<ex::FlatSa
     layer_of(names, || ex::FlatSamples::F32(vec![value; 64 * 64]))
 }
 
-/// The same of any kind of numbers.
+/// The same with any type of numbers.
 pub fn layer_of(names: &[&str], samples: impl Fn() -> ex::FlatSamples) -> ex::Layer<ex::AnyChannels<ex::FlatSamples>> {
     let channels = names.iter().map(|name| ex::AnyChannel::new(*name, samples())).collect();
     let encoding = ex::Encoding::SMALL_LOSSLESS;
     ex::Layer::new((64, 64), ex::LayerAttributes::default(), encoding, ex::AnyChannels::sort(channels))
 }
 
-/// Has an EXR written in the place of a PNG.
+/// Replaces a PNG by an EXR.
 pub fn replace(png: &Path, write: impl FnOnce(&Path) -> Result<(), exr::error::Error>) {
     std::fs::remove_file(png).unwrap();
     write(&png.with_extension("exr")).unwrap();
 }
 
-/// The header of an OpenEXR file, and nothing behind it: deep or flat, of these channels, each with how often it has a number.
+/// The header of an OpenEXR file without data: deep or flat, with these channels and their sampling rates.
 pub fn exr_header(side: i32, deep: bool, channels: &[(&str, i32)]) -> Vec<u8> {
     let attribute = |name: &str, kind: &str, value: &[u8]| {
         [name.as_bytes(), b"\0", kind.as_bytes(), b"\0", &(value.len() as i32).to_le_bytes(), value].concat()
