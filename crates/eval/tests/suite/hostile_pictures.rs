@@ -134,7 +134,7 @@ fn truncated_pictures_are_refused_at_every_length() {
 }
 
 #[test]
-fn numbers_that_are_not_finite() {
+fn numbers_that_are_not_finite_or_out_of_range() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     for (value, expected) in [(f32::NAN, "nan"), (f32::NEG_INFINITY, "infinity"), (-1e-3, "out_of_range")] {
