@@ -26,23 +26,24 @@ const LEAST_FACTOR: f64 = 1.6;
 /// Darker values say more of noise, and of rounding, than of hues.
 const DARKEST: f32 = 0.01;
 
-/// What the hues of a scene say of how its base colours were decoded.
+/// How the base colours of a scene were decoded, judged by its hues.
 #[derive(Debug, Default)]
 pub(super) enum Decoding {
-    /// Nothing: too few, or they do not go along with the picture, or with one decoding as well as with the other.
+    /// There are too few hues, they do not match the picture, or they match it equally well with either decoding.
     #[default]
-    Untold,
+    Unclear,
     Right,
     Wrong(Finding),
 }
 
-/// The findings of scenes whose base colours were decoded wrongly, if most are of which anything is told. One alone proves
-/// nothing: reflections of white light pale the picture as a wrong decoding would, and who decodes wrongly does it everywhere.
+/// The findings of scenes whose base colours were decoded wrongly, if they are most of the scenes with a clear decoding. A
+/// single scene proves nothing: reflections of white light pale the picture as a wrong decoding would, and a method that
+/// decodes wrongly does so in every scene.
 pub(super) fn mostly_wrong(scenes: Vec<Decoding>) -> Vec<Finding> {
-    let told = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Untold)).count();
+    let clear = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Unclear)).count();
     let wrong = |decoding| if let Decoding::Wrong(finding) = decoding { Some(finding) } else { None };
     let wrong: Vec<Finding> = scenes.into_iter().filter_map(wrong).collect();
-    if 2 * wrong.len() > told { wrong } else { Vec::new() }
+    if 2 * wrong.len() > clear { wrong } else { Vec::new() }
 }
 
 /// Whether red and blue are exchanged.
@@ -63,25 +64,25 @@ pub(super) fn exchanged(place: &str, looks: &[Look]) -> Option<Finding> {
 
 /// `are_png` says what most files of the scene are.
 pub(super) fn decoding(place: &str, looks: &[Look], are_png: bool) -> Decoding {
-    let (code, what, action, mended): (_, _, _, fn(f32) -> f32) = if are_png {
+    let (code, what, action, corrected): (_, _, _, fn(f32) -> f32) = if are_png {
         let action = "encode base_color.png as sRGB";
         ("linear_in_png", "linear numbers in PNG, which are read as sRGB", action, srgb_from_linear)
     } else {
         let action = "decode sRGB before base_color.exr is written";
         ("srgb_in_exr", "sRGB numbers in EXR, which are read as linear", action, linear_from_srgb)
     };
-    let (Some(own), Some(then)) = (strength(looks, |value| value), strength(looks, mended)) else {
-        return Decoding::Untold;
+    let (Some(own), Some(then)) = (strength(looks, |value| value), strength(looks, corrected)) else {
+        return Decoding::Unclear;
     };
     let off = if are_png { own } else { 1.0 / own };
     if off >= LEAST_FACTOR && then.ln().abs() <= own.ln().abs() / 2.0 {
         let message = format!(
             "base colours seem to be {what}: their hues are {own:.2} times as strong as the input picture's, {then:.2} times \
-             if that is mended"
+             after that correction"
         );
         return Decoding::Wrong(warning(code, place, message, action));
     }
-    if own.ln().abs() <= then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Untold }
+    if own.ln().abs() <= then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Unclear }
 }
 
 /// How many times as strong the base colour's hues are as the picture's; none where they do not go along with it.
@@ -113,15 +114,15 @@ fn hue(looks: &[Look], channel: usize, change: fn(f32) -> f32) -> Pairs {
 
 #[cfg(test)]
 mod tests {
-    use super::Decoding::{Right, Untold, Wrong};
+    use super::Decoding::{Right, Unclear, Wrong};
     use super::*;
 
     #[test]
     fn most_scenes_must_agree() {
         let wrong = || Wrong(warning("linear_in_png", "scenes/a", String::new(), "encode"));
-        assert_eq!(mostly_wrong(vec![wrong(), Untold, Untold]).len(), 1);
+        assert_eq!(mostly_wrong(vec![wrong(), Unclear, Unclear]).len(), 1);
         assert_eq!(mostly_wrong(vec![wrong(), Right, wrong()]).len(), 2);
         assert_eq!(mostly_wrong(vec![wrong(), Right]).len(), 0);
-        assert_eq!(mostly_wrong(vec![Right, Untold]).len(), 0);
+        assert_eq!(mostly_wrong(vec![Right, Unclear]).len(), 0);
     }
 }

@@ -85,7 +85,7 @@ fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> (Vec<Finding>, De
     let are_png = files.iter().filter(|(_, is_png)| *is_png).count() * 2 >= files.len();
     findings.extend(orientation::check(&place, &looks));
     let exchanged = colours::exchanged(&place, &looks);
-    let decoding = if exchanged.is_some() { Decoding::Untold } else { colours::decoding(&place, &looks, are_png) };
+    let decoding = if exchanged.is_some() { Decoding::Unclear } else { colours::decoding(&place, &looks, are_png) };
     findings.extend(exchanged);
     findings.extend(shading::check(&place, &looks));
     findings.extend(scalars::check(&place, all));

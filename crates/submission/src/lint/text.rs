@@ -45,7 +45,7 @@ mod tests {
 
     #[test]
     fn repeats_are_told_once() {
-        let mut findings: Vec<_> = (0..6).map(|at| error("nan", &format!("f{at}"), "a NaN", "mend it")).collect();
+        let mut findings: Vec<_> = (0..6).map(|at| error("nan", &format!("f{at}"), "a NaN", "fix it")).collect();
         findings.push(warning("alpha", "g", "opacity", "drop it"));
         let dataset = DatasetId {
             name: String::new(),
@@ -57,7 +57,7 @@ mod tests {
             scored_renderer: None,
         };
         let text = plain(&LintFile::new(String::new(), None, dataset, 1, folded(findings)));
-        let expected = "error [nan] 'f0': a NaN; mend it (6 times; also 'f1', 'f2', 'f3', ...)\n\
+        let expected = "error [nan] 'f0': a NaN; fix it (6 times; also 'f1', 'f2', 'f3', ...)\n\
                         warning [alpha] 'g': opacity; drop it\n\
                         not good: 6 errors, 1 warning, 0 notes; 1 map read\n";
         assert_eq!(text, expected);
