@@ -1,25 +1,25 @@
-//! One entry of an archive: its name made a place, its bytes written there.
+//! The entries of an archive written to a folder: the name of each is checked and becomes a path, its bytes are counted.
 
 use std::io::{ErrorKind, Read, Write as _};
 use std::path::Path;
 
 use mateval_scene::Finding;
 
+use super::fault::{Fault, refusal};
 use super::limits::Budget;
-use super::{Fault, refusal};
 use crate::map_file::MAX_MAP_BYTES;
 
 /// Longest name, in bytes.
 const LONGEST_NAME: usize = 512;
-/// Most folders in one another.
+/// Most names in a path.
 const DEEPEST: usize = 8;
-/// Most faults that are told.
+/// Most faults that are reported.
 const MOST_FAULTS: usize = 100;
-/// Bytes that are read at once.
+/// Bytes read at once.
 const BLOCK: usize = 1 << 16;
 
-/// What is wrong with an entry: code and message.
-type Wrong = (&'static str, String);
+/// Code and message of an entry's fault.
+type EntryFault = (&'static str, String);
 
 /// What an entry is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +27,11 @@ pub(super) enum EntryKind {
     File,
     Folder,
     Link,
-    /// Devices, pipes and what else there is.
+    /// A device, a pipe, a sparse file or anything else.
     Special,
 }
 
-/// A folder that entries are written to. What is wrong with single ones is gathered, so that all of it can be told at once.
+/// Writes entries to a folder. Faults of single entries are collected, so that all of them are reported together.
 pub(super) struct Writer<'a> {
     root: &'a Path,
     pub(super) budget: Budget,
@@ -43,14 +43,14 @@ impl<'a> Writer<'a> {
         Self { root, budget: Budget::default(), faults: Vec::new() }
     }
 
-    /// Remembers what is wrong with an entry.
+    /// Records a fault of an entry.
     pub(super) fn fault(&mut self, code: &str, entry: &str, message: impl Into<String>, action: &str) {
         if self.faults.len() < MOST_FAULTS {
             self.faults.push(refusal(code, entry, message, action));
         }
     }
 
-    /// The place of an entry below the folder; none where it is to be passed over: a fault, or the folder itself.
+    /// The path below the folder that an entry's bytes are to be written to; none for a folder and for an entry with a fault.
     pub(super) fn place(&mut self, name: &[u8], kind: EntryKind) -> Result<Option<String>, Fault> {
         self.budget.add_entry()?;
         let shown = String::from_utf8_lossy(name).into_owned();
@@ -63,7 +63,7 @@ impl<'a> Writer<'a> {
         };
         match kind {
             EntryKind::Link => {
-                self.fault("link_in_archive", &shown, "a link; links are not unpacked", "pack the file itself");
+                self.fault("link_in_archive", &shown, "a link; expected a file or a folder", "pack the file itself");
                 Ok(None)
             }
             EntryKind::Special => {
@@ -79,7 +79,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Whether a file of so many bytes would be read at all.
+    /// Whether a file is small enough to be a map; if not, that is a fault.
     pub(super) fn is_small(&mut self, entry: &str, bytes: u64) -> bool {
         if bytes > MAX_MAP_BYTES {
             let message = format!("{bytes} bytes; expected at most {MAX_MAP_BYTES}");
@@ -88,8 +88,8 @@ impl<'a> Writer<'a> {
         bytes <= MAX_MAP_BYTES
     }
 
-    /// Writes a file: all of `data`, which may be `expected` bytes and no more. `packed` says how much of the archive has been
-    /// read. Gives the checksum (CRC-32), or none where there is a fault.
+    /// Writes a file of exactly `expected` bytes. `packed` is the number of the archive's bytes that have been read so far.
+    /// Returns the file's checksum (CRC-32), or none where the entry has a fault.
     pub(super) fn write<R: Read>(
         &mut self,
         place: &str,
@@ -104,7 +104,7 @@ impl<'a> Writer<'a> {
         let mut file = match std::fs::File::create_new(self.root.join(place)) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                self.twice(place);
+                self.duplicate(place);
                 return Ok(None);
             }
             Err(error) => return Err(error.into()),
@@ -118,21 +118,24 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The checksum of what was copied, or what is wrong with it.
+    /// Copies a file's bytes. Returns their checksum, or the entry's fault.
     fn copy<R: Read>(
         &mut self,
         file: &mut std::fs::File,
         expected: u64,
         data: &mut R,
         packed: impl Fn(&R) -> u64,
-    ) -> Result<Result<u32, Wrong>, Fault> {
+    ) -> Result<Result<u32, EntryFault>, Fault> {
         let (mut block, mut written, mut sum) = (vec![0; BLOCK], 0_u64, flate2::Crc::new());
         while written <= expected {
             let count = match data.read(&mut block) {
                 Ok(0) => break,
                 Ok(count) => count,
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-                Err(error) => return Ok(Err(("damaged_archive", format!("it cannot be unpacked: {error}")))),
+                Err(error) => match error.downcast::<Fault>() {
+                    Ok(fault) => return Err(fault),
+                    Err(error) => return Ok(Err(("damaged_archive", format!("it cannot be unpacked: {error}")))),
+                },
             };
             written += count as u64;
             self.budget.add_bytes(count as u64, packed(data))?;
@@ -143,10 +146,11 @@ impl<'a> Writer<'a> {
             return Ok(Ok(sum.sum()));
         }
         let found = if written > expected { "more".to_owned() } else { written.to_string() };
-        Ok(Err(("wrong_size", format!("it says to have {expected} bytes, and has {found}"))))
+        Ok(Err(("wrong_size", format!("expected {expected} bytes as its header states, found {found}"))))
     }
 
-    /// Whether the folder is there now; a file of its name is a fault. Each that is made counts as an entry does.
+    /// Makes a folder and those around it; each counts as an entry. Returns false, and records a fault, where a file has the
+    /// name of one of them.
     fn make_folder(&mut self, entry: &str, place: &str) -> Result<bool, Fault> {
         let path = self.root.join(place);
         if path.is_dir() {
@@ -158,7 +162,7 @@ impl<'a> Writer<'a> {
                 Ok(()) => self.budget.add_entry()?,
                 Err(error) if error.kind() == ErrorKind::AlreadyExists && folder.is_dir() => {}
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                    self.twice(entry);
+                    self.duplicate(entry);
                     return Ok(false);
                 }
                 Err(error) => return Err(error.into()),
@@ -167,11 +171,11 @@ impl<'a> Writer<'a> {
         Ok(true)
     }
 
-    fn twice(&mut self, entry: &str) {
-        self.fault("duplicate_name", entry, "this name is there twice", "pack each file once");
+    fn duplicate(&mut self, entry: &str) {
+        self.fault("duplicate_name", entry, "a name that occurs twice", "pack each file once");
     }
 
-    /// Fails where anything was wrong.
+    /// Fails if any entry had a fault.
     pub(super) fn finish(mut self) -> Result<(), Fault> {
         if self.faults.is_empty() {
             return Ok(());
@@ -181,8 +185,8 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// A name without `.` and empty parts; a code and a message where it leads anywhere else.
-fn place_of(name: &[u8]) -> Result<String, Wrong> {
+/// The path that a name stands for, without `.` and empty parts. Fails where it leads out of the folder or is unusable.
+fn place_of(name: &[u8]) -> Result<String, EntryFault> {
     let text = std::str::from_utf8(name).map_err(|_| ("bad_name", "a name that is not UTF-8".to_owned()))?;
     if text.len() > LONGEST_NAME || text.contains(['\0', '\\']) || text.chars().any(char::is_control) {
         let message = format!(
@@ -192,14 +196,17 @@ fn place_of(name: &[u8]) -> Result<String, Wrong> {
         return Err(("bad_name", message));
     }
     if text.starts_with('/') || text.as_bytes().get(1) == Some(&b':') {
-        return Err(("absolute_name", "a name that does not begin in the archive".to_owned()));
+        return Err((
+            "absolute_name",
+            "a name that is absolute; expected one relative to the archive's root".to_owned(),
+        ));
     }
     let parts: Vec<&str> = text.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
     if parts.contains(&"..") {
         return Err(("name_leads_out", "a name with '..'".to_owned()));
     }
     if parts.len() > DEEPEST {
-        return Err(("bad_name", format!("{} folders in one another; expected at most {DEEPEST}", parts.len())));
+        return Err(("bad_name", format!("a path of {} names; expected at most {DEEPEST}", parts.len())));
     }
     Ok(parts.join("/"))
 }
@@ -209,7 +216,7 @@ mod tests {
     use super::*;
     use crate::archive::limits::MAX_ENTRIES;
 
-    /// A name of many folders is no cheaper than the folders.
+    /// A name that implies many folders counts as much as the folders do.
     #[test]
     fn folders_count_as_entries_do() {
         for (left, fits) in [(3, true), (2, false)] {

@@ -1,17 +1,17 @@
 //! How much an archive may hold.
 
-use super::Fault;
+use super::fault::Fault;
 
 /// Most files and folders of a submission, packed or not.
 pub const MAX_ENTRIES: usize = 200_000;
-/// Most bytes of all files together.
+/// Most bytes of all files together, once unpacked.
 pub const MAX_UNPACKED: u64 = 64 << 30;
-/// Bytes that any archive may hold, however small it is.
+/// Bytes that any archive may unpack to, however small it is.
 pub const ALWAYS_ALLOWED: u64 = 256 << 20;
-/// Beyond them, most bytes that come of one byte of the archive.
+/// Beyond [`ALWAYS_ALLOWED`], most bytes that may be unpacked from each byte of the archive.
 pub const MAX_RATIO: u64 = 200;
 
-/// What has come of an archive so far.
+/// What has been unpacked from an archive so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Budget {
     pub(super) entries: usize,
@@ -26,19 +26,23 @@ impl Budget {
             return Ok(());
         }
         let message = format!("more than {MAX_ENTRIES} files and folders");
-        Err(Fault::refused("too_many_files", message, "leave out what is no map"))
+        Err(Fault::refused("too_many_files", message, "pack submission.json and the maps only"))
     }
 
-    /// Counts bytes that came of the first `packed` bytes of the archive.
+    /// Counts bytes that were unpacked from the first `packed` bytes of the archive.
     pub(super) fn add_bytes(&mut self, bytes: u64, packed: u64) -> Result<(), Fault> {
         self.unpacked = self.unpacked.saturating_add(bytes);
         if self.unpacked > MAX_UNPACKED {
-            let message = format!("more than {MAX_UNPACKED} bytes once it is unpacked");
-            return Err(Fault::refused("archive_too_large", message, "score scenes apart"));
+            let message = format!("more than {MAX_UNPACKED} bytes once unpacked");
+            return Err(Fault::refused(
+                "archive_too_large",
+                message,
+                "pack fewer scenes, and score them in several runs",
+            ));
         }
         if self.unpacked > ALWAYS_ALLOWED && self.unpacked > packed.saturating_mul(MAX_RATIO) {
             let message = format!(
-                "at least {} bytes would come of {packed} bytes of the archive; more than {MAX_RATIO} times as many are no maps",
+                "at least {} bytes unpacked from {packed} bytes of the archive; expected at most {MAX_RATIO} times as many",
                 self.unpacked
             );
             return Err(Fault::refused("archive_bomb", message, "pack maps that are compressed themselves (PNG, EXR)"));
@@ -52,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn little_may_come_of_anything_and_much_only_of_much() {
+    fn small_archives_are_not_held_to_the_ratio_and_large_ones_are() {
         let mut budget = Budget::default();
         budget.add_bytes(ALWAYS_ALLOWED, 1).unwrap();
         budget.add_bytes(1, ALWAYS_ALLOWED).unwrap();

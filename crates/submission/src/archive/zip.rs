@@ -1,4 +1,4 @@
-//! `.zip`, as PKWARE's APPNOTE 6.3 tells it: stored or deflated files, with or without Zip64.
+//! `.zip` after PKWARE's APPNOTE 6.3: stored or deflated files, with or without Zip64.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -6,13 +6,13 @@ use std::path::Path;
 
 use flate2::bufread::DeflateDecoder;
 
-use super::Fault;
 use super::entry::{EntryKind, Writer};
+use super::fault::Fault;
 use super::limits::{Budget, MAX_ENTRIES};
 
-/// Largest list of entries with all their names and comments, in bytes. It is held in memory.
+/// Largest central directory, in bytes. It is held in memory.
 const MAX_DIRECTORY: u64 = 64 << 20;
-/// The closing record without its comment, and its longest comment.
+/// Bytes of the end record without its comment, and of its longest comment.
 const END: u64 = 22;
 const LONGEST_COMMENT: u64 = 65_535;
 
@@ -30,21 +30,17 @@ pub fn unpack_zip(file: File, folder: &Path) -> Result<(), Fault> {
     writer.finish()
 }
 
-fn damaged(message: &str) -> Fault {
-    Fault::refused("damaged_archive", message, "pack it again")
-}
-
-/// What the archive says of itself must not be too much.
+/// Fails where the sizes that the archive states exceed the limits already.
 fn check_declared(entries: &[Entry], length: u64) -> Result<(), Fault> {
     let total = |size: fn(&Entry) -> u64| entries.iter().map(size).fold(0, u64::saturating_add);
     if total(|entry| entry.packed) > length {
-        let message = "its entries have more bytes together than it has: they lie in one another";
+        let message = "its entries together have more bytes than the archive: they overlap";
         return Err(Fault::refused("overlapping_entries", message, "pack it again"));
     }
     Budget::default().add_bytes(total(|entry| entry.size), length)
 }
 
-/// One file or folder, as the list at the archive's end has it.
+/// One file or folder, from the central directory.
 struct Entry {
     name: std::ops::Range<usize>,
     kind: EntryKind,
@@ -57,12 +53,12 @@ struct Entry {
 }
 
 impl Entry {
-    /// Whether its bytes can be read at all; if not, that is a fault.
+    /// Whether its bytes can be unpacked; if not, that is a fault.
     fn is_readable(&self, shown: &str, writer: &mut Writer<'_>) -> bool {
         if self.encrypted {
-            writer.fault("encrypted", shown, "it is encrypted", "pack it without a password");
+            writer.fault("encrypted", shown, "encrypted", "pack it without a password");
         } else if !matches!(self.method, 0 | 8) {
-            let message = format!("packed by method {}; only stored (0) and deflated (8) are read", self.method);
+            let message = format!("compression method {}; expected stored (0) or deflated (8)", self.method);
             writer.fault("unknown_compression", shown, message, "pack it as usual (zip -r)");
         } else {
             return true;
@@ -71,11 +67,11 @@ impl Entry {
     }
 }
 
-/// The list of entries.
+/// The central directory: the list of entries.
 struct Directory {
     bytes: Vec<u8>,
     count: u64,
-    /// Where it begins; files lie before it.
+    /// Where it begins; the files lie before it.
     offset: u64,
 }
 
@@ -89,10 +85,10 @@ impl Archive {
         self.file.seek(SeekFrom::Start(offset))?;
         let mut bytes = Vec::new();
         self.file.by_ref().take(length).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 == length { Ok(bytes) } else { Err(damaged("it ends early")) }
+        if bytes.len() as u64 == length { Ok(bytes) } else { Err(Fault::damaged("it is truncated")) }
     }
 
-    /// Finds the closing record, and reads the list that it tells of.
+    /// Finds the end record and reads the central directory that it points to.
     fn directory(&mut self) -> Result<Directory, Fault> {
         let tail_length = self.length.min(END + LONGEST_COMMENT);
         let tail_start = self.length - tail_length;
@@ -102,7 +98,10 @@ impl Archive {
             tail[*at..].starts_with(b"PK\x05\x06")
                 && number(&tail, at + 20, 2).is_some_and(|comment| *at as u64 + END + comment == tail_length)
         };
-        let at = (0..tail.len()).rev().find(fits).ok_or_else(|| damaged("it has no sound end: it may be cut"))?;
+        let at = (0..tail.len())
+            .rev()
+            .find(fits)
+            .ok_or_else(|| Fault::damaged("it has no valid end record: it may be truncated"))?;
         let field = |offset: usize, bytes: usize| number(&tail, at + offset, bytes).unwrap_or_default();
         let (mut count, mut size, mut offset) = (field(10, 2), field(12, 4), field(16, 4));
         if count == 0xffff || size == 0xffff_ffff || offset == 0xffff_ffff {
@@ -110,28 +109,27 @@ impl Archive {
         }
         if count > MAX_ENTRIES as u64 {
             let message = format!("{count} files and folders; expected at most {MAX_ENTRIES}");
-            return Err(Fault::refused("too_many_files", message, "leave out what is no map"));
+            return Err(Fault::refused("too_many_files", message, "pack submission.json and the maps only"));
         }
         if size > MAX_DIRECTORY {
-            let message =
-                format!("a list of entries, with their comments, of {size} bytes; expected at most {MAX_DIRECTORY}");
+            let message = format!("a central directory of {size} bytes; expected at most {MAX_DIRECTORY}");
             return Err(Fault::refused("directory_too_large", message, "pack it without comments"));
         }
         if offset.checked_add(size).is_none_or(|end| end > tail_start + at as u64) {
-            return Err(damaged("its list of entries is not where it says"));
+            return Err(Fault::damaged("its central directory is not where the end record says"));
         }
         Ok(Directory { bytes: self.read_at(offset, size)?, count, offset })
     }
 
-    /// Count, size and offset of the list, from the larger closing record before the other.
+    /// Count, size and offset of the central directory, from the Zip64 end record in front of the plain one.
     fn zip64_end(&mut self, end: u64) -> Result<(u64, u64, u64), Fault> {
-        let start = end.checked_sub(20).ok_or_else(|| damaged("it has no sound Zip64 end"))?;
+        let start = end.checked_sub(20).ok_or_else(|| Fault::damaged("it has no valid Zip64 end record"))?;
         let locator = self.read_at(start, 20)?;
         let offset = number(&locator, 8, 8).filter(|_| locator.starts_with(b"PK\x06\x07"));
         let offset = offset.filter(|offset| offset.checked_add(56).is_some_and(|end| end <= start));
-        let record = self.read_at(offset.ok_or_else(|| damaged("it has no sound Zip64 end"))?, 56)?;
+        let record = self.read_at(offset.ok_or_else(|| Fault::damaged("it has no valid Zip64 end record"))?, 56)?;
         if !record.starts_with(b"PK\x06\x06") {
-            return Err(damaged("it has no sound Zip64 end"));
+            return Err(Fault::damaged("it has no valid Zip64 end record"));
         }
         let field = |at: usize| number(&record, at, 8).unwrap_or_default();
         Ok((field(32), field(40), field(48)))
@@ -151,7 +149,12 @@ impl Archive {
             return Ok(());
         }
         let Some(start) = self.data_start(entry, name, directory.offset)? else {
-            writer.fault("damaged_archive", &shown, "its data are not where the list says", "pack it again");
+            writer.fault(
+                "damaged_archive",
+                &shown,
+                "its data are not where the central directory says",
+                "pack it again",
+            );
             return Ok(());
         };
         self.file.seek(SeekFrom::Start(start))?;
@@ -171,7 +174,7 @@ impl Archive {
         Ok(())
     }
 
-    /// Where an entry's data begin; none where its own header is not sound, or says another name than the list.
+    /// Where an entry's data begin; none where its own header is invalid or has another name than the central directory.
     fn data_start(&mut self, entry: &Entry, name: &[u8], end: u64) -> Result<Option<u64>, Fault> {
         const HEADER: u64 = 30;
         let Some(header_end) = entry.offset.checked_add(HEADER + name.len() as u64).filter(|at| *at <= end) else {
@@ -189,18 +192,22 @@ impl Archive {
 }
 
 impl Directory {
-    /// All entries; as many as the closing record says.
+    /// All entries, as many as the end record says.
     fn entries(&self) -> Result<Vec<Entry>, Fault> {
         let (mut entries, mut at) = (Vec::new(), 0);
         for _ in 0..self.count {
-            let (entry, next) = self.entry(at).ok_or_else(|| damaged("its list of entries is not sound"))?;
+            let (entry, next) = self.entry(at).ok_or_else(|| Fault::damaged("its central directory is invalid"))?;
             entries.push(entry);
             at = next;
         }
-        if at == self.bytes.len() { Ok(entries) } else { Err(damaged("its list of entries is longer than it says")) }
+        if at == self.bytes.len() {
+            Ok(entries)
+        } else {
+            Err(Fault::damaged("its central directory is longer than the end record says"))
+        }
     }
 
-    /// The entry at a place of the list, and the place of the next.
+    /// The entry at a place of the central directory, and the place of the next.
     fn entry(&self, at: usize) -> Option<(Entry, usize)> {
         let header = self.bytes.get(at..at.checked_add(46)?)?;
         let field = |offset: usize, bytes: usize| number(header, offset, bytes);
@@ -230,7 +237,7 @@ impl Directory {
     }
 }
 
-/// A link or a device is one by its Unix mode, in the upper half of the attributes.
+/// Links and devices are recognised by their Unix mode, in the upper half of the attributes.
 fn kind_of(name: &[u8], made_by: u64, attributes: u64) -> EntryKind {
     const UNIX: u64 = 3;
     let mode = if made_by >> 8 == UNIX { (attributes >> 16) & 0o170_000 } else { 0 };
@@ -243,7 +250,7 @@ fn kind_of(name: &[u8], made_by: u64, attributes: u64) -> EntryKind {
     }
 }
 
-/// The longer numbers of an entry, in a fixed order, each there only where the shorter is full.
+/// The 64-bit numbers of an entry, in a fixed order. Each occurs only where its 32-bit field is all ones.
 struct Zip64<'a>(&'a [u8]);
 
 impl<'a> Zip64<'a> {
@@ -268,7 +275,7 @@ impl<'a> Zip64<'a> {
     }
 }
 
-/// A number of so many bytes, the least first.
+/// A little-endian number of `count` bytes.
 fn number(bytes: &[u8], at: usize, count: usize) -> Option<u64> {
     let bytes = bytes.get(at..at.checked_add(count)?)?;
     Some(bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte)))
