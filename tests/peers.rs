@@ -5,14 +5,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 #![allow(clippy::print_stderr, reason = "measurements and skipped cases are printed")]
-#![allow(dead_code, reason = "the tracer's own tests use more of the shared modules")]
-
-#[path = "../crates/tracer/tests/suite/bench_scene.rs"]
-mod bench_scene;
-#[path = "../crates/tracer/tests/suite/scenes.rs"]
-mod scenes;
-#[path = "../crates/tracer/tests/suite/statistics.rs"]
-mod statistics;
 
 mod peers {
     mod blender;

@@ -19,13 +19,10 @@ mod suite {
     mod house;
     mod images;
     mod importing;
-    mod kept_folder;
     mod lifting;
     mod linting;
     mod map;
     mod mitsuba_export;
-    #[path = "../../crates/eval/tests/suite/packed.rs"]
-    mod packed;
     mod part_labels;
     mod planted;
     mod publish;

@@ -14,7 +14,7 @@ use mateval_tracer::{RenderSettings, World};
 
 use super::blender_job::{self, BOUNCES, SEEDS, SIZE, Shot};
 use super::tiles::{Agreement, Tiles, agreement};
-use crate::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
 
 /// Allowed relative differences: of the means of all tiles but one (that one by twice as much), and of whole pictures.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use mateval_sources::bitterli::{self, Limits};
 use mateval_testkit::data::shared_data;
 
 use super::mitsuba::{Case, all_agree};
-use crate::bench_scene;
+use mateval_testkit::bench_scene;
 
 fn case(name: &str, scene: ReferenceScene, camera: Camera, samples: u32) -> Case {
     Case { name: name.to_owned(), scene, camera, samples }

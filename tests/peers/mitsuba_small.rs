@@ -10,7 +10,7 @@ use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 
 use super::mitsuba::{Case, all_agree};
-use crate::scenes::{Builder, grey, material, quad, sphere};
+use mateval_testkit::scenes::{Builder, grey, material, quad, sphere};
 
 const WHITE: ColorInput = ColorInput::Constant([1.0; 3]);
 const BROWN: ColorInput = ColorInput::Constant([0.8, 0.4, 0.1]);

@@ -21,7 +21,7 @@ use std::f64::consts::{FRAC_PI_2, SQRT_2};
 
 use mateval_image::{LinearRgb, Picture};
 
-use crate::statistics::chi_square_z;
+use mateval_testkit::statistics::chi_square_z;
 
 /// A test with a p-value below this fails.
 pub const FALSE_ALARM: f64 = 1e-5;

@@ -8,8 +8,8 @@ use std::sync::LazyLock;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, run_words, score, stats, verify};
-use super::kept_folder::kept_folder;
 use super::sample::json;
+use mateval_testkit::kept_folder::kept_folder;
 
 /// The sample's source and the survey of its house.
 struct Surveyed {

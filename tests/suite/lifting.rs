@@ -12,8 +12,8 @@ use mateval_scene::uv_atlas::UvAtlas;
 use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, score};
-use super::kept_folder::kept_folder;
 use super::sample::{json, write_source};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// The sample's room, 160x120 pixels, atlas sizes chosen by the tool.
 pub static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {

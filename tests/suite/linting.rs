@@ -5,8 +5,8 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use super::command::{Run, baseline, mateval, run, score};
-use super::packed::{ZipEntry, gzip, tar_header, tarred, zip, zipped};
 use super::sample::{dataset, json};
+use mateval_testkit::packed::{ZipEntry, gzip, tar_header, tarred, zip, zipped};
 
 fn truth(folder: &Path) -> PathBuf {
     let submission = folder.join("gt");

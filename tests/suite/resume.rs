@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use super::command::{build, render, run, verify};
-use super::kept_folder::kept_folder;
 use super::sample::{SMALL, copied_dataset, dataset, manifest, recipe_text, write_source};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// A source whose recipe has two scenes, and the manifest of its whole dataset.
 struct Whole {

@@ -10,8 +10,8 @@ use mateval_testkit::data::report_missing;
 use serde_json::Value;
 
 use super::command::{baseline, build, mateval, run, score};
-use super::kept_folder::kept_folder;
 use super::sample::{json, write_source};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// A folder with `dataset` (160x120 pixels, so that the unobserved strips hold whole SSIM windows; atlas sizes chosen
 /// by the tool), `gt.json` and `grey.json`, all without LPIPS so that the numbers are the same everywhere.

@@ -7,17 +7,11 @@
 )]
 
 mod suite {
-    mod archives;
     mod cache;
     mod damages;
-    mod hostile_pictures;
-    #[path = "../../../../tests/suite/kept_folder.rs"]
-    mod kept_folder;
-    mod lint;
     mod mask_rules;
     mod noise;
     mod noisy_room;
-    mod packed;
     mod planted_light;
     mod protocol_rules;
     mod relit;

@@ -7,8 +7,6 @@
 //! time.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
-#[path = "../tests/suite/bench_scene.rs"]
-mod bench_scene;
 #[path = "support/embree.rs"]
 mod embree;
 #[path = "support/rays.rs"]
@@ -20,6 +18,7 @@ mod timing;
 
 use glam::Vec3;
 use mateval_scene::{Camera, TriangleMesh};
+use mateval_testkit::bench_scene;
 use mateval_tracer::{Accel, Ray, TriangleTest};
 
 use embree::{Embree, Mode};

@@ -8,8 +8,6 @@
 //! 512x512 pixels, 6 bounces (Mitsuba's max_depth 8), no roulette.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
-#[path = "../tests/suite/bench_scene.rs"]
-mod bench_scene;
 #[path = "support/mitsuba.rs"]
 mod mitsuba;
 #[path = "support/room.rs"]
@@ -23,6 +21,7 @@ use std::time::Instant;
 use cpu_time::ProcessTime;
 use mateval_scene::Camera;
 use mateval_scene::reference::ReferenceScene;
+use mateval_testkit::bench_scene;
 use mateval_tracer::{RenderSettings, World, render};
 use mitsuba::Mitsuba;
 use rayon::ThreadPool;

@@ -1,7 +1,6 @@
 //! Writes the initial corpus of the targets to `CORPUS/<target>/`, from the built-in sample and from generated files.
 
-#[path = "../../../crates/eval/tests/suite/packed.rs"]
-mod packed;
+use mateval_testkit::packed;
 
 use std::path::{Path, PathBuf};
 

@@ -15,14 +15,13 @@
 #![allow(clippy::unwrap_used, reason = "a bench that cannot be set up has failed")]
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints")]
 
-#[path = "../../../tracer/tests/suite/bench_scene.rs"]
-mod bench_scene;
 mod mitsuba;
 mod noise;
 mod ours;
 mod stage;
 
 use mateval_scene::{Camera, Intrinsics};
+use mateval_testkit::bench_scene;
 use noise::{Noise, disagreement};
 use stage::{Stage, find};
 

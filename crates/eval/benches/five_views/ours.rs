@@ -12,8 +12,8 @@ use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views
 use crate::FIT_SIZE;
 use crate::Run;
 use crate::SAMPLES;
-use crate::bench_scene;
 use crate::stage::Stage;
+use mateval_testkit::bench_scene;
 
 /// Samples a pixel of the pictures that the fit uses.
 pub const STREAM_C_SAMPLES: u32 = 16;

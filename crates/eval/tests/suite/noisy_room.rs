@@ -14,8 +14,8 @@ use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
 use mateval_submission::prediction::{PredictedMaterial, read_scene};
 use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
 
-use super::kept_folder::kept_folder;
 use super::sample::{dataset, hasty, write_truth};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// The number of renders of everything.
 pub const SEEDS: usize = 50;

@@ -16,8 +16,8 @@ use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
 };
 
-use super::kept_folder::kept_folder;
 use super::sample::{dataset, hasty, write_truth};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// The furnished room of the sample on its stage, with the prediction `gt`.
 struct Staged {

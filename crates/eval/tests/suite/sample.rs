@@ -1,123 +1,14 @@
-//! The built-in sample as a tiny dataset with renders, and submissions for it.
+//! The built-in sample as a tiny dataset with renders, scored.
 
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, LazyLock};
+use std::path::Path;
 
-use mateval_baselines::estimate_source::EstimateSource;
-use mateval_baselines::nn::{self, NnOptions};
-use mateval_baselines::{grey, submission, truth};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
-use mateval_image::texture_io::{Encoding, read_texture};
-use mateval_image::transfer::{byte_from_unit, srgb_from_linear};
-use mateval_image::{LinearRgb, Picture, Wrap, png_io};
 use mateval_metrics::{Lpips, Net};
-use mateval_prep::build::{BuildOptions, build};
-use mateval_prep::render::{RenderOptions, render};
-use mateval_scene::dataset::SceneFile;
-use mateval_scene::open::Dataset;
-use mateval_scene::reference::SurfaceIndex;
-use mateval_scene::submission::Map;
-use mateval_scene::{SceneId, glb, reference_io};
-use mateval_submission::texel_map::TexelMap;
+use mateval_scene::SceneId;
 use mateval_testkit::data::lpips_weights;
-use mateval_tracer::World;
-
-use super::kept_folder::kept_folder;
-
-/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is
-/// fitted by a light stage.
-const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\natlas_size = 128\nsamples = 64\n"];
-
-static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
-    let out = built();
-    render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
-    Dataset::open(&out).unwrap()
-});
-
-/// Builds the dataset without renders.
-pub fn built() -> PathBuf {
-    let folder = kept_folder("dataset");
-    let (source, out) = (folder.join("source"), folder.join("dataset"));
-    mateval_sample::write(&source).unwrap();
-    let recipe = source.join("recipe.toml");
-    let whole = std::fs::read_to_string(&recipe).unwrap();
-    assert!(whole.contains(HEAD[0]), "{whole}");
-    std::fs::write(&recipe, whole.replace(HEAD[0], HEAD[1])).unwrap();
-    let options = BuildOptions { recipe, source: None, out: out.clone(), force: false };
-    build(&options, "test", &|_, _, _| ()).unwrap();
-    out
-}
-
-/// The dataset, with renders of 64 samples a half; tests must not write to it.
-pub fn dataset() -> &'static Dataset {
-    &DATASET
-}
-
-/// Writes the submission `gt`.
-pub fn write_truth(out: &Path) {
-    truth::write(dataset(), out, false).unwrap();
-}
-
-/// Writes the baseline `grey`, whose roughness is the default.
-pub fn write_grey(out: &Path) {
-    grey::write(dataset(), out, false).unwrap();
-}
-
-/// Writes the truth of the photo lifted to the atlases, the rest by nearest neighbours.
-pub fn write_nearest(out: &Path) {
-    write_lifted(out, &EstimateSource::Truth);
-}
-
-/// Writes the photo itself, lifted to the atlases.
-pub fn write_from_photo(out: &Path) {
-    write_lifted(out, &EstimateSource::Input);
-}
-
-fn write_lifted(out: &Path, source: &EstimateSource) {
-    nn::write(dataset(), out, false, source, &NnOptions::default(), &|_, _, _| ()).unwrap();
-}
-
-/// Makes the base colour of a scene's atlases black where the input view does not show them.
-pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
-    let source = dataset().folder(&scene.id);
-    let world = World::new(Arc::new(reference_io::read(&source).unwrap())).unwrap();
-    for (at, node) in glb::read(&source.instances()).unwrap().into_iter().enumerate() {
-        let path = folder.join(&node.name).join("base_color.png");
-        if !path.is_file() {
-            continue;
-        }
-        let colors = png_io::read_rgb_bytes(&path).unwrap();
-        let map = TexelMap::new(&world, SurfaceIndex(at), &node.mesh, colors.width(), &scene.views[0].camera);
-        let mut filled = Picture::filled(colors.width(), colors.height(), [0; 3]);
-        for y in 0..colors.height() {
-            for texel in map.row(y).filter(|texel| texel.observed) {
-                filled.set(texel.column, y, colors.get(texel.column, y));
-            }
-        }
-        png_io::write_rgb_bytes(&path, &filled).unwrap();
-    }
-}
-
-/// Writes `gt` with the base colour of every atlas (linear) changed.
-pub fn write_changed(out: &Path, change: impl Fn(&Picture<LinearRgb>) -> Picture<LinearRgb>) {
-    let method = submission::Method::new("changed", "");
-    submission::write(dataset(), out, false, &method, |scene, instance, folder| {
-        let truth = dataset().folder(&scene.id).truth_material(&instance.id);
-        let file = |map: Map| Path::new(map.stem()).with_extension("png");
-        for map in [Map::Roughness, Map::Metallic] {
-            std::fs::copy(truth.join(file(map)), folder.join(file(map))).unwrap();
-        }
-        let texture = read_texture(&truth.join(file(Map::BaseColor)), Encoding::Srgb, Wrap::Clamp).unwrap();
-        let texel = |x: usize, y: usize| LinearRgb(texture.texel(x, y));
-        let changed = change(&Picture::from_fn(texture.width(), texture.height(), texel));
-        let bytes = changed.map(|LinearRgb(rgb)| rgb.map(|v| byte_from_unit(srgb_from_linear(v))));
-        png_io::write_rgb_bytes(&folder.join(file(Map::BaseColor)), &bytes).unwrap();
-        Ok(())
-    })
-    .unwrap();
-}
+pub use mateval_testkit::sample_dataset::{built, dataset, write_changed, write_grey, write_truth};
 
 /// The network of LPIPS; none where its weights are missing.
 pub fn lpips() -> Option<Lpips> {

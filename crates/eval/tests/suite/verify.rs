@@ -13,8 +13,8 @@ use mateval_scene::json;
 use mateval_scene::open::Dataset;
 use serde_json::Value;
 
-use super::kept_folder::kept_folder;
 use super::sample::built;
+use mateval_testkit::kept_folder::kept_folder;
 
 /// A dataset without renders, so that everything in a protocol is measured within seconds.
 struct Scored {

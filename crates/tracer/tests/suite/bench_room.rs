@@ -6,8 +6,8 @@ use std::sync::Arc;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_tracer::{RenderSettings, World};
 
-use super::bench_scene;
-use super::statistics::{Estimate, Renders};
+use mateval_testkit::bench_scene;
+use mateval_testkit::statistics::{Estimate, Renders};
 
 /// The reference has 4 x 4 pixels for each of ours; box filters nest.
 const SIZE: u32 = 128;

@@ -9,8 +9,8 @@ use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture};
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{RenderSettings, World};
 
-use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use super::statistics::{Estimate, Renders};
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::statistics::{Estimate, Renders};
 
 const WHITE: ColorInput = ColorInput::Constant([1.0; 3]);
 

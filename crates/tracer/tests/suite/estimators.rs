@@ -11,8 +11,8 @@ use mateval_scene::reference::{Emission, ReferenceScene, SourceTexture, SurfaceI
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{LightSampling, Ray, RenderSettings, Sampler, World, render};
 
-use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use super::statistics::{Renders, chi_square_z};
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::statistics::{Renders, chi_square_z};
 
 fn principled(roughness: f32, metallic: f32, flavour: PrincipledFlavour) -> MaterialModel {
     MaterialModel::Principled {

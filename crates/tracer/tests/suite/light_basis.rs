@@ -9,8 +9,8 @@ use mateval_scene::material::{ColorInput, ConductorIor, Distribution, MaterialMo
 use mateval_scene::reference::{Emission, LightIndex, ReferenceScene};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, World, render_views};
 
-use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use super::statistics::Renders;
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::statistics::Renders;
 
 /// A room open to a pale sky behind the camera, with three lamps, one of them hidden from the camera, and a rough metal
 /// sphere. The weights multiply the radiances of the four lights.

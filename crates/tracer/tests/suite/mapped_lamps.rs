@@ -10,8 +10,8 @@ use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{LightBasis, LightGroups, LightSampling, RenderSettings, Sampler, World, render, render_views};
 
 use super::estimators::{self, view, worst};
-use super::scenes::{Builder, camera, grey, material, quad, room, sphere};
-use super::statistics::Renders;
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad, room, sphere};
+use mateval_testkit::statistics::Renders;
 
 fn settings(samples: u32, seed: u64) -> RenderSettings {
     RenderSettings { samples, seed, max_bounces: 6, ..Default::default() }

@@ -12,8 +12,8 @@ use mateval_tracer::{ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
 use super::light_basis::{lit_room, view};
-use super::scenes::{Builder, camera, grey, material, quad};
-use super::statistics::Renders;
+use mateval_testkit::scenes::{Builder, camera, grey, material, quad};
+use mateval_testkit::statistics::Renders;
 
 const COLORS: [[f32; 3]; 3] = [[0.6, 0.5, 0.4], [0.0, 0.9, 0.1], [1.0, 1.0, 1.0]];
 

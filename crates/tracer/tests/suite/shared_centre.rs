@@ -10,8 +10,8 @@ use mateval_tracer::shared_centre::share_centre;
 use mateval_tracer::{LightGroups, RenderSettings, ViewsRender, World, render_views};
 
 use super::light_basis::{lit_world, view};
-use super::scenes::Builder;
-use super::statistics::Renders;
+use mateval_testkit::scenes::Builder;
+use mateval_testkit::statistics::Renders;
 
 const SIZE: usize = 32;
 const OFFSETS: [[f64; 2]; 5] = [[0.0, 0.0], [5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
@@ -127,8 +127,8 @@ fn splatting_adds_little_noise() {
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn splatting_adds_little_noise_to_a_furnished_room() {
-    let Some(folder) = super::bench_scene::folder("room") else { return };
-    let (scene, input) = super::bench_scene::read(&folder, SIZE as u32);
+    let Some(folder) = mateval_testkit::bench_scene::folder("room") else { return };
+    let (scene, input) = mateval_testkit::bench_scene::read(&folder, SIZE as u32);
     let world = World::new(Arc::new(scene)).unwrap();
     let cameras = OFFSETS.map(|[x, y]| input.turned(x, y));
     let together = estimates(&rendered(&world, &cameras, 16, 0..12));
@@ -146,7 +146,7 @@ fn splatting_adds_little_noise_to_a_furnished_room() {
 #[test]
 #[allow(clippy::print_stderr, reason = "a measurement")]
 fn the_number_of_paths_a_pixel_varies_little() {
-    let world = super::scenes::Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();
+    let world = mateval_testkit::scenes::Builder::default().light(Emission::Constant { radiance: [1.0; 3] }).world();
     for (samples, bound) in [(16, 1.5), (64, 2.5)] {
         let [own, turned] = [0, 1].map(|index| {
             let all = variances(&estimates(&rendered(&world, &views(), samples, 0..12))[index]);
@@ -189,8 +189,9 @@ fn halves_are_independent() {
 #[test]
 fn every_pixel_gets_its_samples() {
     let world = lit_world([[1.0; 3]; 4]);
-    let wide =
-        |offset: [f64; 2]| super::scenes::camera([0.1, 0.1, 1.6], [0.0; 3], 48, 70.0).turned(offset[0], offset[1]);
+    let wide = |offset: [f64; 2]| {
+        mateval_testkit::scenes::camera([0.1, 0.1, 1.6], [0.0; 3], 48, 70.0).turned(offset[0], offset[1])
+    };
     let done = rendered(&world, &OFFSETS.map(wide), 64, 3..4);
     assert_eq!(done.passes, 1);
     for (index, view) in done.views.iter().enumerate() {

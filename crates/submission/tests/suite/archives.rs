@@ -6,7 +6,7 @@ use mateval_submission::SubmissionError;
 use mateval_submission::archive::{ALWAYS_ALLOWED, Opened, open};
 use proptest::prelude::*;
 
-use super::packed::{ZipEntry, end, files, gzip, tar_entry, tar_header, tarred, zip, zipped};
+use mateval_testkit::packed::{ZipEntry, end, files, gzip, tar_entry, tar_header, tarred, zip, zipped};
 
 /// Opens these bytes and asserts that the work folder holds nothing but the opened submission.
 fn opened(name: &str, bytes: &[u8]) -> (tempfile::TempDir, Result<Opened, SubmissionError>) {

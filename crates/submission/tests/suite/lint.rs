@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use mateval_scene::Severity;
 use mateval_submission::lint::{LintFile, LintPlan, lint};
 
-use super::sample::{dataset, write_truth};
+use mateval_testkit::sample_dataset::{dataset, write_truth};
 
 /// A code, its severity, and the change of a good submission.
 type Fault = (&'static str, Severity, fn(&Path));
@@ -114,11 +114,11 @@ fn each_fault_has_a_code_of_its_own() {
 fn baselines_are_not_accused() {
     let folder = tempfile::tempdir().unwrap();
     let nn = folder.path().join("nn");
-    super::sample::write_nearest(&nn);
+    mateval_testkit::sample_dataset::write_nearest(&nn);
     let file = linted(&nn);
     assert_eq!((codes(&file, ERROR), codes(&file, WARNING)), (BTreeSet::new(), BTreeSet::new()), "{file:?}");
     let grey = folder.path().join("grey");
-    super::sample::write_grey(&grey);
+    mateval_testkit::sample_dataset::write_grey(&grey);
     let file = linted(&grey);
     assert_eq!(codes(&file, ERROR), BTreeSet::new());
     assert!(codes(&file, WARNING).contains("same_base_color"), "{file:?}");

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::data::shared_data;
 use glam::{Vec2, Vec3};
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{LinearRgb, Picture, Wrap};
@@ -13,7 +14,6 @@ use mateval_scene::reference::{
     Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
 };
 use mateval_scene::{Camera, Intrinsics, TriangleMesh};
-use mateval_testkit::data::shared_data;
 use serde_json::Value;
 
 /// The folder of `bench/<name>`; none where the shared data are missing.
@@ -24,7 +24,6 @@ pub fn folder(name: &str) -> Option<PathBuf> {
 
 /// Mitsuba's picture of a scene with 512 x 512 pixels (NumPy's format, version 1, little-endian floats): `path`,
 /// max_depth 8, 64 samples.
-#[allow(dead_code, reason = "some draw no comparison")]
 pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     const SIZE: usize = 512;
     let bytes = std::fs::read(folder.join("mi_principled_d8_64spp.npy")).unwrap();

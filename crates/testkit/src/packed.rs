@@ -1,21 +1,28 @@
-//! Writes sound and faulty archives byte by byte.
+//! Valid and invalid archives, written byte by byte.
 
 use std::io::Write as _;
 use std::path::Path;
 
-/// An entry of a zip: `data` as stored, and the values of the directory, which may differ from it.
+/// A file in a zip: its packed bytes, and what the central directory states of it.
 #[derive(Clone)]
 pub struct ZipEntry {
+    /// Its name.
     pub name: Vec<u8>,
+    /// Its bytes as they are stored.
     pub data: Vec<u8>,
+    /// 0 for stored, 8 for deflated.
     pub method: u16,
+    /// General purpose bits; 1 for encrypted.
     pub flags: u16,
     /// Unix mode, in the upper half of the attributes.
     pub mode: u32,
+    /// The stated size once unpacked.
     pub size: u64,
+    /// The stated CRC-32.
     pub checksum: u32,
+    /// Its comment in the central directory.
     pub comment: Vec<u8>,
-    /// The entry whose data it shares; none if it has its own.
+    /// The entry whose data it points to; none for data of its own.
     pub shares: Option<usize>,
 }
 
@@ -44,7 +51,7 @@ impl ZipEntry {
         }
     }
 
-    /// A stored file, without compression.
+    /// A stored file.
     pub fn stored(name: &str, bytes: &[u8]) -> Self {
         Self { data: bytes.into(), method: 0, ..Self::new(name, bytes) }
     }
@@ -88,7 +95,7 @@ pub fn zip(entries: &[ZipEntry], comment: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The closing record.
+/// The end record.
 pub fn end(count: u16, size: u32, offset: u32, comment: &[u8]) -> Vec<u8> {
     let mut bytes = b"PK\x05\x06".to_vec();
     bytes.extend(numbers(&[0, 0, count, count]));
@@ -103,7 +110,7 @@ fn numbers(values: &[u16]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// The header of an entry in a tar; `size` may differ from that of the data that follow.
+/// The header of a tar entry. `size` need not be the size of what follows.
 pub fn tar_header(name: &str, kind: u8, size: u64) -> Vec<u8> {
     let mut block = vec![0; 512];
     block[..name.len()].copy_from_slice(name.as_bytes());
@@ -123,14 +130,14 @@ pub fn tar_entry(name: &str, kind: u8, bytes: &[u8]) -> Vec<u8> {
     [&tar_header(name, kind, bytes.len() as u64)[..], bytes, &vec![0; padding]].concat()
 }
 
-/// One member of a gzip; several in a row are read as one stream.
+/// One gzip member; several in a row are read as one stream.
 pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     packed.write_all(bytes).unwrap();
     packed.finish().unwrap()
 }
 
-/// The relative names and the bytes of all files of a folder, sorted.
+/// The relative names and the bytes of all files in a folder, sorted.
 pub fn files(root: &Path) -> Vec<(String, Vec<u8>)> {
     let (mut found, mut folders) = (Vec::new(), vec![root.to_owned()]);
     while let Some(folder) = folders.pop() {
@@ -155,7 +162,7 @@ pub fn zipped(root: &Path, prefix: &str) -> Vec<u8> {
     zip(&entries, b"a comment")
 }
 
-/// The same as a tar in gzip.
+/// A submission's folder as a tar in gzip, below `prefix`.
 pub fn tarred(root: &Path, prefix: &str) -> Vec<u8> {
     let entries = files(root).into_iter().map(|(name, bytes)| tar_entry(&format!("{prefix}{name}"), b'0', &bytes));
     gzip(&[entries.collect::<Vec<_>>().concat(), vec![0; 1024]].concat())

@@ -10,7 +10,9 @@ pub struct Renders(Vec<Picture<LinearRgb>>);
 /// A mean with its standard error.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimate {
+    /// The mean.
     pub mean: f64,
+    /// Its standard error.
     pub error: f64,
 }
 

@@ -7,7 +7,7 @@ use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{LinearRgb, Picture, png_io};
 
 use super::{Fault, NOTE, WARNING, every};
-use crate::suite::sample::{dataset, write_from_photo, write_nearest};
+use mateval_testkit::sample_dataset::{dataset, write_from_photo, write_nearest};
 
 /// The bytes of a map of 8 or 16 bits, three a texel.
 fn bytes(path: &Path) -> Picture<[u8; 3]> {
@@ -93,6 +93,6 @@ pub const FAULTS: &[Fault] = &[
 fn empty_unobserved(root: &Path) {
     instead(root, write_nearest);
     for scene in &dataset().scenes {
-        crate::suite::sample::blacken_unobserved(scene, &root.join("scenes").join(scene.id.as_str()));
+        mateval_testkit::sample_dataset::blacken_unobserved(scene, &root.join("scenes").join(scene.id.as_str()));
     }
 }
