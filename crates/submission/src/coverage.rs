@@ -1,12 +1,12 @@
-//! How much of each texel of an atlas a triangle covers, exactly: by clipping it to the texel's square.
+//! The exact area of each texel of an atlas that a triangle covers, by clipping the triangle to the texel's square.
 //!
-//! Counting texels whose centre lies inside would not do. Packers put the edges of charts on centres, so that a chart of
-//! 2 times 5 texels holds 3 times 6 of them.
+//! Counting the texels whose centre lies inside would be wrong: packers put the edges of charts on texel centres, so that a
+//! chart of 2 by 5 texels holds 3 by 6 of them.
 
 use glam::{DVec2, DVec3};
 use mateval_scene::TriangleMesh;
 
-/// Part of a triangle that lies in a texel's square.
+/// The part of a triangle inside a texel's square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
     /// The texel's column.
@@ -19,7 +19,7 @@ pub(crate) struct Part {
     pub(crate) centroid: DVec2,
 }
 
-/// The triangles of an atlas, by the rows that they reach.
+/// The triangles of an atlas by the rows of texels that they reach.
 pub(crate) struct Coverage {
     size: usize,
     /// In texels from the top left.
@@ -28,8 +28,8 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// Of an atlas of `size` texels a side. A triangle without area there, or a mesh without uv, covers nothing; nor does
-    /// what lies outside of the square.
+    /// For an atlas of `size` texels a side. A triangle without area in the atlas, a mesh without uv and anything outside
+    /// the atlas cover nothing.
     pub(crate) fn new(atlas: &TriangleMesh, size: usize) -> Self {
         let uvs = atlas.uvs.as_deref().unwrap_or_default();
         let texel = |vertex: u32| {
@@ -74,7 +74,7 @@ impl Coverage {
                 }
                 let (area, centroid) = slab.clipped(DVec2::X, left).clipped(-DVec2::X, -(left + 1.0)).measured();
                 if area > 0.0 {
-                    // Of a sliver rounding may put it beside the texel.
+                    // Rounding may put the centroid of a sliver beside the texel.
                     let centroid = centroid.clamp(DVec2::new(left, top), DVec2::new(left + 1.0, bottom));
                     visit(Part { column, triangle, area, centroid });
                 }
@@ -82,7 +82,7 @@ impl Coverage {
         }
     }
 
-    /// The texels of the row that the slab covers whole: all between its least width at top and bottom.
+    /// The columns whose texel in the row is fully covered by the slab: those that lie inside it at both the top and the bottom.
     fn whole_columns(&self, slab: &Polygon, top: f64, bottom: f64) -> std::ops::Range<usize> {
         let (mut low, mut high) = (0.0_f64, self.size as f64);
         for line in [top, bottom] {
@@ -98,7 +98,7 @@ fn twice_area([a, b, c]: [DVec2; 3]) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// The texels along an axis that numbers between the least and the largest reach.
+/// The texels along an axis from the least to the largest of some coordinates.
 fn reached(along: impl IntoIterator<Item = f64>, size: usize) -> std::ops::Range<usize> {
     let (low, high) =
         along.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
@@ -129,8 +129,8 @@ impl Polygon {
         self.count += 1;
     }
 
-    /// What lies where `axis` (along x or y, either way) times the place is at least `least` (Sutherland and Hodgman, 1974).
-    /// What is cut lies on the line to the bit.
+    /// The part whose dot product with `axis` (along x or y, of either sign) is at least `least` (Sutherland and Hodgman,
+    /// 1974). New corners lie exactly on the line.
     fn clipped(&self, axis: DVec2, least: f64) -> Self {
         let mut clipped = Self { corners: [DVec2::ZERO; 8], count: 0 };
         for (at, corner) in self.corners().iter().enumerate() {
@@ -179,8 +179,8 @@ mod tests {
         all
     }
 
-    /// Two texels times five, its edges on centres: whole texels inside, halves along the edges, quarters in the corners.
-    /// Centres inside it number 3 times 6.
+    /// A chart of two by five texels with its edges on texel centres: whole texels inside, halves along the edges, quarters
+    /// in the corners, 3 by 6 texels together.
     #[test]
     fn a_chart_whose_edges_lie_on_centres() {
         let corner = |x: f32, y: f32| Vec2::new((2.5 + x) / 16.0, 1.0 - (3.5 + y) / 16.0);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     proptest! {
-        /// Parts add up to the triangle, their centroids to its own, and lie in it and in their texel.
+        /// Areas and moments of the parts add up to those of the triangle, and each part lies in its texel.
         #[test]
         fn parts_are_the_whole(uvs in prop::collection::vec((0.0_f32..=1.0, 0.0_f32..=1.0), 3), thin in any::<bool>()) {
             let mut uvs: Vec<Vec2> = uvs.into_iter().map(Vec2::from).collect();
@@ -226,9 +226,9 @@ mod tests {
     }
 
     #[test]
-    fn strange_uv_are_no_panic() {
-        for strange in [Vec2::splat(-3.0), Vec2::splat(1e9), Vec2::splat(-1e30), Vec2::splat(0.5)] {
-            let coverage = Coverage::new(&mesh(vec![strange, Vec2::new(0.2, 0.7), Vec2::new(0.9, 0.1)]), 8);
+    fn extreme_uv_do_not_panic() {
+        for extreme in [Vec2::splat(-3.0), Vec2::splat(1e9), Vec2::splat(-1e30), Vec2::splat(0.5)] {
+            let coverage = Coverage::new(&mesh(vec![extreme, Vec2::new(0.2, 0.7), Vec2::new(0.9, 0.1)]), 8);
             assert!(parts(&coverage, 8).iter().all(|(_, part)| part.area <= 1.0 + 1e-9 && part.column < 8));
         }
         let plain = TriangleMesh { uvs: None, ..mesh(vec![Vec2::ZERO; 3]) };

@@ -274,7 +274,7 @@ mod tests {
         assert!(finding.code == "unsound_map" && finding.message.contains("more than 536870912 bytes"), "{finding}");
     }
 
-    /// A map, the finding's code, a word of its action, and the fault.
+    /// A map, the expected code, a part of the expected action, and the change to the map's file.
     type Fault = (Map, &'static str, &'static str, fn(&Path));
 
     const FAULTS: [Fault; 10] = [

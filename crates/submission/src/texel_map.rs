@@ -1,4 +1,4 @@
-//! The texels of an instance's atlas on its surface: how large each is there, and whether the input camera sees it.
+//! The texels of an instance's atlas on its surface: the area of each, and whether the input camera sees it.
 
 use glam::{DVec2, DVec3, Vec2};
 use mateval_scene::camera::Projection;
@@ -10,29 +10,29 @@ use rayon::prelude::*;
 
 use crate::coverage::{Coverage, Part};
 
-/// How far before a place, across the surface that is hit, another may lie without hiding it, in roundings of the largest
-/// coordinate: 0.01 mm at 10 m. Enough for what rays round; a tenth of what `prep` puts between sheets that lay in one
-/// another.
+/// How far in front of a place, along the normal, another surface may lie without hiding it, in units of the rounding of the
+/// largest coordinate: 0.01 mm at 10 m. That covers the rounding of rays, and is a tenth of the distance that `prep` puts
+/// between coincident sheets.
 pub const SAME_PLACE_ROUNDINGS: f64 = 16.0;
 /// Half the spacing of f32 at 1.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
-/// Surfaces at a sharper angle to the ray count as at this cosine.
+/// The least cosine between ray and normal that is used; grazing rays count as having it.
 pub const LEAST_COSINE: f64 = 1e-3;
 
-/// A texel of an atlas that lies on the surface, in whole or in part.
+/// A texel of an atlas of which at least a part lies on the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceTexel {
     /// Its column.
     pub column: usize,
-    /// The uv of the place that stands for it; none where that is its centre.
+    /// The uv of the place that represents it; none where that is its centre.
     pub off_centre: Option<[f32; 2]>,
     /// Its area on the surface, in square metres.
     pub area_m2: f64,
-    /// Whether the input camera sees its place.
+    /// Whether the input camera sees that place.
     pub observed: bool,
 }
 
-/// The same in memory, of which there are millions.
+/// The same in less memory; a scene has millions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Texel {
     area_m2: f32,
@@ -42,28 +42,28 @@ struct Texel {
     observed: bool,
 }
 
-/// The texels of an atlas that lie on its surface. Together they have its area, but for what has none in the atlas and for
-/// texels that are cut out ([`CUT_OUT_BELOW_OPACITY`]), which nobody ever sees: those are left out.
+/// The texels of an atlas that lie on its surface. Their areas add up to that of the surface, except for triangles without
+/// area in the atlas and for texels that are cut out ([`CUT_OUT_BELOW_OPACITY`]). No camera sees the latter.
 ///
-/// The place that stands for a texel is its centre where that lies in a triangle, else the middle of what the triangle
-/// covers that has most of it.
+/// A texel is represented by its centre if that lies in a triangle, else by the centroid of the part covered by the triangle
+/// that covers most of it.
 pub struct TexelMap {
     size: usize,
     rows: Vec<Vec<Texel>>,
 }
 
 impl TexelMap {
-    /// Looks at every texel of an atlas of `size` a side, from `camera` (the input's).
+    /// The texels of an atlas of `size` texels a side, seen by `camera` (that of the input view).
     ///
-    /// `atlas` has the same triangles as the world's surface `surface`, its uv the atlas's. A texel is observed where its
-    /// place lies in the camera's picture and is the first surface along the ray towards it: the same triangle is hit, or
-    /// nothing that lies before it by more than rounding.
+    /// `atlas` has the triangles of the world's surface `surface`, with uv in the atlas. A texel is observed if its place
+    /// lies in the camera's picture and a ray towards it hits that triangle first, or nothing that is nearer by more than
+    /// rounding.
     pub fn new(world: &World, surface: SurfaceIndex, atlas: &TriangleMesh, size: usize, camera: &Camera) -> Self {
         let coverage = Coverage::new(atlas, size);
         let mesh = &world.scene().surfaces[surface.0].mesh;
         let texel_m2 = (0..mesh.triangles.len()).map(|triangle| texel_m2(mesh, &coverage, triangle)).collect();
-        let looker = Looker { world, surface, mesh, coverage, texel_m2, eye: Eye::new(camera) };
-        Self { size, rows: (0..size).into_par_iter().map(|y| looker.row(size, y)).collect() }
+        let observer = Observer { world, surface, mesh, coverage, texel_m2, eye: Eye::new(camera) };
+        Self { size, rows: (0..size).into_par_iter().map(|y| observer.row(size, y)).collect() }
     }
 
     /// Texels a side.
@@ -71,7 +71,7 @@ impl TexelMap {
         self.size
     }
 
-    /// The texels of row `y`, from left to right; panics outside of the atlas.
+    /// The texels of row `y`, from left to right; panics if the atlas has no such row.
     pub fn row(&self, y: usize) -> impl Iterator<Item = SurfaceTexel> + '_ {
         self.rows[y].iter().map(|texel| SurfaceTexel {
             column: usize::from(texel.column),
@@ -89,11 +89,11 @@ fn texel_m2(mesh: &TriangleMesh, coverage: &Coverage, triangle: usize) -> f64 {
     if texels > 0.0 { (b - a).cross(c - a).length() / 2.0 / texels } else { 0.0 }
 }
 
-/// What the triangles cover of a texel.
+/// The coverage of one texel while triangles are added.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
     area_m2: f64,
-    /// Of the triangle that covers most.
+    /// The area of the triangle that covers most.
     largest_m2: f64,
     triangle: usize,
     /// In texels from the top left.
@@ -115,17 +115,17 @@ impl Cell {
     }
 }
 
-/// A camera that looks at places.
+/// The camera, ready to project places.
 struct Eye {
     camera: Camera,
     projection: Projection,
-    /// As rays have it.
+    /// The camera's position, rounded as rays are.
     origin: DVec3,
 }
 
 impl Eye {
     fn new(camera: &Camera) -> Self {
-        // Rays start at a rounded place; towards the others they must be meant from there.
+        // Rays start at single precision, so their directions must be computed from the rounded place.
         let origin = camera.position().as_vec3().as_dvec3();
         Self { camera: *camera, projection: camera.projection(), origin }
     }
@@ -135,8 +135,8 @@ impl Eye {
     }
 }
 
-/// What is looked at, and from where.
-struct Looker<'a> {
+/// The surface whose texels are classified, and the camera that sees them.
+struct Observer<'a> {
     world: &'a World,
     surface: SurfaceIndex,
     mesh: &'a TriangleMesh,
@@ -146,7 +146,7 @@ struct Looker<'a> {
     eye: Eye,
 }
 
-impl Looker<'_> {
+impl Observer<'_> {
     fn row(&self, size: usize, y: usize) -> Vec<Texel> {
         let mut cells = vec![Cell::default(); size];
         self.coverage.visit_row(y, |part| {
@@ -160,7 +160,7 @@ impl Looker<'_> {
 
     /// None for a texel that is cut out.
     fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<Texel> {
-        // Rounding may leave a place of an edge a hair outside.
+        // Rounding may put a place on an edge slightly outside.
         let weights = self.coverage.barycentrics(cell.triangle, cell.place).max(DVec3::ZERO);
         let weights = weights / weights.element_sum();
         if self.opacity(cell.triangle, weights) < CUT_OUT_BELOW_OPACITY {
@@ -190,15 +190,15 @@ impl Looker<'_> {
 
     /// Whether nothing lies between the camera and a place of a triangle.
     fn is_first(&self, triangle: usize, place: DVec3) -> bool {
-        let way = place - self.eye.origin;
-        let distance = way.length();
-        let ray = Ray::endless(self.eye.origin.as_vec3(), (way / distance).as_vec3());
-        // A ray may slip by the edge of what it is sent to; then nothing hides it.
+        let offset = place - self.eye.origin;
+        let distance = offset.length();
+        let ray = Ray::endless(self.eye.origin.as_vec3(), (offset / distance).as_vec3());
+        // A ray may miss the edge that it is aimed at; then nothing hides the place.
         let Some(hit) = self.world.first_hit(&ray) else { return true };
         if hit.surface == self.surface && hit.triangle.0 == triangle {
             return true;
         }
-        let slope = self.mesh.geometric_normal(triangle).dot(way / distance).abs().max(LEAST_COSINE);
+        let slope = self.mesh.geometric_normal(triangle).dot(offset / distance).abs().max(LEAST_COSINE);
         let coordinate = place.abs().max(self.eye.origin.abs()).max_element();
         f64::from(hit.distance) >= distance - SAME_PLACE_ROUNDINGS * ROUNDING * coordinate / slope
     }

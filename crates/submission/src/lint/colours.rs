@@ -1,9 +1,9 @@
-//! Colours that are decoded wrongly: red and blue exchanged, linear numbers taken for sRGB or the reverse.
+//! Base colours that were written wrongly: red and blue exchanged, linear numbers where sRGB is read, or the reverse.
 //!
-//! The hue of the picture is that of the material, but for the light's own, which is much the same all over: brightness
-//! cancels where channels are divided. So log(red / blue) and log(red / green) of picture and base colour lie along a
-//! line of slope 1. Exchanged channels make the slope of the first negative. The curve of sRGB is nearly a power of 2.2:
-//! numbers decoded once too often are 2.2 times as far from grey, numbers decoded once too few 2.2 times as near.
+//! A quotient of two channels does not depend on brightness. In the picture it is the material's, times that of the light,
+//! which hardly varies within a scene. So log(red / blue) and log(red / green) of picture and base colour lie along a line
+//! of slope 1. Exchanging red and blue makes the slope of the first negative. The sRGB curve is close to a power of 2.2:
+//! values decoded once too often are 2.2 times as far from grey, values decoded once too few 2.2 times as near.
 
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
 use mateval_scene::Finding;
@@ -12,38 +12,37 @@ use super::finding::warning;
 use super::looks::Look;
 use super::statistics::Pairs;
 
-/// Fewest pixels that say anything.
+/// Fewest pixels that allow a judgement.
 const FEWEST: f64 = 400.0;
-/// How much hues of materials and picture must differ from place to place, as a standard deviation of logarithms.
+/// The least standard deviation, of logarithms, of the hues of base colours and of the picture.
 const LEAST_HUE: f64 = 0.1;
-/// How well exchanged channels must go along with the picture.
+/// The least strength of a negative correlation with the picture from which channels count as exchanged.
 const LEAST_EXCHANGED: f64 = 0.5;
-/// How well hues must go along with the picture before their strength is judged.
+/// The least correlation of hues with the picture from which their strength is judged.
 const LEAST_CORRELATION: f64 = 0.8;
-/// Base colours whose hues are this many times as strong as the picture's, or as weak, are decoded wrongly; 2.2 is expected
-/// then, 1 otherwise.
+/// Hues stronger or weaker than the picture's by this factor are decoded wrongly. 2.2 is expected then, 1 otherwise.
 const LEAST_FACTOR: f64 = 1.6;
-/// Darker values say more of noise, and of rounding, than of hues.
+/// Darker values hold more noise and rounding than hue.
 const DARKEST: f32 = 0.01;
 
-/// How the base colours of a scene were decoded, judged by its hues.
+/// Whether the base colours of a scene were written as they are read, judged by their hues.
 #[derive(Debug, Default)]
 pub(super) enum Decoding {
-    /// There are too few hues, they do not match the picture, or they match it equally well with either decoding.
+    /// Too few hues, no correlation with the picture, or as good a one with either decoding.
     #[default]
-    Unclear,
+    Unknown,
     Right,
     Wrong(Finding),
 }
 
-/// The findings of scenes whose base colours were decoded wrongly, if they are most of the scenes with a clear decoding. A
-/// single scene proves nothing: reflections of white light pale the picture as a wrong decoding would, and a method that
-/// decodes wrongly does so in every scene.
+/// The findings of scenes whose base colours were decoded wrongly, if these are most of the scenes that can be judged. One
+/// scene proves nothing: reflections of white light make the picture pale as a wrong decoding would. A wrong script, on the
+/// other hand, is wrong in every scene.
 pub(super) fn mostly_wrong(scenes: Vec<Decoding>) -> Vec<Finding> {
-    let clear = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Unclear)).count();
+    let judged = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Unknown)).count();
     let wrong = |decoding| if let Decoding::Wrong(finding) = decoding { Some(finding) } else { None };
     let wrong: Vec<Finding> = scenes.into_iter().filter_map(wrong).collect();
-    if 2 * wrong.len() > clear { wrong } else { Vec::new() }
+    if 2 * wrong.len() > judged { wrong } else { Vec::new() }
 }
 
 /// Whether red and blue are exchanged.
@@ -72,20 +71,20 @@ pub(super) fn decoding(place: &str, looks: &[Look], are_png: bool) -> Decoding {
         ("srgb_in_exr", "sRGB numbers in EXR, which are read as linear", action, linear_from_srgb)
     };
     let (Some(own), Some(then)) = (strength(looks, |value| value), strength(looks, corrected)) else {
-        return Decoding::Unclear;
+        return Decoding::Unknown;
     };
     let off = if are_png { own } else { 1.0 / own };
     if off >= LEAST_FACTOR && then.ln().abs() <= own.ln().abs() / 2.0 {
         let message = format!(
             "base colours seem to be {what}: their hues are {own:.2} times as strong as the input picture's, {then:.2} times \
-             after that correction"
+             once corrected"
         );
         return Decoding::Wrong(warning(code, place, message, action));
     }
-    if own.ln().abs() <= then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Unclear }
+    if own.ln().abs() <= then.ln().abs() / 2.0 { Decoding::Right } else { Decoding::Unknown }
 }
 
-/// How many times as strong the base colour's hues are as the picture's; none where they do not go along with it.
+/// The strength of the base colour's hues over that of the picture's; none where they do not correlate.
 fn strength(looks: &[Look], change: fn(f32) -> f32) -> Option<f64> {
     let hues = [1, 2].map(|channel| hue(looks, channel, change));
     let judged = hues.iter().filter(|hues| {
@@ -114,15 +113,15 @@ fn hue(looks: &[Look], channel: usize, change: fn(f32) -> f32) -> Pairs {
 
 #[cfg(test)]
 mod tests {
-    use super::Decoding::{Right, Unclear, Wrong};
+    use super::Decoding::{Right, Unknown, Wrong};
     use super::*;
 
     #[test]
     fn most_scenes_must_agree() {
         let wrong = || Wrong(warning("linear_in_png", "scenes/a", String::new(), "encode"));
-        assert_eq!(mostly_wrong(vec![wrong(), Unclear, Unclear]).len(), 1);
+        assert_eq!(mostly_wrong(vec![wrong(), Unknown, Unknown]).len(), 1);
         assert_eq!(mostly_wrong(vec![wrong(), Right, wrong()]).len(), 2);
         assert_eq!(mostly_wrong(vec![wrong(), Right]).len(), 0);
-        assert_eq!(mostly_wrong(vec![Right, Unclear]).len(), 0);
+        assert_eq!(mostly_wrong(vec![Right, Unknown]).len(), 0);
     }
 }

@@ -1,4 +1,4 @@
-//! Maps that are the truth's own. That is no fault (the baseline `gt` is such a submission), but who ranks must know.
+//! Maps that are copies of the ground truth. That is no fault, as the baseline `gt` shows, but a ranking must not hide it.
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texture, Wrap};
@@ -7,13 +7,12 @@ use mateval_scene::submission::Map;
 use mateval_scene::{Finding, InstanceId};
 
 use super::finding::note;
-use super::scene::Seen;
 use crate::map_file::MapFile;
 
-/// From this share of maps on a scene is a copy.
+/// The share of maps from which a scene counts as a copy.
 const LEAST_SHARE: f64 = 0.5;
 
-/// How many maps that are not one value all over are the truth's, and how many there are.
+/// Of the maps with more than one value, how many there are and how many equal the truth's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CopyCount {
     copies: usize,
@@ -21,7 +20,7 @@ pub(super) struct CopyCount {
 }
 
 impl CopyCount {
-    /// Of an instance's maps; nothing where the ground truth is withheld.
+    /// Counts an instance's maps; none where the ground truth is withheld.
     pub(super) fn of(folder: &SceneFolder, instance: &InstanceId, files: &[Option<MapFile>; 3]) -> Self {
         let mut count = Self::default();
         for (map, file) in Map::ALL.into_iter().zip(files) {
@@ -30,7 +29,7 @@ impl CopyCount {
                 continue;
             };
             let encoding = if map == Map::BaseColor { Encoding::Srgb } else { Encoding::Linear };
-            // What of the truth cannot be read scoring will tell.
+            // Scoring reports a truth that cannot be read.
             let Ok(truth) = read_texture(&path, encoding, Wrap::Clamp) else { continue };
             count.of += 1;
             count.copies += usize::from(same(&file.texture, &truth));
@@ -53,11 +52,13 @@ fn same(map: &Texture, truth: &Texture) -> bool {
 }
 
 /// A note where most of a scene's maps are the truth's.
-pub(super) fn copies(place: &str, all: &[Seen]) -> Option<Finding> {
-    let [copies, of] = [|count: &CopyCount| count.copies, |count: &CopyCount| count.of]
-        .map(|number| all.iter().map(|seen| number(&seen.copies)).sum::<usize>());
+pub(super) fn copies(place: &str, instances: impl Iterator<Item = CopyCount>) -> Option<Finding> {
+    let CopyCount { copies, of } = instances.fold(CopyCount::default(), |sum, count| CopyCount {
+        copies: sum.copies + count.copies,
+        of: sum.of + count.of,
+    });
     (of > 0 && copies as f64 >= LEAST_SHARE * of as f64).then(|| {
-        let message = format!("{copies} of {of} maps that are not one value all over are the truth's, texel by texel");
-        note("copy_of_truth", place, message, "mark it as a ceiling, not as a method")
+        let message = format!("{copies} of {of} maps with more than one value are the truth's, texel by texel");
+        note("copy_of_truth", place, message, "present it as an upper bound, not as a method")
     })
 }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use mateval_scene::dataset_id::DatasetId;
 
-/// The word for this version of a report.
+/// The name of this version of a report.
 pub const LINT_FORMAT: &str = "mateval-lint/1";
 
 /// What `eval lint` found.
@@ -17,21 +17,21 @@ pub struct LintFile {
     pub format: String,
     /// Program and version.
     pub tool: String,
-    /// From `submission.json`; null where that does not say.
+    /// The method's name from `submission.json`; null where that has none.
     pub method: Option<String>,
-    /// What the submission was held against.
+    /// The dataset that the submission was checked against.
     pub dataset: DatasetId,
-    /// Whether there is no error.
+    /// Whether no error was found.
     pub good: bool,
-    /// Files of maps that could be read.
+    /// How many maps could be decoded.
     pub maps: usize,
-    /// How many errors there are, repeats counted.
+    /// How many errors were found, repeats included.
     pub errors: usize,
-    /// How many warnings there are.
+    /// How many warnings were found, repeats included.
     pub warnings: usize,
-    /// How many notes there are.
+    /// How many notes were found, repeats included.
     pub notes: usize,
-    /// By severity and code.
+    /// Sorted by severity and code.
     pub findings: Vec<FoldedFinding>,
 }
 
@@ -39,18 +39,18 @@ pub struct LintFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FoldedFinding {
-    /// Of all of them.
+    /// Their severity.
     pub severity: Severity,
-    /// The code.
+    /// Their code.
     pub code: String,
-    /// How many there are.
+    /// How many were found.
     pub count: usize,
-    /// The first of them, 100 at most, sorted by file and place.
+    /// The first of them, at most 100, sorted by file and place.
     pub examples: Vec<Finding>,
 }
 
 impl LintFile {
-    /// Counts.
+    /// A report with its counts.
     pub(super) fn new(
         tool: String,
         method: Option<String>,

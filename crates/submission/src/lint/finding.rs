@@ -1,18 +1,18 @@
-//! Findings in one line of code each.
+//! Findings by severity, made in one line of code each.
 
 use mateval_scene::{Finding, Severity};
 
-/// Something that scoring replaces or refuses.
+/// A fault that scoring refuses, or replaces by a default.
 pub(super) fn error(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
     finding(Severity::Error, code, file, message, action)
 }
 
-/// Something that is scored and is probably a mistake.
+/// Something that is scored, but probably a mistake.
 pub(super) fn warning(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
     finding(Severity::Warning, code, file, message, action)
 }
 
-/// Something to know.
+/// Something for information.
 pub(super) fn note(code: &str, file: &str, message: impl Into<String>, action: impl Into<String>) -> Finding {
     finding(Severity::Note, code, file, message, action)
 }

@@ -1,13 +1,13 @@
-//! Repeats folded: all findings of one code in one.
+//! Repeated findings folded: one entry for each code.
 
 use mateval_scene::Finding;
 
 use super::file::FoldedFinding;
 
-/// Most examples that are kept of one code.
+/// Most examples kept for one code.
 const MAX_EXAMPLES: usize = 100;
 
-/// Sorted by severity and code.
+/// Folds findings; sorted by severity and code.
 pub(super) fn folded(mut findings: Vec<Finding>) -> Vec<FoldedFinding> {
     findings.sort();
     findings.dedup();
@@ -29,7 +29,7 @@ mod tests {
     use crate::lint::finding::{error, note};
 
     #[test]
-    fn one_line_a_code_errors_first() {
+    fn findings_fold_by_code_errors_first() {
         let many = (0..150).map(|at| error("nan", &format!("{at:03}"), "", ""));
         let folded = folded(std::iter::once(note("extra_file", "a", "", "")).chain(many).collect());
         let counts: Vec<(&str, usize, usize)> =

@@ -1,4 +1,4 @@
-//! Names of a submission's folders and files held against the dataset's: what is missing, what is too much, what was meant.
+//! The names of a submission's folders and files compared with the dataset's: missing, superfluous and misspelt ones.
 
 use std::collections::BTreeMap;
 
@@ -12,17 +12,17 @@ use super::finding::{error, note, warning};
 use super::names::{distance, nearest, plain};
 use super::tree::{Kind, Tree, joined};
 
-/// Most unknown names a folder that a meaning is looked for.
+/// Most unknown names in a folder that are compared with the missing ones.
 const MOST_GUESSED: usize = 200;
 
-/// What others call the maps.
+/// What other programs call the maps.
 const OTHER_NAMES: [(Map, &[&str]); 3] = [
     (Map::BaseColor, &["albedo", "diffuse", "diffusealbedo", "color", "colour", "basecolour", "kd", "rgb", "texture"]),
     (Map::Roughness, &["rough", "roughnessmap", "perceptualroughness"]),
     (Map::Metallic, &["metal", "metalness", "metallicness", "metallicity"]),
 ];
 
-/// Endings of pictures that are not read.
+/// File name endings of pictures that are not read.
 const OTHER_ENDINGS: [&str; 12] =
     ["jpg", "jpeg", "tif", "tiff", "tga", "bmp", "webp", "hdr", "npy", "dds", "ktx", "avif"];
 
@@ -32,12 +32,12 @@ pub(super) fn check(dataset: &Dataset, tree: &Tree) -> Vec<Finding> {
     for (name, kind) in tree.children("") {
         match (name, kind) {
             (SUBMISSION, _) | ("scenes", Kind::Folder) => {}
-            _ => findings.extend(useless(name, kind)),
+            _ => findings.extend(unexpected(name, kind)),
         }
     }
     let known: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
     if tree.kind("scenes") != Some(Kind::Folder) {
-        let message = "there is no folder 'scenes'";
+        let message = "the folder 'scenes' is missing";
         findings.push(error(
             "no_scenes_folder",
             "scenes",
@@ -46,61 +46,61 @@ pub(super) fn check(dataset: &Dataset, tree: &Tree) -> Vec<Finding> {
         ));
         return findings;
     }
-    let there = matched("scenes", tree, &known, SCENE, &mut findings);
-    for scene in dataset.scenes.iter().filter(|scene| there.get(scene.id.as_str()) == Some(&State::There)) {
+    let states = matched("scenes", tree, &known, SCENE, &mut findings);
+    for scene in dataset.scenes.iter().filter(|scene| states.get(scene.id.as_str()) == Some(&State::Present)) {
         check_scene(tree, scene, &mut findings);
     }
     findings
 }
 
-/// A finding where the submission lies in a folder of what was named, not there itself.
+/// A finding where not the folder given, but one inside it, holds the submission.
 pub(super) fn nested(tree: &Tree) -> Option<Finding> {
     if tree.kind(SUBMISSION).is_some() {
         return None;
     }
     let (name, _) = tree.children("").find(|(name, _)| tree.kind(&joined(name, SUBMISSION)).is_some())?;
-    let message = "the submission is in this folder, not in the one around it";
-    Some(error("nested_submission", name, message, "name this folder"))
+    let message = "the submission is in this folder, not in the one that was given";
+    Some(error("nested_submission", name, message, "give the path of this folder"))
 }
 
-/// How a kind of folder is called in codes.
-struct Words {
+/// The codes about one kind of folder, and its name in messages.
+struct FolderCodes {
     missing: &'static str,
     misnamed: &'static str,
     extra: &'static str,
     what: &'static str,
 }
 
-const SCENE: Words =
-    Words { missing: "missing_scene", misnamed: "misnamed_scene", extra: "extra_scene", what: "scene" };
-const OBJECT: Words =
-    Words { missing: "missing_object", misnamed: "misnamed_object", extra: "extra_object", what: "instance" };
+const SCENE: FolderCodes =
+    FolderCodes { missing: "missing_scene", misnamed: "misnamed_scene", extra: "extra_scene", what: "scene" };
+const OBJECT: FolderCodes =
+    FolderCodes { missing: "missing_object", misnamed: "misnamed_object", extra: "extra_object", what: "instance" };
 
-/// Whether an expected folder is there.
+/// Whether an expected folder exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    There,
+    Present,
     Missing,
-    /// There under another name.
+    /// Exists under another name.
     Misnamed,
 }
 
-/// The expected folders of `folder`, and what is wrong with the others.
+/// The state of each expected folder in `folder`. Adds a finding for each that is missing or misnamed, and for any other entry.
 fn matched<'a>(
     folder: &str,
     tree: &Tree,
     expected: &[&'a str],
-    words: Words,
+    codes: FolderCodes,
     findings: &mut Vec<Finding>,
 ) -> BTreeMap<&'a str, State> {
-    let is_there = |name: &&'a str| tree.kind(&joined(folder, name)).is_some();
+    let exists = |name: &&'a str| tree.kind(&joined(folder, name)).is_some();
     let mut states: BTreeMap<&str, State> =
-        expected.iter().map(|name| (*name, if is_there(name) { State::There } else { State::Missing })).collect();
+        expected.iter().map(|name| (*name, if exists(name) { State::Present } else { State::Missing })).collect();
     let mut guesses = MOST_GUESSED;
     for (name, kind) in tree.children(folder) {
         let path = joined(folder, name);
         if states.contains_key(name) {
-            findings.extend(no_folder(&path, kind));
+            findings.extend(not_a_folder(&path, kind));
             continue;
         }
         let missing = states.iter().filter(|(_, state)| **state == State::Missing).map(|(name, _)| *name);
@@ -109,27 +109,27 @@ fn matched<'a>(
         match near {
             Some(near) => {
                 states.insert(near, State::Misnamed);
-                let message = format!("no {} has this name, and '{near}' is missing", words.what);
-                findings.push(error(words.misnamed, &path, message, format!("rename it to '{near}'")));
+                let message = format!("no {} has this name, while '{near}' is missing", codes.what);
+                findings.push(error(codes.misnamed, &path, message, format!("rename it to '{near}'")));
             }
             None if kind == Kind::Folder => {
-                let message = format!("no {} of the dataset has this name", words.what);
-                findings.push(warning(words.extra, &path, message, "leave it out; it is not scored"));
+                let message = format!("no {} of the dataset has this name", codes.what);
+                findings.push(warning(codes.extra, &path, message, "leave it out; it is not scored"));
             }
-            None => findings.extend(useless(&path, kind)),
+            None => findings.extend(unexpected(&path, kind)),
         }
     }
     let missing = states.iter().filter(|(_, state)| **state == State::Missing);
     findings.extend(missing.map(|(name, _)| {
-        let action = "write its maps; as it is it scores as grey";
-        error(words.missing, &joined(folder, name), "the folder is not there", action)
+        let action = "write its maps; a missing one scores as grey";
+        error(codes.missing, &joined(folder, name), "the folder is missing", action)
     }));
     states
 }
 
-/// A folder's name on what is none.
-fn no_folder(path: &str, kind: Kind) -> Option<Finding> {
-    let action = "put the folder itself in its place";
+/// A finding where the name of an expected folder belongs to something else.
+fn not_a_folder(path: &str, kind: Kind) -> Option<Finding> {
+    let action = "replace it by the folder itself";
     match kind {
         Kind::Folder => None,
         Kind::BadLink => {
@@ -140,14 +140,14 @@ fn no_folder(path: &str, kind: Kind) -> Option<Finding> {
     }
 }
 
-/// What nobody asked for.
-fn useless(path: &str, kind: Kind) -> Option<Finding> {
+/// A finding about an entry that is not expected at all.
+fn unexpected(path: &str, kind: Kind) -> Option<Finding> {
     match kind {
         Kind::BadLink => {
             let message = "a link that leads nowhere, or out of the submission's folder; it is not followed";
             Some(warning("useless_link", path, message, "leave it out"))
         }
-        _ => Some(note("extra_file", path, "nothing of this name is asked for", "it is not read")),
+        _ => Some(note("extra_file", path, "no file or folder of this name is expected", "it is not read")),
     }
 }
 
@@ -158,7 +158,7 @@ fn check_scene(tree: &Tree, scene: &SceneFile, findings: &mut Vec<Finding>) {
     let names: Vec<&str> = wanted.iter().map(|instance| instance.id.as_str()).collect();
     let mut found = Vec::new();
     let states = matched(&folder, tree, &names, OBJECT, &mut found);
-    // Of what needs no maps a folder is no fault.
+    // A folder for an instance that needs no maps is no fault.
     let of_unneeded = |finding: &Finding| {
         unneeded.iter().any(|instance| finding.file == joined(&folder, instance.id.as_str()))
             && finding.code == OBJECT.extra
@@ -170,7 +170,7 @@ fn check_scene(tree: &Tree, scene: &SceneFile, findings: &mut Vec<Finding>) {
             finding
         });
     }
-    for name in names.iter().filter(|name| states.get(*name) == Some(&State::There)) {
+    for name in names.iter().filter(|name| states.get(*name) == Some(&State::Present)) {
         let folder = joined(&folder, name);
         if tree.kind(&folder) == Some(Kind::Folder) {
             check_object(tree, &folder, findings);
@@ -179,7 +179,7 @@ fn check_scene(tree: &Tree, scene: &SceneFile, findings: &mut Vec<Finding>) {
 }
 
 fn check_object(tree: &Tree, folder: &str, findings: &mut Vec<Finding>) {
-    let is_there = |map: Map| {
+    let files = |map: Map| {
         ["png", "exr"].iter().filter(|ending| tree.kind(&format!("{folder}/{}.{ending}", map.stem())).is_some()).count()
     };
     let mut meant: Vec<Map> = Vec::new();
@@ -187,26 +187,26 @@ fn check_object(tree: &Tree, folder: &str, findings: &mut Vec<Finding>) {
         let path = joined(folder, name);
         let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
         let own = Map::ALL.into_iter().find(|map| map.stem() == stem && matches!(ending, "png" | "exr"));
-        let absent = |map: &Map| is_there(*map) == 0 && !meant.contains(map);
+        let absent = |map: &Map| files(*map) == 0 && !meant.contains(map);
         match (own, meaning(stem, ending).filter(absent)) {
             (Some(_), _) => {}
             (None, Some(map)) if kind == Kind::File => {
                 meant.push(map);
                 findings.push(misnamed(&path, map, stem, ending));
             }
-            _ => findings.extend(useless(&path, kind)),
+            _ => findings.extend(unexpected(&path, kind)),
         }
     }
     for map in Map::ALL {
         let place = format!("{folder}/{}.png", map.stem());
-        match is_there(map) {
+        match files(map) {
             0 if meant.contains(&map) => {}
             0 if map == Map::BaseColor => {
                 let message = "expected a PNG or an EXR, found none";
-                findings.push(error("missing_map", &place, message, "write it; as it is it scores as linear 0.5"));
+                findings.push(error("missing_map", &place, message, "write it; a missing one scores as linear 0.5"));
             }
             0 => {
-                let message = format!("no {}; the format lets it be left out", map.stem());
+                let message = format!("{} is missing, which the format allows", map.stem());
                 let value = if map == Map::Roughness { "0.5" } else { "0" };
                 findings.push(note("default_map", &place, message, format!("scored as {value}")));
             }
@@ -219,7 +219,7 @@ fn check_object(tree: &Tree, folder: &str, findings: &mut Vec<Finding>) {
     }
 }
 
-/// The map that a file of another name was meant for.
+/// The map that a misnamed file was probably meant to be.
 fn meaning(stem: &str, ending: &str) -> Option<Map> {
     let ending = ending.to_lowercase();
     if !matches!(ending.as_str(), "png" | "exr") && !OTHER_ENDINGS.contains(&ending.as_str()) {
@@ -234,9 +234,9 @@ fn meaning(stem: &str, ending: &str) -> Option<Map> {
 fn misnamed(path: &str, map: Map, stem: &str, ending: &str) -> Finding {
     let name = map.stem();
     if stem == name && !ending.eq_ignore_ascii_case("png") && !ending.eq_ignore_ascii_case("exr") {
-        let message = format!("a map of the kind .{} is not read", shortened(ending));
+        let message = format!("a .{} file is not read as a map", shortened(ending));
         return error("wrong_ending", path, message, format!("write it as {name}.png or {name}.exr"));
     }
-    let message = format!("not read: {name} is expected, and is not there");
+    let message = format!("not read, while {name} is missing");
     error("misnamed_map", path, message, format!("rename it to {name}.{}", ending.to_lowercase()))
 }

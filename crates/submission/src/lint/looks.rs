@@ -1,4 +1,4 @@
-//! What a submission's maps have where the input picture looks: as they are, and turned as mistakes turn them.
+//! The values of a submission's maps at each pixel of the input picture: as they are, and turned as common mistakes turn them.
 
 use mateval_image::Texture;
 
@@ -23,7 +23,7 @@ impl Turn {
     /// All of them, [`Turn::None`] first.
     pub(super) const ALL: [Self; 5] = [Self::None, Self::Vertical, Self::Horizontal, Self::Half, Self::Transposed];
 
-    /// Where in the file what belongs at `uv` lies then; v runs upwards.
+    /// Where in the file the value lies that belongs at `uv`; v runs upwards.
     fn place(self, [u, v]: [f32; 2]) -> [f32; 2] {
         match self {
             Self::None => [u, v],
@@ -35,7 +35,7 @@ impl Turn {
     }
 }
 
-/// A pixel of the picture, and what the maps say of it.
+/// A pixel of the picture with the base colour that the submission has there.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
     /// Its instance.
@@ -49,13 +49,13 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// The base colour as scores see it.
+    /// The base colour as scoring reads it.
     pub(super) fn own(&self) -> [f32; 3] {
         self.base_color[0]
     }
 }
 
-/// What the base colour has at each pixel that shows the instance.
+/// The base colour at each pixel that shows the instance.
 pub(super) fn looks(instance: usize, pixels: &[SeenPixel], base_color: &Texture) -> Vec<Look> {
     let look = |pixel: &SeenPixel| Look {
         instance,
@@ -66,8 +66,29 @@ pub(super) fn looks(instance: usize, pixels: &[SeenPixel], base_color: &Texture)
     pixels.iter().map(look).collect()
 }
 
+/// Roughness and metallic at a pixel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ScalarLook {
+    pub(super) roughness: f32,
+    pub(super) metallic: f32,
+}
+
+/// Both maps at each pixel that shows the instance; none where a map is missing.
+pub(super) fn scalar_looks(
+    pixels: &[SeenPixel],
+    roughness: Option<Texture>,
+    metallic: Option<Texture>,
+) -> Vec<ScalarLook> {
+    let (Some(roughness), Some(metallic)) = (roughness, metallic) else { return Vec::new() };
+    let look = |pixel: &SeenPixel| {
+        let [roughness, metallic] = [&roughness, &metallic].map(|map| mean(map, pixel, Turn::None)[0]);
+        ScalarLook { roughness, metallic }
+    };
+    pixels.iter().map(look).collect()
+}
+
 /// The mean of a map over a pixel.
-pub(super) fn mean(texture: &Texture, pixel: &SeenPixel, turn: Turn) -> [f32; 3] {
+fn mean(texture: &Texture, pixel: &SeenPixel, turn: Turn) -> [f32; 3] {
     let sum = pixel.uvs.iter().fold([0.0; 3], |sum: [f32; 3], uv| {
         let value = texture.sample(turn.place(*uv));
         std::array::from_fn(|c| sum[c] + value[c])
@@ -81,9 +102,9 @@ mod tests {
 
     use super::*;
 
-    /// A texture of 2x2 texels, all different, turned when it was written: each turn finds what belongs at the upper left.
+    /// Four different texels, turned when they were written: each turn finds the one that belongs at the upper left.
     #[test]
-    fn turns_find_what_belongs_there() {
+    fn turns_find_the_texel_that_was_moved() {
         let written = |texels: [f32; 4]| Texture::new(2, 2, Texels::Grey(texels.into()), Wrap::Clamp).unwrap();
         let upper_left = SeenPixel { uvs: [[0.25, 0.75]; 4], photo: None, tile: 0 };
         let files = [[1.0, 2.0, 3.0, 4.0], [3.0, 4.0, 1.0, 2.0], [2.0, 1.0, 4.0, 3.0], [4.0, 3.0, 2.0, 1.0]];

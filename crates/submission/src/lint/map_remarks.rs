@@ -1,4 +1,4 @@
-//! What a sound map's file says that is passed over, or that no such map should say.
+//! Headers of maps that can be read but look wrong: fields that are ignored, and fields that no such map should have.
 
 use mateval_image::exr_header::{ExrChannel, ExrHeader, ExrNumber};
 use mateval_image::png_header::{PngColor, PngHeader};
@@ -13,96 +13,97 @@ use crate::map_file::{MapFile, MapHeader};
 /// Code, message, what to do.
 type Remark = (&'static str, String, &'static str);
 
-/// All remarks on one file.
+/// All findings about one file.
 pub(super) fn remarks(path: &str, map: Map, file: &MapFile) -> Vec<Finding> {
     let (warnings, known) = match &file.header {
         MapHeader::Png(header) => {
             let warnings = [samples(map, header), chunks(map, header), pictures(header)].concat();
             let message = "interlaced rows";
-            (
-                warnings,
-                header.interlaced.then(|| note("interlaced", path, message, "read all the same; it is only larger")),
-            )
+            (warnings, header.interlaced.then(|| note("interlaced", path, message, "read, but larger than necessary")))
         }
         MapHeader::Exr(header) => {
             let warnings = [parts(header), channels(map, header), beyond_unit(&file.texture)].concat();
-            (warnings, header.tiled.then(|| note("tiled", path, "stored in tiles", "read all the same")))
+            (warnings, header.tiled.then(|| note("tiled", path, "stored in tiles", "read as any other")))
         }
     };
     let warned = warnings.into_iter().map(|(code, message, action)| warning(code, path, message, action));
     warned.chain(known).collect()
 }
 
-/// Of a PNG's kind of samples.
+/// About the samples of a PNG.
 fn samples(map: Map, header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.bit_depth < 8 {
         remarks.push(("low_bit_depth", format!("{} bits a sample", header.bit_depth), "write 8 or 16"));
     } else if header.color == PngColor::Palette {
         let message = "a palette of at most 256 colours".to_owned();
-        remarks.push(("palette", message, "write RGB or grey; it is read as what it shows"));
+        remarks.push(("palette", message, "write RGB or grey; the colours it stands for are read"));
     }
     if matches!(header.color, PngColor::GreyAlpha | PngColor::Rgba) {
         let message = format!("{}: alpha is dropped", header.color.name());
         remarks.push(("alpha", message, "write it without alpha"));
     } else if header.has(b"tRNS") {
-        let message = "a colour that counts as transparent (tRNS)".to_owned();
+        let message = "one colour marked as transparent (tRNS)".to_owned();
         remarks.push(("transparent_colour", message, "write it without"));
     }
     if map != Map::BaseColor && matches!(header.color, PngColor::Rgb | PngColor::Rgba | PngColor::Palette) {
         let message = format!("{} for a map of one number a texel: only red is read", header.color.name());
-        remarks.push(("colour_scalar", message, "write grey; of packed maps write each apart"));
+        remarks.push(("colour_scalar", message, "write grey; split packed maps into one file each"));
     }
     remarks
 }
 
-/// Of a PNG's chunks that tell how its numbers were meant.
+/// About chunks of a PNG that define how its numbers are to be decoded.
 fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
-    const TOLD: [(&[u8; 4], &str, &str); 4] = [
+    const IGNORED: [(&[u8; 4], &str, &str); 4] = [
         (b"gAMA", "gamma_chunk", "a gamma (gAMA)"),
         (b"iCCP", "icc_profile", "a colour profile (iCCP)"),
         (b"cHRM", "primaries_chunk", "primaries of its own (cHRM)"),
         (b"cICP", "coding_chunk", "a colour coding of its own (cICP)"),
     ];
     let read_as = if map == Map::BaseColor { "sRGB" } else { "linear" };
-    let told = TOLD.iter().filter(|(chunk, ..)| header.has(chunk));
-    let mut remarks: Vec<Remark> = told
+    let ignored = IGNORED.iter().filter(|(chunk, ..)| header.has(chunk));
+    let mut remarks: Vec<Remark> = ignored
         .map(|(_, code, what)| {
-            let message = format!("{what}, which is passed over: it is read as {read_as}");
-            (*code, message, "convert it, and write it without")
+            let message = format!("{what}, which is ignored: it is read as {read_as}");
+            (*code, message, "convert the numbers and leave out the chunk")
         })
         .collect();
     if map != Map::BaseColor && header.has(b"sRGB") {
-        let message = "it says to be sRGB, which is passed over: it is read as linear".to_owned();
-        remarks.push(("srgb_chunk", message, "write linear numbers, without that chunk"));
+        let message = "an sRGB chunk, which is ignored: it is read as linear".to_owned();
+        remarks.push(("srgb_chunk", message, "write linear numbers and leave out the chunk"));
     }
     remarks
 }
 
-/// Of what a PNG holds beside its picture.
+/// About what a PNG holds beside its picture.
 fn pictures(header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.has(b"acTL") {
-        remarks.push(("animated", "several pictures: the first is read".to_owned(), "write one"));
+        remarks.push(("animated", "several pictures, of which the first is read".to_owned(), "write one only"));
     }
     if header.trailing_bytes > 0 {
-        let message = format!("{} bytes behind the PNG's end", header.trailing_bytes);
+        let message = format!("{} bytes after the end of the PNG", header.trailing_bytes);
         remarks.push(("trailing_bytes", message, "write it without"));
     }
     remarks
 }
 
-/// Of an EXR's parts and what holds for all of them.
+/// About the parts of an EXR and what holds for all of them.
 fn parts(header: &ExrHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.parts > 1 {
-        remarks.push(("several_parts", format!("{} parts: the first is read", header.parts), "write one"));
+        remarks.push((
+            "several_parts",
+            format!("{} parts, of which the first is read", header.parts),
+            "write one only",
+        ));
     }
     if (header.width, header.height) != header.display {
         let ((width, height), shown) = ((header.width, header.height), header.display);
         let message =
             format!("its data window has {width}x{height} texels, its display window {}x{}", shown.0, shown.1);
-        remarks.push(("cropped_window", message, "write both alike; the data window is read"));
+        remarks.push(("cropped_window", message, "write two equal windows; the data window is read"));
     }
     if header.other_primaries {
         let message = "primaries other than Rec. 709's".to_owned();
@@ -111,14 +112,14 @@ fn parts(header: &ExrHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Of an EXR's channels.
+/// About the channels of an EXR.
 fn channels(map: Map, header: &ExrHeader) -> Vec<Remark> {
     let wanted: &[&str] = if map == Map::BaseColor { &["R", "G", "B"] } else { &["V", "Y"] };
     let (read, others): (Vec<&ExrChannel>, Vec<&ExrChannel>) =
         header.channels.iter().partition(|channel| wanted.contains(&channel.name.as_str()));
     let mut remarks = Vec::new();
     if read.iter().any(|channel| channel.number == ExrNumber::Whole) {
-        remarks.push(("whole_numbers", "channels of whole numbers".to_owned(), "write half or float"));
+        remarks.push(("whole_numbers", "channels of integers".to_owned(), "write half or float"));
     }
     if !others.is_empty() {
         let names: Vec<&str> = others.iter().map(|channel| channel.name.as_str()).collect();
@@ -128,10 +129,10 @@ fn channels(map: Map, header: &ExrHeader) -> Vec<Remark> {
     remarks
 }
 
-/// Of base colours that no surface has.
+/// About base colours that no surface has.
 fn beyond_unit(texture: &Texture) -> Vec<Remark> {
     let Texels::Linear(values) = texture.texels() else { return Vec::new() };
     let beyond = values.as_flattened().iter().find(|value| !(0.0..=1.0).contains(*value));
-    let remark = |value| ("beyond_unit", format!("a base colour of {value}"), "keep to 0 to 1; light clips it");
+    let remark = |value| ("beyond_unit", format!("a base colour of {value}"), "keep to 0 to 1; rendering clips it");
     beyond.map(remark).into_iter().collect()
 }

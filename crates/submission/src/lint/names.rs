@@ -1,14 +1,14 @@
-//! The name that a wrong name was meant to be.
+//! The name that a misspelt name was probably meant to be.
 
 /// Longest name that is compared, in characters.
 const LONGEST: usize = 80;
 
-/// A name without case and signs: `Base-Color` is `basecolor`.
+/// A name in lower case, letters and digits only: `Base-Color` becomes `basecolor`.
 pub(super) fn plain(name: &str) -> String {
     name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// The candidate that `name` is nearest to: the same but for case and signs, or at most a third of its letters off.
+/// The candidate nearest to `name`, comparing letters and digits only. At most a third of its letters may differ.
 pub(super) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let wanted = plain(name);
     let most = (wanted.chars().count() / 3).max(1);
@@ -20,7 +20,7 @@ pub(super) fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a s
         .map(|(_, candidate)| candidate)
 }
 
-/// Letters to be put in, left out, changed or exchanged with their neighbour (optimal string alignment).
+/// The number of letters to insert, delete, change or exchange with their neighbour (optimal string alignment).
 pub(super) fn distance(a: &str, b: &str) -> usize {
     let [a, b] = [a, b].map(|text| text.chars().take(LONGEST).collect::<Vec<char>>());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];

@@ -1,8 +1,8 @@
-//! Atlases that are turned: v counted from the wrong end, left and right exchanged.
+//! Atlases that are flipped or turned: v counted from the wrong end, left and right exchanged.
 //!
-//! Within a small neighbourhood of the picture, and within an instance, light hardly changes: what is brighter there is of a
-//! brighter material. So the base colour goes along with the picture if it lies where it belongs, and does not where
-//! it was turned. Turning it back must then make it do so.
+//! Within an instance and a small neighbourhood of the picture, light hardly changes: a brighter pixel shows a brighter
+//! material. So the base colour correlates with the picture where it lies right and does not where it was turned. Turning
+//! it back must then restore the correlation.
 
 use mateval_image::LinearRgb;
 use mateval_scene::Finding;
@@ -11,13 +11,13 @@ use super::finding::warning;
 use super::looks::{Look, Turn};
 use super::statistics::Pairs;
 
-/// Fewest pixels that say anything.
+/// Fewest pixels that allow a judgement.
 const FEWEST: f64 = 400.0;
-/// How well a turned base colour must go along with the picture, at least.
+/// The least correlation of the base colour, turned back, with the picture.
 const LEAST_CORRELATION: f64 = 0.35;
-/// And by how much better than as it is.
+/// How much larger that must be than the correlation of the base colour as it is.
 const LEAST_GAIN: f64 = 0.25;
-/// Darker values say more of noise than of materials.
+/// Darker values hold more noise than material.
 const DARKEST: f64 = 1e-3;
 
 /// A finding where another turn explains the picture clearly better.
@@ -40,14 +40,14 @@ pub(super) fn check(place: &str, looks: &[Look]) -> Option<Finding> {
         Turn::Transposed => ("transposed", "rows and columns exchanged", "write u along rows, v along columns"),
     };
     let message = format!(
-        "base colours seem {what}: turned back their detail goes along with the input picture's ({then:.2}, as it is \
-         {now:.2}, over {:.0} pixels)",
+        "base colours seem {what}: turned back, their detail correlates with the input picture's by {then:.2}, as they are by \
+         {now:.2} (over {:.0} pixels)",
         own.count()
     );
     Some(warning(code, place, message, action))
 }
 
-/// How the base colour's brightness goes along with the picture's, within instances and neighbourhoods.
+/// Brightness of the base colour and of the picture, within instances and neighbourhoods.
 fn detail(looks: &[Look], turn: usize) -> Pairs {
     let pair = |look: &Look| {
         let [base, photo] = [LinearRgb(look.base_color[turn]).luminance(), LinearRgb(look.photo?).luminance()];

@@ -1,57 +1,33 @@
-//! Roughness and metallic that cannot be meant, and base colours that say nothing.
+//! Roughness and metallic that are probably mistakes, and base colours without information.
 
 use std::collections::BTreeMap;
 
-use mateval_image::Texture;
 use mateval_scene::Finding;
 
 use super::finding::warning;
-use super::looks::{Look, Turn, mean};
-use super::scene::Seen;
-use super::sight::SeenPixel;
+use super::instance_facts::InstanceFacts;
+use super::looks::{Look, ScalarLook};
 use super::statistics::Pairs;
 
-/// Fewest pixels that say anything.
+/// Fewest pixels that allow a judgement.
 const FEWEST: usize = 400;
-/// What is smoother and more metallic than this is a mirror of some kind.
+/// A surface smoother and more metallic than this is a mirror of some kind.
 const MIRROR: (f32, f32) = (0.1, 0.3);
-/// No room is a hall of mirrors: from this share of pixels on the two maps were exchanged.
+/// No room is a hall of mirrors: if more than this share of the pixels shows one, the two maps are exchanged.
 const MOST_MIRRORS: f64 = 0.6;
-/// Roughness and metallic of a pixel that are no further apart than this are the same.
+/// Roughness and metallic of a pixel that differ by at most this much count as equal.
 const SAME: f32 = 1.0 / 255.0;
-/// Fewest neighbourhoods of an instance whose hues are compared, and fewest pixels of each: a mean of them is hardly noise.
+/// Fewest neighbourhoods of an instance whose hues are compared, and fewest pixels of each, which keeps noise out of its mean.
 const FEWEST_TILES: usize = 4;
 const FEWEST_OF_TILE: f64 = 16.0;
-/// Darker values say more of noise than of hues.
+/// Darker values hold more noise than hue.
 const DARKEST: f32 = 0.01;
-/// How much the picture's hues must differ over an instance, from neighbourhood to neighbourhood, before one colour cannot be all
-/// of it.
+/// How much the picture's hues must differ between the neighbourhoods of an instance for a single base colour to be wrong.
 const MOST_HUE: f64 = 0.3;
 
-/// Roughness and metallic that a pixel shows.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ScalarLook {
-    roughness: f32,
-    metallic: f32,
-}
-
-/// What both maps have at each pixel; nothing where one of them is missing.
-pub(super) fn scalar_looks(
-    pixels: &[SeenPixel],
-    roughness: Option<Texture>,
-    metallic: Option<Texture>,
-) -> Vec<ScalarLook> {
-    let (Some(roughness), Some(metallic)) = (roughness, metallic) else { return Vec::new() };
-    let look = |pixel: &SeenPixel| {
-        let [roughness, metallic] = [&roughness, &metallic].map(|map| mean(map, pixel, Turn::None)[0]);
-        ScalarLook { roughness, metallic }
-    };
-    pixels.iter().map(look).collect()
-}
-
 /// Findings about a scene.
-pub(super) fn check(place: &str, all: &[Seen]) -> Vec<Finding> {
-    let scalars: Vec<ScalarLook> = all.iter().flat_map(|seen| seen.scalars.iter().copied()).collect();
+pub(super) fn check(place: &str, all: &[InstanceFacts]) -> Vec<Finding> {
+    let scalars: Vec<ScalarLook> = all.iter().flat_map(|facts| facts.scalars.iter().copied()).collect();
     let mut findings: Vec<Finding> = exchanged(place, &scalars).or_else(|| same(place, &scalars)).into_iter().collect();
     findings.extend(one_for_all(place, all));
     findings.extend(all.iter().filter_map(one_colour));
@@ -74,7 +50,7 @@ fn exchanged(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
     })
 }
 
-/// One map written twice.
+/// The same map written as both.
 fn same(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
     let same = looks.iter().all(|look| (look.roughness - look.metallic).abs() <= SAME);
     (looks.len() >= FEWEST && same).then(|| {
@@ -83,33 +59,33 @@ fn same(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
     })
 }
 
-/// The same file for every instance.
-fn one_for_all(place: &str, all: &[Seen]) -> Option<Finding> {
-    let hashes: Vec<&String> = all.iter().filter_map(|seen| seen.base_color.as_ref().map(|(hash, _)| hash)).collect();
+/// The same base colour for every instance.
+fn one_for_all(place: &str, all: &[InstanceFacts]) -> Option<Finding> {
+    let hashes: Vec<&String> = all.iter().filter_map(|facts| facts.base_color.as_ref().map(|(hash, _)| hash)).collect();
     (hashes.len() > 2 && hashes.iter().all(|hash| *hash == hashes[0])).then(|| {
-        let message = format!("all {} base colours are one and the same file", hashes.len());
-        warning("same_base_color", place, message, "write each instance's own, if this is no baseline")
+        let message = format!("all {} base colours are the same file", hashes.len());
+        warning("same_base_color", place, message, "write one for each instance, unless this is a baseline")
     })
 }
 
-/// One colour where the picture shows several: light and shadow change brightness, and hues a little.
-fn one_colour(seen: &Seen) -> Option<Finding> {
-    let first = seen.looks.first()?.own();
+/// A single colour where the picture shows several. Light and shadow change brightness, and hues only a little.
+fn one_colour(facts: &InstanceFacts) -> Option<Finding> {
+    let first = facts.looks.first()?.own();
     let is_first = |look: &Look| look.own().iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-4);
-    if !seen.looks.iter().all(is_first) {
+    if !facts.looks.iter().all(is_first) {
         return None;
     }
     let (hue, tiles) =
-        [1, 2].map(|channel| hues(&seen.looks, channel)).into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        [1, 2].map(|channel| hues(&facts.looks, channel)).into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (tiles >= FEWEST_TILES && hue > MOST_HUE).then(|| {
         let message = format!(
-            "one colour all over, where the input picture shows several: its hue differs by {hue:.2} between {tiles} tiles"
+            "a single colour where the input picture shows several: its hue differs by {hue:.2} between {tiles} tiles"
         );
-        warning("one_colour", &seen.folder, message, "bake what the picture shows, if this is no baseline")
+        warning("one_colour", &facts.folder, message, "bake what the picture shows, unless this is a baseline")
     })
 }
 
-/// How much log(red / `channel`) of the picture differs between neighbourhoods, as a standard deviation, and how many there are.
+/// The standard deviation of log(red / `channel`) of the picture between neighbourhoods, and the number of neighbourhoods.
 fn hues(looks: &[Look], channel: usize) -> (f64, usize) {
     let mut tiles: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for look in looks {
@@ -126,24 +102,24 @@ fn hues(looks: &[Look], channel: usize) -> (f64, usize) {
 mod tests {
     use super::*;
 
-    /// Eight tiles of 40 pixels each that an instance of one colour shows; `photo` tells a tile's colour in the picture.
-    fn seen(photo: impl Fn(usize) -> [f32; 3]) -> Seen {
+    /// An instance of one colour, seen in eight tiles of 40 pixels; `photo` is the picture's colour of a tile.
+    fn facts(photo: impl Fn(usize) -> [f32; 3]) -> InstanceFacts {
         let look = |at: usize| Look {
             instance: 0,
             tile: at / 40,
             photo: Some(photo(at / 40)),
             base_color: [[0.5, 0.4, 0.3]; 5],
         };
-        Seen { looks: (0..320).map(look).collect(), ..Seen::default() }
+        InstanceFacts { looks: (0..320).map(look).collect(), ..InstanceFacts::default() }
     }
 
     #[test]
-    fn one_colour_is_told_where_hues_differ_and_not_where_light_does() {
-        let lit = seen(|tile| [0.1, 0.08, 0.06].map(|value| value * (1 + tile) as f32));
+    fn one_colour_is_reported_where_hues_differ_and_not_where_light_does() {
+        let lit = facts(|tile| [0.1, 0.08, 0.06].map(|value| value * (1 + tile) as f32));
         assert_eq!(one_colour(&lit), None);
-        let striped = seen(|tile| if tile % 2 == 0 { [0.5, 0.1, 0.1] } else { [0.1, 0.1, 0.5] });
+        let striped = facts(|tile| if tile % 2 == 0 { [0.5, 0.1, 0.1] } else { [0.1, 0.1, 0.5] });
         assert_eq!(one_colour(&striped).map(|found| found.code), Some("one_colour".to_owned()));
-        // Of several colours nothing is said.
+        // Several colours are no finding.
         let mut painted = striped;
         painted.looks[7].base_color[0] = [0.1; 3];
         assert_eq!(one_colour(&painted), None);

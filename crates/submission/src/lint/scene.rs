@@ -1,4 +1,4 @@
-//! One scene: every map read once, an instance at a time, and what they show together.
+//! One scene checked: each map is read once, a few instances at a time, then judged together.
 
 use mateval_image::Texture;
 use mateval_scene::Finding;
@@ -9,11 +9,12 @@ use rayon::prelude::*;
 use super::colours::{self, Decoding};
 use super::copies::{CopyCount, copies};
 use super::finding::{error, note};
-use super::looks::{Look, looks};
-use super::scalars::{ScalarLook, scalar_looks};
+use super::instance_facts::InstanceFacts;
+use super::looks::{Look, looks, scalar_looks};
+use super::plan::LintPlan;
 use super::sight::{InstanceSight, Sight};
-use super::unobserved::{Fill, fill};
-use super::{LintPlan, map_remarks, orientation, scalars, shading, unobserved};
+use super::unobserved::fill;
+use super::{map_remarks, orientation, scalars, shading, unobserved};
 use crate::error::SubmissionError;
 use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
 use crate::map_place::MapFolder;
@@ -24,93 +25,83 @@ use crate::submitted_file::{SubmittedFile, relative};
 /// Instances whose maps are in memory at once.
 const AT_ONCE: usize = 4;
 
-/// What was found of one instance.
-#[derive(Default)]
-pub(super) struct Seen {
-    /// Its folder in the submission.
-    pub(super) folder: String,
-    pub(super) findings: Vec<Finding>,
-    pub(super) maps: usize,
-    /// That its maps take in memory while a scene is scored.
-    pub(super) bytes: usize,
-    pub(super) looks: Vec<Look>,
-    pub(super) scalars: Vec<ScalarLook>,
-    pub(super) fill: Option<Fill>,
-    pub(super) copies: CopyCount,
-    /// The hash of the base colour's file, and whether that is a PNG.
-    pub(super) base_color: Option<(String, bool)>,
-}
-
 /// What was found in a scene.
 #[derive(Default)]
 pub(super) struct SceneFindings {
     pub(super) findings: Vec<Finding>,
-    /// How many maps could be read.
+    /// How many maps could be decoded.
     pub(super) maps: usize,
-    /// Judged over all scenes, and not among the findings yet.
+    /// Not among the findings: it is judged over all scenes.
     pub(super) decoding: Decoding,
 }
 
-/// Looks over one scene; nothing is found in one that the submission leaves out.
+/// Checks one scene. A scene that the submission leaves out has no findings here.
 pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<SceneFindings, SubmissionError> {
     if !plan.submission.join("scenes").join(scene.id.as_str()).is_dir() {
         return Ok(SceneFindings::default());
     }
     let sight = Sight::read(plan.dataset, scene)?;
     let order: Vec<usize> = (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
-    let mut all: Vec<Seen> = Vec::new();
+    let mut all: Vec<InstanceFacts> = Vec::new();
     for some in order.chunks(AT_ONCE) {
         all.par_extend(some.par_iter().map(|&at| instance(plan, scene, at, &sight.instances[at])));
     }
-    let maps = all.iter().map(|seen| seen.maps).sum();
-    let mut findings: Vec<Finding> = all.iter_mut().flat_map(|seen| std::mem::take(&mut seen.findings)).collect();
+    let maps = all.iter().map(|facts| facts.maps).sum();
+    let mut findings: Vec<Finding> = all.iter_mut().flat_map(|facts| std::mem::take(&mut facts.findings)).collect();
     let (together, decoding) = together(scene, &sight, &all);
     findings.extend(together);
     Ok(SceneFindings { findings, maps, decoding })
 }
 
-fn together(scene: &SceneFile, sight: &Sight, all: &[Seen]) -> (Vec<Finding>, Decoding) {
+fn together(scene: &SceneFile, sight: &Sight, all: &[InstanceFacts]) -> (Vec<Finding>, Decoding) {
     let place = format!("scenes/{}", scene.id);
     let mut findings = Vec::new();
-    if all.iter().map(|seen| seen.bytes).sum::<usize>() > MAX_SCENE_BYTES {
+    if all.iter().map(|facts| facts.bytes).sum::<usize>() > MAX_SCENE_BYTES {
         findings.push(error("scene_too_large", &place, MemoryBudget::exceeded(), "bake them smaller, or with 8 bits"));
     }
     if !sight.has_photo {
         let message = "the dataset has no input picture";
-        let action = "maps were not held against it; render the dataset (`mateval prep render`)";
+        let action = "maps were not compared with it; render the dataset (`mateval prep render`)";
         findings.push(note("no_photo", &place, message, action));
     }
-    let looks: Vec<Look> = all.iter().flat_map(|seen| seen.looks.iter().copied()).collect();
-    let files: Vec<&(String, bool)> = all.iter().filter_map(|seen| seen.base_color.as_ref()).collect();
+    let looks: Vec<Look> = all.iter().flat_map(|facts| facts.looks.iter().copied()).collect();
+    let files: Vec<&(String, bool)> = all.iter().filter_map(|facts| facts.base_color.as_ref()).collect();
     let are_png = files.iter().filter(|(_, is_png)| *is_png).count() * 2 >= files.len();
     findings.extend(orientation::check(&place, &looks));
     let exchanged = colours::exchanged(&place, &looks);
-    let decoding = if exchanged.is_some() { Decoding::Unclear } else { colours::decoding(&place, &looks, are_png) };
+    let decoding = if exchanged.is_some() { Decoding::Unknown } else { colours::decoding(&place, &looks, are_png) };
     findings.extend(exchanged);
     findings.extend(shading::check(&place, &looks));
     findings.extend(scalars::check(&place, all));
-    findings.extend(unobserved::check(&place, all.iter().filter_map(|seen| seen.fill.as_ref())));
-    findings.extend(copies(&place, all));
+    findings.extend(unobserved::check(&place, all.iter().filter_map(|facts| facts.fill.as_ref())));
+    findings.extend(copies(&place, all.iter().map(|facts| facts.copies)));
     (findings, decoding)
 }
 
-fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceSight) -> Seen {
+fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceSight) -> InstanceFacts {
     let instance = &scene.instances[at];
-    let mut seen = Seen { folder: format!("scenes/{}/{}", scene.id, instance.id), ..Seen::default() };
-    let [base_color, roughness, metallic] = Map::ALL.map(|map| read(plan, scene, instance, map, &mut seen));
+    let mut facts =
+        InstanceFacts { folder: format!("scenes/{}/{}", scene.id, instance.id), ..InstanceFacts::default() };
+    let [base_color, roughness, metallic] = Map::ALL.map(|map| read(plan, scene, instance, map, &mut facts));
     if let Some(file) = &base_color {
-        seen.looks = looks(at, &sight.pixels, &file.texture);
-        seen.fill = Some(fill(&sight.texels, &file.texture));
-        seen.base_color = Some((file.sha256.clone(), matches!(file.header, MapHeader::Png(_))));
+        facts.looks = looks(at, &sight.pixels, &file.texture);
+        facts.fill = Some(fill(&sight.texels, &file.texture));
+        facts.base_color = Some((file.sha256.clone(), matches!(file.header, MapHeader::Png(_))));
     }
     let of = |file: &Option<MapFile>| -> Option<Texture> { file.as_ref().map(|file| file.texture.clone()) };
-    seen.scalars = scalar_looks(&sight.pixels, of(&roughness), of(&metallic));
+    facts.scalars = scalar_looks(&sight.pixels, of(&roughness), of(&metallic));
     let files = [base_color, roughness, metallic];
-    seen.copies = CopyCount::of(&plan.dataset.folder(&scene.id), &instance.id, &files);
-    seen
+    facts.copies = CopyCount::of(&plan.dataset.folder(&scene.id), &instance.id, &files);
+    facts
 }
 
-fn read(plan: &LintPlan<'_>, scene: &SceneFile, instance: &Instance, map: Map, seen: &mut Seen) -> Option<MapFile> {
+fn read(
+    plan: &LintPlan<'_>,
+    scene: &SceneFile,
+    instance: &Instance,
+    map: Map,
+    facts: &mut InstanceFacts,
+) -> Option<MapFile> {
     let folder = MapFolder { submission: plan.submission, scene: &scene.id, instance: &instance.id };
     // A missing map, and two files for one map, are findings of `layout`.
     let [path] = folder.present(map).try_into().ok()?;
@@ -118,15 +109,15 @@ fn read(plan: &LintPlan<'_>, scene: &SceneFile, instance: &Instance, map: Map, s
     let file = SubmittedFile::read(plan.submission, &path, MAX_MAP_BYTES);
     match file.and_then(|file| map_file::decode(file, map)) {
         Ok(file) => {
-            seen.maps += 1;
+            facts.maps += 1;
             // A clone shares its texels.
-            seen.bytes += in_memory(file.clone(), map).bytes().len();
-            seen.findings.extend(map_remarks::remarks(&name, map, &file));
+            facts.bytes += in_memory(file.clone(), map).bytes().len();
+            facts.findings.extend(map_remarks::remarks(&name, map, &file));
             Some(file)
         }
         Err(fault) => {
             let finding = error(fault.code, &name, fault.message, fault.action);
-            seen.findings.push(Finding { place: fault.place, ..finding });
+            facts.findings.push(Finding { place: fault.place, ..finding });
             None
         }
     }

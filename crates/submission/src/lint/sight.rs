@@ -1,4 +1,4 @@
-//! What the input picture shows of a scene: at which places of which atlas, and in what colour. Public files alone.
+//! Which place of which atlas each pixel of the input picture shows, and in what colour. Read from public files alone.
 
 use std::sync::Arc;
 
@@ -16,14 +16,14 @@ use rayon::prelude::*;
 use crate::error::{SceneFault, SubmissionError};
 use crate::texel_map::TexelMap;
 
-/// Most pixels of the picture that are looked at.
+/// Most pixels of the picture that are used.
 const MOST_PIXELS: usize = 100_000;
-/// Pixels a side of what counts as one neighbourhood, where light hardly changes.
+/// Side of a neighbourhood in which light hardly changes, in pixels.
 const TILE: usize = 16;
-/// Texels a side of the coarse atlas that is asked which of it the picture shows.
+/// Side of the coarse atlas that is divided into observed and unobserved texels.
 const COARSE: usize = 64;
 
-/// A pixel that shows one instance alone.
+/// A pixel that shows a single instance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenPixel {
     /// The places of the atlas that four places of the pixel show; v runs upwards.
@@ -45,7 +45,7 @@ pub(super) struct CoarseTexel {
     pub(super) observed: bool,
 }
 
-/// What is seen of one instance, and what is not.
+/// The pixels that show an instance, and its texels, observed or not.
 #[derive(Clone, Debug, Default)]
 pub(super) struct InstanceSight {
     pub(super) pixels: Vec<SeenPixel>,
@@ -54,14 +54,14 @@ pub(super) struct InstanceSight {
 
 /// A scene as the input camera sees it.
 pub(super) struct Sight {
-    /// In the scene's order; empty without an atlas.
+    /// In the scene's order; empty for instances without an atlas.
     pub(super) instances: Vec<InstanceSight>,
-    /// Whether there is an input picture.
+    /// Whether the dataset has an input picture.
     pub(super) has_photo: bool,
 }
 
 impl Sight {
-    /// Reads a scene's geometry and pictures. Fails where they are missing or not what the manifest says.
+    /// Reads a scene's geometry and pictures. Fails where a file is missing or differs from the manifest.
     pub(super) fn read(dataset: &Dataset, scene: &SceneFile) -> Result<Self, SubmissionError> {
         dataset.check_files(&scene.id, |file| {
             file == "geometry/instances.glb"
@@ -86,7 +86,7 @@ fn unsound(folder: &SceneFolder, fault: SceneFault) -> SubmissionError {
     SubmissionError::UnsoundScene { scene_file: folder.scene_file(), fault }
 }
 
-/// What is looked through.
+/// The input view: its camera, its pictures and the scene in front of it.
 struct Eye<'a> {
     world: World,
     scene: &'a SceneFile,
@@ -115,7 +115,7 @@ impl<'a> Eye<'a> {
         Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })
     }
 
-    /// Every pixel that shows one instance alone, or every other one in both directions where there are too many, and so on.
+    /// The pixels that show a single instance. If the picture has too many, only every second, third... row and column is used.
     fn pixels(&self) -> Vec<(usize, SeenPixel)> {
         let (width, height) = (self.ids.width(), self.ids.height());
         let step = (1..).find(|step| (width / step) * (height / step) <= MOST_PIXELS).unwrap_or(1);

@@ -1,4 +1,4 @@
-//! Correlations and slopes of what two pictures show, pixel by pixel.
+//! Standard deviations and correlation of pairs of numbers.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ impl Pairs {
         self.xy += x * y;
     }
 
-    /// What is within groups: pairs less their group's mean.
+    /// Pairs minus the mean of their group.
     pub(super) fn within<K: Ord>(pairs: impl IntoIterator<Item = (K, f64, f64)>) -> Self {
         let mut groups: BTreeMap<K, Self> = BTreeMap::new();
         pairs.into_iter().for_each(|(group, x, y)| groups.entry(group).or_default().add(x, y));
@@ -34,7 +34,7 @@ impl Pairs {
         })
     }
 
-    /// How many pairs.
+    /// The number of pairs.
     pub(super) fn count(&self) -> f64 {
         self.count
     }
@@ -45,7 +45,7 @@ impl Pairs {
         [xx, yy].map(|sum| (sum / self.count.max(1.0)).sqrt())
     }
 
-    /// -1 to 1; 0 where one of both never changes.
+    /// The correlation, -1 to 1; 0 where x or y is constant.
     pub(super) fn correlation(&self) -> f64 {
         let [xx, yy, xy] = self.centred();
         if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_line_and_of_groups_on_lines() {
+    fn a_line_and_groups_on_lines() {
         let mut line = Pairs::default();
         (0..5).for_each(|x| line.add(f64::from(x), 3.0 - 2.0 * f64::from(x)));
         assert!((line.correlation() + 1.0).abs() < 1e-12);

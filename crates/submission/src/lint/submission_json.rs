@@ -20,7 +20,7 @@ const KEYS: [(&str, bool); 4] =
 /// Longest name of a method, in characters.
 const LONGEST_METHOD: usize = 100;
 
-/// The method's name, where there is one, and what is wrong. The submission was made for the dataset of this manifest.
+/// The method's name, if it has one, and every fault. `manifest_sha256` is that of the dataset to compare with.
 pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<Finding>) {
     match read(submission) {
         Ok(object) => {
@@ -68,10 +68,10 @@ fn is_sound(object: &Map<String, Value>) -> bool {
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Null => "null",
-        Value::Bool(_) => "a truth value",
+        Value::Bool(_) => "a boolean",
         Value::Number(_) => "a number",
-        Value::String(_) => "a text",
-        Value::Array(_) => "a list",
+        Value::String(_) => "a string",
+        Value::Array(_) => "an array",
         Value::Object(_) => "an object",
     }
 }
@@ -98,17 +98,20 @@ fn check_keys(object: &Map<String, Value>) -> Vec<Finding> {
     };
     let missing = || KEYS.iter().filter(|(key, required)| *required && !object.contains_key(*key)).map(|(key, _)| *key);
     for key in missing() {
-        at(key, error("missing_key", SUBMISSION, format!("no key '{key}'"), "add it"));
+        at(key, error("missing_key", SUBMISSION, format!("the key '{key}' is missing"), "add it"));
     }
-    // A stranger's file may have any number of keys.
+    // Untrusted input may have any number of keys.
     for (key, value) in object.iter().take(100) {
         let short = shortened(key);
         if !KEYS.iter().any(|(known, _)| known == key) {
             let action = nearest(key, KEYS.map(|(key, _)| key))
                 .map_or("leave it out".to_owned(), |near| format!("leave it out, or write '{near}'"));
-            at(&short, error("unknown_key", SUBMISSION, format!("no such key as '{short}'"), action));
+            at(&short, error("unknown_key", SUBMISSION, format!("the key '{short}' is unknown"), action));
         } else if !value.is_string() {
-            at(key, error("wrong_type", SUBMISSION, format!("expected a text, found {}", kind(value)), "write a text"));
+            at(
+                key,
+                error("wrong_type", SUBMISSION, format!("expected a string, found {}", kind(value)), "write a string"),
+            );
         }
     }
     findings
@@ -126,16 +129,16 @@ fn check_method(text: &str) -> Option<Finding> {
             "no_method_name",
             SUBMISSION,
             "the method has no name",
-            "name it as tables shall show it",
+            "write the name that tables should show",
         ));
     }
     let (length, control) = (text.chars().count(), text.chars().any(char::is_control));
     (length > LONGEST_METHOD || control).then(|| {
         let message = format!(
-            "a method's name of {length} characters{}",
+            "the method's name has {length} characters{}",
             if control { ", some of them unprintable" } else { "" }
         );
-        let action = format!("name it in at most {LONGEST_METHOD} printable characters");
+        let action = format!("use at most {LONGEST_METHOD} printable characters");
         warning("bad_method_name", SUBMISSION, message, action)
     })
 }
@@ -144,9 +147,9 @@ fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
     let is_hash = text.len() == 64 && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
     let action = "copy manifest_sha256 of the dataset's dataset.json, if it was made for that";
     if !is_hash {
-        let message = format!("'{}' is no SHA-256: expected 64 digits, 0-9 and a-f", shortened(text));
+        let message = format!("'{}' is not a SHA-256: expected 64 digits, 0-9 and a-f", shortened(text));
         return Some(warning("bad_hash", SUBMISSION, message, action));
     }
-    let message = || format!("made for the dataset {text}, held against {manifest_sha256}");
+    let message = || format!("made for the dataset {text}, checked against {manifest_sha256}");
     (text != manifest_sha256).then(|| warning("other_dataset", SUBMISSION, message(), action))
 }

@@ -1,10 +1,10 @@
-//! The report for people: a line a code, and a verdict.
+//! The report for people: one line for each code, then the verdict.
 
 use std::fmt::Write as _;
 
 use super::file::{FoldedFinding, LintFile};
 
-/// How many further places are named behind the first.
+/// How many further files are named after the first.
 const PLACES: usize = 3;
 
 /// Findings, errors first, then the verdict in one line.
@@ -44,7 +44,7 @@ mod tests {
     use mateval_scene::dataset_id::DatasetId;
 
     #[test]
-    fn repeats_are_told_once() {
+    fn repeats_take_one_line() {
         let mut findings: Vec<_> = (0..6).map(|at| error("nan", &format!("f{at}"), "a NaN", "fix it")).collect();
         findings.push(warning("alpha", "g", "opacity", "drop it"));
         let dataset = DatasetId {

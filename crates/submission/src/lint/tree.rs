@@ -1,4 +1,4 @@
-//! What lies in a submission's folder: names and kinds, four folders deep, nothing behind links that lead out.
+//! The names and kinds of the entries in a submission's folder, four levels deep; links that lead out are not followed.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::error::SubmissionError;
 /// How deep maps lie: `scenes/<scene>/<instance>/<map>`.
 const DEPTH: usize = 4;
 
-/// What something is.
+/// The kind of an entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     File,
@@ -24,13 +24,13 @@ pub(super) enum Kind {
     Other,
 }
 
-/// Names with forward slashes, relative to the folder.
+/// Entries by their path, relative to the submission, with forward slashes.
 pub(super) struct Tree {
     entries: BTreeMap<String, Kind>,
 }
 
 impl Tree {
-    /// Lists the folder. Names that are no text, and more entries than are looked at, are findings.
+    /// Lists the folder. Names that are not UTF-8 and entries beyond the limit are findings.
     pub(super) fn walk(root: &Path) -> Result<(Self, Vec<Finding>), SubmissionError> {
         let real = root.canonicalize().map_err(SubmissionError::io("open", root))?;
         let (mut tree, mut findings) = (Self { entries: BTreeMap::new() }, Vec::new());
@@ -40,8 +40,8 @@ impl Tree {
             for entry in std::fs::read_dir(&path).map_err(SubmissionError::io("list", &path))? {
                 let entry = entry.map_err(SubmissionError::io("list", &path))?;
                 if tree.entries.len() == MAX_ENTRIES {
-                    let message = format!("more than {MAX_ENTRIES} files and folders; the rest was not looked at");
-                    findings.push(error("too_many_files", &folder, message, "leave out what is no map"));
+                    let message = format!("more than {MAX_ENTRIES} files and folders; the rest was not checked");
+                    findings.push(error("too_many_files", &folder, message, "keep submission.json and the maps only"));
                     return Ok((tree, findings));
                 }
                 let Some(name) = entry.file_name().to_str().map(|name| joined(&folder, name)) else {
@@ -59,12 +59,12 @@ impl Tree {
         Ok((tree, findings))
     }
 
-    /// What is at a path.
+    /// The kind of the entry at a path.
     pub(super) fn kind(&self, path: &str) -> Option<Kind> {
         self.entries.get(path).copied()
     }
 
-    /// Names and kinds of what lies in a folder (of the root where it is empty), sorted.
+    /// Names and kinds of the entries in a folder, sorted; an empty path is the submission's own folder.
     pub(super) fn children<'a>(&'a self, folder: &str) -> impl Iterator<Item = (&'a str, Kind)> + use<'a> {
         let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
         let length = prefix.len();
@@ -78,7 +78,7 @@ pub(super) fn joined(folder: &str, name: &str) -> String {
     if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") }
 }
 
-/// Links inside the folder are what they lead to.
+/// The kind of an entry; a link that stays inside the folder has the kind of its target.
 fn kind_of(root: &Path, path: &Path) -> Kind {
     let is_link = path.symlink_metadata().is_ok_and(|data| data.is_symlink());
     let place: Option<PathBuf> = if is_link { path.canonicalize().ok() } else { Some(path.to_owned()) };
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn four_folders_deep_and_no_further() {
+    fn the_tree_ends_after_four_levels() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir_all(folder.path().join("scenes/s/i/deep/deeper")).unwrap();
         std::fs::write(folder.path().join("scenes/s/i/a.png"), "").unwrap();
@@ -109,7 +109,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_that_lead_out_and_loops_end() {
+    fn links_that_lead_out_are_not_followed_and_loops_end() {
         let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let link = |to: &Path, name: &str| std::os::unix::fs::symlink(to, folder.path().join(name)).unwrap();
         link(outside.path(), "out");

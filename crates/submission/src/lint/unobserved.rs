@@ -1,4 +1,4 @@
-//! Texels that the input picture does not show, left empty: they are scored like all others.
+//! Texels that the input picture does not show, and that the submission leaves empty. They are scored like all others.
 
 use std::collections::BTreeMap;
 
@@ -8,22 +8,22 @@ use mateval_scene::Finding;
 use super::finding::warning;
 use super::sight::CoarseTexel;
 
-/// From this share of the unobserved area on one value is an empty one, where hardly anything that is observed has it.
+/// A single value on this share of the unobserved area counts as empty, unless the observed area has it too.
 const MOST_EMPTY: f64 = 0.5;
-/// The share of the observed area that may have it all the same.
+/// The largest share of the observed area that may have that value.
 const MOST_FILLED: f64 = 0.02;
 
-/// A colour to the last bit.
+/// The bits of a colour.
 type Bits = [u32; 3];
 
-/// Areas of an instance by what its base colour has there.
+/// The area of an instance by base colour.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fill {
     /// Unobserved, then observed, in square metres.
     by_value: BTreeMap<Bits, [f64; 2]>,
 }
 
-/// What the base colour has at texels that are seen and at those that are not.
+/// The base colour of observed and of unobserved texels.
 pub(super) fn fill(texels: &[CoarseTexel], base_color: &Texture) -> Fill {
     let mut fill = Fill::default();
     for texel in texels {
@@ -33,8 +33,8 @@ pub(super) fn fill(texels: &[CoarseTexel], base_color: &Texture) -> Fill {
     fill
 }
 
-/// A finding where one colour fills what is not seen, and only that. Instances that are seen nowhere, or everywhere, tell
-/// nothing: some one colour is all that can be said of them.
+/// A finding where one colour fills the unobserved area, and only that. Instances that are observed nowhere or everywhere do
+/// not count: for the former, a single colour is a legitimate answer.
 pub(super) fn check<'a>(place: &str, fills: impl Iterator<Item = &'a Fill>) -> Option<Finding> {
     let mut by_value: BTreeMap<Bits, [f64; 2]> = BTreeMap::new();
     let mut all = [0.0; 2];
@@ -56,10 +56,10 @@ pub(super) fn check<'a>(place: &str, fills: impl Iterator<Item = &'a Fill>) -> O
     }
     let [r, g, b] = value.map(f32::from_bits);
     let message = format!(
-        "what the input picture does not show seems left empty: {:.0} % of that area has base colour ({r:.3}, {g:.3}, \
-         {b:.3}) to the last bit, of what it shows {:.0} %",
+        "the area that the input picture does not show seems left empty: {:.0} % of it has exactly the base colour ({r:.3}, \
+         {g:.3}, {b:.3}), and {:.0} % of the area that it shows",
         100.0 * unobserved,
         100.0 * observed
     );
-    Some(warning("unobserved_empty", place, message, "fill every texel; those that are not seen are scored too"))
+    Some(warning("unobserved_empty", place, message, "fill every texel; unobserved ones are scored too"))
 }

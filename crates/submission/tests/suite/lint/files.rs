@@ -17,7 +17,7 @@ fn rough(root: &Path) -> std::path::PathBuf {
     map(root, "roughness.png")
 }
 
-/// The file's bytes, changed.
+/// Changes the bytes of a file.
 fn edit(path: &Path, change: impl FnOnce(&mut Vec<u8>)) {
     let mut bytes = std::fs::read(path).unwrap();
     change(&mut bytes);

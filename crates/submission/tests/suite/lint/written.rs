@@ -21,7 +21,7 @@ pub fn insert(path: &Path, name: &[u8; 4], data: &[u8]) {
     std::fs::write(path, with).unwrap();
 }
 
-/// A PNG of these rows of bytes, each with its filter; `before` are chunks before the picture.
+/// A PNG of these rows of bytes, each preceded by its filter; `before` are chunks in front of the picture.
 pub fn png(side: u32, depth: u8, color: u8, interlace: u8, before: &[u8], rows: &[u8]) -> Vec<u8> {
     let size = side.to_be_bytes();
     let header = [&size[..], &size, &[depth, color, 0, 0, interlace]].concat();
