@@ -22,8 +22,8 @@ use mateval_testkit::box_room::{self, box_room, quad};
 use mateval_tracer::World;
 use serde_json::{Value, json};
 
-use super::kept_folder::kept_folder;
 use super::sample::{dataset, hasty, plan, write_grey};
+use mateval_testkit::kept_folder::kept_folder;
 
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
 const READINGS: [(&str, fn(&Protocol) -> Value); 16] = [
