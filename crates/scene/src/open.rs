@@ -163,7 +163,7 @@ mod tests {
         std::fs::write(&path, example).unwrap();
         assert_eq!(read_scene(folder.path(), &id).unwrap().instances[0].role, Role::Other {});
         let words = [
-            ("\"other\"", "\"ghost\"", "/instances/0/role"),
+            ("\"other\"", "\"ghost\"", "/instances/0/role/type"),
             ("\"bitterli\"", "\"elsewhere\"", "/source/kind"),
             ("\"own\"", "\"candles\"", "/lights"),
         ];

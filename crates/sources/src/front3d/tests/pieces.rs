@@ -254,7 +254,7 @@ fn textures_may_be_missing_altogether() {
     assert!(house.scene.textures.iter().all(|texture| texture.name.contains("3D-FUTURE-model")));
     let messages: Vec<&str> =
         house.findings.iter().filter(|f| f.code == "no_textures").map(|f| f.message.as_str()).collect();
-    assert_eq!(messages, ["7 materials have a texture, and no folder of textures was given"]);
+    assert_eq!(messages, ["7 materials have a texture, but no folder of textures was given"]);
     assert_sound(&house);
     // The twin: with the folder there is no such finding.
     let house = furnish(&disk.files(), &Limits::default()).unwrap();
