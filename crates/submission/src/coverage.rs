@@ -1,7 +1,7 @@
 //! The exact area of each texel of an atlas that a triangle covers, by clipping the triangle to the texel's square.
 //!
-//! Counting the texels whose centre lies inside would be wrong: packers put the edges of charts on texel centres, so that a
-//! chart of 2 by 5 texels holds 3 by 6 of them.
+//! Counting the texels whose centre lies inside would be wrong: packers put the edges of charts on texel centres, so
+//! that a chart of 2 by 5 texels holds 3 by 6 of them.
 
 use glam::{DVec2, DVec3};
 use mateval_scene::TriangleMesh;
@@ -28,8 +28,8 @@ pub(crate) struct Coverage {
 }
 
 impl Coverage {
-    /// For an atlas of `size` texels a side. A triangle without area in the atlas, a mesh without uv and anything outside
-    /// the atlas cover nothing.
+    /// For an atlas of `size` texels a side. A triangle without area in the atlas, a mesh without uv and anything
+    /// outside the atlas cover nothing.
     pub(crate) fn new(atlas: &TriangleMesh, size: usize) -> Self {
         let uvs = atlas.uvs.as_deref().unwrap_or_default();
         let texel = |vertex: u32| {
@@ -82,7 +82,8 @@ impl Coverage {
         }
     }
 
-    /// The columns whose texel in the row is fully covered by the slab: those that lie inside it at both the top and the bottom.
+    /// The columns whose texel in the row is fully covered by the slab: those that lie inside it at both the top and
+    /// the bottom.
     fn whole_columns(&self, slab: &Polygon, top: f64, bottom: f64) -> std::ops::Range<usize> {
         let (mut low, mut high) = (0.0_f64, self.size as f64);
         for line in [top, bottom] {
@@ -129,8 +130,8 @@ impl Polygon {
         self.count += 1;
     }
 
-    /// The part whose dot product with `axis` (along x or y, of either sign) is at least `least` (Sutherland and Hodgman,
-    /// 1974). New corners lie exactly on the line.
+    /// The part whose dot product with `axis` (along x or y, of either sign) is at least `least` (Sutherland and
+    /// Hodgman, 1974). New corners lie exactly on the line.
     fn clipped(&self, axis: DVec2, least: f64) -> Self {
         let mut clipped = Self { corners: [DVec2::ZERO; 8], count: 0 };
         for (at, corner) in self.corners().iter().enumerate() {
@@ -179,8 +180,8 @@ mod tests {
         all
     }
 
-    /// A chart of two by five texels with its edges on texel centres: whole texels inside, halves along the edges, quarters
-    /// in the corners, 3 by 6 texels together.
+    /// A chart of two by five texels with its edges on texel centres: whole texels inside, halves along the edges,
+    /// quarters in the corners, 3 by 6 texels together.
     #[test]
     fn a_chart_whose_edges_lie_on_centres() {
         let corner = |x: f32, y: f32| Vec2::new((2.5 + x) / 16.0, 1.0 - (3.5 + y) / 16.0);

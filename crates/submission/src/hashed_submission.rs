@@ -36,7 +36,8 @@ pub fn hashed_submission(
     Ok(HashedSubmission { method: json.file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
 }
 
-/// The maps of a scene in the order of [`crate::prediction::PredictedScene::files`]; those that cannot be read have no hash.
+/// The maps of a scene in the order of [`crate::prediction::PredictedScene::files`]; those that cannot be read have no
+/// hash.
 fn map_hashes(submission: &Path, scene: &SceneFile) -> Vec<HashedFile> {
     let with_atlas = scene.instances.iter().filter(|instance| instance.atlas.is_some());
     let paths = with_atlas.flat_map(|instance| {

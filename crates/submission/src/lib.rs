@@ -1,10 +1,10 @@
 //! Submissions from untrusted makers.
 //!
-//! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered ([`prediction`]), the hash
-//! that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`]).
+//! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered ([`prediction`]), the
+//! hash that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`]).
 //!
-//! Between: [`archive`] unpacks within limits, [`submitted_file`] reads a file once and hashes the same bytes, [`map_file`]
-//! decodes one map, [`texel_map`] says where an atlas's texels lie and which of them the input view shows.
+//! Between: [`archive`] unpacks within limits, [`submitted_file`] reads a file once and hashes the same bytes,
+//! [`map_file`] decodes one map, [`texel_map`] says where an atlas's texels lie and which of them the input view shows.
 
 pub mod archive;
 mod coverage;

@@ -1,5 +1,5 @@
-//! One map of a submission, decoded as scoring and `eval lint` decode it: what the file's header says and the texels, or
-//! why it cannot be used.
+//! One map of a submission, decoded as scoring and `eval lint` decode it: what the file's header says and the texels,
+//! or why it cannot be used.
 //!
 //! The file is untrusted input: sizes are checked before memory is taken.
 
@@ -17,7 +17,8 @@ use crate::submitted_file::SubmittedFile;
 /// Largest file of a map, in bytes.
 pub const MAX_MAP_BYTES: u64 = 512 << 20;
 
-/// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest map.
+/// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest
+/// map.
 pub const MAX_EXR_NUMBERS: usize = 8 * 4096 * 4096;
 
 /// The range of a linear base colour. One stray value must not dominate the mean over all pixels.
@@ -136,7 +137,8 @@ fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
     Ok(())
 }
 
-/// A PNG without its closing chunk was truncated. That holds even if all texels are there: nothing says that none is missing.
+/// A PNG without its closing chunk was truncated. That holds even if all texels are there: nothing says that none is
+/// missing.
 fn check_end(png: &PngHeader) -> Result<(), FileFault> {
     if png.ended {
         return Ok(());

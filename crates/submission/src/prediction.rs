@@ -1,5 +1,5 @@
-//! The maps that a submission holds for one scene, ready to be rendered. A missing or unusable map scores as its default.
-//! That is a finding, unless the format lets the map be left out.
+//! The maps that a submission holds for one scene, ready to be rendered. A missing or unusable map scores as its
+//! default. That is a finding, unless the format lets the map be left out.
 
 use std::path::Path;
 
@@ -49,8 +49,8 @@ impl PredictedMaterial {
 pub struct PredictedScene {
     /// None for instances without an atlas.
     pub materials: Vec<Option<PredictedMaterial>>,
-    /// SHA-256, hex, over all decoded texels of roughness and metallic. Submissions with equal keys have the same roughness
-    /// and metallic everywhere in the scene, however their files store them. Different keys prove nothing.
+    /// SHA-256, hex, over all decoded texels of roughness and metallic. Submissions with equal keys have the same
+    /// roughness and metallic everywhere in the scene, however their files store them. Different keys prove nothing.
     pub scattering_key: String,
     /// Every fault, with what is scored instead.
     pub findings: Vec<Finding>,
@@ -152,8 +152,8 @@ fn one_texel(value: f32) -> Texture {
     Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
 }
 
-/// The map's texels in as little memory as possible: one texel where all are equal, and for scalars one float then, however
-/// they were stored.
+/// The map's texels in as little memory as possible: one texel where all are equal, and for scalars one float then,
+/// however they were stored.
 pub fn in_memory(file: MapFile, map: Map) -> Texture {
     let texture = file.texture.collapsed();
     if map != Map::BaseColor && texture.width() == 1 { one_texel(texture.texel(0, 0)[0]) } else { texture }
@@ -354,8 +354,8 @@ mod tests {
         assert_eq!(key(no_metal), key(black));
     }
 
-    /// A map is replaced over and over while scenes are read: each hash is of the version whose texels were decoded. The
-    /// versions are large enough to be replaced between two readings of the same file, if there were two.
+    /// A map is replaced over and over while scenes are read: each hash is of the version whose texels were decoded.
+    /// The versions are large enough to be replaced between two readings of the same file, if there were two.
     #[test]
     fn a_hash_is_of_the_bytes_that_were_decoded() {
         let folder = sound();

@@ -1,7 +1,7 @@
 //! A file of a submission, read once: its bytes, and the hash of these same bytes.
 //!
-//! Scoring, verification and `eval lint` read a submission's files here and nowhere else. If a file is replaced during a
-//! run, the result therefore has the hash of the bytes that were scored, never that of the other version.
+//! Scoring, verification and `eval lint` read a submission's files here and nowhere else. If a file is replaced during
+//! a run, the result therefore has the hash of the bytes that were scored, never that of the other version.
 //!
 //! The files are untrusted input: nothing outside the submission's folder is read, and no more than a given size.
 

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 
 use crate::coverage::{Coverage, Part};
 
-/// How far in front of a place, along the normal, another surface may lie without hiding it, in units of the rounding of the
-/// largest coordinate: 0.01 mm at 10 m. That covers the rounding of rays, and is a tenth of the distance that `prep` puts
-/// between coincident sheets.
+/// How far in front of a place, along the normal, another surface may lie without hiding it, in units of the rounding
+/// of the largest coordinate: 0.01 mm at 10 m. That covers the rounding of rays, and is a tenth of the distance that
+/// `prep` puts between coincident sheets.
 pub const SAME_PLACE_ROUNDINGS: f64 = 16.0;
 /// Half the spacing of f32 at 1.
 const ROUNDING: f64 = 1.0 / (1 << 24) as f64;
@@ -42,11 +42,11 @@ struct Texel {
     observed: bool,
 }
 
-/// The texels of an atlas that lie on its surface. Their areas add up to that of the surface, except for triangles without
-/// area in the atlas and for texels that are cut out ([`CUT_OUT_BELOW_OPACITY`]). No camera sees the latter.
+/// The texels of an atlas that lie on its surface. Their areas add up to that of the surface, except for triangles
+/// without area in the atlas and for texels that are cut out ([`CUT_OUT_BELOW_OPACITY`]). No camera sees the latter.
 ///
-/// A texel is represented by its centre if that lies in a triangle, else by the centroid of the part covered by the triangle
-/// that covers most of it.
+/// A texel is represented by its centre if that lies in a triangle, else by the centroid of the part covered by the
+/// triangle that covers most of it.
 pub struct TexelMap {
     size: usize,
     rows: Vec<Vec<Texel>>,
@@ -55,9 +55,9 @@ pub struct TexelMap {
 impl TexelMap {
     /// The texels of an atlas of `size` texels a side, seen by `camera` (that of the input view).
     ///
-    /// `atlas` has the triangles of the world's surface `surface`, with uv in the atlas. A texel is observed if its place
-    /// lies in the camera's picture and a ray towards it hits that triangle first, or nothing that is nearer by more than
-    /// rounding.
+    /// `atlas` has the triangles of the world's surface `surface`, with uv in the atlas. A texel is observed if its
+    /// place lies in the camera's picture and a ray towards it hits that triangle first, or nothing that is nearer by
+    /// more than rounding.
     pub fn new(world: &World, surface: SurfaceIndex, atlas: &TriangleMesh, size: usize, camera: &Camera) -> Self {
         let coverage = Coverage::new(atlas, size);
         let mesh = &world.scene().surfaces[surface.0].mesh;
@@ -300,8 +300,8 @@ mod tests {
         }
     }
 
-    /// A sheet of which the atlas holds a strip, much thinner than a texel, that no centre lies in: it keeps its area and
-    /// its uv.
+    /// A sheet of which the atlas holds a strip, much thinner than a texel, that no centre lies in: it keeps its area
+    /// and its uv.
     #[test]
     fn what_no_centre_lies_in_counts_by_its_area() {
         let mut mesh = sheet(-4.0, 2.0);

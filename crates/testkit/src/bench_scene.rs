@@ -33,8 +33,8 @@ pub fn reference(folder: &Path) -> Picture<LinearRgb> {
     Picture::new(SIZE, SIZE, pixels).unwrap()
 }
 
-/// The scene, with Mitsuba's flavour of `principled`, two-sided surfaces and one-sided lamps, as its references were made;
-/// and its camera with `size` x `size` pixels.
+/// The scene, with Mitsuba's flavour of `principled`, two-sided surfaces and one-sided lamps, as its references were
+/// made; and its camera with `size` x `size` pixels.
 pub fn read(folder: &Path, size: u32) -> (ReferenceScene, Camera) {
     let json: Value = serde_json::from_slice(&std::fs::read(folder.join("scene.json")).unwrap()).unwrap();
     let mut scene = ReferenceScene::default();

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-/// Makes a new folder that outlives the tests of this run, since nothing drops a static. It lies in the build's folder for
-/// temporary files, from which folders older than an hour are removed.
+/// Makes a new folder that outlives the tests of this run, since nothing drops a static. It lies in the build's folder
+/// for temporary files, from which folders older than an hour are removed.
 pub fn kept_folder(name: &str) -> PathBuf {
     const OLD: std::time::Duration = std::time::Duration::from_secs(3600);
     let root = build_folder().join("tmp");

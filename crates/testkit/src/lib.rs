@@ -1,9 +1,9 @@
 //! Code that the tests and benches of several crates share. It is only a dev-dependency: no released crate uses it.
 //!
 //! [`data`] finds inputs that are not in the repository; [`synthetic_noise`] makes noisy pictures whose expectation is
-//! known; [`box_room`] is a plain closed room, [`scenes`] builds small scenes, [`bench_scene`] reads larger ones and [`statistics`] compares their noisy renders;
-//! [`sample_dataset`] is the built-in sample as a dataset, with submissions for it; [`packed`] writes archives byte by byte;
-//! [`kept_folder`] makes folders that tests share.
+//! known; [`box_room`] is a plain closed room, [`scenes`] builds small scenes, [`bench_scene`] reads larger ones and
+//! [`statistics`] compares their noisy renders; [`sample_dataset`] is the built-in sample as a dataset, with
+//! submissions for it; [`packed`] writes archives byte by byte; [`kept_folder`] makes folders that tests share.
 
 #![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "a test that cannot be set up has failed")]
 

@@ -21,8 +21,8 @@ use mateval_tracer::World;
 
 use crate::kept_folder::kept_folder;
 
-/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is fitted
-/// by a light stage.
+/// In the recipe that the sample comes with: both sources. `room` keeps its own emitters in every track, `living` is
+/// fitted by a light stage.
 const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\natlas_size = 128\nsamples = 64\n"];
 
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {

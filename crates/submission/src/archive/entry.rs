@@ -1,4 +1,5 @@
-//! The entries of an archive written to a folder: the name of each is checked and becomes a path, its bytes are counted.
+//! The entries of an archive written to a folder: the name of each is checked and becomes a path, its bytes are
+//! counted.
 
 use std::io::{ErrorKind, Read, Write as _};
 use std::path::Path;
@@ -50,7 +51,8 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The path below the folder that an entry's bytes are to be written to; none for a folder and for an entry with a fault.
+    /// The path below the folder that an entry's bytes are to be written to; none for a folder and for an entry with a
+    /// fault.
     pub(super) fn place(&mut self, name: &[u8], kind: EntryKind) -> Result<Option<String>, Fault> {
         self.budget.add_entry()?;
         let shown = String::from_utf8_lossy(name).into_owned();
@@ -88,8 +90,8 @@ impl<'a> Writer<'a> {
         bytes <= MAX_MAP_BYTES
     }
 
-    /// Writes a file of exactly `expected` bytes. `packed` is the number of the archive's bytes that have been read so far.
-    /// Returns the file's checksum (CRC-32), or none where the entry has a fault.
+    /// Writes a file of exactly `expected` bytes. `packed` is the number of the archive's bytes that have been read so
+    /// far. Returns the file's checksum (CRC-32), or none where the entry has a fault.
     pub(super) fn write<R: Read>(
         &mut self,
         place: &str,
@@ -149,8 +151,8 @@ impl<'a> Writer<'a> {
         Ok(Err(("wrong_size", format!("expected {expected} bytes as its header states, found {found}"))))
     }
 
-    /// Makes a folder and those around it; each counts as an entry. Returns false, and records a fault, where a file has the
-    /// name of one of them.
+    /// Makes a folder and those around it; each counts as an entry. Returns false, and records a fault, where a file
+    /// has the name of one of them.
     fn make_folder(&mut self, entry: &str, place: &str) -> Result<bool, Fault> {
         let path = self.root.join(place);
         if path.is_dir() {

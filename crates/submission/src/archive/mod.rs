@@ -1,8 +1,8 @@
 //! Submissions as archives: `.zip` and `.tar.gz`, unpacked to a folder of their own within limits.
 //!
-//! An archive is untrusted input. Nothing is written outside its folder: absolute names, names that lead out, links, devices
-//! and repeated names all refuse the archive. Bytes are counted while they are unpacked; the sizes that the archive states
-//! are not relied on. Memory does not grow with the archive.
+//! An archive is untrusted input. Nothing is written outside its folder: absolute names, names that lead out, links,
+//! devices and repeated names all refuse the archive. Bytes are counted while they are unpacked; the sizes that the
+//! archive states are not relied on. Memory does not grow with the archive.
 
 mod entry;
 mod fault;

@@ -24,8 +24,8 @@ impl Opened {
     }
 }
 
-/// Opens a submission: a folder as it is, an archive after unpacking it to a new folder in `work`. An archive may hold the
-/// submission itself, or one folder that holds it.
+/// Opens a submission: a folder as it is, an archive after unpacking it to a new folder in `work`. An archive may hold
+/// the submission itself, or one folder that holds it.
 pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
     let data = std::fs::metadata(path).map_err(SubmissionError::io("read", path))?;
     if data.is_dir() {

@@ -1,9 +1,9 @@
 //! `.tar.gz`: what the `tar` crate reads, in gzip, under the byte budget of [`super::limits`].
 //!
-//! The crate is used in raw mode, which yields the headers of GNU long names and of pax attributes as entries of their own.
-//! It then reads nothing unboundedly into memory and expands no sparse file. Every byte that it asks for, also one that it
-//! skips, passes through [`Stream`], which counts it. The pax records are parsed here, because the crate takes a line break
-//! within a value, as macOS writes in extended attributes, for the end of the record.
+//! The crate is used in raw mode, which yields the headers of GNU long names and of pax attributes as entries of their
+//! own. It then reads nothing unboundedly into memory and expands no sparse file. Every byte that it asks for, also one
+//! that it skips, passes through [`Stream`], which counts it. The pax records are parsed here, because the crate takes
+//! a line break within a value, as macOS writes in extended attributes, for the end of the record.
 
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read};

@@ -174,7 +174,8 @@ impl Archive {
         Ok(())
     }
 
-    /// Where an entry's data begin; none where its own header is invalid or has another name than the central directory.
+    /// Where an entry's data begin; none where its own header is invalid or has another name than the central
+    /// directory.
     fn data_start(&mut self, entry: &Entry, name: &[u8], end: u64) -> Result<Option<u64>, Fault> {
         const HEADER: u64 = 30;
         let Some(header_end) = entry.offset.checked_add(HEADER + name.len() as u64).filter(|at| *at <= end) else {

@@ -1,9 +1,10 @@
 //! Base colours that were written wrongly: red and blue exchanged, linear numbers where sRGB is read, or the reverse.
 //!
-//! A quotient of two channels does not depend on brightness. In the picture it is the material's, times that of the light,
-//! which hardly varies within a scene. So log(red / blue) and log(red / green) of picture and base colour lie along a line
-//! of slope 1. Exchanging red and blue makes the slope of the first negative. The sRGB curve is close to a power of 2.2:
-//! values decoded once too often are 2.2 times as far from grey, values decoded once too few 2.2 times as near.
+//! A quotient of two channels does not depend on brightness. In the picture it is the material's, times that of the
+//! light, which hardly varies within a scene. So log(red / blue) and log(red / green) of picture and base colour lie
+//! along a line of slope 1. Exchanging red and blue makes the slope of the first negative. The sRGB curve is close to a
+//! power of 2.2: values decoded once too often are 2.2 times as far from grey, values decoded once too few 2.2 times as
+//! near.
 
 use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
 use mateval_scene::Finding;
@@ -35,9 +36,9 @@ pub(super) enum Decoding {
     Wrong(Finding),
 }
 
-/// The findings of scenes whose base colours were decoded wrongly, if these are most of the scenes that can be judged. One
-/// scene proves nothing: reflections of white light make the picture pale as a wrong decoding would. A wrong script, on the
-/// other hand, is wrong in every scene.
+/// The findings of scenes whose base colours were decoded wrongly, if these are most of the scenes that can be judged.
+/// One scene proves nothing: reflections of white light make the picture pale as a wrong decoding would. A wrong
+/// script, on the other hand, is wrong in every scene.
 pub(super) fn mostly_wrong(scenes: Vec<Decoding>) -> Vec<Finding> {
     let judged = scenes.iter().filter(|decoding| !matches!(decoding, Decoding::Unknown)).count();
     let wrong = |decoding| if let Decoding::Wrong(finding) = decoding { Some(finding) } else { None };

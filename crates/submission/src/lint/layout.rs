@@ -85,7 +85,8 @@ enum State {
     Misnamed,
 }
 
-/// The state of each expected folder in `folder`. Adds a finding for each that is missing or misnamed, and for any other entry.
+/// The state of each expected folder in `folder`. Adds a finding for each that is missing or misnamed, and for any
+/// other entry.
 fn matched<'a>(
     folder: &str,
     tree: &Tree,

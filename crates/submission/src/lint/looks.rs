@@ -1,4 +1,5 @@
-//! The values of a submission's maps at each pixel of the input picture: as they are, and turned as common mistakes turn them.
+//! The values of a submission's maps at each pixel of the input picture: as they are, and turned as common mistakes
+//! turn them.
 
 use mateval_image::Texture;
 

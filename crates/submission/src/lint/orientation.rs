@@ -1,8 +1,8 @@
 //! Atlases that are flipped or turned: v counted from the wrong end, left and right exchanged.
 //!
 //! Within an instance and a small neighbourhood of the picture, light hardly changes: a brighter pixel shows a brighter
-//! material. So the base colour correlates with the picture where it lies right and does not where it was turned. Turning
-//! it back must then restore the correlation.
+//! material. So the base colour correlates with the picture where it lies right and does not where it was turned.
+//! Turning it back must then restore the correlation.
 
 use mateval_image::LinearRgb;
 use mateval_scene::Finding;

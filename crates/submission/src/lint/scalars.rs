@@ -17,12 +17,14 @@ const MIRROR: (f32, f32) = (0.1, 0.3);
 const MOST_MIRRORS: f64 = 0.6;
 /// Roughness and metallic of a pixel that differ by at most this much count as equal.
 const SAME: f32 = 1.0 / 255.0;
-/// Fewest neighbourhoods of an instance whose hues are compared, and fewest pixels of each, which keeps noise out of its mean.
+/// Fewest neighbourhoods of an instance whose hues are compared, and fewest pixels of each, which keeps noise out of
+/// its mean.
 const FEWEST_TILES: usize = 4;
 const FEWEST_OF_TILE: f64 = 16.0;
 /// Darker values hold more noise than hue.
 const DARKEST: f32 = 0.01;
-/// How much the picture's hues must differ between the neighbourhoods of an instance for a single base colour to be wrong.
+/// How much the picture's hues must differ between the neighbourhoods of an instance for a single base colour to be
+/// wrong.
 const MOST_HUE: f64 = 0.3;
 
 /// Findings about a scene.
@@ -85,7 +87,8 @@ fn one_colour(facts: &InstanceFacts) -> Option<Finding> {
     })
 }
 
-/// The standard deviation of log(red / `channel`) of the picture between neighbourhoods, and the number of neighbourhoods.
+/// The standard deviation of log(red / `channel`) of the picture between neighbourhoods, and the number of
+/// neighbourhoods.
 fn hues(looks: &[Look], channel: usize) -> (f64, usize) {
     let mut tiles: BTreeMap<usize, (f64, f64)> = BTreeMap::new();
     for look in looks {

@@ -11,8 +11,8 @@ use super::statistics::Pairs;
 const FEWEST: f64 = 400.0;
 /// The least standard deviation, of logarithms, of the picture's brightness within instances.
 const LEAST_SHADING: f64 = 0.15;
-/// The correlation from which the base colour is the picture itself: at most a tenth of the picture's variance is left to
-/// light. A picture of 64x48 pixels, blurred by resampling to atlases, reaches 0.97; the truth 0.3 to 0.4.
+/// The correlation from which the base colour is the picture itself: at most a tenth of the picture's variance is left
+/// to light. A picture of 64x48 pixels, blurred by resampling to atlases, reaches 0.97; the truth 0.3 to 0.4.
 const LEAST_CORRELATION: f64 = 0.95;
 const DARKEST: f64 = 1e-3;
 

@@ -115,7 +115,8 @@ impl<'a> Eye<'a> {
         Ok(Self { world, scene, camera: &view.camera, valid, ids, photo })
     }
 
-    /// The pixels that show a single instance. If the picture has too many, only every second, third... row and column is used.
+    /// The pixels that show a single instance. If the picture has too many, only every second, third... row and column
+    /// is used.
     fn pixels(&self) -> Vec<(usize, SeenPixel)> {
         let (width, height) = (self.ids.width(), self.ids.height());
         let step = (1..).find(|step| (width / step) * (height / step) <= MOST_PIXELS).unwrap_or(1);

@@ -33,8 +33,8 @@ pub(super) fn fill(texels: &[CoarseTexel], base_color: &Texture) -> Fill {
     fill
 }
 
-/// A finding where one colour fills the unobserved area, and only that. Instances that are observed nowhere or everywhere do
-/// not count: for the former, a single colour is a legitimate answer.
+/// A finding where one colour fills the unobserved area, and only that. Instances that are observed nowhere or
+/// everywhere do not count: for the former, a single colour is a legitimate answer.
 pub(super) fn check<'a>(place: &str, fills: impl Iterator<Item = &'a Fill>) -> Option<Finding> {
     let mut by_value: BTreeMap<Bits, [f64; 2]> = BTreeMap::new();
     let mut all = [0.0; 2];
