@@ -9,15 +9,15 @@ fn crates() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("crates")
 }
 
-/// The paths below `crates/` that a text names: words in backticks with a slash and without blanks.
+/// The paths that a text names: words in backticks with a slash and without blanks.
 fn named_paths(text: &str) -> Vec<&str> {
     let words = text.split('`').skip(1).step_by(2);
     words.filter(|word| word.contains('/') && !word.contains([' ', '<', '*'])).collect()
 }
 
-/// The paths that do not exist.
+/// The paths that exist neither below `crates/` nor below the repository's root.
 fn missing(paths: &[&str]) -> Vec<String> {
-    let exists = |path: &&&str| crates().join(path).exists();
+    let exists = |path: &&&str| [crates(), crates().join("..")].iter().any(|root| root.join(path).exists());
     paths.iter().filter(|path| !exists(path)).map(|path| (*path).to_owned()).collect()
 }
 
