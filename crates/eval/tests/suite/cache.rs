@@ -32,7 +32,11 @@ static KEPT: LazyLock<Kept> = LazyLock::new(|| {
 });
 
 fn score_with(submission: &Path, cache: &Path, protocol: &Protocol) -> ResultFile {
-    scored(&ScorePlan { cache: Some(cache), ..plan(&[submission], protocol, &[]) }).remove(0)
+    score_scenes(submission, cache, protocol, &[])
+}
+
+fn score_scenes(submission: &Path, cache: &Path, protocol: &Protocol, scenes: &[&str]) -> ResultFile {
+    scored(&ScorePlan { cache: Some(cache), ..plan(&[submission], protocol, scenes) }).remove(0)
 }
 
 fn files(cache: &Path) -> Vec<PathBuf> {
@@ -131,7 +135,8 @@ fn another_texel_is_another_submission() {
 
 #[test]
 fn another_protocol_is_another_score() {
-    let cache = poisoned(&["living", "room"]);
+    let cache = poisoned(&["room"]);
+    let room = |protocol: &Protocol| poisons(&score_scenes(&KEPT.submission, cache.path(), protocol, &["room"]));
     let others: [fn(&mut Protocol); 3] = [
         |protocol| protocol.light.fit.pool = 4,
         |protocol| protocol.light.relit.dim = 0.5,
@@ -140,11 +145,12 @@ fn another_protocol_is_another_score() {
     for change in others {
         let mut other = hasty();
         change(&mut other);
-        assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &other)), [""; 0]);
+        assert_eq!(room(&other), [""; 0]);
     }
-    let tool =
-        ScorePlan { tool: "another".into(), cache: Some(cache.path()), ..plan(&[&KEPT.submission], &hasty(), &[]) };
+    let protocol = hasty();
+    let plan = plan(&[&KEPT.submission], &protocol, &["room"]);
+    let tool = ScorePlan { tool: "another".into(), cache: Some(cache.path()), ..plan };
     assert_eq!(poisons(&scored(&tool)[0]), [""; 0]);
     // The twin.
-    assert_eq!(poisons(&score_with(&KEPT.submission, cache.path(), &hasty())), ["living", "room"]);
+    assert_eq!(room(&hasty()), ["room"]);
 }

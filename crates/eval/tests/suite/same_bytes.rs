@@ -49,18 +49,14 @@ fn with_any_other_submissions() {
         assert!(texts(&plan(&[submission], &hasty(), &[]))[0] == together[at], "{}", submission.display());
     }
     let [gt, dark, grey] = [0, 1, 2].map(|at| all()[at]);
-    let pair = texts(&plan(&[grey, gt], &hasty(), &[]));
-    assert!(pair[0] == together[2] && pair[1] == together[0], "beside one of another roughness");
-    let pair = texts(&plan(&[dark, gt], &hasty(), &[]));
-    assert!(pair[0] == together[1] && pair[1] == together[0], "beside one of the same roughness");
+    let [one, other] = [[grey, gt], [dark, gt]].map(|pair| texts(&plan(&pair, &hasty(), &["room"])));
+    assert!(one[1] == other[1], "another or the same roughness beside it");
     // The twins: methods differ, and so do numbers of samples.
     assert!(together[0] != together[1] && together[0] != together[2]);
-    let mut other = hasty();
-    other.light.noise.most_samples = 2;
-    assert!(
-        scored(&plan(&[gt], &other, &[]))[0].protocols["mateval-1"].pictures
-            != scored(&plan(&[gt], &hasty(), &[]))[0].protocols["mateval-1"].pictures
-    );
+    let mut fewer = hasty();
+    fewer.light.noise.most_samples = 2;
+    let pictures = |protocol| scored(&plan(&[gt], &protocol, &["room"]))[0].protocols["mateval-1"].pictures.clone();
+    assert!(pictures(hasty()) != pictures(fewer));
 }
 
 #[test]
