@@ -9,14 +9,14 @@ use anyhow::Context as _;
 /// The arguments `A` that these words stand for on a command line.
 pub fn parse_args<A: clap::Args>(words: &[OsString]) -> anyhow::Result<A> {
     let command = A::augment_args(clap::Command::new("mateval").no_binary_name(true));
-    let matches = command.try_get_matches_from(words).context("the arguments of a step are unsound: a bug")?;
+    let matches = command.try_get_matches_from(words).context("the arguments of a step are invalid, which is a bug")?;
     Ok(A::from_arg_matches(&matches)?)
 }
 
 /// The subcommand `C` that these words stand for on a command line.
 pub fn parse_subcommand<C: clap::Subcommand>(words: &[OsString]) -> anyhow::Result<C> {
     let command = C::augment_subcommands(clap::Command::new("mateval").no_binary_name(true));
-    let matches = command.try_get_matches_from(words).context("the arguments of a step are unsound: a bug")?;
+    let matches = command.try_get_matches_from(words).context("the arguments of a step are invalid, which is a bug")?;
     Ok(C::from_arg_matches(&matches)?)
 }
 

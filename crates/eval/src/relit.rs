@@ -46,7 +46,7 @@ impl FromStr for LightingName {
         let known = [Some(Self::Dim), Some(Self::WarmCool), alone()];
         // Only the printed form is accepted: `alone_01` is not.
         known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {
-            what: "lighting",
+            what: "lighting's name",
             word: word.to_owned(),
             expected: format!("{DIM}, {WARM_COOL}, {ALONE}1, {ALONE}2, ..."),
         })
@@ -149,7 +149,10 @@ mod tests {
             assert_eq!(name.to_string().parse(), Ok(name));
         }
         for word in ["", "dimmer", "alone", "alone_", "alone_01", "alone_+1", "Dim"] {
-            assert!(word.parse::<LightingName>().unwrap_err().to_string().contains("is no lighting"), "{word}");
+            assert!(
+                word.parse::<LightingName>().unwrap_err().to_string().contains("is not a lighting's name"),
+                "{word}"
+            );
         }
     }
 

@@ -152,14 +152,14 @@ pub struct ResultKey {
     pub metric: Metric,
 }
 
-/// A text that is no key of a result.
+/// A text that is not a key of a result.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BadResultKey {
     /// It has fewer or more than three words.
-    #[error("{} is no key of a result; expected <picture>.<views>.<metric>", quoted(.0))]
+    #[error("{} is not a key of a result; expected <picture>.<views>.<metric>", quoted(.0))]
     Shape(String),
     /// One of its words is unknown.
-    #[error("{} is no key of a result: {source}", quoted(key))]
+    #[error("{} is not a key of a result: {source}", quoted(key))]
     Word {
         /// The text.
         key: String,
@@ -323,13 +323,13 @@ mod tests {
     #[test]
     fn unknown_words_are_named() {
         for (text, unknown) in [
-            ("albedo.novel.rmse", "'rmse' is no metric; expected one of: mse, psnr, "),
-            ("albedo.behind.psnr", "'behind' is no kind of views"),
-            ("shading.novel.psnr", "'shading' is no kind of picture"),
-            ("albedo_specular_specular.novel.psnr", "'albedo_specular' is no kind of picture"),
+            ("albedo.novel.rmse", "'rmse' is not a metric; expected one of: mse, psnr, "),
+            ("albedo.behind.psnr", "'behind' is not a kind of views"),
+            ("shading.novel.psnr", "'shading' is not a kind of picture"),
+            ("albedo_specular_specular.novel.psnr", "'albedo_specular' is not a kind of picture"),
             ("albedo.novel", "expected <picture>.<views>.<metric>"),
             ("albedo.input./../../evil.psnr", "expected <picture>.<views>.<metric>"),
-            ("a\nb.novel.psnr", "'a\\nb' is no kind of picture"),
+            ("a\nb.novel.psnr", "'a\\nb' is not a kind of picture"),
             ("", "expected <picture>.<views>.<metric>"),
         ] {
             let error = text.parse::<ResultKey>().unwrap_err().to_string();
@@ -337,7 +337,7 @@ mod tests {
         }
     }
 
-    /// The key of the sample's result in the published example, and its twins with a word that nobody knows.
+    /// The published example of a result holds only known keys; its twins with an unknown word are refused.
     #[test]
     fn the_published_example_holds_known_keys_alone() {
         let text = include_str!("../../../dataset_spec/examples/result.json");
@@ -345,7 +345,7 @@ mod tests {
         assert!(read(text).unwrap().protocols["mateval-1"].summary.len() >= 4);
         for twin in ["albedo.input.mze", "albido.input.mse", "albedo.inputs.mse"] {
             let error = read(&text.replace("albedo.input.mse", twin)).unwrap_err();
-            assert!(error.contains(&format!("'{twin}' is no key of a result")), "{error}");
+            assert!(error.contains(&format!("'{twin}' is not a key of a result")), "{error}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 /// A word that an enum does not have.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{} is no {what}; expected one of: {expected}", quoted(.word))]
+#[error("{} is not a {what}; expected one of: {expected}", quoted(.word))]
 pub struct UnknownWord {
     /// The kind of word that was expected, as in "metric".
     pub what: &'static str,

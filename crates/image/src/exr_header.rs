@@ -45,7 +45,7 @@ pub struct ExrHeader {
     pub height: usize,
     /// Width and height of the display window.
     pub display: (usize, usize),
-    /// In the file's order.
+    /// The channels, in the file's order.
     pub channels: Vec<ExrChannel>,
     /// Whether pixels hold lists of samples.
     pub deep: bool,

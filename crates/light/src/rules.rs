@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where the lights of a stage are; lengths in metres. The values are ours: nobody has published theirs.
+/// Where the lights of a stage are; lengths in metres. The values are MatEval's own, since PSDR-Room's are not published.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageRules {
@@ -25,7 +25,7 @@ pub struct StageRules {
     pub wall_gap_m: f64,
     /// Pieces of the architecture that are narrower or lower than this are not walls.
     pub least_wall_m: f64,
-    /// A wall is looked at in a grid of this many places along each of its sides.
+    /// A wall's visibility is tested at a grid of places, with this many along each side.
     pub wall_samples: u32,
     /// Sine of the largest angle between a ceiling's normal and the vertical, and between a wall's normal and the
     /// horizontal. Triangles of one wall agree in the rounded multiples of this of their normals' coordinates.

@@ -14,7 +14,7 @@ pub const CHOSEN_SIZES: (u32, u32) = (256, 4096);
 const XATLAS_LENGTH: f32 = 1000.0;
 /// How often packing is tried at a smaller scale before it fails.
 const MAX_PACKS: u32 = 24;
-/// The factor on the scale after a packing that overflowed, of which it is unknown by how much it was too fine.
+/// The factor on the scale after a packing that overflowed, since xatlas does not report by how much it overflowed.
 const OVERFLOW_STEP: f64 = 0.7;
 
 /// The wanted size of an atlas.

@@ -58,7 +58,7 @@ pub fn bake(unwrapped: &Unwrapped, source: &TriangleMesh, material: &Material, t
         let uvs = source.uvs.as_deref()?;
         Some(source.triangles[triangle].map(|vertex| uvs[vertex as usize]))
     };
-    let source_texels = finest(material, textures);
+    let source_texels = texels_per_uv_unit(material, textures);
     let texel = |x: usize, y: usize| {
         let (triangle, _) = atlas.owner(x, y)?;
         let corners = source_uv(triangle).unwrap_or([Vec2::ZERO; 3]);
@@ -107,7 +107,7 @@ fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearanc
 }
 
 /// The largest number of texels that any texture of the material has along one unit of the surface's uv.
-fn finest(material: &Material, textures: &[Texture]) -> f64 {
+fn texels_per_uv_unit(material: &Material, textures: &[Texture]) -> f64 {
     material
         .lookups()
         .into_iter()
@@ -120,7 +120,7 @@ fn finest(material: &Material, textures: &[Texture]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The number of lookups along a texel's side, so that neighbouring lookups are half a source texel apart.
+/// The number of lookups along a texel's side for which neighbouring lookups are half a source texel apart.
 fn lookups_a_side(atlas: &UvAtlas, triangle: usize, corners: [Vec2; 3], source_texels: f64) -> usize {
     let [a, b, c] = corners.map(|uv| uv.as_dvec2());
     let uv_area = ((b - a).perp_dot(c - a) / 2.0).abs();

@@ -9,7 +9,7 @@ use mateval_scene::{InstanceId, InstanceIndex, Role};
 use crate::numbering::{TooMany, number};
 use mateval_sources::source_scene::InstanceOrigin;
 
-/// One instance: instance k is surface k of the reference scene.
+/// One instance. Instances have the order of the reference scene's surfaces.
 #[derive(Clone, Debug)]
 pub struct InstanceEntry {
     /// Its id, unique in the scene.

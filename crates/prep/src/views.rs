@@ -44,7 +44,7 @@ pub struct GeometryPictures {
     pub instance: Picture<u16>,
     /// The triangle at pixel centres; none where the ray hits no surface.
     pub triangle: Picture<Option<SeenTriangle>>,
-    /// Pixels of which the centre and every sub-pixel show a scored surface.
+    /// Pixels whose centre and every sub-pixel show a scored surface.
     pub valid: Mask,
     /// Valid pixels whose centre the input view does not show.
     pub unobserved: Mask,

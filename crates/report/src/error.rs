@@ -33,7 +33,7 @@ pub enum ReportError {
         expected: &'static str,
     },
     /// A folder that is no leaderboard would be replaced: choose another one.
-    #[error("cannot write the leaderboard: '{}' exists and is no leaderboard; choose another --out", path.display())]
+    #[error("cannot write the leaderboard: '{}' exists and is not a leaderboard; choose another --out", path.display())]
     NotALeaderboard {
         /// The folder.
         path: PathBuf,

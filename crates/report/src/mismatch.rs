@@ -102,7 +102,7 @@ pub enum Mismatch {
         found: String,
     },
     /// A result holds a number that no metric gives.
-    #[error("the result of '{method}' holds {value:e} for '{key}', which is no possible score; score it again")]
+    #[error("the result of '{method}' holds {value:e} for '{key}', which is not a possible score; score it again")]
     ImpossibleScore {
         /// The method.
         method: String,

@@ -109,6 +109,6 @@ pub enum GltfError {
         attribute: &'static str,
     },
     /// The attributes of a mesh differ in length.
-    #[error("expected as many NORMAL and TEXCOORD_0 as POSITION")]
+    #[error("expected as many entries of NORMAL and TEXCOORD_0 as of POSITION")]
     CountsDiffer,
 }

@@ -238,7 +238,7 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
     for (at, texture) in file.textures.iter().enumerate() {
         let mut parts = Path::new(&texture.file).components();
         if !matches!((parts.next(), parts.next()), (Some(std::path::Component::Normal(_)), None)) {
-            fault("reference.json", format!("/textures/{at}/file"), format!("'{}' is no file name", texture.file));
+            fault("reference.json", format!("/textures/{at}/file"), format!("'{}' is not a file name", texture.file));
         }
     }
     for (at, material) in file.materials.iter().enumerate() {

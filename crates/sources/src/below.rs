@@ -41,7 +41,7 @@ pub fn relative_below(path: &Path, source: &Path) -> Result<PathBuf, BelowError>
     as_written().or_else(resolved).ok_or_else(elsewhere)
 }
 
-/// The folder; the empty path stands for the current one.
+/// The folder, or `.` where its path is empty.
 fn folder_or_here(folder: &Path) -> &Path {
     if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
 }

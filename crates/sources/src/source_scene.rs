@@ -41,7 +41,7 @@ pub struct SourceScene {
     pub house: String,
     /// The file that findings refer to by default.
     pub file: String,
-    /// Geometry, materials and lights in world space. Surface k becomes instance k.
+    /// Geometry, materials and lights in world space. Each surface becomes an instance.
     pub scene: ReferenceScene,
     /// Facts about each surface, in the order of `scene.surfaces`.
     pub origins: Vec<InstanceOrigin>,

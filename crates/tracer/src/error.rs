@@ -203,7 +203,7 @@ pub enum RequestFault {
     #[error("seed {0} occurs twice, expected another seed for each half")]
     RepeatedSeed(u64),
     /// A hierarchy is shared with a scene of other triangles.
-    #[error("the hierarchy was built from {hierarchy} triangles other than the scene's {scene}")]
+    #[error("the hierarchy was built from other triangles than the scene's: it holds {hierarchy}, the scene {scene}")]
     OtherTriangles {
         /// How many triangles the hierarchy holds.
         hierarchy: usize,
@@ -211,7 +211,7 @@ pub enum RequestFault {
         scene: usize,
     },
     /// Groups of lights were made for another scene.
-    #[error("groups of {found} lights for a scene of {expected} lights")]
+    #[error("the light groups hold {found} lights, the scene has {expected}")]
     GroupedLights {
         /// How many lights the groups hold.
         found: usize,
@@ -253,7 +253,7 @@ pub enum RequestFault {
         found: f64,
     },
     /// Predictions were made for a world with another number of surfaces.
-    #[error("{atlases} atlases and {coats} coats for a world of {surfaces} surfaces")]
+    #[error("{atlases} atlases and {coats} coats, expected one of each for each of {surfaces} surfaces")]
     SurfaceCount {
         /// How many atlases there are.
         atlases: usize,
@@ -275,7 +275,7 @@ pub enum RequestFault {
         expected: usize,
     },
     /// An atlas with a coat has no uv, or one that is not finite or not one a vertex.
-    #[error("surface {} '{name}': a coat for an atlas without one finite uv a vertex", surface.0)]
+    #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for each vertex", surface.0)]
     AtlasUv {
         /// The surface.
         surface: SurfaceIndex,

@@ -193,7 +193,7 @@ pub struct WorstTile {
     pub x: usize,
     /// The tile's upper row.
     pub y: usize,
-    /// The channel in which it is off most, and by how much.
+    /// The channel with the largest difference, and the difference.
     pub off: MeanDifference,
 }
 

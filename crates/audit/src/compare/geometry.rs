@@ -154,7 +154,7 @@ fn common(ours: &OurGeometry, theirs: Option<&Picture<u16>>) -> Vec<usize> {
     ids.filter(|(at, id)| **id > 0 && same(*at, **id)).map(|(at, _)| at).collect()
 }
 
-/// For each pixel whether its id equals that of all of its neighbours, of which it has up to eight.
+/// For each pixel, whether all of its neighbours (up to eight) have the same id.
 pub(super) fn away_from_edges(ids: &Picture<u16>) -> Vec<bool> {
     let (width, height) = (ids.width(), ids.height());
     let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);

@@ -189,7 +189,7 @@ fn write_surface(
         sheets.push((format!("meshes/{index}_back.ply"), Sheet::Behind(distance)));
     }
     if glow.is_some() && surface.mesh.normals.is_some() {
-        let message = "the surface emits; Mitsuba's emitters take vertex normals for those of the shape";
+        let message = "the surface emits; Mitsuba's emitters use its vertex normals as if they were the triangles' own";
         remarks.note("flat_light", &place, message, "wrote it without vertex normals");
     }
     let mut shapes = Vec::new();

@@ -89,7 +89,7 @@ fn check(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>) -
     Ok(())
 }
 
-/// The first pixel of which a channel is `wrong`.
+/// Position and value of the first pixel with a channel that is `wrong`.
 fn first_pixel(picture: &Picture<LinearRgb>, wrong: impl Fn(f32) -> bool) -> Option<([usize; 2], [f32; 3])> {
     let at = picture.pixels().iter().position(|pixel| pixel.0.iter().any(|v| wrong(*v)))?;
     Some(([at % picture.width(), at / picture.width()], picture.pixels()[at].0))

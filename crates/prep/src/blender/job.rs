@@ -121,7 +121,7 @@ pub struct ResultView {
 pub struct JobPlan<'a> {
     /// The scene's id.
     pub scene: &'a SceneId,
-    /// The scene; instance k is surface k - 1.
+    /// The scene. Its surface at position k is the instance with index k + 1.
     pub reference: &'a ReferenceScene,
     /// The value in `part.png` of every triangle of every surface.
     pub parts: &'a [Vec<u16>],

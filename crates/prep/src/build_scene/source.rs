@@ -37,7 +37,7 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
         house: folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
         file: xml.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         origins: vec![InstanceOrigin::default(); read.scene.surfaces.len()],
-        camera: camera_of_film(recipe, entry, &read.camera).map_err(PrepError::scene(&entry.id))?,
+        camera: bitterli_camera(recipe, entry, &read.camera).map_err(PrepError::scene(&entry.id))?,
         scene: read.scene,
         findings: read.findings,
         licence: read.licence,
@@ -47,7 +47,7 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
-fn camera_of_film(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, SceneFault> {
+fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, SceneFault> {
     let old = source.intrinsics;
     let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or([old.width, old.height]);
     if ![width, height].iter().all(|side| RESOLUTION.contains(side)) {

@@ -1,4 +1,4 @@
-//! The views of a scene: the input camera and its turns.
+//! The views of a scene: the input camera, and the novel views that turn it about its position.
 
 use mateval_scene::dataset::View;
 use mateval_scene::layout::INPUT;
@@ -6,7 +6,7 @@ use mateval_scene::{Camera, ViewId};
 
 use crate::recipe::Recipe;
 
-/// The input view and then the novel views, which are its turns.
+/// The input view, then the novel views: the input camera, turned by each of the recipe's offsets.
 pub(super) fn views_of(recipe: &Recipe, camera: Camera) -> Vec<View> {
     let input = View { id: ViewId::new(INPUT).expect("our own id is an id"), x_deg: 0.0, y_deg: 0.0, camera };
     let turned = recipe.views.iter().map(|offset| View {

@@ -85,7 +85,7 @@ fn only_a_leaderboard_is_replaced() {
     std::fs::create_dir(&other).unwrap();
     std::fs::write(other.join("mine.txt"), "mine").unwrap();
     let error = write(&plan(&results), &other, true, &quiet).unwrap_err().to_string();
-    assert!(error.contains("is no leaderboard") && other.join("mine.txt").exists(), "{error}");
+    assert!(error.contains("is not a leaderboard") && other.join("mine.txt").exists(), "{error}");
 }
 
 #[test]

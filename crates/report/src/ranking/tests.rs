@@ -329,7 +329,7 @@ fn results_that_cannot_be_ranked_together() {
     let scenes = &mut other.protocols.get_mut("mateval-1").unwrap().scenes;
     scenes.get_mut(&scene(3)).unwrap().insert(PSNR, 1e300);
     let error = rank(&[good.clone(), other], "mateval-1", false).unwrap_err().to_string();
-    assert!(error.contains("1e300 for 'albedo.input.psnr', which is no possible score"), "{error}");
+    assert!(error.contains("1e300 for 'albedo.input.psnr', which is not a possible score"), "{error}");
     let error = refused(|other| other.dataset.houses.values_mut().for_each(|house| house.push('2')));
     assert!(error.contains("assign scene 's00' to different houses"), "{error}");
     let error = refused(|other| other.protocols.clear());

@@ -129,10 +129,15 @@ impl<'a> Reader<'a> {
     fn only_child(&mut self, from: &mut Parameters<'a>) -> Option<&'a Element> {
         let children = from.objects("bsdf");
         match children.len() {
-            0 => self.log.warn("missing_child", &from.place, "no bsdf within", "used diffuse grey 0.5"),
+            0 => self.log.warn(
+                "missing_child",
+                &from.place,
+                "expected a bsdf inside the element, found none",
+                "used diffuse grey 0.5",
+            ),
             1 => {}
             more => {
-                let message = format!("{more} bsdfs within");
+                let message = format!("{more} bsdfs inside the element");
                 self.log.warn("unsupported", &from.place, message, "used the first one everywhere");
             }
         }

@@ -232,7 +232,7 @@ impl<'l> Builder<'l> {
                 self.variables.entry(name.to_owned()).or_insert_with(|| value.to_owned());
             }
             _ => {
-                let message = "expected a name and a value of <default>, found one of them missing";
+                let message = "expected both a name and a value of <default>";
                 self.log.warn("bad_default", &default.place(), message, "ignored it");
             }
         }

@@ -37,7 +37,7 @@ impl<'a> Parameters<'a> {
         Self { place, kind: format!("{} '{}'", element.tag, shortened(element.kind())), children }
     }
 
-    /// Takes the first child of one of these names.
+    /// The first child with one of these names that has not been taken yet. A child that is never taken is reported.
     pub(super) fn take(&mut self, names: &[&str]) -> Option<&'a Element> {
         let child = self.children.iter_mut().find(|c| !c.taken && names.contains(&c.name))?;
         child.taken = true;

@@ -36,7 +36,7 @@ impl<'a> Reader<'a> {
         let world_from_map = self.world_from_map(to_world, &from.place);
         let sky = self.sun_sky_parameters(kind, from, world_from_map);
         from.ignore(&["resolution", "complex_sun", "extend"]);
-        let message = format!("'{kind}' as a map of {} by {ROWS} texels", 2 * ROWS);
+        let message = format!("'{kind}' is approximated by a map of {}x{ROWS} texels", 2 * ROWS);
         let action = "used the sky of Hosek and Wilkie and, for the sun, a black body seen through the air of Preetham";
         self.log.note("approximated", &from.place, message, action);
         let texture = bake(&sky)?;

@@ -25,7 +25,7 @@ const TOUCHING_M: f64 = 1e-4;
 const SMALLEST_AREA: f64 = 1e-8;
 /// No sheet is moved further than this many times [`LAYER_M`].
 const MOST_LAYERS: usize = 8;
-/// The most pairs of triangles that are compared. A real house has less than a hundredth of it.
+/// The most pairs of triangles that are compared. A real house has less than a hundredth as many.
 const MOST_PAIRS: usize = 50_000_000;
 
 /// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces.

@@ -179,7 +179,7 @@ impl<'a> Furnisher<'a> {
         }
         // Two negative factors are a rotation by 180 degrees, one or three mirror the piece.
         if child.placement.scale.element_product() < 0.0 {
-            let message = format!("a scale of {}", child.placement.scale);
+            let message = format!("the scale {} mirrors the piece", child.placement.scale);
             let place = format!("{}/scale", child.place);
             self.log.note("mirrored_piece", &place, message, "mirrored it and kept its front sides outside");
         }

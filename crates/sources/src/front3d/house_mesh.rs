@@ -11,9 +11,9 @@ use crate::surface_mesh::has_area;
 /// Coordinates beyond this many metres are faults.
 const FARTHEST: f64 = 1e5;
 /// The largest deviation of a normal's length from 1 that is not reported.
-const UNIT: f64 = 0.01;
+const UNIT_TOLERANCE: f64 = 0.01;
 
-/// Reads `xyz`, `uv` and `faces` of the mesh at `place`. A mesh without usable triangles is reported and gives none.
+/// Reads `xyz`, `uv` and `faces` of the mesh at `place`. None, with a finding, where no triangle is usable.
 pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleMesh> {
     // Anything that is not a number is read as NaN and then handled with the numbers that are not finite.
     let floats = |key: &str| list(from, key).iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
@@ -25,7 +25,7 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleM
     mesh.uvs = uvs(&uv, &mesh, place, log);
     note_bad_normals(from, mesh.positions.len(), place, log);
     if mesh.triangles.is_empty() {
-        log.note("empty_mesh", place, "it has no triangle that covers anything", "left it out");
+        log.note("empty_mesh", place, "expected a triangle with an area, found none", "left it out");
         return None;
     }
     // Unused vertices may have positions that are not finite, so they are dropped.
@@ -99,11 +99,12 @@ fn note_bad_normals(from: &Value, vertices: usize, place: &str, log: &mut Log) {
         return log.note("bad_normals", &place, message, "used the triangles' geometric normals");
     };
     let floats: Vec<f64> = all.iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect();
-    let is_unit = |n: &[f64; 3]| (n.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0).abs() <= UNIT;
+    let is_unit = |n: &[f64; 3]| (n.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0).abs() <= UNIT_TOLERANCE;
     let bad = floats.as_chunks::<3>().0.iter().filter(|normal| !is_unit(normal)).count();
     if bad > 0 || floats.len() != 3 * vertices {
         let (expected, found) = (3 * vertices, floats.len());
-        let message = format!("expected {expected} numbers, found {found}, and {bad} normals are not of unit length");
+        let message =
+            format!("expected {expected} numbers, found {found}; {bad} of the normals are not of unit length");
         log.note("bad_normals", &place, message, "used the triangles' geometric normals");
     }
 }

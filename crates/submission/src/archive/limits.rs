@@ -42,7 +42,7 @@ impl Budget {
         }
         if self.unpacked > ALWAYS_ALLOWED && self.unpacked > packed.saturating_mul(MAX_RATIO) {
             let message = format!(
-                "at least {} bytes unpacked from {packed} bytes of the archive; expected at most {MAX_RATIO} times as many",
+                "{packed} bytes of the archive unpack to {} bytes or more; expected at most {MAX_RATIO} times the packed size",
                 self.unpacked
             );
             return Err(Fault::refused("archive_bomb", message, "pack maps that are compressed themselves (PNG, EXR)"));

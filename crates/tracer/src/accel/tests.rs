@@ -171,7 +171,7 @@ fn nothing_is_hit_where_there_is_nothing() {
 }
 
 #[test]
-fn equal_triangles_are_told_apart_by_their_order() {
+fn equal_triangles_are_distinguished_by_their_order() {
     let mesh = ball(8);
     let accel = Accel::build(&[&mesh, &mesh, &mesh]).unwrap();
     for k in 0..100 {

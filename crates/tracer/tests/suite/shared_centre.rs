@@ -271,7 +271,7 @@ fn what_makes_no_sense_is_refused() {
         done.unwrap_err().to_string()
     };
     assert!(message(&LightGroups::apart(4), 1, &[3, 4, 3]).contains("seed 3 occurs twice"));
-    assert!(message(&LightGroups::apart(3), 1, &[3]).contains("groups of 3 lights for a scene of 4"));
+    assert!(message(&LightGroups::apart(3), 1, &[3]).contains("the light groups hold 3 lights, the scene has 4"));
     assert!(message(&LightGroups::apart(4), 0, &[3]).contains("0 samples"));
 }
 
