@@ -33,7 +33,7 @@ pub(super) struct Appearances {
     /// By file. None stands for a file that is missing or faulty, which has been reported.
     known_textures: BTreeMap<String, Option<TextureIndex>>,
     /// By index in [`House::materials`].
-    of_layout: BTreeMap<Option<usize>, MaterialIndex>,
+    of_architecture: BTreeMap<Option<usize>, MaterialIndex>,
     /// By model id.
     of_models: BTreeMap<String, MaterialIndex>,
     /// Number of materials that name a texture although no folder of textures was given.
@@ -49,7 +49,7 @@ impl Appearances {
             texels: 0,
             most_texels,
             known_textures: BTreeMap::new(),
-            of_layout: BTreeMap::new(),
+            of_architecture: BTreeMap::new(),
             of_models: BTreeMap::new(),
             untextured: 0,
         }
@@ -71,7 +71,7 @@ impl Appearances {
     }
 
     /// The material made of `house.materials[material]`, and its colour. Without a material it is mid-grey.
-    pub(super) fn of_layout(
+    pub(super) fn of_architecture(
         &mut self,
         house: &House,
         material: Option<usize>,
@@ -80,21 +80,21 @@ impl Appearances {
     ) -> (MaterialIndex, [f32; 3]) {
         let source = material.map(|material| &house.materials[material]);
         let plain = source.map_or(MISSING, |source| source.color.map(|v| linear_from_srgb(v as f32 / 255.0)));
-        if let Some(known) = self.of_layout.get(&material) {
+        if let Some(known) = self.of_architecture.get(&material) {
             return (*known, plain);
         }
-        let texture = source.and_then(|source| self.layout_texture(source, textures, log));
+        let texture = source.and_then(|source| self.architecture_texture(source, textures, log));
         let color = match (texture, source) {
             (Some(texture), Some(source)) => ColorInput::Texture { texture, uv: source.uv },
             _ => ColorInput::Constant(plain),
         };
         let name = source.map_or("none", |source| source.uid.as_str());
         let index = self.add(name.to_owned(), color);
-        self.of_layout.insert(material, index);
+        self.of_architecture.insert(material, index);
         (index, plain)
     }
 
-    fn layout_texture(
+    fn architecture_texture(
         &mut self,
         source: &HouseMaterial,
         textures: Option<&mut Library>,

@@ -9,7 +9,7 @@ use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
 use super::furnished_house::FurnishedHouse;
 use super::furnisher::{Furnished, Furnisher};
-use super::house::{DesignerCamera, House, world_from_layout};
+use super::house::{DesignerCamera, House, world_from_house};
 use super::house_files::{HouseFiles, shown_path};
 use super::limits::Limits;
 use super::model::Library;
@@ -31,7 +31,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     let models = library(files, &files.models, limits)?;
     let textures = files.textures.as_ref().map(|path| library(files, path, limits)).transpose()?;
     let mut furnisher = Furnisher::new(&house, models, textures, limits, files.blenderproc_compat, log);
-    let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.room(room)).collect();
+    let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.add_room(room)).collect();
     let Furnished { scene, placed, mut log, libraries } = furnisher.finish();
 
     // The designers' cameras, and the list of all files.
@@ -68,7 +68,7 @@ fn read_json(path: &Path, limits: &Limits, log: &mut Log) -> Result<(House, Sour
 }
 
 fn mirrored(camera: DesignerCamera, compat: bool) -> DesignerCamera {
-    let place = |point: DVec3| world_from_layout(compat).transform_point3(point);
+    let place = |point: DVec3| world_from_house(compat).transform_point3(point);
     DesignerCamera { position: place(camera.position), target: place(camera.target), ..camera }
 }
 

@@ -9,7 +9,7 @@ use mateval_scene::{Role, Severity, TriangleMesh};
 use super::appearance::{Appearances, MISSING};
 use super::coincident;
 use super::furnished_house::{PlacedModel, PlacedSurface};
-use super::house::{Child, ChildKind, House, world_from_layout};
+use super::house::{Child, ChildKind, House, world_from_house};
 use super::limits::Limits;
 use super::model::{self, Library, Model, is_folder_name};
 use super::model_info::ModelInfo;
@@ -90,22 +90,22 @@ impl<'a> Furnisher<'a> {
     }
 
     /// Places all children of a room. Returns how many of them are valid pieces of furniture.
-    pub(super) fn room(&mut self, room: usize) -> usize {
-        self.architecture(room);
+    pub(super) fn add_room(&mut self, room: usize) -> usize {
+        self.add_architecture(room);
         let mut wanted = 0;
         for child in &self.house.rooms[room].children {
             if let ChildKind::Furniture(record) = child.what
                 && self.house.furniture[record].valid
             {
                 wanted += 1;
-                self.piece(room, child, record);
+                self.add_piece(room, child, record);
             }
         }
         wanted
     }
 
     /// Adds one surface for each mesh type and material of the room; the meshes merged into it are its parts.
-    fn architecture(&mut self, room: usize) {
+    fn add_architecture(&mut self, room: usize) {
         // The meshes in world space, grouped.
         let house = self.house;
         let mut groups: Vec<((&str, Option<usize>), Merged)> = Vec::new();
@@ -115,7 +115,7 @@ impl<'a> Furnisher<'a> {
             if !self.fits_limit(&source.mesh, &source.place) {
                 continue;
             }
-            let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * child.placement.matrix();
+            let matrix = world_from_house(self.compat) * house.rooms[room].house_from_room * child.placement.matrix();
             let (mesh, repairs) = to_world(source.mesh.clone(), matrix, false);
             if self.is_too_far(&repairs, &child.place) {
                 continue;
@@ -129,7 +129,8 @@ impl<'a> Furnisher<'a> {
         }
         // A surface for each group.
         for ((kind, material), merged) in groups {
-            let (index, color) = self.appearances.of_layout(house, material, self.textures.as_mut(), &mut self.log);
+            let (index, color) =
+                self.appearances.of_architecture(house, material, self.textures.as_mut(), &mut self.log);
             let parts = parts_of_labels(&merged.mesh, &merged.mesh_of_triangle);
             let role = Role::Architecture { kind: kind.to_owned() };
             let origin = InstanceOrigin { role, part_of_triangle: Some(parts), ..InstanceOrigin::default() };
@@ -159,7 +160,7 @@ impl<'a> Furnisher<'a> {
     }
 
     /// Adds a piece of furniture, unless it has no model or an impossible placement.
-    fn piece(&mut self, room: usize, child: &Child, record: usize) {
+    fn add_piece(&mut self, room: usize, child: &Child, record: usize) {
         // Its mesh in world space.
         let house = self.house;
         let record = &house.furniture[record];
@@ -172,7 +173,7 @@ impl<'a> Furnisher<'a> {
             return;
         }
         let own = if self.compat { child.placement.mirrored_matrix() } else { child.placement.matrix() };
-        let matrix = world_from_layout(self.compat) * house.rooms[room].world_from_room * own;
+        let matrix = world_from_house(self.compat) * house.rooms[room].house_from_room * own;
         let (mesh, repairs) = to_world(model.mesh.clone(), matrix, false);
         if self.is_too_far(&repairs, &child.place) {
             return;

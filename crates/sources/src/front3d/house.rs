@@ -53,7 +53,7 @@ pub struct FurnitureRecord {
     pub place: String,
 }
 
-/// A mesh of the architecture, in the house's space.
+/// A mesh of the architecture, in the space of the child that refers to it.
 #[derive(Clone, Debug)]
 pub struct HouseMesh {
     /// The uid by which children refer to it.
@@ -90,8 +90,8 @@ pub struct Room {
     pub id: String,
     /// Its type, as in `LivingDiningRoom`.
     pub kind: String,
-    /// The product of the scene's and the room's transforms, which is the identity in every known file.
-    pub world_from_room: DMat4,
+    /// The product of the scene's and the room's transforms; the identity in every known file.
+    pub house_from_room: DMat4,
     /// Its meshes and pieces of furniture.
     pub children: Vec<Child>,
     /// JSON pointer to the record.
@@ -120,7 +120,8 @@ pub enum ChildKind {
     Mesh(usize),
 }
 
-/// Translation, rotation and scale: `world = T * R * S * v`.
+/// Translation, rotation and scale of a child in its room, of a room in the scene, or of the scene in the house: a point v
+/// moves to `T * R * S * v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Metres.
@@ -147,8 +148,9 @@ impl Placement {
     }
 }
 
-/// BlenderProc's world in MatEval's axes: BlenderProc swaps y and z instead of rotating, which mirrors the third axis.
-pub(super) fn world_from_layout(compat: bool) -> DMat4 {
+/// From the house's space to world space: the identity, or with `compat` the mirror that BlenderProc applies, since it swaps y
+/// and z instead of rotating.
+pub(super) fn world_from_house(compat: bool) -> DMat4 {
     DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
 

@@ -169,7 +169,7 @@ fn rooms(
         return Err(HouseError::TooManyRooms { most: limits.rooms, found: found.len() });
     }
     // The records that children may refer to.
-    let world_from_scene = placement(scene, "/scene", log).matrix();
+    let house_from_scene = placement(scene, "/scene", log).matrix();
     let records = Records {
         furniture: furniture.iter().enumerate().map(|(k, record)| (record.uid.as_str(), k)).collect(),
         meshes: meshes.iter().enumerate().map(|(k, mesh)| (mesh.uid.as_str(), k)).collect(),
@@ -185,7 +185,7 @@ fn rooms(
             return Err(HouseError::TooManyChildren { place, most: limits.children });
         }
         let id = room_id(record, at, &rooms, &place, log);
-        rooms.push(room(record, id, place, world_from_scene, &records, log));
+        rooms.push(room(record, id, place, house_from_scene, &records, log));
     }
     Ok(rooms)
 }
@@ -216,7 +216,7 @@ fn room(
     record: &Value,
     id: String,
     place: String,
-    world_from_scene: DMat4,
+    house_from_scene: DMat4,
     records: &Records<'_>,
     log: &mut Log,
 ) -> Room {
@@ -231,7 +231,7 @@ fn room(
         .collect();
     Room {
         kind: text(record, "type").unwrap_or("OtherRoom").to_owned(),
-        world_from_room: world_from_scene * placement(record, &place, log).matrix(),
+        house_from_room: house_from_scene * placement(record, &place, log).matrix(),
         id,
         children,
         place,

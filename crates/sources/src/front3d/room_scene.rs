@@ -24,7 +24,7 @@ const LONGEST_NAME: usize = 40;
 pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[Camera]) -> SourceScene {
     let kept = kept(house, room, &seen(world, views));
     let names = names(house, room, &kept);
-    let mut scene = only(&house.scene, &kept);
+    let mut scene = scene_of(&house.scene, &kept);
     for (surface, name) in scene.surfaces.iter_mut().zip(&names) {
         surface.name.clone_from(name);
     }
@@ -96,7 +96,7 @@ fn names(house: &FurnishedHouse, room: usize, kept: &[usize]) -> Vec<String> {
 }
 
 /// A scene of the kept surfaces with the materials and textures that they use.
-fn only(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
+fn scene_of(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
     let mut part = ReferenceScene::default();
     let (mut materials, mut textures) = (BTreeMap::new(), BTreeMap::new());
     for &surface in kept {

@@ -166,7 +166,7 @@ fn transforms_of_scene_and_room_are_applied() {
     let folder = tempfile::tempdir().unwrap();
     let house = furnish(&lone_house(folder.path(), json.to_string().as_bytes()), &Limits::default()).unwrap();
     assert_sound(&house);
-    let matrix = house.house.rooms[0].world_from_room;
+    let matrix = house.house.rooms[0].house_from_room;
     assert!((matrix.transform_point3(DVec3::X * 5.0) - DVec3::new(10.0, 6.0, -10.0)).length() < 1e-9);
     let [low, high] = bounds(&house.scene.surfaces[0].mesh);
     // x of 1 to 5 becomes z of -2 to -10, z of 0 to 4 becomes x of 10 to 18.
