@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use mateval_image::{LinearRgb, Picture};
-use mateval_prep::blender::{BlenderLimits, BlenderProgram, JobPlan, JobView, News, Workplace, tail};
+use mateval_prep::blender::{BlenderEvent, BlenderLimits, BlenderProgram, JobFolder, JobPlan, JobView, tail};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, SceneId, ViewId};
 
@@ -52,17 +52,17 @@ fn pictures(shot: &Shot) -> Vec<Picture<LinearRgb>> {
         max_bounces: BOUNCES,
         threads: 0,
     };
-    let place = Workplace::prepare(folder.path(), &plan).unwrap();
+    let job = JobFolder::prepare(folder.path(), &plan).unwrap();
     let hour = Duration::from_secs(3600);
     let limits = BlenderLimits { time: hour, silence: hour, memory_bytes: 8 << 30 };
     let mut pictures = Vec::new();
-    let ended = place.run(&program(), &limits, &mut |news| {
-        if let News::View(_, _, view) = news {
+    let ended = job.run(&program(), &limits, &mut |event| {
+        if let BlenderEvent::View(_, _, view) = event {
             pictures.extend(view.halves.map(|half| half.rgb));
         }
         Ok(())
     });
-    assert_eq!(pictures.len(), SEEDS as usize, "{}: {ended:?}\n{}", shot.name, tail(&place.log(), 4000));
+    assert_eq!(pictures.len(), SEEDS as usize, "{}: {ended:?}\n{}", shot.name, tail(&job.log(), 4000));
     pictures
 }
 

@@ -17,9 +17,9 @@ pub use job::{BlenderJob, BlenderResult, JobPlan, JobView};
 pub use process::{BlenderLimits, BlenderProgram, Ended, tail};
 pub use view_files::{BlenderView, LightPictures};
 
-/// The folder of a job that is ready to run.
+/// A folder with a job that is ready to run.
 #[derive(Debug)]
-pub struct Workplace {
+pub struct JobFolder {
     folder: PathBuf,
     script: PathBuf,
     /// Number of light groups of the scene.
@@ -27,14 +27,14 @@ pub struct Workplace {
 }
 
 /// An event of a running Blender.
-pub enum News<'a> {
+pub enum BlenderEvent<'a> {
     /// Blender printed a line.
     Line(&'a str),
     /// The pictures of a view are complete.
     View(&'a job::ResultView, &'a BlenderResult, Box<BlenderView>),
 }
 
-impl Workplace {
+impl JobFolder {
     /// Writes the job into the folder, which is created if it does not exist.
     pub fn prepare(folder: &Path, plan: &JobPlan<'_>) -> Result<Self, PrepError> {
         std::fs::create_dir_all(folder).map_err(PrepError::io("make", folder))?;
@@ -59,13 +59,13 @@ impl Workplace {
         words.map(|word| format!("'{}'", word.to_string_lossy())).collect::<Vec<_>>().join(" ")
     }
 
-    /// Runs Blender until it ends, and calls `hear` for every line that it prints and for each view as soon as its pictures
-    /// are complete.
+    /// Runs Blender until it ends, and calls `on_event` for every line that it prints and for each view as soon as its
+    /// pictures are complete.
     pub fn run(
         &self,
         program: &BlenderProgram,
         limits: &BlenderLimits,
-        hear: &mut dyn FnMut(News<'_>) -> Result<(), PrepError>,
+        on_event: &mut dyn FnMut(BlenderEvent<'_>) -> Result<(), PrepError>,
     ) -> Result<Ended, PrepError> {
         let result = self.folder.join("result.json");
         match std::fs::remove_file(&result) {
@@ -74,15 +74,15 @@ impl Workplace {
             }
             _ => {}
         }
-        let mut heard = 0;
+        let mut reported = 0;
         process::run(program.command(&self.script, &self.job()), &self.log(), limits, &mut |line| match line {
-            Some(line) => hear(News::Line(line)),
+            Some(line) => on_event(BlenderEvent::Line(line)),
             None => {
                 let Some(result) = self.result()? else { return Ok(()) };
-                for view in result.views.iter().skip(heard) {
+                for view in result.views.iter().skip(reported) {
                     let pictures = view_files::read(&self.folder.join(view.id.as_str()), self.groups)?;
-                    hear(News::View(view, &result, Box::new(pictures)))?;
-                    heard += 1;
+                    on_event(BlenderEvent::View(view, &result, Box::new(pictures)))?;
+                    reported += 1;
                 }
                 Ok(())
             }

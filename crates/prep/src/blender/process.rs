@@ -81,13 +81,13 @@ impl BlenderProgram {
     }
 }
 
-/// Runs the command until it ends or exceeds a limit. Its output goes to the file `log`, and line by line to `hear`, which is
-/// also called with `None` after every look at the process.
+/// Runs the command until it ends or exceeds a limit. Its output goes to the file `log`. `on_line` is called with each
+/// line of it, and with `None` after every look at the process.
 pub fn run(
     mut command: Command,
     log: &Path,
     limits: &BlenderLimits,
-    hear: &mut dyn FnMut(Option<&str>) -> Result<(), PrepError>,
+    on_line: &mut dyn FnMut(Option<&str>) -> Result<(), PrepError>,
 ) -> Result<Ended, PrepError> {
     let io = |action| PrepError::io(action, log);
     let file = File::create(log).map_err(io("write"))?;
@@ -102,9 +102,9 @@ pub fn run(
         let ended = child.0.try_wait().map_err(io("wait for the process of"))?;
         for line in lines.read_new().map_err(io("read"))? {
             last_line = Instant::now();
-            hear(Some(&line))?;
+            on_line(Some(&line))?;
         }
-        hear(None)?;
+        on_line(None)?;
         if let Some(status) = ended {
             return Ok(Ended::Itself(status));
         }

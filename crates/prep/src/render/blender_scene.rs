@@ -1,4 +1,7 @@
 //! Renders with Blender: one process per scene, which is run again where it fails and resumes where it ended.
+//!
+//! Blender renders the reference scene, as the built-in tracer does: its geometry with the source's uv, and the source's
+//! textures. `instances.glb` and `parts.glb` serve only to find the part of each triangle; baked textures are not used.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -10,12 +13,12 @@ use mateval_scene::layout::SceneFolder;
 use mateval_scene::{Finding, Progress, SceneId, Severity, json, reference_io};
 
 use super::noise::RenderNoise;
-use super::order::{MAX_BOUNCES, Order, seed, seed_texts};
 use super::render_file::RenderFile;
+use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
 use super::report::RenderReport;
 use super::store::{self, ViewRender};
 use crate::blender::{
-    BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobPlan, JobView, News, Workplace, tail,
+    BlenderEvent, BlenderLimits, BlenderProgram, BlenderResult, BlenderView, JobFolder, JobPlan, JobView, tail,
 };
 use crate::error::PrepError;
 use crate::scene_meshes;
@@ -56,7 +59,7 @@ impl BlenderOptions {
 /// Renders the scenes, `options.jobs` at a time. A scene that fails becomes a failure in the report and does not stop the
 /// others.
 pub(super) fn render_scenes(
-    order: &Order<'_>,
+    run: &RenderRun<'_>,
     options: &BlenderOptions,
     scenes: &[&SceneId],
     progress: Progress<'_>,
@@ -67,7 +70,7 @@ pub(super) fn render_scenes(
         // A panic of another thread leaves the queue and the list in a valid state.
         let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
         while let Some(at) = next() {
-            let scene = BlenderScene { order, options, id: scenes[at], progress };
+            let scene = BlenderScene { run, options, id: scenes[at], progress };
             done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((at, scene.render()));
         }
     };
@@ -82,13 +85,13 @@ pub(super) fn render_scenes(
     for (_, report) in done {
         all.add(report?);
     }
-    remove_if_empty(order.root.join(WORK));
+    remove_if_empty(run.root.join(WORK));
     Ok(all)
 }
 
 /// A scene that Blender is to render.
 struct BlenderScene<'a> {
-    order: &'a Order<'a>,
+    run: &'a RenderRun<'a>,
     options: &'a BlenderOptions,
     id: &'a SceneId,
     progress: Progress<'a>,
@@ -96,7 +99,7 @@ struct BlenderScene<'a> {
 
 impl BlenderScene<'_> {
     fn render(&self) -> Result<RenderReport, PrepError> {
-        let folder = SceneFolder::of(self.order.root, self.id);
+        let folder = SceneFolder::of(self.run.root, self.id);
         let scene: SceneFile = json::read(&folder.scene_file())?;
         let mut report = RenderReport::default();
         let mut views = self.views_to_render(&folder, &scene);
@@ -104,7 +107,7 @@ impl BlenderScene<'_> {
         if views.is_empty() {
             return Ok(report);
         }
-        let work = self.order.root.join(WORK).join(self.id.as_str());
+        let work = self.run.root.join(WORK).join(self.id.as_str());
         if work.exists() {
             std::fs::remove_dir_all(&work).map_err(PrepError::io("remove", &work))?;
         }
@@ -117,13 +120,13 @@ impl BlenderScene<'_> {
                 reference: &reference,
                 parts: &parts,
                 views: views.clone(),
-                samples_each_half: self.order.samples,
+                samples_each_half: self.run.samples,
                 max_bounces: MAX_BOUNCES,
                 threads: self.threads(),
             };
-            let place = Workplace::prepare(&work, &plan)?;
+            let job = JobFolder::prepare(&work, &plan)?;
             let before = views.len();
-            failure = self.attempt(&place, &folder, &scene, &mut views).err();
+            failure = self.attempt(&job, &folder, &scene, &mut views).err();
             report.rendered += before - views.len();
             let Some(failure) = &failure else { break };
             report.remarks.push(format!("scene '{}': attempt {attempt} failed: {}", self.id, failure.what));
@@ -136,7 +139,7 @@ impl BlenderScene<'_> {
     }
 
     fn views_to_render(&self, folder: &SceneFolder, scene: &SceneFile) -> Vec<JobView> {
-        let is_missing = |view: &&View| !self.order.is_done(folder, view, &seed_texts(self.seeds(view)));
+        let is_missing = |view: &&View| !self.run.is_done(folder, view, &seed_texts(self.seeds(view)));
         let job_view = |view: &View| JobView {
             id: view.id.clone(),
             camera: view.camera,
@@ -160,18 +163,18 @@ impl BlenderScene<'_> {
     /// Runs Blender once and removes the views that it finished from `views`.
     fn attempt(
         &self,
-        place: &Workplace,
+        job: &JobFolder,
         folder: &SceneFolder,
         scene: &SceneFile,
         views: &mut Vec<JobView>,
     ) -> Result<(), Failure> {
         let mut step = format!("{} start", self.id);
-        let ended = place.run(&self.options.program, &self.options.limits, &mut |news| match news {
-            News::Line(line) => {
+        let ended = job.run(&self.options.program, &self.options.limits, &mut |event| match event {
+            BlenderEvent::Line(line) => {
                 self.show_progress(line, &mut step);
                 Ok(())
             }
-            News::View(view, result, pictures) => {
+            BlenderEvent::View(view, result, pictures) => {
                 let Some(at) = views.iter().position(|wanted| wanted.id == view.id) else { return Ok(()) };
                 self.keep(folder, scene, &views[at], result, &pictures)?;
                 views.remove(at);
@@ -180,14 +183,14 @@ impl BlenderScene<'_> {
         });
         let failed = |what: String| Failure {
             what,
-            log: tail(&place.log(), TAIL_BYTES),
-            repeat: place.command_text(&self.options.program),
+            log: tail(&job.log(), TAIL_BYTES),
+            repeat: job.command_text(&self.options.program),
         };
         match ended {
             Err(error) => Err(failed(error.to_string())),
             Ok(_) if views.is_empty() => Ok(()),
             Ok(ended) => {
-                let reported = place.result().ok().flatten().and_then(|result| result.error);
+                let reported = job.result().ok().flatten().and_then(|result| result.error);
                 Err(failed(reported.map_or(ended.to_string(), |error| format!("{ended}: {error}"))))
             }
         }
@@ -225,9 +228,9 @@ impl BlenderScene<'_> {
             });
         }
         let file = RenderFile {
-            renderer: self.order.renderer.clone(),
+            renderer: self.run.renderer.clone(),
             renderer_version: Some(result.blender.clone()),
-            samples_each_half: self.order.samples,
+            samples_each_half: self.run.samples,
             seeds: seed_texts(view.seeds.map(u64::from)),
             max_bounces: MAX_BOUNCES,
             capped_throughput: None,
@@ -236,7 +239,7 @@ impl BlenderScene<'_> {
             approximations: result.approximations.clone(),
         };
         let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };
-        store::write(&folder.render(&self.order.renderer, &view.id), &render, scene.exposure, &file)
+        store::write(&folder.render(&self.run.renderer, &view.id), &render, scene.exposure, &file)
     }
 
     fn finding(&self, failure: Failure) -> Finding {

@@ -9,8 +9,8 @@ use mateval_scene::{Progress, SceneId, json, reference_io};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
 use super::noise::RenderNoise;
-use super::order::{MAX_BOUNCES, Order, seed, seed_texts};
 use super::render_file::RenderFile;
+use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
 use super::report::RenderReport;
 use super::store::{self, ViewRender};
 use crate::blender::LightPictures;
@@ -18,29 +18,29 @@ use crate::error::PrepError;
 
 /// Renders the views that no earlier run has rendered, scene by scene.
 pub(super) fn render_scenes(
-    order: &Order<'_>,
+    run: &RenderRun<'_>,
     scenes: &[&SceneId],
     progress: Progress<'_>,
 ) -> Result<RenderReport, PrepError> {
     let mut report = RenderReport::default();
     for id in scenes {
-        render_scene(order, id, progress, &mut report)?;
+        render_scene(run, id, progress, &mut report)?;
     }
     Ok(report)
 }
 
 fn render_scene(
-    order: &Order<'_>,
+    run: &RenderRun<'_>,
     id: &SceneId,
     progress: Progress<'_>,
     report: &mut RenderReport,
 ) -> Result<(), PrepError> {
-    let folder = SceneFolder::of(order.root, id);
+    let folder = SceneFolder::of(run.root, id);
     let scene: SceneFile = json::read(&folder.scene_file())?;
     let mut world: Option<World> = None;
     for view in &scene.views {
         let seeds = [0, 1].map(|half| seed(id, view, half));
-        if order.is_done(&folder, view, &seed_texts(seeds)) {
+        if run.is_done(&folder, view, &seed_texts(seeds)) {
             report.kept += 1;
             continue;
         }
@@ -50,16 +50,16 @@ fn render_scene(
         };
         let step = format!("{id} {}", view.id);
         let shown = |done: usize, all: usize| progress(&step, done, all);
-        let settings = RenderSettings { samples: order.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
+        let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
         let groups = LightGroups::apart(world.emitters().groups());
         let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
         let [a, b]: [LightPictures; 2] =
             std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
         report.remarks.extend(remark(&step, &render.stats));
         let file = RenderFile {
-            renderer: order.renderer.clone(),
+            renderer: run.renderer.clone(),
             renderer_version: None,
-            samples_each_half: order.samples,
+            samples_each_half: run.samples,
             seeds: seed_texts(seeds),
             max_bounces: MAX_BOUNCES,
             capped_throughput: Some(render.stats.capped_throughput),
@@ -72,7 +72,7 @@ fn render_scene(
             groups: a.groups.iter().zip(&b.groups).map(|(a, b)| mean(a, b)).collect(),
         };
         let render = ViewRender { halves: [&a, &b], shown: &shown, passes: None };
-        store::write(&folder.render(&order.renderer, &view.id), &render, scene.exposure, &file)?;
+        store::write(&folder.render(&run.renderer, &view.id), &render, scene.exposure, &file)?;
         report.rendered += 1;
     }
     Ok(())

@@ -10,8 +10,8 @@ mod blender_scene;
 mod builtin;
 mod kind;
 mod noise;
-mod order;
 mod render_file;
+mod render_run;
 mod report;
 mod store;
 
@@ -29,9 +29,9 @@ use crate::recipe;
 pub use blender_scene::BlenderOptions;
 pub use kind::{RendererKind, UnknownRenderer};
 pub use noise::RenderNoise;
-pub use order::MAX_BOUNCES;
-use order::Order;
 pub use render_file::{RENDER_FILE, RenderFile};
+pub use render_run::MAX_BOUNCES;
+use render_run::RenderRun;
 pub use report::RenderReport;
 
 /// What to render.
@@ -68,13 +68,13 @@ impl Renderer {
 
     fn render_scenes(
         &self,
-        order: &Order<'_>,
+        run: &RenderRun<'_>,
         scenes: &[&SceneId],
         progress: Progress<'_>,
     ) -> Result<RenderReport, PrepError> {
         match self {
-            Self::Builtin => builtin::render_scenes(order, scenes, progress),
-            Self::Blender(options) => blender_scene::render_scenes(order, options, scenes, progress),
+            Self::Builtin => builtin::render_scenes(run, scenes, progress),
+            Self::Blender(options) => blender_scene::render_scenes(run, options, scenes, progress),
         }
     }
 }
@@ -95,8 +95,8 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
         Some(samples) => samples,
         None => recipe::read(&root.join(RECIPE))?.0.samples,
     };
-    let order = Order { root, renderer: renderer.clone(), samples, force: options.force };
-    let mut report = options.renderer.render_scenes(&order, &wanted, progress)?;
+    let run = RenderRun { root, renderer: renderer.clone(), samples, force: options.force };
+    let mut report = options.renderer.render_scenes(&run, &wanted, progress)?;
     dataset.scored_renderer = scored_renderer(root, &dataset);
     if dataset.scored_renderer.is_none() {
         report.remarks.push("some scenes have no pictures yet, so the dataset names no scored renderer".to_owned());

@@ -1,4 +1,4 @@
-//! What every view of a run is rendered with, and whether an earlier run has already done it.
+//! The settings that all views of a run share, and whether an earlier run rendered a view with the same ones.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use super::render_file::{RENDER_FILE, RenderFile};
 pub const MAX_BOUNCES: u32 = 16;
 
 /// The settings that all views of a run share.
-pub(super) struct Order<'a> {
+pub(super) struct RenderRun<'a> {
     /// The dataset's folder.
     pub(super) root: &'a Path,
     pub(super) renderer: RendererId,
@@ -23,7 +23,7 @@ pub(super) struct Order<'a> {
     pub(super) force: bool,
 }
 
-impl Order<'_> {
+impl RenderRun<'_> {
     /// Whether the view's pictures exist and were made with these settings.
     pub(super) fn is_done(&self, folder: &SceneFolder, view: &View, seeds: &[String; 2]) -> bool {
         let path = folder.render(&self.renderer, &view.id).join(RENDER_FILE);
