@@ -1,5 +1,5 @@
-//! Aligned pictures: one scale a channel, which distinguishes a method that found the right colours at the wrong brightness
-//! from one that found the wrong colours.
+//! Aligned pictures: one scale a channel, which distinguishes a method that found the right colours at the wrong
+//! brightness from one that found the wrong colours.
 
 use mateval_image::{LinearRgb, Mask, Picture};
 

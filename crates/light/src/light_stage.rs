@@ -114,8 +114,8 @@ impl LitRoom<'_> {
         (tilt < most * most).then(|| f64::from(hit.position.y))
     }
 
-    /// The walls: for each upright plane, the rectangle around the architecture's triangles in it, if it is large enough. Sorted
-    /// by their planes.
+    /// The walls: for each upright plane, the rectangle around the architecture's triangles in it, if it is large
+    /// enough. Sorted by their planes.
     fn walls(&self, architecture: &[usize]) -> Vec<Rectangle> {
         let mut planes: BTreeMap<[i64; 3], Vec<DVec3>> = BTreeMap::new();
         for &surface in architecture {
@@ -132,8 +132,8 @@ impl LitRoom<'_> {
         rectangles.filter(|wall| wall.sides.iter().all(|side| side.length() >= least)).collect()
     }
 
-    /// The plane of a triangle, as the horizontal coordinates of its normal and its distance from the centre, rounded so that
-    /// all triangles of a wall agree. None where the triangle is not upright.
+    /// The plane of a triangle, as the horizontal coordinates of its normal and its distance from the centre, rounded
+    /// so that all triangles of a wall agree. None where the triangle is not upright.
     fn upright_plane(&self, corners: [DVec3; 3]) -> Option<[i64; 3]> {
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
         if normal.y.abs() > self.rules.upright_sine {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Where the lights of a stage are; lengths in metres. The values are MatEval's own, since PSDR-Room's are not published.
+/// Where the lights of a stage are; lengths in metres. PSDR-Room's values are not published; these are MatEval's own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StageRules {

@@ -350,8 +350,8 @@ mod tests {
         assert_eq!(areas(&map(&[sheet(4.0, 8.0)], 0, 64)), [0.0, 64.0]);
     }
 
-    /// Sheets a tenth of a millimetre apart, as `prep` puts them, are distinguished even where they are seen at a grazing
-    /// angle 10 m away; one sheet does not hide itself.
+    /// Sheets a tenth of a millimetre apart, as `prep` puts them, are distinguished even where they are seen at a
+    /// grazing angle 10 m away; one sheet does not hide itself.
     #[test]
     fn sheets_a_hair_apart_are_distinguished() {
         let floor = |y: f32| {
@@ -367,7 +367,8 @@ mod tests {
         assert_eq!(areas(&map(&[lower.clone(), lower], 0, 64)), [1.0, 0.0]);
     }
 
-    /// A wall behind a sheet whose left half is cut out is seen through the cut. Of the sheet itself only the right half counts.
+    /// A wall behind a sheet whose left half is cut out is seen through the cut. Of the sheet itself only the right
+    /// half counts.
     #[test]
     fn cut_out_texels_hide_nothing_and_count_nowhere() {
         let meshes = [sheet(-2.0, 2.0), sheet(-4.0, 8.0)];

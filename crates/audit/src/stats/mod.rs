@@ -1,7 +1,7 @@
 //! Counts what a dataset contains: the numbers of the paper's Table I, and those behind them.
 //!
-//! In: an open dataset, but only its `dataset.json` and the `scene.json` of each scene. Out: [`StatsFile`], which [`text`]
-//! prints as tables and [`picture`] draws as a chart.
+//! In: an open dataset, but only its `dataset.json` and the `scene.json` of each scene. Out: [`StatsFile`], which
+//! [`text`] prints as tables and [`picture`] draws as a chart.
 
 pub mod picture;
 pub mod text;

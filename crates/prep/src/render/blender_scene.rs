@@ -1,7 +1,8 @@
 //! Renders with Blender: one process per scene, which is run again where it fails and resumes where it ended.
 //!
-//! Blender renders the reference scene, as the built-in tracer does: its geometry with the source's uv, and the source's
-//! textures. `instances.glb` and `parts.glb` serve only to find the part of each triangle; baked textures are not used.
+//! Blender renders the reference scene, as the built-in tracer does: its geometry with the source's uv, and the
+//! source's textures. `instances.glb` and `parts.glb` serve only to find the part of each triangle; baked textures are
+//! not used.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;

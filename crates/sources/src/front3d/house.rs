@@ -120,8 +120,8 @@ pub enum ChildKind {
     Mesh(usize),
 }
 
-/// Translation, rotation and scale of a child in its room, of a room in the scene, or of the scene in the house: a point v
-/// moves to `T * R * S * v`.
+/// Translation, rotation and scale of a child in its room, of a room in the scene, or of the scene in the house: a
+/// point v moves to `T * R * S * v`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Metres.
@@ -148,8 +148,8 @@ impl Placement {
     }
 }
 
-/// From the house's space to world space: the identity, or with `compat` the mirror that BlenderProc applies, since it swaps y
-/// and z instead of rotating.
+/// From the house's space to world space: the identity, or with `compat` the mirror that BlenderProc applies, since it
+/// swaps y and z instead of rotating.
 pub(super) fn world_from_house(compat: bool) -> DMat4 {
     DMat4::from_scale(DVec3::new(1.0, 1.0, if compat { -1.0 } else { 1.0 }))
 }
