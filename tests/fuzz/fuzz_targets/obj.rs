@@ -6,7 +6,7 @@ use mateval_scene::obj::{self, Materials, ObjLimits};
 
 fuzz_target!(|bytes: &[u8]| {
     let limits = ObjLimits { triangles: 100_000, corners: 300_000 };
-    if let Ok(found) = obj::read(bytes, limits, Materials::Told) {
+    if let Ok(found) = obj::read(bytes, limits, Materials::Split) {
         let vertices = found.mesh.positions.len();
         assert!(found.mesh.triangles.iter().flatten().all(|vertex| (*vertex as usize) < vertices));
     }
