@@ -17,7 +17,7 @@ word_enum! {
     PictureKind, a "kind of picture":
     /// Pictures of the base colour.
     Albedo = "albedo",
-    /// The same times the scale of each channel that fits the truth best.
+    /// Pictures of the base colour, each channel multiplied by the scale that fits the truth best.
     AlbedoAligned = "albedo_aligned",
     /// Renders under the scene's own lights.
     RgbTrue = "rgb_true",
@@ -69,7 +69,7 @@ word_enum! {
 }
 
 impl PictureKind {
-    /// As people are shown it.
+    /// The title for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Albedo => "Albedo",
@@ -85,14 +85,14 @@ impl PictureKind {
         }
     }
 
-    /// Whether it is rendered light, whose errors are freed of noise.
+    /// Whether it is rendered light, whose errors are estimated without render noise.
     pub const fn is_light(self) -> bool {
         matches!(self, Self::RgbTrue | Self::RgbFitted | Self::RgbRelit)
     }
 }
 
 impl Surfaces {
-    /// As people are shown it.
+    /// The title for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::All => "All surfaces",
@@ -100,7 +100,7 @@ impl Surfaces {
         }
     }
 
-    /// What the name of a picture ends with.
+    /// The end of a picture's name.
     const fn suffix(self) -> &'static str {
         match self {
             Self::All => "",
@@ -110,7 +110,7 @@ impl Surfaces {
 }
 
 impl Views {
-    /// As people are shown it.
+    /// The title for display.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Input => "Input view",
@@ -174,7 +174,7 @@ impl PictureName {
         Self { kind, surfaces: Surfaces::All }
     }
 
-    /// The words that it is printed as, one after the other.
+    /// The two words whose concatenation is the printed name.
     const fn parts(self) -> [&'static str; 2] {
         [self.kind.word(), self.surfaces.suffix()]
     }

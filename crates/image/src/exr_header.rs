@@ -64,7 +64,7 @@ pub enum ExrHeaderError {
     #[error(transparent)]
     Unsound(#[from] exr::error::Error),
     /// Nothing follows the file's version.
-    #[error("it has no part")]
+    #[error("it has no parts")]
     NoPart,
 }
 

@@ -32,7 +32,7 @@ pub enum ReportError {
         /// The format that this version reads.
         expected: &'static str,
     },
-    /// A folder that is no leaderboard would be replaced: choose another one.
+    /// A folder that is not a leaderboard would be replaced: choose another one.
     #[error("cannot write the leaderboard: '{}' exists and is not a leaderboard; choose another --out", path.display())]
     NotALeaderboard {
         /// The folder.
@@ -53,8 +53,8 @@ pub enum ReportError {
         /// The folder of the dataset.
         dataset: PathBuf,
     },
-    /// The track `relit` has several pictures a view, of which none can be chosen: show another track.
-    #[error("cannot show track 'relit', which has several lights a view; show 'true' or 'fitted'")]
+    /// The track `relit` has several pictures for each view, and none of them can be chosen: show another track.
+    #[error("cannot show track 'relit', which has several lightings for each view; show 'true' or 'fitted'")]
     RelitTrack,
     /// More houses than the bootstrap can draw from: rank fewer scenes.
     #[error("cannot rank scenes of {houses} houses; at most {most} are supported")]

@@ -93,11 +93,11 @@ pub enum GltfError {
         /// The accessor.
         accessor: usize,
     },
-    /// An accessor of a kind that is not read.
-    #[error("sparse accessors are not read")]
+    /// An accessor of a kind that is not supported.
+    #[error("sparse accessors are not supported")]
     Sparse,
     /// A mesh of no primitive, or of several.
-    #[error("expected one primitive a mesh, found {found}")]
+    #[error("expected one primitive per mesh, found {found}")]
     NotOnePrimitive {
         /// How many it has.
         found: usize,

@@ -32,7 +32,7 @@ pub struct ObjError {
 pub enum ObjFault {
     /// It is too large; the rest of it is not read.
     #[error(
-        "more than {} triangles or {} corners, which is what is left of the scene's limit", .0.triangles, .0.corners
+        "more than {} triangles or {} corners, the rest of the scene's limit", .0.triangles, .0.corners
     )]
     TooLarge(ObjLimits),
     /// A face of one or two corners.
@@ -136,9 +136,9 @@ pub struct ObjMaterial {
 /// Whether groups are split where their material changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Materials {
-    /// They are not split, and no group names a material.
+    /// Groups are not split, and none of them names a material.
     Ignored,
-    /// They are split, so that each group has one material.
+    /// Groups are split, so that each has one material.
     Split,
 }
 

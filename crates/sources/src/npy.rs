@@ -17,7 +17,7 @@ const MAX_HEADER_DIGITS: usize = 16;
 #[derive(Debug, thiserror::Error)]
 pub enum NpyError {
     /// The bytes end within the prefix or the header.
-    #[error("expected a NumPy array, found {found} bytes, which end in its header")]
+    #[error("expected a NumPy array, found {found} bytes, which end within the header")]
     CutOff {
         /// The number of bytes.
         found: usize,

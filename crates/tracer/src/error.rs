@@ -58,7 +58,7 @@ pub enum SceneFault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceFault {
     /// It names a material that does not exist.
-    #[error("material {material}, expected one of {count}")]
+    #[error("material {material} does not exist; the scene has {count} materials")]
     MissingMaterial {
         /// The material named.
         material: usize,
@@ -76,7 +76,7 @@ pub enum SurfaceFault {
         limit: f32,
     },
     /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} names vertices {vertices:?}, expected below {count}")]
+    #[error("triangle {triangle} names vertices {vertices:?}, expected indices below {count}")]
     MissingVertex {
         /// The triangle.
         triangle: usize,
@@ -85,7 +85,7 @@ pub enum SurfaceFault {
         /// How many vertices the mesh has.
         count: usize,
     },
-    /// Normals or uvs are not one a vertex.
+    /// The number of normals or uvs differs from the number of vertices.
     #[error("{found} {attribute}, expected one for each of {expected} vertices")]
     AttributeCount {
         /// Which array: "normals" or "uvs".
@@ -115,7 +115,7 @@ pub enum MaterialFault {
     #[error("index of refraction {0}, expected a finite one above 0")]
     IndexOfRefraction(f32),
     /// It names a texture that does not exist.
-    #[error("texture {texture}, expected one of {count}")]
+    #[error("texture {texture} does not exist; the scene has {count} textures")]
     MissingTexture {
         /// The texture named.
         texture: usize,
@@ -134,7 +134,7 @@ pub enum LightFault {
     #[error("radiance {0:?}, expected finite values of at least 0")]
     Radiance([f32; 3]),
     /// It names a texture that does not exist.
-    #[error("texture {texture}, expected one of {count}")]
+    #[error("texture {texture} does not exist; the scene has {count} textures")]
     MissingTexture {
         /// The texture named.
         texture: usize,
@@ -142,7 +142,7 @@ pub enum LightFault {
         count: usize,
     },
     /// It names a surface that does not exist.
-    #[error("surface {surface}, expected one of {count}")]
+    #[error("surface {surface} does not exist; the scene has {count} surfaces")]
     MissingSurface {
         /// The surface named.
         surface: usize,
@@ -150,7 +150,7 @@ pub enum LightFault {
         count: usize,
     },
     /// One of its surfaces emits for another light already.
-    #[error("surface {0} emits twice, expected one light a surface")]
+    #[error("surface {0} emits twice, expected one light per surface")]
     SharedSurface(usize),
     /// The transform of its map's uv is not finite.
     #[error("the uv transform of its map is {0:?}, expected finite values")]
@@ -170,7 +170,7 @@ pub enum LightFault {
     #[error("rotation {0:?} of its environment map, expected finite values")]
     EnvironmentRotation([[f32; 3]; 3]),
     /// A light of a stage has no triangles.
-    #[error("a mesh without triangles, expected at least one")]
+    #[error("its mesh has no triangles, expected at least one")]
     NoTriangles,
 }
 
@@ -193,8 +193,8 @@ pub enum RequestFault {
         /// The fault.
         fault: SurfaceFault,
     },
-    /// Too few paths a pixel.
-    #[error("{0} samples a pixel, expected at least 1")]
+    /// Too few paths per pixel.
+    #[error("{0} samples per pixel, expected at least 1")]
     Samples(u32),
     /// The probability of surviving Russian roulette is out of range.
     #[error("roulette survival {0}, expected above 0 and at most 1")]
@@ -218,7 +218,7 @@ pub enum RequestFault {
         /// How many lights the scene has.
         expected: usize,
     },
-    /// Mixes of lights are not given once for each prediction.
+    /// The number of lists of light mixes differs from the number of predictions.
     #[error("light mixes for {found} predictions, expected {expected}")]
     MixedPredictions {
         /// For how many predictions there are mixes.
@@ -236,7 +236,7 @@ pub enum RequestFault {
         /// How many the first one has.
         expected: usize,
     },
-    /// A mix or a weighted sum does not have one weight a light or group of lights.
+    /// A mix or a weighted sum does not have one weight for each light or group of lights.
     #[error("{found} weights, expected {expected}: one for each light or group of lights")]
     WeightCount {
         /// How many weights there are.
@@ -274,7 +274,7 @@ pub enum RequestFault {
         /// How many triangles the surface has.
         expected: usize,
     },
-    /// An atlas with a coat has no uv, or one that is not finite or not one a vertex.
+    /// A surface has a coat, but its atlas does not have one finite uv for each vertex.
     #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for each vertex", surface.0)]
     AtlasUv {
         /// The surface.
@@ -302,10 +302,10 @@ pub enum RequestFault {
         /// How many surfaces the world has.
         expected: usize,
     },
-    /// Predictions are asked for that do not exist.
-    #[error("predictions {found:?}, expected within 0..{count}")]
+    /// The requested predictions do not exist.
+    #[error("predictions {found:?} were requested, expected a range within 0..{count}")]
     Predictions {
-        /// Those asked for.
+        /// The requested range.
         found: Range<usize>,
         /// How many there are.
         count: usize,
@@ -333,7 +333,7 @@ pub enum ExceededLimit {
     },
     /// The pictures of a single group of lights take more memory than is allowed.
     #[error(
-        "{halves} halves of {views} views take {group_bytes} bytes a group of lights, and {allowed} are allowed; \
+        "{halves} halves of {views} views take {group_bytes} bytes per group of lights, and {allowed} are allowed; \
          allow more, or make fewer views at a time"
     )]
     BasisBytes {

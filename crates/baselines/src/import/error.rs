@@ -149,7 +149,7 @@ pub enum Unsupported {
     #[error("strips and fans are not read; write triangles")]
     StripsAndFans,
     /// Sparse accessors.
-    #[error("sparse accessors are not read; write whole buffer views")]
+    #[error("sparse accessors are not supported; write whole buffer views")]
     SparseAccessor,
     /// A sampler that wraps u and v in different ways.
     #[error("a sampler that wraps u and v in different ways is not read")]

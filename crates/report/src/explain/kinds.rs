@@ -38,7 +38,7 @@ pub(super) struct Explained {
     left: [f64; 5],
     pub(super) scale: f64,
     pub(super) channel_scales: [f64; 3],
-    /// The views in which the model was moved.
+    /// The shifts of step 4, for the views in which one lowers the error.
     pub(super) shifts: Vec<shift::Shift>,
     pub(super) blur_sigma_pixels: Option<f64>,
 }

@@ -1,4 +1,4 @@
-//! Ranks as ranges: methods share ranks as long as their difference may be chance.
+//! Ranks as ranges: methods whose difference may be chance share ranks.
 
 use super::file::RankRange;
 

@@ -41,7 +41,7 @@ pub enum HouseError {
         found: usize,
     },
     /// The rooms have too many children.
-    #[error("{place}: expected at most {most} children in all rooms, found more")]
+    #[error("{place}: expected at most {most} children in all rooms together, found more")]
     TooManyChildren {
         /// JSON pointer to the room at which the limit is exceeded.
         place: String,
@@ -49,7 +49,7 @@ pub enum HouseError {
         most: usize,
     },
     /// The meshes have too many triangles.
-    #[error("{place}: expected at most {most} triangles in all meshes, found more")]
+    #[error("{place}: expected at most {most} triangles in all meshes together, found more")]
     TooManyTriangles {
         /// JSON pointer to the mesh at which the limit is exceeded.
         place: String,
