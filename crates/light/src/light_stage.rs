@@ -87,7 +87,7 @@ impl LitRoom<'_> {
         lights
     }
 
-    /// The smallest and largest coordinates that are visible from the centre in a horizontal plane.
+    /// The bounds of the places that horizontal rays from the centre hit first: smallest and largest coordinates.
     fn visible_extent(&self) -> [DVec3; 2] {
         let mut extent = [self.centre; 2];
         let directions = self.rules.extent_directions;

@@ -10,7 +10,7 @@ use mateval_scene::submission::Map;
 use crate::error::SubmissionError;
 use crate::hashed_file::{HashedFile, submission_sha256};
 use crate::map_file::MAX_MAP_BYTES;
-use crate::map_place::MapFolder;
+use crate::map_folder::MapFolder;
 use crate::submission_json::SubmissionJson;
 use crate::submitted_file::SubmittedFile;
 

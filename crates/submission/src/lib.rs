@@ -1,10 +1,11 @@
-//! Submissions from untrusted makers.
+//! Submissions, read as untrusted input.
 //!
 //! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered ([`prediction`]), the
 //! hash that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`]).
 //!
 //! Between: [`archive`] unpacks within limits, [`submitted_file`] reads a file once and hashes the same bytes,
-//! [`map_file`] decodes one map, [`texel_map`] says where an atlas's texels lie and which of them the input view shows.
+//! [`map_file`] decodes one map, [`texel_map`] finds where an atlas's texels lie on the surface and which of them the
+//! input view shows.
 
 pub mod archive;
 mod coverage;
@@ -14,7 +15,7 @@ pub mod hashed_file;
 pub mod hashed_submission;
 pub mod lint;
 pub mod map_file;
-mod map_place;
+mod map_folder;
 pub mod memory_budget;
 pub mod prediction;
 pub mod submission_json;

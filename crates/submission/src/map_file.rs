@@ -1,7 +1,7 @@
-//! One map of a submission, decoded as scoring and `eval lint` decode it: what the file's header says and the texels,
-//! or why it cannot be used.
+//! Decodes one map of a submission: its header and texels, or the fault that makes it unusable.
 //!
-//! The file is untrusted input: sizes are checked before memory is taken.
+//! Scoring and `eval lint` both decode maps here. The file is untrusted input: sizes are checked before memory is
+//! taken.
 
 use std::path::Path;
 
@@ -56,7 +56,7 @@ pub fn decode(file: SubmittedFile, map: Map) -> Result<MapFile, FileFault> {
     Ok(MapFile { header, texture, sha256 })
 }
 
-/// The header of a file whose texels are worth decoding.
+/// Reads the header. Fails if the file's kind, size or channels rule it out, before any texel is decoded.
 fn check_header(path: &Path, bytes: &[u8], map: Map) -> Result<MapHeader, FileFault> {
     check_kind(path, bytes)?;
     let header = header_of(path, bytes)?;
@@ -124,7 +124,7 @@ fn header_of(path: &Path, bytes: &[u8]) -> Result<MapHeader, FileFault> {
 /// Fails unless the map is a square of a size that a submission may use.
 fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
     let (least, most) = (*MAP_SIZES.start(), *MAP_SIZES.end());
-    let found = format!("{width}x{height} texels; expected a square of {least} to {most} a side");
+    let found = format!("{width}x{height} texels; expected a square with sides of {least} to {most}");
     if width != height {
         return Err(FileFault::new("not_square", found, "bake it to the square atlas of instances.glb"));
     }
@@ -137,8 +137,8 @@ fn check_size(width: usize, height: usize) -> Result<(), FileFault> {
     Ok(())
 }
 
-/// A PNG without its closing chunk was truncated. That holds even if all texels are there: nothing says that none is
-/// missing.
+/// A PNG without its closing chunk was truncated. That holds even if all texels can be
+/// decoded, since nothing else proves that the file is complete.
 fn check_end(png: &PngHeader) -> Result<(), FileFault> {
     if png.ended {
         return Ok(());
@@ -150,7 +150,7 @@ fn check_end(png: &PngHeader) -> Result<(), FileFault> {
 fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {
     if exr.deep {
         let message = "deep data: a list of samples in each texel";
-        return Err(FileFault::new("deep_data", message, "write one number a texel and channel"));
+        return Err(FileFault::new("deep_data", message, "write one number per texel and channel"));
     }
     check_size(exr.width, exr.height)?;
     let wanted: &[&str] = if map == Map::BaseColor { &["R", "G", "B"] } else { &["V"] };
@@ -165,7 +165,7 @@ fn check_exr(exr: &ExrHeader, map: Map) -> Result<(), FileFault> {
         };
         if channel.subsampled {
             let message = format!("channel {name} has numbers for some texels only");
-            return Err(FileFault::new("subsampled_channel", message, "write one number a texel and channel"));
+            return Err(FileFault::new("subsampled_channel", message, "write one number per texel and channel"));
         }
     }
     if exr.samples > MAX_EXR_NUMBERS {

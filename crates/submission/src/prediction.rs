@@ -1,5 +1,7 @@
-//! The maps that a submission holds for one scene, ready to be rendered. A missing or unusable map scores as its
-//! default. That is a finding, unless the format lets the map be left out.
+//! The maps that a submission holds for one scene, ready to be rendered.
+//!
+//! A missing or unusable map is replaced by a default, which is scored and reported as a finding. A map that the format
+//! makes optional may be missing without a finding.
 
 use std::path::Path;
 
@@ -12,14 +14,14 @@ use mateval_scene::{Finding, Severity};
 use crate::file_fault::FileFault;
 use crate::hashed_file::HashedFile;
 use crate::map_file::{self, MAX_MAP_BYTES, MapFile};
-use crate::map_place::MapFolder;
+use crate::map_folder::MapFolder;
 use crate::memory_budget::MemoryBudget;
 use crate::submitted_file::{SubmittedFile, relative};
 
-/// What a missing roughness scores as; perceptual.
+/// The perceptual roughness that replaces a missing map.
 pub const MISSING_ROUGHNESS: f32 = 0.5;
 
-/// What a missing metallic scores as.
+/// The metallic that replaces a missing map.
 pub const MISSING_METALLIC: f32 = 0.0;
 
 /// One instance's maps. A map with the same value everywhere has one texel.
@@ -90,7 +92,7 @@ impl Reader<'_> {
                 Ok(texture) => return texture,
                 Err(finding) => finding,
             },
-            // The format lets the others be left out.
+            // Roughness and metallic are optional.
             [] if map != Map::BaseColor => return default_of(map),
             [] => self.replaced("missing_map", &folder.candidates(map)[0], map, "expected a PNG or an EXR, found none"),
             several => {
@@ -110,7 +112,7 @@ impl Reader<'_> {
             let finding = self.replaced("unsound_map", path, map, &fault.message);
             Finding { place: fault.place, ..finding }
         })?;
-        let held = self.memory.holding(in_memory(file, map));
+        let held = self.memory.holding(compact_texture(file, map));
         held.ok_or_else(|| self.replaced("unsound_map", path, map, &MemoryBudget::exceeded()))
     }
 
@@ -139,7 +141,7 @@ impl Reader<'_> {
     }
 }
 
-/// What is scored where a map is missing or unusable.
+/// The texture that replaces a missing or unusable map.
 fn default_of(map: Map) -> Texture {
     one_texel(match map {
         Map::BaseColor => GREY,
@@ -152,9 +154,9 @@ fn one_texel(value: f32) -> Texture {
     Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
 }
 
-/// The map's texels in as little memory as possible: one texel where all are equal, and for scalars one float then,
-/// however they were stored.
-pub fn in_memory(file: MapFile, map: Map) -> Texture {
+/// The map's texture, reduced to one texel if all texels are equal. Constant roughness and metallic become one float,
+/// so that files of different types with the same value give equal textures.
+pub fn compact_texture(file: MapFile, map: Map) -> Texture {
     let texture = file.texture.collapsed();
     if map != Map::BaseColor && texture.width() == 1 { one_texel(texture.texel(0, 0)[0]) } else { texture }
 }

@@ -18,7 +18,7 @@ pub use nonnegative_l1::{MOST_STEPS, NonnegativeL1, SHORTNESS, STEP_SHARE, TOLER
 pub struct LightFit {
     /// Red, green and blue of each light group, not negative; they multiply the scene's own radiances.
     pub weights: Vec<[f64; 3]>,
-    /// Red, green, blue: how well the weights fit, and the proof that no others fit better.
+    /// The solution of the fit for red, green and blue, each with the proof that no other weights fit better.
     pub channels: [NonnegativeL1; 3],
     /// The largest [`NonnegativeL1::relative_gap`] of the channels.
     pub relative_gap: f64,

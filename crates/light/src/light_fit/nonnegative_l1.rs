@@ -52,7 +52,7 @@ pub fn solve(columns: &[Vec<f64>], target: &[f64]) -> NonnegativeL1 {
     let brightness: Vec<f64> = columns.iter().map(|column| column.iter().sum::<f64>() / rows).collect();
     let lit: Vec<usize> = (0..columns.len()).filter(|&e| brightness[e] > 0.0).collect();
     let mut weights = vec![0.0; columns.len()];
-    // Without light nothing of the target can be explained, and its signs prove that.
+    // If no column has any light, no weights lower the error; the signs of the target are the dual that proves it.
     let mut found = Point { y: target.iter().map(|t| t.signum()).collect(), ..Default::default() };
     if target_scale > 0.0 && !lit.is_empty() {
         let scaled = |values: &[f64], scale: f64| values.iter().map(|v| v / scale).collect::<Vec<f64>>();
@@ -68,10 +68,11 @@ pub fn solve(columns: &[Vec<f64>], target: &[f64]) -> NonnegativeL1 {
     certify(columns, target, weights, &found)
 }
 
-/// Makes the dual feasible and works out both sums.
+/// Makes the dual feasible, and computes the objective and its lower bound.
 ///
-/// Columns are not negative, so y - d, where d is the largest share by which a column's product is too large, brings
-/// all products to 0 or less; dividing by 1 + d brings it back within -1..1.
+/// A feasible dual lies within -1..1 and has a product of at most 0 with every column. Let d be the largest ratio of a
+/// column's product with y to the column's sum, at least 0. Columns are not negative, so all products with y - d are at
+/// most 0. Dividing by 1 + d brings the values back within -1..1.
 fn certify(columns: &[Vec<f64>], target: &[f64], weights: Vec<f64>, found: &Point) -> NonnegativeL1 {
     let excess = |column: &Vec<f64>| {
         let sum: f64 = column.iter().sum();

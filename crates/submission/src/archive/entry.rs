@@ -1,5 +1,4 @@
-//! The entries of an archive written to a folder: the name of each is checked and becomes a path, its bytes are
-//! counted.
+//! Writes the entries of an archive to a folder; checks the name of each and counts its bytes.
 
 use std::io::{ErrorKind, Read, Write as _};
 use std::path::Path;
@@ -51,8 +50,8 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// The path below the folder that an entry's bytes are to be written to; none for a folder and for an entry with a
-    /// fault.
+    /// The path, relative to the target folder, of the file that an entry becomes. None for a folder, and for an entry
+    /// with a fault.
     pub(super) fn place(&mut self, name: &[u8], kind: EntryKind) -> Result<Option<String>, Fault> {
         self.budget.add_entry()?;
         let shown = String::from_utf8_lossy(name).into_owned();

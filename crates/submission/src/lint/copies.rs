@@ -1,5 +1,6 @@
-//! Maps that are copies of the ground truth. That is no fault, as the baseline `gt` shows, but a ranking must not hide
-//! it.
+//! Maps that are copies of the ground truth.
+//!
+//! A copy is not a fault, as the baseline `gt` shows, but a ranking must not hide it.
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::{Texture, Wrap};

@@ -1,5 +1,4 @@
-//! The values of a submission's maps at each pixel of the input picture: as they are, and turned as common mistakes
-//! turn them.
+//! The values of a submission's maps at each pixel of the input picture, also after the turns of common mistakes.
 
 use mateval_image::Texture;
 

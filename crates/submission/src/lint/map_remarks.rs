@@ -44,16 +44,16 @@ fn samples(map: Map, header: &PngHeader) -> Vec<Remark> {
         remarks.push(("alpha", message, "write it without alpha"));
     } else if header.has(b"tRNS") {
         let message = "one colour marked as transparent (tRNS)".to_owned();
-        remarks.push(("transparent_colour", message, "write it without"));
+        remarks.push(("transparent_colour", message, "write it without transparency"));
     }
     if map != Map::BaseColor && matches!(header.color, PngColor::Rgb | PngColor::Rgba | PngColor::Palette) {
-        let message = format!("{} for a map of one number a texel: only red is read", header.color.name());
+        let message = format!("{} for a map of one number per texel: only red is read", header.color.name());
         remarks.push(("colour_scalar", message, "write grey; split packed maps into one file each"));
     }
     remarks
 }
 
-/// About chunks of a PNG that define how its numbers are to be decoded.
+/// Remarks about chunks of a PNG that define how its numbers are to be decoded.
 fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
     const IGNORED: [(&[u8; 4], &str, &str); 4] = [
         (b"gAMA", "gamma_chunk", "a gamma (gAMA)"),
@@ -65,18 +65,18 @@ fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
     let ignored = IGNORED.iter().filter(|(chunk, ..)| header.has(chunk));
     let mut remarks: Vec<Remark> = ignored
         .map(|(_, code, what)| {
-            let message = format!("{what}, which is ignored: it is read as {read_as}");
+            let message = format!("{what}, which is ignored: the numbers are read as {read_as}");
             (*code, message, "convert the numbers and leave out the chunk")
         })
         .collect();
     if map != Map::BaseColor && header.has(b"sRGB") {
-        let message = "an sRGB chunk, which is ignored: it is read as linear".to_owned();
+        let message = "an sRGB chunk, which is ignored: the numbers are read as linear".to_owned();
         remarks.push(("srgb_chunk", message, "write linear numbers and leave out the chunk"));
     }
     remarks
 }
 
-/// About what a PNG holds beside its picture.
+/// Remarks about anything that a PNG holds besides its picture.
 fn pictures(header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.has(b"acTL") {

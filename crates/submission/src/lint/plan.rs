@@ -1,4 +1,4 @@
-//! What `eval lint` is asked to check.
+//! The inputs of `eval lint`.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use mateval_scene::open::Dataset;
 
 /// A submission to check, and the dataset that it answers.
 pub struct LintPlan<'a> {
-    /// What the submission was made for; its ground truth is not needed.
+    /// The dataset that the submission was made for; its ground truth is not needed.
     pub dataset: &'a Dataset,
     /// The submission's folder.
     pub submission: &'a Path,

@@ -17,9 +17,9 @@ use super::unobserved::fill;
 use super::{map_remarks, orientation, scalars, shading, unobserved};
 use crate::error::SubmissionError;
 use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
-use crate::map_place::MapFolder;
+use crate::map_folder::MapFolder;
 use crate::memory_budget::{MAX_SCENE_BYTES, MemoryBudget};
-use crate::prediction::in_memory;
+use crate::prediction::compact_texture;
 use crate::submitted_file::{SubmittedFile, relative};
 
 /// Instances whose maps are in memory at once.
@@ -111,7 +111,7 @@ fn read(
         Ok(file) => {
             facts.maps += 1;
             // A clone shares its texels.
-            facts.bytes += in_memory(file.clone(), map).bytes().len();
+            facts.bytes += compact_texture(file.clone(), map).bytes().len();
             facts.findings.extend(map_remarks::remarks(&name, map, &file));
             Some(file)
         }

@@ -24,7 +24,7 @@ impl Pairs {
         self.xy += x * y;
     }
 
-    /// Pairs minus the mean of their group.
+    /// The sums of all pairs after the mean of each pair's group has been subtracted.
     pub(super) fn within<K: Ord>(pairs: impl IntoIterator<Item = (K, f64, f64)>) -> Self {
         let mut groups: BTreeMap<K, Self> = BTreeMap::new();
         pairs.into_iter().for_each(|(group, x, y)| groups.entry(group).or_default().add(x, y));

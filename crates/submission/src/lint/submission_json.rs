@@ -10,7 +10,7 @@ use serde_json::{Map, Value};
 use super::finding::{error, warning};
 use super::names::nearest;
 use crate::file_fault::FileFault;
-use crate::map_place::exists;
+use crate::map_folder::exists;
 use crate::submitted_file::SubmittedFile;
 
 /// Its keys, and whether it must have them.
