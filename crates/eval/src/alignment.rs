@@ -1,10 +1,11 @@
-//! Aligned pictures: one scale a channel, which distinguishes a method that found the right colours at the wrong
-//! brightness from one that found the wrong colours.
+//! Aligned pictures: each channel multiplied by the scale that fits the truth best.
+//!
+//! They distinguish a method that found the right colours at the wrong brightness from one that found wrong colours.
 
 use mateval_image::{LinearRgb, Mask, Picture};
 
 /// The scale of each channel that brings `prediction` nearest to `reference` in the mean square over the mask, in linear
-/// light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, a picture at a time.)
+/// light: sum(gt * p) / sum(p * p); 1 where the denominator is 0. (Stanford-ORB's definition, applied to each picture alone.)
 pub fn channel_scales(prediction: &Picture<LinearRgb>, reference: &Picture<LinearRgb>, mask: &Mask) -> [f64; 3] {
     let mut products = [0.0_f64; 3];
     let mut squares = [0.0_f64; 3];
@@ -18,7 +19,7 @@ pub fn channel_scales(prediction: &Picture<LinearRgb>, reference: &Picture<Linea
     std::array::from_fn(|c| if squares[c] == 0.0 { 1.0 } else { products[c] / squares[c] })
 }
 
-/// The picture times a scale a channel.
+/// The picture, each channel multiplied by its scale.
 pub fn scaled(picture: &Picture<LinearRgb>, scales: [f64; 3]) -> Picture<LinearRgb> {
     picture.map(|LinearRgb(rgb)| LinearRgb(std::array::from_fn(|c| (f64::from(rgb[c]) * scales[c]) as f32)))
 }

@@ -21,11 +21,11 @@ pub struct FixedRules {
     pub subpixels: usize,
     /// Surfaces of lower opacity are looked through in those pictures, as in the dataset's.
     pub cut_out_below_opacity: f32,
-    /// Score of a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
+    /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
     pub missing_base_color: f32,
-    /// Score of a missing or unsound roughness, as the format promises.
+    /// Value that replaces a missing or unsound roughness, as the format promises.
     pub missing_roughness: f32,
-    /// Score of a missing or unsound metallic, as the format promises.
+    /// Value that replaces a missing or unsound metallic, as the format promises.
     pub missing_metallic: f32,
     /// A base colour with values outside this range is unsound, by the format.
     pub base_color_range: [f32; 2],

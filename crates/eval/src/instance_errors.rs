@@ -35,7 +35,7 @@ impl InstanceErrors {
         }
     }
 
-    /// The means, by picture, views and index. What shows no instance is left out.
+    /// The means, by picture, views and index. Pixels that show no instance are left out.
     pub fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
         let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {
             let instance = scene.instances.iter().find(|instance| instance.index.0.get() == index)?;

@@ -3,10 +3,17 @@
 //! In: a dataset with its ground truth, a submission, the weights of LPIPS. Out: [`result::ResultFile`], or, from [`verify`],
 //! whether a result states what the submission scores.
 //!
-//! [`protocol`] holds every constant. For each scene of the dataset, [`score`] looks up a submission's maps in every view
-//! ([`material_pictures`]) and removes their scale ([`alignment`]), renders the maps under every light ([`predicted_light`]),
-//! compares pictures ([`measure`], [`rgb`]) and texels ([`texture_space`]). Scores stay nested by scene, view and picture
-//! until the result lists each by its key ([`result_key`]) and takes the means ([`means`]).
+//! [`protocol`] holds the constants that protocols may change, [`fixed_rules`] those that they may not. For each scene of
+//! the dataset, [`score()`](score::score) reads the submissions' maps
+//! ([`read_scene`](mateval_submission::prediction::read_scene)), and `scene_scorer` takes three steps:
+//!
+//! 1. `material_score` looks up the maps in every view ([`material_pictures`]), removes their scale ([`alignment`]) and
+//!    compares the pictures with the truth's ([`measure`]).
+//! 2. It compares the maps texel by texel ([`texture_space`]).
+//! 3. [`light_score`] renders the maps under every light ([`predicted_light`]) and compares the renders ([`rgb`]).
+//!
+//! Scores stay nested by scene, view and picture until `result_writer` lists each value by its key ([`result_key`]) and
+//! takes the means ([`means`]): pictures to scenes, scenes to the dataset.
 
 pub mod alignment;
 pub mod error;
@@ -31,9 +38,9 @@ pub mod result;
 pub mod result_key;
 mod result_writer;
 pub mod rgb;
-mod scene_order;
 mod scene_score;
 mod scene_scorer;
+mod scene_task;
 pub mod score;
 mod seeds;
 pub mod shown_scene;

@@ -20,20 +20,20 @@ use crate::relit::{LightingName, RelitLighting, lightings};
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
-use crate::scene_order::{MaskedRegion, SceneOrder, regions};
-use crate::scene_score::{NoiseScore, Sheet};
+use crate::scene_score::{NoiseScore, ScoreSheet};
+use crate::scene_task::{MaskedRegion, SceneTask, regions};
 use crate::truth::{RgbTruth, ViewTruth};
 
 /// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures.
 pub(crate) fn score_light(
-    order: &SceneOrder<'_>,
+    task: &SceneTask<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
     at: usize,
-    sheets: &mut [Vec<Sheet>],
+    sheets: &mut [Vec<ScoreSheet>],
 ) -> Result<(), EvalError> {
-    let bench = LightBench::new(order, renderer, truths, &order.protocols[at])?;
-    bench.predict(&mut |submission, light| bench.measure(light, &mut sheets[submission][at]))
+    let scorer = LightScorer::new(task, renderer, truths, &task.protocols[at])?;
+    scorer.predict(&mut |submission, light| scorer.measure(light, &mut sheets[submission][at]))
 }
 
 /// A view's light, exposed, clipped and encoded for display.
@@ -46,20 +46,20 @@ pub struct ShownLight {
 
 /// The truth's light and every submission's in each view, for display, in the first track of the first protocol.
 pub(crate) fn shown_light(
-    order: &SceneOrder<'_>,
+    task: &SceneTask<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
 ) -> Result<Vec<ShownLight>, EvalError> {
-    let bench = LightBench::new(order, renderer, truths, &order.protocols[0])?;
+    let scorer = LightScorer::new(task, renderer, truths, &task.protocols[0])?;
     // Predictions arrive in any order.
     let mut predicted = BTreeMap::new();
-    bench.predict(&mut |submission, light| {
+    scorer.predict(&mut |submission, light| {
         let first = light.pictures.first().into_iter().flat_map(|picture| &picture.views);
-        let shown = |halves| EncodedLight::of_prediction(halves, order.scene.exposure).shown();
+        let shown = |halves| EncodedLight::of_prediction(halves, task.scene.exposure).shown();
         predicted.insert(submission, first.map(shown).collect::<Vec<_>>());
         Ok(())
     })?;
-    let references = bench.references[&None].iter().enumerate();
+    let references = scorer.references[&None].iter().enumerate();
     let of_view = |at: usize| predicted.values().map(|views| views[at].clone()).collect();
     let shown = |(at, reference): (usize, &LightReference)| ShownLight {
         truth: reference.shown().clone(),
@@ -68,9 +68,9 @@ pub(crate) fn shown_light(
     Ok(references.map(shown).collect())
 }
 
-/// What pictures of light are measured against.
-struct LightBench<'a> {
-    order: &'a SceneOrder<'a>,
+/// Scores the renders of predictions against the truth, under one protocol.
+struct LightScorer<'a> {
+    task: &'a SceneTask<'a>,
     protocol: &'a Protocol,
     truths: &'a [ViewTruth],
     photo: Photo<'a>,
@@ -83,31 +83,31 @@ struct LightBench<'a> {
     blocks: Vec<Picture<u32>>,
 }
 
-impl<'a> LightBench<'a> {
+impl<'a> LightScorer<'a> {
     fn new(
-        order: &'a SceneOrder<'a>,
+        task: &'a SceneTask<'a>,
         renderer: &RendererId,
         truths: &'a [ViewTruth],
         protocol: &'a Protocol,
     ) -> Result<Self, EvalError> {
-        let own = order.views.iter().map(|view| RgbTruth::read(order.folder, renderer, view));
+        let own = task.views.iter().map(|view| RgbTruth::read(task.folder, renderer, view));
         let own = own.collect::<Result<Vec<_>, _>>()?;
-        let photo = photo(order, truths, &own)?;
+        let photo = photo(task, truths, &own)?;
         let lightings = if protocol.light.tracks.contains(&Track::Relit) {
-            let group = |group| RgbTruth::shown_of_group(order.folder, renderer, photo.view, group);
-            let groups = (0..order.world.emitters().groups()).map(group).collect::<Result<Vec<_>, EvalError>>()?;
+            let group = |group| RgbTruth::shown_of_group(task.folder, renderer, photo.view, group);
+            let groups = (0..task.world.emitters().groups()).map(group).collect::<Result<Vec<_>, EvalError>>()?;
             lightings(&protocol.light.relit, &groups, photo.valid)
         } else {
             Vec::new()
         };
-        let cameras: Vec<Camera> = order.views.iter().map(|view| view.camera).collect();
+        let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
         Ok(Self {
-            order,
+            task,
             protocol,
             truths,
             photo,
             regions: truths.iter().map(regions).collect(),
-            references: references(order, renderer, protocol, &own, &lightings)?,
+            references: references(task, renderer, protocol, &own, &lightings)?,
             blocks: noise_blocks(&protocol.light.noise, &cameras),
             lightings,
         })
@@ -115,22 +115,22 @@ impl<'a> LightBench<'a> {
 
     /// Renders every submission and passes it to `each` with its number.
     fn predict(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
-        let order = self.order;
+        let task = self.task;
         let lit = LitScene {
-            scene: order.scene,
-            world: order.world,
-            atlases: order.atlases,
-            views: order.views.clone(),
+            scene: task.scene,
+            world: task.world,
+            atlases: task.atlases,
+            views: task.views.clone(),
             truths: self.truths,
             references: &self.references[&None],
             blocks: &self.blocks,
             photo: self.photo.clone(),
             lightings: self.lightings.clone(),
         };
-        predicted_light(&lit, &self.protocol.light, order.predictions, order.progress, each)
+        predicted_light(&lit, &self.protocol.light, task.predictions, task.progress, each)
     }
 
-    fn measure(&self, light: PredictedLight, sheet: &mut Sheet) -> Result<(), EvalError> {
+    fn measure(&self, light: PredictedLight, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
         let PredictedLight { pictures, fit, samples, not_finite } = light;
         for picture in &pictures {
             self.measure_picture(picture, samples, sheet)?;
@@ -142,11 +142,11 @@ impl<'a> LightBench<'a> {
         Ok(())
     }
 
-    fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut Sheet) -> Result<(), EvalError> {
-        let order = self.order;
+    fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
+        let task = self.task;
         let kind = picture.track.picture();
         let lights: Vec<EncodedLight> =
-            picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, order.scene.exposure)).collect();
+            picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, task.scene.exposure)).collect();
         let references = &self.references[&picture.lighting];
         let jobs: Vec<(usize, &MaskedRegion)> = self
             .regions
@@ -158,13 +158,13 @@ impl<'a> LightBench<'a> {
             .par_iter()
             .map(|&(view, region)| {
                 let (light, reference, blocks) = (&lights[view], &references[view], &self.blocks[view]);
-                rgb_metrics(self.protocol, order.lpips, light, reference, &region.mask, blocks)
+                rgb_metrics(self.protocol, task.lpips, light, reference, &region.mask, blocks)
             })
             .collect();
         let mut errors: BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>> = BTreeMap::new();
         for (&(view, region), measured) in jobs.iter().zip(measured) {
-            let view = order.views[view];
-            let RgbMeasured { values, mse } = order.or_named(view, measured)?;
+            let view = task.views[view];
+            let RgbMeasured { values, mse } = task.locate_error(view, measured)?;
             let score = region.score(kind, picture.lighting, values);
             errors.entry((score.picture, Views::of(&view.id, region.region))).or_default().extend(mse);
             sheet.score.add(&view.id, vec![score]);
@@ -190,7 +190,7 @@ impl<'a> LightBench<'a> {
         errors: &mut InstanceErrors,
     ) {
         let pairs = lights.iter().zip(references);
-        for ((view, truth), (light, reference)) in self.order.views.iter().zip(self.truths).zip(pairs) {
+        for ((view, truth), (light, reference)) in self.task.views.iter().zip(self.truths).zip(pairs) {
             let error = |k: usize| light.noise_free_square(reference, k);
             errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
@@ -200,29 +200,29 @@ impl<'a> LightBench<'a> {
     }
 }
 
-fn photo<'a>(order: &SceneOrder<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
-    let scene = || order.scene.id.clone();
-    let view = order.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene() })?;
-    let place = order.views.iter().position(|scored| scored.id == view.id);
+fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
+    let scene = || task.scene.id.clone();
+    let view = task.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene() })?;
+    let place = task.views.iter().position(|scored| scored.id == view.id);
     let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: scene() })?;
     Ok(Photo { view, light: own[place].shown.clone(), valid: &truths[place].valid })
 }
 
 fn references(
-    order: &SceneOrder<'_>,
+    task: &SceneTask<'_>,
     renderer: &RendererId,
     protocol: &Protocol,
     own: &[RgbTruth],
     lightings: &[RelitLighting],
 ) -> Result<BTreeMap<Option<LightingName>, Vec<LightReference>>, EvalError> {
     let reference = |view: &View, truth: &RgbTruth| {
-        order.or_named(view, LightReference::new(protocol, order.lpips, truth, order.scene.exposure))
+        task.locate_error(view, LightReference::new(protocol, task.lpips, truth, task.scene.exposure))
     };
     let own: Vec<LightReference> =
-        order.views.iter().zip(own).map(|(view, truth)| reference(view, truth)).collect::<Result<_, _>>()?;
+        task.views.iter().zip(own).map(|(view, truth)| reference(view, truth)).collect::<Result<_, _>>()?;
     let mut references = BTreeMap::from([(None, own)]);
-    for view in &order.views {
-        let relit = RgbTruth::relit(order.folder, renderer, view, lightings)?;
+    for view in &task.views {
+        let relit = RgbTruth::relit(task.folder, renderer, view, lightings)?;
         for (lighting, truth) in lightings.iter().zip(&relit) {
             references.entry(Some(lighting.name)).or_default().push(reference(view, truth)?);
         }

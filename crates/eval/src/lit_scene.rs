@@ -1,4 +1,4 @@
-//! A scene and the truth of its light: what predictions are rendered for.
+//! A scene and its true renders: the input for rendering predictions and for fitting their lights.
 
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_scene::TriangleMesh;
@@ -9,7 +9,7 @@ use crate::relit::RelitLighting;
 use crate::rgb::LightReference;
 use crate::truth::ViewTruth;
 
-/// A scene and the truth of its light.
+/// A scene, and the true renders that predictions are compared with.
 pub struct LitScene<'a> {
     /// `scene.json`.
     pub scene: &'a SceneFile,

@@ -23,11 +23,11 @@ pub struct MaterialPictures {
 /// Red, green and blue of the base colour, roughness, metallic.
 type Values = [f32; 5];
 
-/// The pictures of each submission: means over the same sub-pixels as the truth's, of those that hit an instance with a
-/// material. Rays are traced once for all submissions.
+/// The pictures of each submission. A pixel is the mean over those of its sub-pixels that hit an instance with a predicted
+/// material, and 0 if there are none (such pixels are not valid). The sub-pixels are those of the truth's pictures. Rays
+/// are traced once for all submissions.
 ///
-/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces. Zero where nothing is predicted
-/// (such pixels are not valid).
+/// `atlases` are the meshes of `instances.glb` in the order of the world's surfaces.
 pub fn material_pictures(
     world: &World,
     atlases: &[TriangleMesh],

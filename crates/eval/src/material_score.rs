@@ -13,16 +13,16 @@ use crate::measure::{albedo_metrics, scalar_metrics};
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::{InstanceTexelErrors, TexelErrors};
 use crate::result_key::{PictureKind, Region, Views};
-use crate::scene_order::{MaskedRegion, SceneOrder, regions};
-use crate::scene_score::{PictureScore, Sheet};
+use crate::scene_score::{PictureScore, ScoreSheet};
+use crate::scene_task::{MaskedRegion, SceneTask, regions};
 use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
 use crate::truth::ViewTruth;
 
-/// What a view shows of one submission.
+/// One submission's pictures of a view.
 #[derive(Clone, Copy)]
 struct Predicted<'a> {
     pictures: &'a MaterialPictures,
-    /// Its base colour, scaled.
+    /// The base colour, scaled by [`channel_scales`].
     aligned: &'a Picture<LinearRgb>,
 }
 
@@ -32,9 +32,13 @@ impl<'a> Predicted<'a> {
     }
 }
 
-impl SceneOrder<'_> {
+impl SceneTask<'_> {
     /// Pictures of base colour, roughness and metallic.
-    pub(crate) fn score_materials(&self, truths: &[ViewTruth], sheets: &mut [Vec<Sheet>]) -> Result<(), EvalError> {
+    pub(crate) fn score_materials(
+        &self,
+        truths: &[ViewTruth],
+        sheets: &mut [Vec<ScoreSheet>],
+    ) -> Result<(), EvalError> {
         for (at, (view, truth)) in self.views.iter().zip(truths).enumerate() {
             (self.progress)(&format!("scene {}: materials", self.scene.id), at, self.views.len());
             let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
@@ -57,7 +61,8 @@ impl SceneOrder<'_> {
         Ok(())
     }
 
-    /// All metrics of a view's albedo (raw and aligned, which keeps its picture's scale everywhere), roughness, metallic.
+    /// All metrics of a view's raw albedo, aligned albedo, roughness and metallic. The scale of the aligned albedo is fitted
+    /// over all valid pixels and is the same for every region.
     fn material_values(
         &self,
         protocol: &Protocol,
@@ -70,7 +75,7 @@ impl SceneOrder<'_> {
         for region in regions {
             for (kind, picture) in predicted.albedos() {
                 let found = albedo_metrics(protocol, self.lpips, picture, &truth.albedo, &region.mask);
-                values.push(region.score(kind, None, self.or_named(view, found)?));
+                values.push(region.score(kind, None, self.locate_error(view, found)?));
             }
             let scalars = [
                 (PictureKind::Roughness, &predicted.pictures.roughness, &truth.roughness),
@@ -78,12 +83,13 @@ impl SceneOrder<'_> {
             ];
             for (kind, picture, truth) in scalars {
                 let found = scalar_metrics(protocol, picture, truth, &region.mask);
-                values.push(region.score(kind, None, self.or_named(view, found)?));
+                values.push(region.score(kind, None, self.locate_error(view, found)?));
             }
         }
         Ok(values)
     }
 
+    /// Adds the squared errors of raw and aligned albedo to the sums by instance.
     fn material_errors(
         &self,
         protocol: &Protocol,
@@ -105,7 +111,8 @@ impl SceneOrder<'_> {
         }
     }
 
-    pub(crate) fn score_texels(&self, sheets: &mut [Vec<Sheet>]) -> Result<(), EvalError> {
+    /// Errors of texels; they are the same under every protocol.
+    pub(crate) fn score_texels(&self, sheets: &mut [Vec<ScoreSheet>]) -> Result<(), EvalError> {
         let found = texture_space(self.folder, self.scene, self.world, self.atlases, self.predictions, self.progress)?;
         for (sheets, instances) in sheets.iter_mut().zip(found) {
             let errors: Vec<InstanceTexelErrors> =

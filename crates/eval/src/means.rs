@@ -9,8 +9,8 @@ use crate::metric::Metric;
 use crate::result::{InstanceTexelErrors, PictureValue, PsnrNoise, TexelErrors};
 use crate::result_key::{PictureKind, ResultKey, Views};
 
-/// The means of each scene over its pictures (over texels by area), and of the dataset over its scenes. A missing value is
-/// left out of its mean; a scene without any value of a key is left out of the key's mean.
+/// The means of each scene, over its pictures and over its texels weighted by area, and the means of the dataset over its
+/// scenes. A mean skips missing values; the dataset's mean of a key skips scenes without a value of that key.
 pub fn means(
     pictures: &[PictureValue],
     texels: &[InstanceTexelErrors],

@@ -32,8 +32,8 @@ pub(crate) fn enough_samples(
     Ok(needed.max().unwrap_or(rules.least_samples))
 }
 
-/// Samples that bring the noise under its bound: variance falls as samples rise. A `pilot` of none saw an error that is
-/// nothing but noise.
+/// Samples that bring the noise under its bound, since variance is inversely proportional to their number. Without a
+/// `pilot`, where an estimated error was not above 0, the answer is the most samples that the rules allow.
 pub fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>) -> u32 {
     let Some(NoisePsnr { prediction, reference, .. }) = pilot else { return rules.most_samples };
     let bound = rules.target_db.max(rules.truth_share * reference);

@@ -13,7 +13,7 @@ use crate::metric::Metric;
 use crate::protocol::Protocol;
 use crate::truth::RgbTruth;
 
-/// A picture under one light: two halves, and one picture for display.
+/// A picture under one light: two halves for MSE and PSNR, and one picture for display, SSIM and LPIPS.
 pub struct EncodedLight {
     /// Linear, multiplied by the exposure.
     linear: [Picture<LinearRgb>; 2],

@@ -9,7 +9,7 @@ use crate::predicted_light::FittedRadiances;
 use crate::relit::LightingName;
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
-use crate::scene_order::MaskedRegion;
+use crate::scene_task::MaskedRegion;
 
 /// What one submission scored in one scene under one protocol.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -55,7 +55,7 @@ pub(crate) struct NoiseScore {
 
 /// Scores of one submission and protocol while a scene is being scored.
 #[derive(Default)]
-pub(crate) struct Sheet {
+pub(crate) struct ScoreSheet {
     pub(crate) score: SceneScore,
     pub(crate) errors: InstanceErrors,
 }

@@ -20,20 +20,20 @@ use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::result::{MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId};
 use crate::result_writer::protocol_result;
-use crate::scene_order::SceneOrder;
 use crate::scene_score::SceneScore;
 use crate::scene_scorer::score_scene;
+use crate::scene_task::SceneTask;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::submission_json::SubmissionJson;
 
-/// The network of LPIPS, or why it is missing.
+/// The network of LPIPS, or the reason why it is missing.
 pub enum LpipsWeights {
     /// Loaded.
     Loaded(Box<Lpips>),
     /// Missing.
     Missing {
-        /// Why.
+        /// The reason, for the result's list of missing metrics.
         reason: String,
         /// The command that makes the metric available.
         fix: String,
@@ -149,7 +149,7 @@ fn score_scenes(
             if outcome.is_err() {
                 next.store(scenes.len(), Ordering::Relaxed);
             }
-            // Only the worker that drew a scene's number fills its place.
+            // Each index is taken by one worker only, so the cell is empty.
             let _ = done[at].set(outcome);
         }
     };
@@ -157,26 +157,26 @@ fn score_scenes(
         (1..plan.jobs.max(1)).for_each(|_| drop(scope.spawn(work)));
         work();
     });
-    // Scenes that were not scored because of a failure are empty.
+    // After a failure, scenes that no worker had started have no outcome; the failure itself ends the collection.
     done.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
     let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
     let mut scores: Vec<Option<Vec<SceneScore>>> =
-        predictions.iter().map(|prediction| plan.kept(scene, prediction)).collect();
-    let fresh: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
-    if !fresh.is_empty() {
-        let chosen: Vec<PredictedScene> = fresh.iter().map(|&at| predictions[at].clone()).collect();
-        for (&at, found) in fresh.iter().zip(plan.score_fresh(scene, &chosen, progress)?) {
-            plan.keep(scene, &predictions[at], &found)?;
+        predictions.iter().map(|prediction| plan.read_cached(scene, prediction)).collect();
+    let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();
+    if !uncached.is_empty() {
+        let chosen: Vec<PredictedScene> = uncached.iter().map(|&at| predictions[at].clone()).collect();
+        for (&at, found) in uncached.iter().zip(plan.score_uncached(scene, &chosen, progress)?) {
+            plan.write_cache(scene, &predictions[at], &found)?;
             scores[at] = Some(found);
         }
     }
     let outcome = |(prediction, scores): (PredictedScene, Option<Vec<SceneScore>>)| Outcome {
         findings: prediction.findings,
         files: prediction.files,
-        scores: scores.expect("what was not kept is fresh"),
+        scores: scores.expect("scores that were not cached have just been computed"),
     };
     Ok(predictions.into_iter().zip(scores).map(outcome).collect())
 }
@@ -189,7 +189,7 @@ impl ScorePlan<'_> {
         if expected == found { Ok(()) } else { Err(EvalError::LpipsNet { expected, found }) }
     }
 
-    fn score_fresh(
+    fn score_uncached(
         &self,
         scene: &SceneFile,
         predictions: &[PredictedScene],
@@ -197,7 +197,7 @@ impl ScorePlan<'_> {
     ) -> Result<Vec<Vec<SceneScore>>, EvalError> {
         let renderer = self.dataset.file.scored_renderer.as_ref();
         let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene, renderer)?;
-        score_scene(&SceneOrder {
+        score_scene(&SceneTask {
             scene,
             folder: &folder,
             world: &world,
@@ -211,8 +211,9 @@ impl ScorePlan<'_> {
         })
     }
 
-    /// The file of a scene's scores under a protocol; its name is the hash of everything that they depend on.
-    fn place(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
+    /// The cache's file for a scene's scores under a protocol, named after the hash of everything that they depend on. None
+    /// without a cache.
+    fn cache_file(&self, scene: &SceneFile, prediction: &PredictedScene, protocol: &Protocol) -> Option<PathBuf> {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;
         let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], file.scored_renderer.as_ref(), weights);
@@ -220,16 +221,21 @@ impl ScorePlan<'_> {
         Some(self.cache?.join(format!("{key}.json")))
     }
 
-    /// The scores that an earlier run kept, if all of them can be read.
-    fn kept(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
+    /// The scores that an earlier run wrote to the cache, if all of them can be read.
+    fn read_cached(&self, scene: &SceneFile, prediction: &PredictedScene) -> Option<Vec<SceneScore>> {
         // A truncated or foreign file counts as missing.
-        self.protocols.iter().map(|protocol| json::read(&self.place(scene, prediction, protocol)?).ok()).collect()
+        self.protocols.iter().map(|protocol| json::read(&self.cache_file(scene, prediction, protocol)?).ok()).collect()
     }
 
-    fn keep(&self, scene: &SceneFile, prediction: &PredictedScene, scores: &[SceneScore]) -> Result<(), EvalError> {
+    fn write_cache(
+        &self,
+        scene: &SceneFile,
+        prediction: &PredictedScene,
+        scores: &[SceneScore],
+    ) -> Result<(), EvalError> {
         for (protocol, score) in self.protocols.iter().zip(scores) {
-            if let Some(place) = self.place(scene, prediction, protocol) {
-                json::write(&place, score)?;
+            if let Some(path) = self.cache_file(scene, prediction, protocol) {
+                json::write(&path, score)?;
             }
         }
         Ok(())

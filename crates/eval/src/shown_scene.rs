@@ -12,7 +12,7 @@ use crate::light_score::{ShownLight, shown_light};
 use crate::material_pictures::material_pictures;
 use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
-use crate::scene_order::SceneOrder;
+use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
@@ -61,7 +61,7 @@ pub fn scene_light(
     let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
     let views = scored_views(dataset, scene)?;
     let truths = views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
-    let order = SceneOrder {
+    let task = SceneTask {
         scene,
         folder: &folder,
         world: &world,
@@ -73,7 +73,7 @@ pub fn scene_light(
         renderer: Some(renderer),
         progress,
     };
-    let shown = shown_light(&order, renderer, &truths)?;
+    let shown = shown_light(&task, renderer, &truths)?;
     let rows = truths.into_iter().zip(shown);
     Ok(rows.map(|(truth, shown)| SceneLight { truth, shown }).collect())
 }

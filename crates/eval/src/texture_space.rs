@@ -1,5 +1,6 @@
-//! Submissions compared with the truth texel by texel, on the surface itself: every place counts by its area, whether or
-//! not a view shows it.
+//! Submissions compared with the truth texel by texel, weighted by the texels' areas on the surface.
+//!
+//! Every texel counts, whether or not a view shows it.
 //!
 //! In: the baked truth of an instance, the maps of every submission. Out: an [`InstanceTexels`] for each submission, whose
 //! sums add up to the errors of a scene or a category.

@@ -123,7 +123,7 @@ fn group_name(group: usize) -> String {
     format!("group_{group:02}")
 }
 
-/// Where both masks are set; they are of one size.
+/// The pixels where both masks are set. The masks have the same size.
 pub(crate) fn intersection(a: &Mask, b: &Mask) -> Mask {
     Mask::from_fn(a.width(), a.height(), |x, y| a.get(x, y) && b.get(x, y))
 }

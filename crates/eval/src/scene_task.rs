@@ -1,4 +1,4 @@
-//! A scene with its predictions and the rules: what is scored, and the regions of its views.
+//! The inputs of scoring one scene: its files, the predictions and the rules; and the regions of its views.
 
 use mateval_image::Mask;
 use mateval_metrics::{Lpips, MetricError};
@@ -13,8 +13,8 @@ use crate::protocol::Protocol;
 use crate::result_key::{Region, Surfaces};
 use crate::truth::{ViewTruth, intersection};
 
-/// A scene, its predictions and the rules.
-pub(crate) struct SceneOrder<'a> {
+/// Everything that is needed to score submissions on one scene.
+pub(crate) struct SceneTask<'a> {
     pub(crate) scene: &'a SceneFile,
     pub(crate) folder: &'a SceneFolder,
     pub(crate) world: &'a World,
@@ -24,26 +24,26 @@ pub(crate) struct SceneOrder<'a> {
     pub(crate) predictions: &'a [PredictedScene],
     pub(crate) protocols: &'a [Protocol],
     pub(crate) lpips: Option<&'a Lpips>,
-    /// The renderer of the pictures that light is compared with; none leaves light out.
+    /// The renderer whose pictures predicted renders are compared with. Without one, light is not scored.
     pub(crate) renderer: Option<&'a RendererId>,
     pub(crate) progress: Progress<'a>,
 }
 
-/// Some of a view's pixels.
+/// A region of a view on some of its surfaces, with the mask of its pixels.
 pub(crate) struct MaskedRegion {
     pub(crate) region: Region,
     pub(crate) surfaces: Surfaces,
     pub(crate) mask: Mask,
 }
 
-impl SceneOrder<'_> {
+impl SceneTask<'_> {
     /// Adds scene and view to an error of a metric.
-    pub(crate) fn or_named<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
+    pub(crate) fn locate_error<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
         found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })
     }
 }
 
-/// The regions of a view that have values of their own.
+/// The regions of a view over which metrics are computed.
 pub(crate) fn regions(truth: &ViewTruth) -> Vec<MaskedRegion> {
     let mut regions = vec![MaskedRegion { region: Region::Valid, surfaces: Surfaces::All, mask: truth.valid.clone() }];
     let unobserved = truth.unobserved.as_ref();
