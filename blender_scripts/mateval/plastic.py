@@ -6,7 +6,7 @@ STEPS = 4096
 
 
 def fresnel(*, cosine: float, eta: float) -> float:
-    """Returns the share of unpolarised light that a boundary reflects; eta is the index beyond over that before."""
+    """Returns the share of unpolarised light that a boundary reflects; eta is the index behind it over that before it."""
     sine2 = (1.0 - cosine * cosine) / (eta * eta)
     if sine2 >= 1.0:
         return 1.0

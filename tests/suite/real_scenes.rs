@@ -23,7 +23,7 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, se
     (json(&dataset.join("scenes/staircase2/scene.json")), summary)
 }
 
-/// 30,911 triangles in OBJ files, as SOURCE_FORMATS counts them. Rectangles and disks are additional.
+/// 30,911 triangles in OBJ files. Rectangles and disks are additional.
 #[test]
 fn staircase2_is_built_verified_and_scored() {
     let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };

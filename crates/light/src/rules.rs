@@ -1,4 +1,4 @@
-//! The part of a protocol that says where lights stand and how their radiances are fitted.
+//! The part of a protocol that defines where lights stand and how their radiances are fitted.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
-//! [`mod@reference`] describe a scene with its source materials and lights; [`role`] says what its instances are;
+//! [`mod@reference`] describe a scene with its source materials and lights; [`role`] states what its instances are;
 //! [`dataset`], [`layout`], [`manifest`] and [`open`] are the files of a dataset, [`submission`] those of a submission.
 //! [`obj`], [`gltf_accessor`] and [`source_folder`] read untrusted files.
 

@@ -18,7 +18,7 @@ pub struct FileFault {
     pub message: String,
 }
 
-/// A folder outside of which nothing is read.
+/// A source's folder. No file outside it is read.
 #[derive(Debug)]
 pub struct SourceFolder {
     root: PathBuf,
@@ -54,7 +54,7 @@ impl LookedFor {
 }
 
 impl SourceFolder {
-    /// The folder `root`, of which no file of more than `file_bytes` is read.
+    /// The folder `root`. Files of more than `file_bytes` are refused.
     pub fn new(root: &Path, file_bytes: u64) -> std::io::Result<Self> {
         let root = if root.as_os_str().is_empty() { Path::new(".") } else { root };
         Ok(Self { root: root.canonicalize()?, file_bytes, hashes: BTreeMap::new(), absent: BTreeSet::new() })

@@ -34,7 +34,7 @@ pub enum NpyError {
     #[error("its header is not one that NumPy writes for an array of integers")]
     OtherHeader,
     /// The library refused the array.
-    #[error("expected a sound NumPy array: {reason}")]
+    #[error("expected a valid NumPy array: {reason}")]
     Unsound {
         /// The library's reason.
         reason: std::io::Error,

@@ -82,7 +82,7 @@ fn product(a: &[f32; 3], b: &[f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] * b[c])
 }
 
-/// The light from infinitely far away, of which Mitsuba takes one.
+/// The light from infinitely far away. Mitsuba supports one.
 pub(super) fn distant(
     folder: &Path,
     scene: &ReferenceScene,

@@ -122,7 +122,7 @@ pub enum ImportError {
     Materials(Vec<MaterialFault>),
 }
 
-/// A quantity of which a file may have a limited number.
+/// A quantity whose number in a file is limited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Limited {
     /// Bytes of all buffers of a glTF together.

@@ -32,7 +32,7 @@ pub struct RenderArgs {
 /// Which program renders, and how.
 #[derive(clap::Args, Clone)]
 pub struct RendererArgs {
-    /// What renders.
+    /// The renderer.
     #[arg(long, default_value = RendererKind::Builtin.name(), value_parser = renderer_parser())]
     renderer: RendererKind,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
     }
     print(&format!("{}: {} views rendered, {} kept\n", args.dataset.display(), report.rendered, report.kept))?;
     if !report.failures.is_empty() {
-        bail!("{} scenes could not be rendered; the others were", report.failures.len());
+        bail!("{} scenes could not be rendered; all others were rendered", report.failures.len());
     }
     Ok(Outcome::Good)
 }

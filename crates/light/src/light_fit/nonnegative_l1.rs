@@ -281,7 +281,8 @@ fn product(columns: &[Vec<f64>], weights: &[f64], rows: usize) -> Vec<f64> {
     sums
 }
 
-/// The lower triangle L of L L^T = `matrix`, of which the lower triangle is given; none if it is not positive.
+/// The lower triangular L with L L^T = `matrix`; none if the matrix is not positive definite. Only its lower triangle
+/// is read.
 fn cholesky(mut matrix: Vec<Vec<f64>>) -> Option<Vec<Vec<f64>>> {
     for i in 0..matrix.len() {
         let (done, rest) = matrix.split_at_mut(i);

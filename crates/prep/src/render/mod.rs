@@ -37,7 +37,7 @@ pub use report::RenderReport;
 /// What to render.
 #[derive(Clone, Debug, Default)]
 pub struct RenderOptions {
-    /// What renders.
+    /// The renderer and its options.
     pub renderer: Renderer,
     /// Samples per pixel of each half; the recipe's number where absent.
     pub samples: Option<u32>,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::noise::RenderNoise;
 
-/// The name of the file. It is written last, so that its presence says that a view's pictures are complete.
+/// The name of the file. It is written last, so its presence means that a view's pictures are complete.
 pub const RENDER_FILE: &str = "render.json";
 
 /// `render.json` beside a view's pictures: how they were made.

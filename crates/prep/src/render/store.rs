@@ -20,8 +20,8 @@ pub(super) struct ViewRender<'a> {
     pub(super) passes: Option<&'a BlenderView>,
 }
 
-/// Writes the pictures. `render.json` is removed first and written last, so that it never vouches for pictures that are
-/// half replaced.
+/// Writes the pictures. `render.json` is removed first and written last, so it never exists beside pictures of two
+/// runs.
 pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: &RenderFile) -> Result<(), PrepError> {
     std::fs::create_dir_all(place).map_err(PrepError::io("make", place))?;
     let mark = place.join(RENDER_FILE);

@@ -175,8 +175,8 @@ fn outside(room: usize) -> Vec<LayoutMesh> {
     outer.chain(levels).collect()
 }
 
-/// The parts of a wall's plan that touch the floor: all of it except an opening that reaches down to the floor, of which a
-/// wall has at most one.
+/// The parts of a wall's plan that touch the floor: all of it except an opening that reaches down to the floor. A wall
+/// has at most one such opening.
 fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
     for [from, to] in HOLES.iter().filter(|[from, _]| from.y == 0.0) {
         let (from, to) = (DVec2::new(from.x, from.z), DVec2::new(to.x, to.z));

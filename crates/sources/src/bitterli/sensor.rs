@@ -133,7 +133,8 @@ fn camera(world_from_sensor: DMat4, intrinsics: Intrinsics, place: &str, log: &m
     let wanted = DMat3::from_cols(-sensor.x_axis, sensor.y_axis, -sensor.z_axis);
     let miss = (rotation - wanted).to_cols_array().iter().fold(0.0_f64, |worst, v| worst.max(v.abs()));
     if miss > SKEW_WITHOUT_FINDING {
-        let message = format!("expected a to_world of rotation and translation, found one off by {miss:.6}");
+        let message =
+            format!("expected a to_world of rotation and translation only, found one that deviates by {miss:.6}");
         log.warn("camera_not_rigid", place, message, "kept position, direction of view and up vector");
     }
     let position: DVec3 = world_from_sensor.w_axis.truncate();

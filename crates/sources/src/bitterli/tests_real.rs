@@ -11,7 +11,7 @@ fn real(file: &str) -> Option<BitterliScene> {
     Some(read(&path, &Limits::default()).unwrap())
 }
 
-/// The triangles of the OBJ files, as counted in SOURCE_FORMATS. Rectangles and disks come in addition.
+/// The triangles of the OBJ files. Rectangles and disks come in addition.
 fn file_triangles(scene: &BitterliScene) -> usize {
     let of_files = |name: &&mateval_scene::reference::Surface| name.name != "rectangle" && name.name != "disk";
     scene.scene.surfaces.iter().filter(of_files).map(|s| s.mesh.triangles.len()).sum()

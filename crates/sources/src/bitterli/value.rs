@@ -37,7 +37,7 @@ pub(super) fn triple(text: &str) -> Result<[f64; 3], ValueError> {
     }
 }
 
-/// The triple in the attribute `value` of an element, or in `x`, `y` and `z`, of which an absent one counts as `missing`.
+/// The triple in the attribute `value` of an element, or in `x`, `y` and `z`, where an absent one counts as `missing`.
 pub(super) fn vector(element: &Element, missing: f64) -> Result<[f64; 3], ValueError> {
     if let Some(text) = element.attribute("value") {
         return triple(text);

@@ -110,7 +110,7 @@ impl Appearances {
         self.texture(jid, textures?, "used the colour", log)
     }
 
-    /// The texture `<id>/texture.png`. One that cannot be read is reported once and gives none.
+    /// The texture `<id>/texture.png`. None where it cannot be read, which is reported once.
     fn texture(&mut self, id: &str, library: &mut Library, action: &str, log: &mut Log) -> Option<TextureIndex> {
         let relative = format!("{id}/texture.png");
         let shown = library.shown(&relative);

@@ -1,6 +1,6 @@
 //! Draws cameras in a room until one keeps its distance from everything and sees enough of the room.
 //!
-//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples (SOURCE_FORMATS 3.7). Height and
+//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples. Height and
 //! pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and ten by ten
 //! rays decide on the distances and on a score of what is seen.
 
@@ -29,7 +29,7 @@ pub struct SamplerRules {
     pub mean_distance_m: [f64; 2],
     /// The score that the input view must exceed.
     pub min_score: f64,
-    /// The number of draws.
+    /// The largest number of draws.
     pub tries: u32,
 }
 
@@ -66,7 +66,7 @@ pub struct FoundCamera {
 /// The rule that a draw breaks first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Refusal {
-    /// Something else than the room's floor is below the camera.
+    /// The first surface below the camera is not the room's floor.
     OffFloor,
     /// A view sees the outside.
     SeesOutside,
@@ -83,7 +83,7 @@ enum Refusal {
 /// How many draws broke each rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Refusals {
-    /// Draws above something else than the room's floor.
+    /// Draws with a surface other than the room's floor below the camera.
     pub off_floor: u32,
     /// Draws that see the outside.
     pub sees_outside: u32,

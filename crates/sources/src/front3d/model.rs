@@ -48,7 +48,7 @@ pub(super) fn is_folder_name(id: &str) -> bool {
     (1..=64).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || matches!(b, b'-' | b'_'))
 }
 
-/// Reads `<jid>/raw_model.obj`. A file without a usable mesh is reported and gives none.
+/// Reads `<jid>/raw_model.obj`. None, with a finding, where it has no usable mesh.
 pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut Log) -> Option<Model> {
     let relative = format!("{jid}/raw_model.obj");
     let file = library.shown(&relative);
