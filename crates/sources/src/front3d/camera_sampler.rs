@@ -1,8 +1,8 @@
 //! Draws cameras in a room until one keeps its distance from everything and sees enough of the room.
 //!
-//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples. Height and
-//! pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and ten by ten
-//! rays decide on the distances and on a score of what is seen.
+//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples. Height and pitch are uniform,
+//! the position is uniform over the floor's bounding box and must be above the floor, and ten by ten rays decide on the
+//! distances and on a score of what is seen.
 
 use std::collections::BTreeMap;
 
