@@ -36,11 +36,11 @@ impl Track {
 pub struct LightRules {
     /// The lights.
     pub tracks: Vec<Track>,
-    /// The renderer whose `principled` material predictions are; specular 0.5, two-sided, without bumps.
+    /// The renderer whose `principled` material predictions use, with specular 0.5, two-sided and without bumps.
     pub flavour: PrincipledFlavour,
     /// The largest number of scatterings after the first hit.
     pub max_bounces: u32,
-    /// The bounce from which on Russian roulette ends paths.
+    /// The first bounce at which Russian roulette may end a path.
     pub roulette_start: u32,
     /// The probability that a path survives Russian roulette.
     pub roulette_survival: f32,

@@ -36,7 +36,7 @@ pub fn means(
     (scenes, summary)
 }
 
-/// For each scene, map, and observed or unobserved texels: the mean squared error by area, and its PSNR.
+/// For each scene and map, of observed and of unobserved texels: the mean squared error weighted by area, and its PSNR.
 fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<ResultKey, f64>> {
     type Part = (Views, fn(&InstanceTexelErrors) -> &TexelErrors);
     type Map = (PictureKind, fn(&TexelErrors) -> Option<f64>);
@@ -70,7 +70,8 @@ fn texel_means(texels: &[InstanceTexelErrors]) -> BTreeMap<SceneId, BTreeMap<Res
     means
 }
 
-/// The standard error of the dataset's mean of each key that all its scenes have one of: scenes are independent.
+/// The standard error of the dataset's mean of each key. A key is left out if one of its scenes has no standard error. The
+/// noise of different scenes is independent.
 pub(crate) fn summary_noise(noise: &BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>) -> BTreeMap<ResultKey, f64> {
     let mut sums: BTreeMap<ResultKey, (usize, Option<f64>)> = BTreeMap::new();
     for (key, of_scene) in noise.values().flatten() {

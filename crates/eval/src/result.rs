@@ -88,7 +88,7 @@ pub struct ProtocolResult {
     pub instances: Vec<InstancePixelErrors>,
 }
 
-/// The uncertainty of a scene's mean PSNR.
+/// The uncertainty of a scene's mean PSNR due to render noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PsnrNoise {
@@ -118,7 +118,7 @@ pub enum NoiseState {
     AboveTarget,
 }
 
-/// The squared errors of one instance's texels, in means over area.
+/// The mean squared errors of one instance's texels, weighted by area.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceTexelErrors {
@@ -154,7 +154,7 @@ pub struct InstancePixelErrors {
     pub scene: SceneId,
     /// The instance.
     pub instance: InstanceId,
-    /// The source's category; of architecture what piece of it it is, as in `WallInner`; else null.
+    /// The source's category; for architecture the kind of piece, as in `WallInner`; else null.
     pub category: Option<String>,
     /// The source's broader category; `Architecture` for architecture; else null.
     pub super_category: Option<String>,
@@ -164,7 +164,7 @@ pub struct InstancePixelErrors {
     pub views: Views,
     /// Valid pixels that show it, in all of these views.
     pub pixels: usize,
-    /// Mean over those pixels, in the space of the protocol's MSE of that picture; of light free of noise.
+    /// Mean over those pixels, in the colour space of the protocol's MSE of that picture; for light without render noise.
     pub mse: f64,
 }
 
@@ -210,7 +210,7 @@ pub struct MissingMetric {
     pub fix: String,
 }
 
-/// All numbers of a metric, or all of a kind of picture; one word in files.
+/// The numbers that are missing: all of one metric, or all of one kind of picture. A single word in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum MissingNumbers {

@@ -24,7 +24,7 @@ pub struct RenderSettings {
     /// The largest number of scatterings after the first before the last direct light of a path: Blender's "max
     /// bounces". Mitsuba's `max_depth` is larger by 2.
     pub max_bounces: u32,
-    /// The bounce from which on Russian roulette ends paths.
+    /// The first bounce at which Russian roulette may end a path.
     pub roulette_start: u32,
     /// The probability that a path survives Russian roulette, above 0 and at most 1.
     pub roulette_survival: f32,

@@ -26,7 +26,7 @@ pub struct ViewLight {
 /// One of several independent estimates of a view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HalfLight {
-    /// Linear radiance, one picture per group of lights.
+    /// Linear radiance: one picture per group of lights, or per mix of lights, by [`Lighting`](super::Lighting).
     pub basis: LightBasis,
     /// The number of paths that each pixel received.
     pub counts: Picture<u32>,
