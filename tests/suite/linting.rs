@@ -44,7 +44,7 @@ fn the_verdict_is_one_line_and_the_exit_code() {
     }
     std::fs::rename(room.join("wall_paper"), room.join("wallpaper")).unwrap();
     let bad = lint(&submission, &[]).ends_with(1);
-    let expected = "error [misnamed_object] 'scenes/room/wallpaper': no instance has this name, while 'wall_paper' is missing; \
+    let expected = "error [misnamed_object] 'scenes/room/wallpaper': no instance has this name, and 'wall_paper' is missing; \
                     rename it to 'wall_paper'\n\
                     error [missing_map] 'scenes/room/floor/base_color.png': expected a PNG or an EXR, found none; write it; a \
                     missing one scores as linear 0.5 (3 times; also 'scenes/room/rug/base_color.png', \

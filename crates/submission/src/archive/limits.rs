@@ -45,7 +45,11 @@ impl Budget {
                 "{packed} bytes of the archive unpack to {} bytes or more; expected at most {MAX_RATIO} times the packed size",
                 self.unpacked
             );
-            return Err(Fault::refused("archive_bomb", message, "pack maps that are compressed themselves (PNG, EXR)"));
+            return Err(Fault::refused(
+                "archive_bomb",
+                message,
+                "store maps as compressed PNG or EXR files, then pack them",
+            ));
         }
         Ok(())
     }

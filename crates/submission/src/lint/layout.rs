@@ -110,7 +110,7 @@ fn matched<'a>(
         match near {
             Some(near) => {
                 states.insert(near, State::Misnamed);
-                let message = format!("no {} has this name, while '{near}' is missing", codes.what);
+                let message = format!("no {} has this name, and '{near}' is missing", codes.what);
                 findings.push(error(codes.misnamed, &path, message, format!("rename it to '{near}'")));
             }
             None if kind == Kind::Folder => {
@@ -238,6 +238,6 @@ fn misnamed(path: &str, map: Map, stem: &str, ending: &str) -> Finding {
         let message = format!("a .{} file is not read as a map", shortened(ending));
         return error("wrong_ending", path, message, format!("write it as {name}.png or {name}.exr"));
     }
-    let message = format!("not read, while {name} is missing");
+    let message = format!("this file is not read, and {name} is missing");
     error("misnamed_map", path, message, format!("rename it to {name}.{}", ending.to_lowercase()))
 }

@@ -30,14 +30,14 @@ pub(super) fn remarks(path: &str, map: Map, file: &MapFile) -> Vec<Finding> {
     warned.chain(known).collect()
 }
 
-/// About the samples of a PNG.
+/// Remarks about the samples of a PNG.
 fn samples(map: Map, header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.bit_depth < 8 {
-        remarks.push(("low_bit_depth", format!("{} bits a sample", header.bit_depth), "write 8 or 16"));
+        remarks.push(("low_bit_depth", format!("{} bits per sample", header.bit_depth), "write 8 or 16 bits"));
     } else if header.color == PngColor::Palette {
         let message = "a palette of at most 256 colours".to_owned();
-        remarks.push(("palette", message, "write RGB or grey; the colours it stands for are read"));
+        remarks.push(("palette", message, "write RGB or grey; the palette's colours are read"));
     }
     if matches!(header.color, PngColor::GreyAlpha | PngColor::Rgba) {
         let message = format!("{}: alpha is dropped", header.color.name());
@@ -80,39 +80,43 @@ fn chunks(map: Map, header: &PngHeader) -> Vec<Remark> {
 fn pictures(header: &PngHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.has(b"acTL") {
-        remarks.push(("animated", "several pictures, of which the first is read".to_owned(), "write one only"));
+        remarks.push(("animated", "several pictures, of which the first is read".to_owned(), "write a single picture"));
     }
     if header.trailing_bytes > 0 {
         let message = format!("{} bytes after the end of the PNG", header.trailing_bytes);
-        remarks.push(("trailing_bytes", message, "write it without"));
+        remarks.push(("trailing_bytes", message, "write the PNG without them; they are not read"));
     }
     remarks
 }
 
-/// About the parts of an EXR and what holds for all of them.
+/// Remarks about the parts of an EXR, their windows and their primaries.
 fn parts(header: &ExrHeader) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if header.parts > 1 {
         remarks.push((
             "several_parts",
             format!("{} parts, of which the first is read", header.parts),
-            "write one only",
+            "write a single part",
         ));
     }
     if (header.width, header.height) != header.display {
         let ((width, height), shown) = ((header.width, header.height), header.display);
         let message =
             format!("its data window has {width}x{height} texels, its display window {}x{}", shown.0, shown.1);
-        remarks.push(("cropped_window", message, "write two equal windows; the data window is read"));
+        remarks.push((
+            "cropped_window",
+            message,
+            "write a data window equal to the display window; only the data window is read",
+        ));
     }
     if header.other_primaries {
         let message = "primaries other than Rec. 709's".to_owned();
-        remarks.push(("other_primaries", message, "convert it; it is read as Rec. 709"));
+        remarks.push(("other_primaries", message, "convert the colours; they are read as Rec. 709"));
     }
     remarks
 }
 
-/// About the channels of an EXR.
+/// Remarks about the channels of an EXR.
 fn channels(map: Map, header: &ExrHeader) -> Vec<Remark> {
     let wanted: &[&str] = if map == Map::BaseColor { &["R", "G", "B"] } else { &["V", "Y"] };
     let (read, others): (Vec<&ExrChannel>, Vec<&ExrChannel>) =
@@ -124,12 +128,12 @@ fn channels(map: Map, header: &ExrHeader) -> Vec<Remark> {
     if !others.is_empty() {
         let names: Vec<&str> = others.iter().map(|channel| channel.name.as_str()).collect();
         let message = format!("channels that are not read: {}", shortened(&names.join(", ")));
-        remarks.push(("extra_channels", message, "write it without"));
+        remarks.push(("extra_channels", message, "write the map without them"));
     }
     remarks
 }
 
-/// About base colours that no surface has.
+/// Remarks about base colours outside 0..1, which no surface has.
 fn beyond_unit(texture: &Texture) -> Vec<Remark> {
     let Texels::Linear(values) = texture.texels() else { return Vec::new() };
     let beyond = values.as_flattened().iter().find(|value| !(0.0..=1.0).contains(*value));

@@ -48,7 +48,8 @@ fn exchanged(place: &str, looks: &[ScalarLook]) -> Option<Finding> {
             MIRROR.0,
             MIRROR.1
         );
-        warning("swapped_roughness_metallic", place, message, "write each into its own file; of ORM maps green is roughness")
+        let action = "write each into its own file; in an ORM map, green is roughness";
+        warning("swapped_roughness_metallic", place, message, action)
     })
 }
 
@@ -66,7 +67,7 @@ fn one_for_all(place: &str, all: &[InstanceFacts]) -> Option<Finding> {
     let hashes: Vec<&String> = all.iter().filter_map(|facts| facts.base_color.as_ref().map(|(hash, _)| hash)).collect();
     (hashes.len() > 2 && hashes.iter().all(|hash| *hash == hashes[0])).then(|| {
         let message = format!("all {} base colours are the same file", hashes.len());
-        warning("same_base_color", place, message, "write one for each instance, unless this is a baseline")
+        warning("same_base_color", place, message, "bake a map of its own for each instance, unless this is a baseline")
     })
 }
 
