@@ -12,7 +12,7 @@ use mateval_tracer::World;
 
 use crate::error::BaselineError;
 
-/// The public part of a scene. Surface k of the world is instance k of `scene.json`.
+/// The public part of a scene. The surfaces of the world have the order of the instances in `scene.json`.
 pub struct SceneGeometry<'a> {
     /// `scene.json`.
     pub scene: &'a SceneFile,

@@ -275,7 +275,7 @@ pub enum RequestFault {
         expected: usize,
     },
     /// A surface has a coat, but its atlas does not have one finite uv for each vertex.
-    #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for each vertex", surface.0)]
+    #[error("surface {} '{name}': a coat whose atlas lacks a finite uv for some vertex", surface.0)]
     AtlasUv {
         /// The surface.
         surface: SurfaceIndex,

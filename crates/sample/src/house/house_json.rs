@@ -8,7 +8,7 @@ use super::layout::{self, ROOMS};
 use super::models::Model;
 use super::pieces::{PIECES, RECORDS, Record, Validity, record_of};
 use super::surfaces::LayoutMesh;
-use super::textures::LayoutTexture;
+use super::textures::ArchitectureTexture;
 use super::{materials, uids};
 
 /// The coordinates of all points in one list.
@@ -17,7 +17,7 @@ fn flat(points: &[DVec3]) -> Value {
 }
 
 /// The whole house.
-pub(super) fn house(models: &[Model], textures: &[LayoutTexture]) -> Value {
+pub(super) fn house(models: &[Model], textures: &[ArchitectureTexture]) -> Value {
     // The meshes of all rooms are in one list, to which the rooms' children refer.
     let mut meshes: Vec<Value> = Vec::new();
     let mut rooms: Vec<Value> = Vec::new();

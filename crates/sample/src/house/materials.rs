@@ -3,11 +3,11 @@
 use serde_json::{Value, json};
 
 use super::json_number::number;
-use super::textures::LayoutTexture;
+use super::textures::ArchitectureTexture;
 use super::uids;
 
-/// A material of the layout.
-pub(super) struct LayoutMaterial {
+/// A material of the architecture.
+pub(super) struct ArchitectureMaterial {
     /// The name by which meshes refer to it.
     pub(super) name: &'static str,
     /// The name of its texture; without one it shows its colour.
@@ -21,7 +21,7 @@ pub(super) struct LayoutMaterial {
 const WHITE: [u8; 3] = [255; 3];
 
 /// Every material. Those of the third room come last, and [`super::faults`] changes them by their position.
-pub(super) const ALL: [LayoutMaterial; 13] = [
+pub(super) const ALL: [ArchitectureMaterial; 13] = [
     pictured("floor", "planks", ["material", "flooring - hardwood"]),
     pictured("wallpaper", "wallpaper", ["material", "wallpaper"]),
     pictured("bedroom_wallpaper", "stripes", ["material", "wallpaper"]),
@@ -32,17 +32,17 @@ pub(super) const ALL: [LayoutMaterial; 13] = [
     plain("outer_wall", [206, 198, 184], ["material", "paint"]),
     plain("light_band", [255, 244, 214], ["material", "emissive"]),
     pictured("library_floor", "tiles", ["material", "tiles"]),
-    LayoutMaterial { color: [188, 202, 208], ..pictured("library_wall", "wallpaper", ["material", "paint"]) },
-    LayoutMaterial { color: [150, 118, 92], ..pictured("cabinet", "door_wood", ["material", "wood"]) },
+    ArchitectureMaterial { color: [188, 202, 208], ..pictured("library_wall", "wallpaper", ["material", "paint"]) },
+    ArchitectureMaterial { color: [150, 118, 92], ..pictured("cabinet", "door_wood", ["material", "wood"]) },
     plain("library_trim", [222, 216, 204], ["material", "paint"]),
 ];
 
-const fn pictured(name: &'static str, texture: &'static str, content: [&'static str; 2]) -> LayoutMaterial {
-    LayoutMaterial { name, texture: Some(texture), color: WHITE, content }
+const fn pictured(name: &'static str, texture: &'static str, content: [&'static str; 2]) -> ArchitectureMaterial {
+    ArchitectureMaterial { name, texture: Some(texture), color: WHITE, content }
 }
 
-const fn plain(name: &'static str, color: [u8; 3], content: [&'static str; 2]) -> LayoutMaterial {
-    LayoutMaterial { name, texture: None, color, content }
+const fn plain(name: &'static str, color: [u8; 3], content: [&'static str; 2]) -> ArchitectureMaterial {
+    ArchitectureMaterial { name, texture: None, color, content }
 }
 
 /// The id of a material, made of its position in the list and shaped as the data's.
@@ -52,7 +52,7 @@ pub(super) fn uid(name: &str) -> String {
 }
 
 /// The material's entry in the data's list.
-pub(super) fn json(material: &LayoutMaterial, textures: &[LayoutTexture]) -> Value {
+pub(super) fn json(material: &ArchitectureMaterial, textures: &[ArchitectureTexture]) -> Value {
     let [r, g, b] = material.color;
     let mut entry = json!({
         "uid": uid(material.name), "aid": [], "jid": "local", "texture": "", "normaltexture": "",

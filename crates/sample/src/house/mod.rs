@@ -60,7 +60,11 @@ pub fn write_without_pictures(out: &Path) -> Result<(), SampleError> {
     write_shapes(out, &models::all(), &textures::all())
 }
 
-fn write_shapes(out: &Path, models: &[models::Model], textures: &[textures::LayoutTexture]) -> Result<(), SampleError> {
+fn write_shapes(
+    out: &Path,
+    models: &[models::Model],
+    textures: &[textures::ArchitectureTexture],
+) -> Result<(), SampleError> {
     let house = out.join("house");
     let (layouts, library) = (house.join("3D-FRONT"), house.join("3D-FUTURE-model"));
     for folder in [&layouts, &library, &house.join("3D-FRONT-texture")] {
@@ -84,7 +88,7 @@ pub fn faulty_house() -> serde_json::Value {
     with_faults(&models::all(), &textures::all())
 }
 
-fn with_faults(models: &[models::Model], textures: &[textures::LayoutTexture]) -> serde_json::Value {
+fn with_faults(models: &[models::Model], textures: &[textures::ArchitectureTexture]) -> serde_json::Value {
     let mut house = house_json::house(models, textures);
     faults::plant(&mut house);
     house

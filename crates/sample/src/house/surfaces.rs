@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 
 use crate::solid::sides;
 
-/// A mesh of the house's layout.
+/// A mesh of the architecture.
 #[derive(Clone, Debug)]
 pub(super) struct LayoutMesh {
     /// The data's type of mesh, as in "WallInner".

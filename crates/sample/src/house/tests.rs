@@ -73,7 +73,8 @@ fn the_bytes_are_these_in_every_run() {
     use sha2::{Digest as _, Sha256};
     let first = files(&Files::new().root());
     assert_eq!(first, files(&Files::new().root()));
-    // Six layout textures; three files for each of 21 models, one of which has no texture; three lists, two texts.
+    // Six textures of the architecture; three files for each of 21 models, one of which has no texture; three lists;
+    // two texts.
     assert_eq!(first.len(), 6 + 21 * 3 - 1 + 4);
     let json = &first[&Path::new("3D-FRONT").join(format!("{}.json", uids::HOUSE))];
     assert_eq!(serde_json::from_slice::<Value>(json).unwrap(), House::new().0);
@@ -364,8 +365,8 @@ fn sound_files_show_no_fault() {
 #[test]
 fn models_can_be_read() {
     let (house, files) = (House::new(), Files::new());
-    let layout: usize = house.list("/mesh").iter().map(|mesh| mesh["faces"].as_array().unwrap().len() / 3).sum();
-    let mut triangles = layout;
+    let architecture: usize = house.list("/mesh").iter().map(|mesh| mesh["faces"].as_array().unwrap().len() / 3).sum();
+    let mut triangles = architecture;
     for model in models::all() {
         let folder = files.model(&model.jid().into());
         let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };

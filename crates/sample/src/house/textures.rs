@@ -40,7 +40,7 @@ impl Stored {
 }
 
 /// A texture for floors or walls.
-pub(super) struct LayoutTexture {
+pub(super) struct ArchitectureTexture {
     /// The name by which materials refer to it.
     pub(super) name: &'static str,
     /// The number in its id.
@@ -52,16 +52,16 @@ pub(super) struct LayoutTexture {
     pub(super) seen: Picture<[u8; 3]>,
 }
 
-impl LayoutTexture {
+impl ArchitectureTexture {
     /// The texture as the file stores it.
     pub(super) fn file(&self) -> Picture<[u8; 3]> {
         self.stored.stored(&self.seen)
     }
 }
 
-/// Every layout texture.
-pub(super) fn all() -> Vec<LayoutTexture> {
-    let texture = |name, number, tile, stored, seen| LayoutTexture { name, number, tile, stored, seen };
+/// Every texture of the architecture.
+pub(super) fn all() -> Vec<ArchitectureTexture> {
+    let texture = |name, number, tile, stored, seen| ArchitectureTexture { name, number, tile, stored, seen };
     vec![
         texture("wallpaper", 1, 0.6, Stored::Upright, paint(256, 256, wallpaper)),
         texture("planks", 2, 1.2, Stored::Upright, paint(512, 512, planks)),

@@ -8,7 +8,7 @@ pub(super) fn model(number: u32) -> String {
     format!("cc0f0000-5a3b-4e00-8000-{number:012}")
 }
 
-/// The id of a layout texture, which names its folder.
+/// The id of a texture of the architecture, which names its folder.
 pub(super) fn texture(number: u32) -> String {
     format!("cc0a0000-5a3b-4e00-8000-{number:012}")
 }

@@ -15,7 +15,8 @@ pub struct HouseFiles {
     pub textures: Option<PathBuf>,
     /// A file of designers' cameras beside the house.
     pub cameras: Option<PathBuf>,
-    /// Whether to place everything as BlenderProc does: the layout mirrored, and each piece of furniture mirrored back.
+    /// Whether to place everything as BlenderProc does: the architecture mirrored, and each piece of furniture mirrored
+    /// back.
     pub blenderproc_compat: bool,
 }
 

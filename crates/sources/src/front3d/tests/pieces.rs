@@ -11,8 +11,8 @@ fn color_of(material: &Material) -> &ColorInput {
     base_color
 }
 
-/// The colour of the layout's material with this number, if any surface uses it.
-fn layout_color(house: &FurnishedHouse, number: usize) -> Option<&ColorInput> {
+/// The colour of the architecture's material with this number, if any surface uses it.
+fn architecture_color(house: &FurnishedHouse, number: usize) -> Option<&ColorInput> {
     let uid = format!("101000000003/{number:05}");
     house.scene.materials.iter().find(|material| material.name == uid).map(color_of)
 }
@@ -45,7 +45,7 @@ fn the_first_of_two_records_is_used() {
     assert_eq!(pieces_of(house, LIBRARY, 19).len(), 1);
     // The magenta one repeats the floor's uid.
     assert_eq!(house.house.materials.len(), 13);
-    assert!(matches!(layout_color(house, 0), Some(ColorInput::Texture { .. })));
+    assert!(matches!(architecture_color(house, 0), Some(ColorInput::Texture { .. })));
 }
 
 /// Sizes follow from the numbers in the files: the stool's are centimetres, the shelf has a shadow of six metres.
@@ -171,20 +171,21 @@ fn materials_of_models_are_their_pictures() {
     }
 }
 
-/// Materials of the layout: the effects of `useColor`, `local`, "" and a missing folder; colours are decoded as sRGB.
+/// Materials of the architecture: the effects of `useColor`, `local`, "" and a missing folder; colours are decoded as
+/// sRGB.
 #[test]
-fn materials_of_the_layout_follow_the_rules() {
+fn materials_of_the_architecture_follow_the_rules() {
     let house = furnished();
     // 255, 244, 214 is 1, 0.9047, 0.6724 in linear light (IEC 61966-2-1, by hand); 8 is the light band's.
-    let Some(ColorInput::Constant(band)) = layout_color(house, 8) else { panic!() };
+    let Some(ColorInput::Constant(band)) = architecture_color(house, 8) else { panic!() };
     for (found, by_hand) in band.iter().zip([1.0, 0.904_66, 0.672_44]) {
         assert!((found - by_hand).abs() < 2e-4, "{band:?}");
     }
     for plain in [5, 6, 7, 8, 10, 11, 12] {
-        assert!(matches!(layout_color(house, plain), Some(ColorInput::Constant(_))), "{plain}");
+        assert!(matches!(architecture_color(house, plain), Some(ColorInput::Constant(_))), "{plain}");
     }
     for textured in [0, 1, 2, 3, 4, 9] {
-        let color = layout_color(house, textured).unwrap();
+        let color = architecture_color(house, textured).unwrap();
         assert!(texture_name(house, color).starts_with("house/3D-FRONT-texture/"), "{textured}");
         let ColorInput::Texture { uv, .. } = color else { unreachable!() };
         assert_ne!(*uv, UvTransform::default());

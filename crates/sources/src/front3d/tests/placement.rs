@@ -67,10 +67,10 @@ fn compat_is_blenderprocs_matrix() {
 }
 
 /// The L-sofa stands with its back to the north in the living room. In the source's world its long seat is in the west;
-/// under compat it is in the east of a room whose x is unchanged, which contradicts the layout, as in BlenderProc's
-/// pictures.
+/// under compat it is in the east of a room whose x is unchanged, which contradicts the architecture, as in
+/// BlenderProc's pictures.
 #[test]
-fn compat_mirrors_the_layout_and_not_the_sofa() {
+fn compat_mirrors_the_architecture_and_not_the_sofa() {
     let disk = Disk::bare();
     let normal = disk.furnish();
     let compat = furnish(&HouseFiles { blenderproc_compat: true, ..disk.files() }, &Limits::default()).unwrap();
@@ -93,7 +93,7 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
         DMat3::from_diagonal(DVec3::new(-1.0, 1.0, -1.0)),
     );
     assert_near(linear_map(&source.positions, &sofa(&compat).positions), DMat3::IDENTITY);
-    // The layout: M_z.
+    // The architecture: M_z.
     assert_near(
         linear_map(&wall(&normal).positions, &wall(&compat).positions),
         DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)),
@@ -115,7 +115,7 @@ fn compat_mirrors_the_layout_and_not_the_sofa() {
     assert!((one + other).abs() < 1e-3);
 }
 
-/// The designers' cameras are mirrored with the layout, so that they see the same walls.
+/// The designers' cameras are mirrored with the architecture, so that they see the same walls.
 #[test]
 fn compat_mirrors_cameras_too() {
     let disk = Disk::bare();
