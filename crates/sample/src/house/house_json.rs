@@ -7,7 +7,7 @@ use super::json_number::{number, numbers};
 use super::layout::{self, ROOMS};
 use super::models::Model;
 use super::pieces::{PIECES, RECORDS, Record, Validity, record_of};
-use super::surfaces::LayoutMesh;
+use super::surfaces::ArchitectureMesh;
 use super::textures::ArchitectureTexture;
 use super::{materials, uids};
 
@@ -47,7 +47,7 @@ pub(super) fn house(models: &[Model], textures: &[ArchitectureTexture]) -> Value
     })
 }
 
-fn mesh_entry(mesh: &LayoutMesh, place: usize) -> Value {
+fn mesh_entry(mesh: &ArchitectureMesh, place: usize) -> Value {
     let uvs = mesh.uvs.iter().flat_map(|uv: &DVec2| uv.to_array());
     json!({
         "uid": format!("101000000002/{place}"), "jid": "", "aid": [], "xyz": flat(&mesh.positions),

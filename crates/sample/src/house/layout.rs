@@ -5,7 +5,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::surfaces::{LayoutMesh, WallHole};
+use super::surfaces::{ArchitectureMesh, WallHole};
 
 /// Height of the ceiling.
 pub(super) const HEIGHT: f64 = 2.8;
@@ -71,7 +71,7 @@ const LIBRARY_WINDOW: [DVec3; 2] = [v(-0.2, 1.2, 5.8), v(0.0, 2.2, 6.8)];
 const HOLES: [[DVec3; 2]; 5] = [PASSAGE, DOOR, LIVING_WINDOW, BEDROOM_WINDOW, LIBRARY_WINDOW];
 
 /// The meshes of the room with this index in [`ROOMS`]. The library has no ceiling.
-pub(super) fn meshes(room: usize) -> Vec<LayoutMesh> {
+pub(super) fn meshes(room: usize) -> Vec<ArchitectureMesh> {
     let mut meshes = shell(&ROOMS[room]);
     meshes.retain(|mesh| room < 2 || mesh.kind != "Ceiling");
     meshes.extend(outside(room));
@@ -110,26 +110,26 @@ fn wall_lines(room: &Room) -> [(DVec3, DVec3); 4] {
 }
 
 /// Floor, ceiling, four walls and their baseboards.
-fn shell(room: &Room) -> Vec<LayoutMesh> {
+fn shell(room: &Room) -> Vec<ArchitectureMesh> {
     let mut meshes = vec![
-        LayoutMesh::new("Floor", room.floor).facing_up(room.low, room.high, 0.0),
-        LayoutMesh::new("Ceiling", "ceiling").facing_down(room.low, room.high, HEIGHT),
+        ArchitectureMesh::new("Floor", room.floor).facing_up(room.low, room.high, 0.0),
+        ArchitectureMesh::new("Ceiling", "ceiling").facing_down(room.low, room.high, HEIGHT),
     ];
     for (foot, along) in wall_lines(room) {
         let holes = holes_of(foot, along);
-        meshes.push(LayoutMesh::new("WallInner", room.walls).wall(foot, along, HEIGHT, &holes));
+        meshes.push(ArchitectureMesh::new("WallInner", room.walls).wall(foot, along, HEIGHT, &holes));
         meshes.push(baseboard(room.trim, foot, along, &holes));
     }
     meshes
 }
 
 /// A strip of 10 cm by 1.2 cm along a wall, interrupted by the openings that reach down to the floor.
-fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHole]) -> LayoutMesh {
+fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHole]) -> ArchitectureMesh {
     let (length, right) = (along.length(), along.normalize());
     let inwards = right.cross(DVec3::Y);
     let mut gaps: Vec<_> = holes.iter().filter(|h| h.bottom < 0.1).map(|h| (h.left - 0.06, h.right + 0.06)).collect();
     gaps.push((length, length));
-    let (mut board, mut from) = (LayoutMesh::new("Baseboard", material), 0.0);
+    let (mut board, mut from) = (ArchitectureMesh::new("Baseboard", material), 0.0);
     for (left, next) in gaps {
         let (a, b) = (foot + right * from, foot + right * left + inwards * 0.012 + DVec3::Y * 0.1);
         board = board.boxed(a.min(b), a.max(b));
@@ -139,7 +139,7 @@ fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHol
 }
 
 /// The outer walls of a room, and the tops and bottoms of its walls.
-fn outside(room: usize) -> Vec<LayoutMesh> {
+fn outside(room: usize) -> Vec<ArchitectureMesh> {
     // Start and extent of the outer sides, which run to the right seen from outside.
     let lines: &[(DVec3, DVec3)] = &match room {
         0 => vec![(v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)), (v(-0.2, 0.0, -0.2), v(0.0, 0.0, 4.7))],
@@ -162,13 +162,13 @@ fn outside(room: usize) -> Vec<LayoutMesh> {
     };
     // The outer sides with their openings; a top and a bottom for every wall.
     let outer = lines.iter().map(|&(foot, along)| {
-        LayoutMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along))
+        ArchitectureMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along))
     });
     let levels = plans.iter().flat_map(|&[x0, z0, x1, z1]| {
         let (low, high) = (DVec2::new(x0, z0), DVec2::new(x1, z1));
-        let bottom = LayoutMesh::new("WallBottom", "outer_wall");
+        let bottom = ArchitectureMesh::new("WallBottom", "outer_wall");
         [
-            LayoutMesh::new("WallTop", "outer_wall").facing_up(low, high, HEIGHT),
+            ArchitectureMesh::new("WallTop", "outer_wall").facing_up(low, high, HEIGHT),
             on_the_floor(low, high).into_iter().fold(bottom, |mesh, (low, high)| mesh.facing_down(low, high, 0.0)),
         ]
     });
@@ -191,13 +191,13 @@ fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
 }
 
 /// The opening to the bedroom, the door to the library, the window and the suspended ceiling.
-fn living_room() -> Vec<LayoutMesh> {
+fn living_room() -> Vec<ArchitectureMesh> {
     let mut meshes = vec![
-        LayoutMesh::new("Hole", "trim").reveal(PASSAGE[0], PASSAGE[1], true),
-        LayoutMesh::new("Door", "door").reveal(DOOR[0], DOOR[1], true),
-        LayoutMesh::new("Door", "door").boxed(DOOR[0].with_z(4.48), DOOR[1].with_z(4.52)),
+        ArchitectureMesh::new("Hole", "trim").reveal(PASSAGE[0], PASSAGE[1], true),
+        ArchitectureMesh::new("Door", "door").reveal(DOOR[0], DOOR[1], true),
+        ArchitectureMesh::new("Door", "door").boxed(DOOR[0].with_z(4.48), DOOR[1].with_z(4.52)),
         door_trim(4.388, 4.4),
-        LayoutMesh::new("Window", "trim").reveal(LIVING_WINDOW[0], LIVING_WINDOW[1], true),
+        ArchitectureMesh::new("Window", "trim").reveal(LIVING_WINDOW[0], LIVING_WINDOW[1], true),
         window_bars(),
     ];
     meshes.extend(hung_ceiling());
@@ -205,19 +205,20 @@ fn living_room() -> Vec<LayoutMesh> {
 }
 
 /// Trim on three sides of the door from z = `back` to z = `front`.
-fn door_trim(back: f64, front: f64) -> LayoutMesh {
+fn door_trim(back: f64, front: f64) -> ArchitectureMesh {
     let ([low, high], w) = (DOOR, 0.06);
-    LayoutMesh::new("Pocket", "door")
+    ArchitectureMesh::new("Pocket", "door")
         .boxed(v(low.x - w, 0.0, back), v(low.x, high.y, front))
         .boxed(v(high.x, 0.0, back), v(high.x + w, high.y, front))
         .boxed(v(low.x - w, high.y, back), v(high.x + w, high.y + w, front))
 }
 
 /// The frame of the living room's window, with two mullions.
-fn window_bars() -> LayoutMesh {
+fn window_bars() -> ArchitectureMesh {
     let ([low, high], w) = (LIVING_WINDOW, 0.05);
-    let bar = |mesh: LayoutMesh, x0: f64, y0: f64, x1: f64, y1: f64| mesh.boxed(v(x0, y0, -0.13), v(x1, y1, -0.08));
-    let mut bars = LayoutMesh::new("Window", "trim");
+    let bar =
+        |mesh: ArchitectureMesh, x0: f64, y0: f64, x1: f64, y1: f64| mesh.boxed(v(x0, y0, -0.13), v(x1, y1, -0.08));
+    let mut bars = ArchitectureMesh::new("Window", "trim");
     for x in [low.x, low.x + 0.9, high.x - 0.95, high.x - w] {
         bars = bar(bars, x, low.y, x + w, high.y);
     }
@@ -229,11 +230,11 @@ fn window_bars() -> LayoutMesh {
 
 /// A suspended ceiling: four boxes whose tops lie in the ceiling, a sheet just below the ceiling, and light strips along
 /// the inner edges.
-fn hung_ceiling() -> Vec<LayoutMesh> {
+fn hung_ceiling() -> Vec<ArchitectureMesh> {
     let (low, high, wide, bottom) = (ROOMS[0].low, ROOMS[0].high, 0.5, 2.55);
-    let mut frame = LayoutMesh::new("CustomizedCeiling", "ceiling");
-    let mut band = LayoutMesh::new("LightBand", "light_band");
-    let strip = |mesh: LayoutMesh, x0: f64, y0: f64, z0: f64, x1: f64, y1: f64, z1: f64| {
+    let mut frame = ArchitectureMesh::new("CustomizedCeiling", "ceiling");
+    let mut band = ArchitectureMesh::new("LightBand", "light_band");
+    let strip = |mesh: ArchitectureMesh, x0: f64, y0: f64, z0: f64, x1: f64, y1: f64, z1: f64| {
         mesh.boxed(v(x0, y0, z0), v(x1, y1, z1))
     };
     for x in [low.x, high.x - wide] {
@@ -248,30 +249,31 @@ fn hung_ceiling() -> Vec<LayoutMesh> {
     for z in [low.y + wide, high.y - wide - 0.02] {
         band = strip(band, low.x + wide, 2.7, z, high.x - wide, 2.72, z + 0.02);
     }
-    let sheet = LayoutMesh::new("CustomizedCeiling", "ceiling").facing_down(low + wide, high - wide, HEIGHT - 0.005);
+    let sheet =
+        ArchitectureMesh::new("CustomizedCeiling", "ceiling").facing_down(low + wide, high - wide, HEIGHT - 0.005);
     vec![frame, sheet, band]
 }
 
 /// A panel on the wall behind the bed, the window's inner sides and its sill.
-fn bedroom() -> Vec<LayoutMesh> {
+fn bedroom() -> Vec<ArchitectureMesh> {
     let (low, high) = (v(6.95, 0.12, 0.0), v(9.25, 2.4, 0.03));
     vec![
-        LayoutMesh::new("CustomizedFeatureWall", "panel").boxed(low, high),
-        LayoutMesh::new("BayWindow", "trim").reveal(BEDROOM_WINDOW[0], BEDROOM_WINDOW[1], true),
-        LayoutMesh::new("BayWindow", "trim").boxed(v(9.94, 0.87, 1.35), v(10.0, 0.9, 3.25)),
+        ArchitectureMesh::new("CustomizedFeatureWall", "panel").boxed(low, high),
+        ArchitectureMesh::new("BayWindow", "trim").reveal(BEDROOM_WINDOW[0], BEDROOM_WINDOW[1], true),
+        ArchitectureMesh::new("BayWindow", "trim").boxed(v(9.94, 0.87, 1.35), v(10.0, 0.9, 3.25)),
     ]
 }
 
 /// A wall cabinet of three meshes, a cornice, a pipe and the door's trim on this side. The window is an open hole.
-fn library() -> Vec<LayoutMesh> {
+fn library() -> Vec<ArchitectureMesh> {
     vec![
-        LayoutMesh::new("Cabinet", "cabinet").boxed(v(2.0, 1.5, 7.86), v(4.6, 2.2, 8.19)),
-        LayoutMesh::new("Front", "cabinet")
+        ArchitectureMesh::new("Cabinet", "cabinet").boxed(v(2.0, 1.5, 7.86), v(4.6, 2.2, 8.19)),
+        ArchitectureMesh::new("Front", "cabinet")
             .boxed(v(2.02, 1.52, 7.84), v(3.29, 2.18, 7.86))
             .boxed(v(3.31, 1.52, 7.84), v(4.58, 2.18, 7.86)),
-        LayoutMesh::new("Back", "cabinet").boxed(v(2.0, 1.5, 8.19), v(4.6, 2.2, 8.2)),
-        LayoutMesh::new("Cornice", "library_trim").boxed(v(5.54, 2.7, 4.6), v(5.6, 2.8, 8.2)),
-        LayoutMesh::new("SewerPipe", "library_trim").boxed(v(5.44, 0.0, 8.04), v(5.6, 2.8, 8.2)),
+        ArchitectureMesh::new("Back", "cabinet").boxed(v(2.0, 1.5, 8.19), v(4.6, 2.2, 8.2)),
+        ArchitectureMesh::new("Cornice", "library_trim").boxed(v(5.54, 2.7, 4.6), v(5.6, 2.8, 8.2)),
+        ArchitectureMesh::new("SewerPipe", "library_trim").boxed(v(5.44, 0.0, 8.04), v(5.6, 2.8, 8.2)),
         door_trim(4.6, 4.612),
     ]
 }

@@ -7,7 +7,7 @@ use crate::solid::sides;
 
 /// A mesh of the architecture.
 #[derive(Clone, Debug)]
-pub(super) struct LayoutMesh {
+pub(super) struct ArchitectureMesh {
     /// The data's type of mesh, as in "WallInner".
     pub(super) kind: &'static str,
     /// The name of its material in `materials`.
@@ -29,7 +29,7 @@ pub(super) struct WallHole {
     pub(super) top: f64,
 }
 
-impl LayoutMesh {
+impl ArchitectureMesh {
     pub(super) fn new(kind: &'static str, material: &'static str) -> Self {
         Self { kind, material, positions: vec![], normals: vec![], uvs: vec![], faces: vec![] }
     }
@@ -123,12 +123,12 @@ impl LayoutMesh {
 mod tests {
     use super::*;
 
-    fn area(mesh: &LayoutMesh) -> f64 {
+    fn area(mesh: &ArchitectureMesh) -> f64 {
         let p = &mesh.positions;
         mesh.faces.iter().map(|&[a, b, c]| (p[b] - p[a]).cross(p[c] - p[a]).length() / 2.0).sum()
     }
 
-    fn faces_agree_with_normals(mesh: &LayoutMesh) -> bool {
+    fn faces_agree_with_normals(mesh: &ArchitectureMesh) -> bool {
         let p = &mesh.positions;
         mesh.faces.iter().all(|&[a, b, c]| (p[b] - p[a]).cross(p[c] - p[a]).dot(mesh.normals[a]) > 0.0)
     }
@@ -139,7 +139,7 @@ mod tests {
             WallHole { left: 3.0, right: 3.5, bottom: 0.0, top: 2.0 },
             WallHole { left: 0.5, right: 1.5, bottom: 1.0, top: 2.0 },
         ];
-        let wall = LayoutMesh::new("WallInner", "paint").wall(DVec3::ZERO, DVec3::X * 4.0, 2.5, &holes);
+        let wall = ArchitectureMesh::new("WallInner", "paint").wall(DVec3::ZERO, DVec3::X * 4.0, 2.5, &holes);
         assert!((area(&wall) - (10.0 - 1.0 - 1.0)).abs() < 1e-12);
         assert!(faces_agree_with_normals(&wall));
         // u is the distance along the wall and v the height relative to its top, however the wall is cut.
@@ -152,7 +152,7 @@ mod tests {
     fn reveals_face_into_their_hole() {
         let (low, high) = (DVec3::new(1.0, 0.5, 0.0), DVec3::new(2.0, 1.5, 0.2));
         for (sill, rectangles) in [(true, 4), (false, 3)] {
-            let reveal = LayoutMesh::new("Window", "paint").reveal(low, high, sill);
+            let reveal = ArchitectureMesh::new("Window", "paint").reveal(low, high, sill);
             assert_eq!(reveal.faces.len(), 2 * rectangles);
             assert!(faces_agree_with_normals(&reveal));
             let middle = (low + high) / 2.0;
