@@ -91,7 +91,7 @@ def result(*, method: str, psnr: float, scenes: list[str], seed: int, **said: ob
         "submission": {"sha256": sha256(method + str(seed)), "description": said.pop("description", ""), **said},
         "dataset": {
             "name": "synthetic", "version": "1.0", "manifest_sha256": MANIFEST, "scenes": scenes,
-            "scenes_in_all": len(scenes), "scored_renderer": "builtin",
+            "total_scenes": len(scenes), "scored_renderer": "builtin",
             "houses": {scene: f"house-{at // 2 if len(scenes) > 12 else at}" for at, scene in enumerate(scenes)},
         },
         "lpips_weights": {"alex": WEIGHTS}, "protocols": {"mateval-1": scores}, "missing": [], "findings": [],

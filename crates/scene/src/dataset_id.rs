@@ -22,7 +22,7 @@ pub struct DatasetId {
     /// The scenes that were scored, in the dataset's order.
     pub scenes: Vec<SceneId>,
     /// The number of scenes of the dataset.
-    pub scenes_in_all: usize,
+    pub total_scenes: usize,
     /// The house of each scored scene. Rankings draw scenes of one house together.
     #[serde(default)]
     pub houses: BTreeMap<SceneId, String>,
@@ -40,7 +40,7 @@ impl DatasetId {
             version: dataset.file.version.clone(),
             manifest_sha256: dataset.file.manifest_sha256.clone(),
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-            scenes_in_all: dataset.scenes.len(),
+            total_scenes: dataset.scenes.len(),
             houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
             scored_renderer: dataset.file.scored_renderer.clone(),
         }

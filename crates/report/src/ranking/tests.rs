@@ -181,7 +181,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             name: "d".to_owned(),
             version: "1".to_owned(),
             manifest_sha256: "m".to_owned(),
-            scenes_in_all: ids.len(),
+            total_scenes: ids.len(),
             houses: ids.iter().map(|id| (id.clone(), format!("house of {id}"))).collect(),
             scenes: ids,
             scored_renderer: None,

@@ -52,7 +52,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             version: String::new(),
             manifest_sha256: String::new(),
             scenes: vec![scene("b"), scene("a")],
-            scenes_in_all: 2,
+            total_scenes: 2,
             houses: BTreeMap::new(),
             scored_renderer: None,
         },

@@ -52,7 +52,7 @@ mod tests {
             version: String::new(),
             manifest_sha256: String::new(),
             scenes: Vec::new(),
-            scenes_in_all: 0,
+            total_scenes: 0,
             houses: Default::default(),
             scored_renderer: None,
         };
