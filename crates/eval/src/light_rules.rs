@@ -1,5 +1,7 @@
 //! The part of a protocol that defines the light under which predictions are compared, and the precision of the numbers.
 
+use std::collections::BTreeMap;
+
 use mateval_light::rules::{FitRules, StageRules};
 use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
@@ -44,7 +46,8 @@ pub struct LightRules {
     pub roulette_start: u32,
     /// The probability that a path survives Russian roulette.
     pub roulette_survival: f32,
-    /// The positions of a stage's lights.
+    /// The positions of a stage's lights: constants by name, which `PROTOCOL.md` defines.
+    #[schemars(with = "BTreeMap<String, f64>")]
     pub stage: StageRules,
     /// The fit of radiances.
     pub fit: FitRules,

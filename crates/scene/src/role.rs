@@ -1,8 +1,9 @@
 //! The role of an instance in its scene, the kind of source of a scene, and whose lights its fitted light uses.
 
+use std::borrow::Cow;
 use std::fmt;
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 /// The role of an instance in its scene. The reader of the source states it, since only the source knows it.
@@ -51,7 +52,7 @@ impl Role {
 }
 
 /// The kind of source that a scene came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SourceKind {
     /// One of Bitterli's scenes, as Mitsuba XML.
@@ -65,6 +66,21 @@ impl fmt::Display for SourceKind {
         f.write_str(match self {
             Self::Bitterli => "bitterli",
             Self::Front3d => "front3d",
+        })
+    }
+}
+
+// The words are listed once, in `dataset_spec/FORMAT.md`, so that a new source changes no schema.
+impl JsonSchema for SourceKind {
+    fn schema_name() -> Cow<'static, str> {
+        "SourceKind".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({
+            "description": "The kind of source that a scene came from; FORMAT.md lists the words.",
+            "type": "string",
+            "pattern": "^[a-z0-9_]+$"
         })
     }
 }

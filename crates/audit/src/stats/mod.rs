@@ -96,7 +96,7 @@ pub struct Spread {
 pub struct SceneStats {
     /// The scene.
     pub scene: SceneId,
-    /// The kind of its source: `bitterli` or `front3d`.
+    /// The kind of its source.
     pub source_kind: SourceKind,
     /// Its house.
     pub house: String,

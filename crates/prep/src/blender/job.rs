@@ -12,7 +12,7 @@ use mateval_scene::material::Material;
 use mateval_scene::reference::{LightGroup, ReferenceScene, Surface};
 use mateval_scene::reference_io::WrapWord;
 use mateval_scene::{Camera, SceneId, TriangleMesh, ViewId, json};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 
 use crate::error::PrepError;
@@ -33,6 +33,7 @@ pub struct BlenderJob {
     /// The scene's surfaces.
     pub surfaces: Vec<JobSurface>,
     /// Materials as in `reference.json`.
+    #[schemars(schema_with = "materials_schema")]
     pub materials: Vec<Material>,
     /// Textures that materials and lights refer to by index.
     pub textures: Vec<JobTexture>,
@@ -46,6 +47,11 @@ pub struct BlenderJob {
     pub max_bounces: u32,
     /// Number of threads to render with; 0 for one per processor.
     pub threads: u32,
+}
+
+/// The schema of `reference.json` defines what a material is.
+fn materials_schema(_: &mut SchemaGenerator) -> Schema {
+    json_schema!({ "type": "array", "items": { "$ref": "reference.schema.json#/$defs/Material" } })
 }
 
 /// A surface, in world space: metres, +Y up.

@@ -20,9 +20,9 @@ const SOURCE_KEYS: [&str; 2] = ["bitterli", "front3d"];
 pub struct RecipeScene {
     /// Its id.
     pub id: SceneId,
-    /// The scene's Mitsuba XML; either this or `front3d`.
+    /// The scene's Mitsuba XML. Every scene names exactly one source.
     pub bitterli: Option<PathBuf>,
-    /// A room of a 3D-FRONT house; either this or `bitterli`.
+    /// A room of a 3D-FRONT house.
     pub front3d: Option<Front3dRoom>,
     /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder or the house's uid.
     pub house: Option<String>,
@@ -89,9 +89,11 @@ fn default_exposure() -> f64 {
 impl RecipeScene {
     /// The source of the scene. Fails unless the recipe names exactly one.
     pub fn source(&self) -> Result<RecipeSource<'_>, RecipeSceneFault> {
-        match (&self.bitterli, &self.front3d) {
-            (Some(xml), None) => Ok(RecipeSource::Bitterli(xml)),
-            (None, Some(room)) => Ok(RecipeSource::Front3d(room)),
+        let bitterli = self.bitterli.as_deref().map(RecipeSource::Bitterli);
+        let front3d = self.front3d.as_ref().map(RecipeSource::Front3d);
+        let mut named = [bitterli, front3d].into_iter().flatten();
+        match (named.next(), named.next()) {
+            (Some(source), None) => Ok(source),
             _ => Err(RecipeSceneFault::NotOneSource { keys: &SOURCE_KEYS }),
         }
     }
