@@ -91,9 +91,11 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
     Ok(report)
 }
 
+/// The folder that the recipe's paths are relative to.
 fn source_folder(options: &BuildOptions) -> PathBuf {
-    let beside = || options.recipe.parent().map(Path::to_owned).unwrap_or_default();
-    options.source.clone().unwrap_or_else(beside)
+    // The parent of a file name alone is the empty path, which names no folder.
+    let parent = options.recipe.parent().filter(|folder| !folder.as_os_str().is_empty());
+    options.source.clone().unwrap_or_else(|| parent.unwrap_or(Path::new(".")).to_owned())
 }
 
 /// Makes the paths that the dataset records relative to `source`.
@@ -284,4 +286,20 @@ fn finish(out: &Path, recipe: &Recipe, text: &str, dataset: &mut DatasetFile) ->
     // From here on the dataset is finished, and the build folder no longer matters.
     let marks = out.join(BUILD);
     std::fs::remove_dir_all(&marks).map_err(PrepError::io("remove", &marks))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recipe_without_a_folder_lies_in_the_current_one() {
+        let source = |recipe: &str| {
+            source_folder(&BuildOptions { recipe: recipe.into(), source: None, out: "out".into(), force: false })
+        };
+        for (recipe, folder) in [("mini.toml", "."), ("recipes/mini.toml", "recipes"), ("/mini.toml", "/")] {
+            assert_eq!(source(recipe), Path::new(folder));
+            assert!(std::path::absolute(source(recipe)).is_ok());
+        }
+    }
 }
