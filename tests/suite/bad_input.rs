@@ -7,7 +7,7 @@ use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture};
 
 use super::command::{Run, baseline, build, mateval, render, run, score, stats, verify};
-use super::sample::{copied_dataset, dataset, files_below, json, write_source};
+use super::sample::{copied_dataset, files_below, json, unrendered, write_source};
 
 /// The head of a recipe with the input view alone and the smallest sizes.
 const TINY: &str = "resolution = [32, 24]\natlas_size = 64\nviews = []";
@@ -236,7 +236,7 @@ fn outputs_that_exist() {
     let out = source.out();
     for words in [&[][..], &["--force"]] {
         run(build(&source.recipe, &out).args(words)).ends_with(2).says("is not a dataset");
-        run(baseline("grey", dataset(), &out).args(words)).ends_with(2).says("dataset'");
+        run(baseline("grey", unrendered(), &out).args(words)).ends_with(2).says("dataset'");
     }
     run(mateval().arg("sample").arg(&out)).ends_with(2).says("already exists");
     assert_eq!(files_below(&out), [Path::new("notes.txt")]);
@@ -244,11 +244,11 @@ fn outputs_that_exist() {
     let result = out.join("RESULT.json");
     std::fs::write(&result, "mine").unwrap();
     let submission = out.join("grey");
-    run(&mut baseline("grey", dataset(), &submission)).ends_with(0);
-    run(&mut baseline("grey", dataset(), &submission)).ends_with(2).says("already exists").says("--force");
-    run(&mut score(&submission, dataset(), &result)).ends_with(2).says("already exists").says("--force");
+    run(&mut baseline("grey", unrendered(), &submission)).ends_with(0);
+    run(&mut baseline("grey", unrendered(), &submission)).ends_with(2).says("already exists").says("--force");
+    run(&mut score(&submission, unrendered(), &result)).ends_with(2).says("already exists").says("--force");
     assert_eq!(std::fs::read_to_string(&result).unwrap(), "mine");
-    run(score(&submission, dataset(), &result).arg("--force")).ends_with(0);
+    run(score(&submission, unrendered(), &result).arg("--force")).ends_with(0);
     assert!(json(&result).is_object());
 }
 

@@ -1,8 +1,8 @@
-//! Same command, same bytes, on any number of threads.
+//! Same command, same bytes, on any number of threads. `eval/tests/suite/same_bytes.rs` shows the same for scores.
 
 use std::path::Path;
 
-use super::command::{Run, baseline, build, render, run, score};
+use super::command::{Run, build, render, run};
 use super::sample::{self, SMALL, manifest, write_source};
 
 /// Runs the command on this number of threads.
@@ -46,22 +46,4 @@ fn another_recipe_and_other_samples_give_another_manifest() {
     let copy = sample::copied_dataset();
     run(&mut render(copy.path(), 2)).ends_with(0);
     assert_ne!(manifest(copy.path()), manifest(sample::dataset()));
-}
-
-#[test]
-fn scores_are_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let [gt, grey] = ["gt", "grey"].map(|name| {
-        let submission = folder.path().join(name);
-        run(&mut baseline(name, sample::dataset(), &submission)).ends_with(0);
-        submission
-    });
-    let scored = |submission: &Path, threads: usize| {
-        let result = folder.path().join("RESULT.json");
-        on_threads(threads, score(submission, sample::dataset(), &result).arg("--force"));
-        std::fs::read(result).unwrap()
-    };
-    let [one, two] = [1, 2].map(|threads| scored(&gt, threads));
-    assert!(one == two, "1 and 2 threads give different results");
-    assert_ne!(one, scored(&grey, 2));
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use super::command::{Run, baseline, build, mateval, render, run, score, verify};
-use super::sample::{SMALL, copied_dataset, dataset, files_below, manifest, write_source};
+use super::sample::{SMALL, copied_dataset, dataset, files_below, manifest, unrendered, write_source};
 
 /// Runs the command with every file limited to this number of blocks of 512 bytes. The signal for a larger file is
 /// ignored, so that the write fails instead.
@@ -59,11 +59,11 @@ fn a_render_fails_cleanly_and_resumes() {
 fn submissions_and_results_are_complete_or_absent() {
     let folder = tempfile::tempdir().unwrap();
     let (submission, result) = (folder.path().join("gt"), folder.path().join("RESULT.json"));
-    let failed = limited(0, &baseline("gt", dataset(), &submission)).ends_with(2);
+    let failed = limited(0, &baseline("gt", unrendered(), &submission)).ends_with(2);
     assert!(failed.error().contains("base_color.png"), "{}", failed.stderr);
     assert!(!submission.exists());
-    run(&mut baseline("gt", dataset(), &submission)).ends_with(0);
-    let failed = limited(2, &score(&submission, dataset(), &result)).ends_with(2);
+    run(&mut baseline("gt", unrendered(), &submission)).ends_with(0);
+    let failed = limited(2, &score(&submission, unrendered(), &result)).ends_with(2);
     assert!(failed.error().contains("RESULT.json"), "{}", failed.stderr);
     assert!(!result.exists());
     assert_eq!(partial_files(folder.path()), [""; 0]);

@@ -1,6 +1,6 @@
 //! Checks the README's numbers against a run.
 
-use super::command::{build, run, run_words};
+use super::command::{build, mateval, run, run_words};
 
 /// Uses the demo's dataset at its own size, without renders, which do not affect albedo scores.
 #[test]
@@ -15,7 +15,9 @@ fn its_table_is_what_the_demo_prints() {
         let words = ["baseline", method, "--dataset"].map(std::path::PathBuf::from);
         run_words(words.into_iter().chain([path("dataset"), "--out".into(), submission.clone()])).ends_with(0);
         let words = ["eval".into(), "score".into(), submission, "--dataset".into(), path("dataset"), "--out".into()];
-        run_words(words.into_iter().chain([result.clone()])).ends_with(0);
+        // Without the weights of LPIPS, whose values the table does not show and which take most of the time.
+        run(mateval().args(words.into_iter().chain([result.clone()])).env("MATEVAL_CACHE", path("no-such-folder")))
+            .ends_with(0);
         let result: serde_json::Value = serde_json::from_slice(&std::fs::read(result).unwrap()).unwrap();
         let row = readme_row(method, &result);
         assert!(readme.contains(&row), "README.md lacks '{row}'");

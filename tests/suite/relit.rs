@@ -10,7 +10,7 @@ use super::command::{build, render, run};
 use super::sample::{json, recipe_text, write_source};
 
 const HEAD: &str = "resolution = [96, 72]\natlas_size = 64\nviews = []";
-const SAMPLES: u32 = 64;
+const SAMPLES: u32 = 32;
 /// Side of the compared tiles, in pixels.
 const TILE: usize = 8;
 

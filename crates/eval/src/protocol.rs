@@ -200,6 +200,7 @@ mod tests {
 
     #[test]
     fn an_unknown_name_says_what_is_known() {
-        assert!(Protocol::named("papr").unwrap_err().to_string().contains("'paper'"));
+        let error = Protocol::named("papr").unwrap_err().to_string();
+        assert!(error.contains("'papr'") && error.contains("paper"), "{error}");
     }
 }

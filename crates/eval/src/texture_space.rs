@@ -374,13 +374,13 @@ mod tests {
         let roughness = folder.truth_material(&instance).join("roughness.png");
         png_io::write_grey_bytes(&roughness, &Picture::filled(128, 128, 9)).unwrap();
         let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
-        assert!(text.contains("roughness.png': 128x128 texels, scene.json says 64"), "{text}");
+        assert!(text.contains("roughness.png': expected 64x64 texels, as scene.json states, found 128x128"), "{text}");
         std::fs::remove_file(&roughness).unwrap();
         assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("roughness.png"));
         scene.instances[0].atlas.as_mut().unwrap().size = 1 << 20;
         let text = compared(&folder, &scene, &submission).unwrap_err().to_string();
-        assert!(text.contains("instance 'a' has an atlas of 1048576 texels"), "{text}");
+        assert!(text.contains("the atlas of instance 'a' has 1048576 texels a side"), "{text}");
         scene.views.clear();
-        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("no input view"));
+        assert!(compared(&folder, &scene, &submission).unwrap_err().to_string().contains("expected an input view"));
     }
 }

@@ -54,7 +54,7 @@ fn copied(scenes: &[&str]) -> tempfile::TempDir {
     let copy = tempfile::tempdir().unwrap();
     let all = files(&KEPT.cache);
     assert_eq!(all.len(), 2);
-    let is_wanted = |file: &&PathBuf| scenes.iter().any(|scene| read(file)["pictures"][0]["scene"] == *scene);
+    let is_wanted = |file: &&PathBuf| scenes.iter().any(|scene| read(file)["texels"][0]["scene"] == *scene);
     let chosen: Vec<&PathBuf> = all.iter().filter(is_wanted).collect();
     assert_eq!(chosen.len(), scenes.len());
     for file in chosen {
@@ -63,7 +63,7 @@ fn copied(scenes: &[&str]) -> tempfile::TempDir {
     copy
 }
 
-/// The first value of a poisoned entry.
+/// The first value of a poisoned cache entry.
 const POISON: f64 = 12345.5;
 
 /// A cache whose entries are all wrong, which shows whether they are used.
@@ -71,7 +71,7 @@ fn poisoned(scenes: &[&str]) -> tempfile::TempDir {
     let cache = copied(scenes);
     for file in files(cache.path()) {
         let mut entry = read(&file);
-        entry["pictures"][0]["value"] = Value::from(POISON);
+        entry["views"][0]["pictures"][0]["metrics"][0]["value"] = Value::from(POISON);
         std::fs::write(&file, entry.to_string()).unwrap();
     }
     cache

@@ -1,3 +1,5 @@
+//! The estimated bias of an encoded error is its true bias, on synthetic noise.
+
 use super::*;
 use crate::{mse, noise_free_mse};
 use mateval_testkit::synthetic_noise::{Render, SCATTERS, Scatter, mean_and_deviation, single_pixels, squares, waves};

@@ -1,3 +1,5 @@
+//! Errors between noisy pictures are, on the average, those of the pictures without noise.
+
 use mateval_image::LinearRgb;
 
 use super::*;

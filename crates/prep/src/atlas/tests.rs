@@ -1,3 +1,5 @@
+//! Atlases do not overlap, keep their gutters and cover every triangle.
+
 use glam::Vec3;
 use proptest::prelude::*;
 

@@ -1,3 +1,5 @@
+//! Planted errors of each kind are recognised as that kind.
+
 use std::collections::BTreeMap;
 
 use mateval_scene::{InstanceId, SceneId};

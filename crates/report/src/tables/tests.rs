@@ -1,3 +1,5 @@
+//! Tables show what results hold, and refuse results that cannot be compared.
+
 use std::collections::BTreeMap;
 
 use mateval_scene::dataset_id::DatasetId;
