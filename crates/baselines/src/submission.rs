@@ -47,7 +47,7 @@ pub fn write(
     })
 }
 
-/// Like [`write`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the number
+/// Like [`write()`], scene by scene: `write_scene` receives the folder for its instances' folders and returns the number
 /// of instances that it wrote.
 pub fn write_scenes(
     dataset: &Dataset,

@@ -90,7 +90,7 @@ impl Reader<'_> {
         let fault = match present.as_slice() {
             [path] => match self.decoded(path, map) {
                 Ok(texture) => return texture,
-                Err(finding) => finding,
+                Err(finding) => *finding,
             },
             // Roughness and metallic are optional.
             [] if map != Map::BaseColor => return default_of(map),
@@ -106,14 +106,14 @@ impl Reader<'_> {
         default_of(map)
     }
 
-    fn decoded(&mut self, path: &Path, map: Map) -> Result<Texture, Finding> {
+    fn decoded(&mut self, path: &Path, map: Map) -> Result<Texture, Box<Finding>> {
         let decoded = self.read(path).and_then(|file| map_file::decode(file, map));
         let file = decoded.map_err(|fault| {
             let finding = self.replaced("unsound_map", path, map, &fault.message);
-            Finding { place: fault.place, ..finding }
+            Box::new(Finding { place: fault.place, ..finding })
         })?;
         let held = self.memory.holding(compact_texture(file, map));
-        held.ok_or_else(|| self.replaced("unsound_map", path, map, &MemoryBudget::exceeded()))
+        held.ok_or_else(|| Box::new(self.replaced("unsound_map", path, map, &MemoryBudget::exceeded())))
     }
 
     /// Reads a file and records its hash.

@@ -9,6 +9,7 @@ pub mod text;
 #[cfg(test)]
 mod tests;
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::dataset::{Instance, SceneFile};
@@ -256,16 +257,15 @@ fn super_categories(objects: &[&Instance]) -> Vec<SuperCategoryCount> {
 fn categories(objects: &[&Instance]) -> Vec<CategoryCount> {
     let found =
         tally(objects.iter().map(|instance| (instance.super_category.as_deref(), instance.category.as_deref())));
-    let mut rows: Vec<((Option<&str>, Option<&str>), usize)> = found.into_iter().collect();
-    rows.sort_by_key(|((super_category, category), count)| {
-        (rank(*super_category), *super_category, std::cmp::Reverse(*count), *category)
-    });
     let row = |((super_category, category), objects): ((Option<&str>, Option<&str>), usize)| CategoryCount {
         super_category: super_category.map(str::to_owned),
         category: category.map(str::to_owned),
         objects,
     };
-    rows.into_iter().map(row).collect()
+    let mut rows: Vec<CategoryCount> = found.into_iter().map(row).collect();
+    // The sort is stable and the tally is sorted, so that ties stay sorted by category.
+    rows.sort_by_key(|row| (rank(row.super_category.as_deref()), row.super_category.clone(), Reverse(row.objects)));
+    rows
 }
 
 /// How often each value occurs, sorted by value.

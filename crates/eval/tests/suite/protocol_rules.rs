@@ -26,8 +26,11 @@ use serde_json::{Value, json};
 use super::sample::{dataset, hasty, plan, write_grey};
 use mateval_testkit::kept_folder::kept_folder;
 
+/// The start of JSON pointers, and a value that the rules below it decide.
+type Reading = (&'static str, fn(&Protocol) -> Value);
+
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
-const READINGS: [(&str, fn(&Protocol) -> Value); 16] = [
+const READINGS: [Reading; 16] = [
     ("/name", scores),
     ("/mask_rule", scores),
     ("/albedo_space", scores),

@@ -55,7 +55,7 @@ pub fn write(out: &Path) -> Result<(), SampleError> {
     models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
 }
 
-/// As [`write`], but without textures, which take most of the time.
+/// As [`write()`], but without textures, which take most of the time.
 pub fn write_without_pictures(out: &Path) -> Result<(), SampleError> {
     write_shapes(out, &models::all(), &textures::all())
 }
@@ -83,7 +83,7 @@ pub fn sound_house() -> serde_json::Value {
     house_json::house(&models::all(), &textures::all())
 }
 
-/// The house's JSON with its faults, as [`write`] writes it.
+/// The house's JSON with its faults, as [`write()`] writes it.
 pub fn faulty_house() -> serde_json::Value {
     with_faults(&models::all(), &textures::all())
 }
