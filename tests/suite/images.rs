@@ -97,12 +97,12 @@ fn every_value_of_the_reference_is_reproduced() {
 
 /// VGG takes seconds a picture here; the crate's own tests check all of its values.
 #[test]
-fn vgg_is_reproduced_on_three_cases() {
+fn vgg_is_reproduced() {
     let Some((folder, cases)) = cases() else { return };
-    let three = [&cases[0], &cases[8], &cases[10]].map(Value::clone);
-    let Some((wrong, count)) = check_cases(&folder, &three, "vgg") else { return };
+    let two = [&cases[0], &cases[10]].map(Value::clone);
+    let Some((wrong, count)) = check_cases(&folder, &two, "vgg") else { return };
     assert_eq!(wrong, [""; 0]);
-    assert_eq!(count, 2 * 11 + 1);
+    assert_eq!(count, 11 + 1);
 }
 
 /// The twin: with another prediction every value differs, with another mask every masked value.
