@@ -75,7 +75,7 @@ fn metadata() -> Metadata {
 /// The dependencies of a package that are not allowed.
 fn forbidden(package: &str, used: &[&str]) -> Vec<String> {
     let allowed = ARROWS.iter().find(|(name, _)| *name == package).map(|(_, allowed)| *allowed);
-    let Some(allowed) = allowed else { return vec![format!("'{package}' is a crate that DESIGN does not know")] };
+    let Some(allowed) = allowed else { return vec![format!("'{package}' is a crate that `ARROWS` does not list")] };
     let wrong = used.iter().filter(|name| !name.strip_prefix("mateval-").is_some_and(|name| allowed.contains(&name)));
     wrong.map(|name| format!("{package} -> {name}")).collect()
 }

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::metric::LPIPS_NET;
 
-/// Constants that all protocols share. Each entry says why no protocol can change it.
+/// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FixedRules {

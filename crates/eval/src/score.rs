@@ -217,7 +217,9 @@ impl ScorePlan<'_> {
         let weights = self.lpips.network().map(Lpips::sha256);
         let file = &self.dataset.file;
         let print = protocol.fingerprint(&file.manifest_sha256, &[&scene.id], file.scored_renderer.as_ref(), weights);
-        let key = sha256_of_bytes(json::to_text(&(&self.tool, print, &prediction.files)).as_bytes());
+        // A file that cannot be read has no hash, but may replace a map by its default; a finding states it.
+        let scored = (&self.tool, print, &prediction.files, &prediction.findings);
+        let key = sha256_of_bytes(json::to_text(&scored).as_bytes());
         Some(self.cache?.join(format!("{key}.json")))
     }
 

@@ -133,6 +133,21 @@ fn another_texel_is_another_submission() {
     }
 }
 
+/// The link has no hash, but the map beside it is ambiguous and no longer scored.
+#[test]
+fn a_file_that_cannot_be_read_is_another_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let changed = folder.path().join("gt");
+    write_truth(&changed);
+    let cache = poisoned(&["room"]);
+    let room = || poisons(&score_scenes(&changed, cache.path(), &hasty(), &["room"]));
+    assert_eq!(room(), ["room"], "the twin");
+    let scene = changed.join("scenes/room");
+    let instance = std::fs::read_dir(&scene).unwrap().map(|entry| entry.unwrap().path()).min().unwrap();
+    std::os::unix::fs::symlink("nowhere.exr", instance.join("base_color.exr")).unwrap();
+    assert_eq!(room(), [""; 0]);
+}
+
 #[test]
 fn another_protocol_is_another_score() {
     let cache = poisoned(&["room"]);

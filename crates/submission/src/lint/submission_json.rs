@@ -13,9 +13,16 @@ use crate::file_fault::FileFault;
 use crate::map_folder::exists;
 use crate::submitted_file::SubmittedFile;
 
-/// Its keys, and whether it must have them.
-const KEYS: [(&str, bool); 4] =
-    [("format", true), ("method", true), ("description", false), ("dataset_manifest_sha256", true)];
+/// Its keys, the kinds of value that each may have, and whether it must be given. They are those of [`SubmissionFile`].
+const KEYS: [(&str, &[&str], bool); 7] = [
+    ("format", &["a string"], true),
+    ("method", &["a string"], true),
+    ("description", &["a string"], false),
+    ("url", &["a string", "null"], false),
+    ("licence", &["a string", "null"], false),
+    ("cost", &["an object", "null"], false),
+    ("dataset_manifest_sha256", &["a string"], true),
+];
 
 /// Longest name of a method, in characters.
 const LONGEST_METHOD: usize = 100;
@@ -60,9 +67,8 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
 }
 
 fn is_sound(object: &Map<String, Value>) -> bool {
-    let known = |key: &String| KEYS.iter().any(|(known, _)| known == key);
-    object.iter().all(|(key, value)| known(key) && value.is_string())
-        && KEYS.iter().all(|(key, required)| !required || object.contains_key(*key))
+    object.iter().all(|(key, value)| KEYS.iter().any(|(known, kinds, _)| known == key && kinds.contains(&kind(value))))
+        && KEYS.iter().all(|(key, _, required)| !required || object.contains_key(*key))
 }
 
 fn kind(value: &Value) -> &'static str {
@@ -96,22 +102,22 @@ fn check_keys(object: &Map<String, Value>) -> Vec<Finding> {
     let mut at = |key: &str, finding: Finding| {
         findings.push(Finding { place: format!("/{}", key.replace('~', "~0").replace('/', "~1")), ..finding });
     };
-    let missing = || KEYS.iter().filter(|(key, required)| *required && !object.contains_key(*key)).map(|(key, _)| *key);
-    for key in missing() {
+    let missing = KEYS.iter().filter(|(key, _, required)| *required && !object.contains_key(*key));
+    for (key, ..) in missing {
         at(key, error("missing_key", SUBMISSION, format!("the key '{key}' is missing"), "add it"));
     }
     // Untrusted input may have any number of keys.
     for (key, value) in object.iter().take(100) {
         let short = shortened(key);
-        if !KEYS.iter().any(|(known, _)| known == key) {
-            let action = nearest(key, KEYS.map(|(key, _)| key))
+        let Some(&(_, kinds, _)) = KEYS.iter().find(|(known, ..)| known == key) else {
+            let action = nearest(key, KEYS.map(|(key, ..)| key))
                 .map_or("leave it out".to_owned(), |near| format!("leave it out, or write '{near}'"));
             at(&short, error("unknown_key", SUBMISSION, format!("the key '{short}' is unknown"), action));
-        } else if !value.is_string() {
-            at(
-                key,
-                error("wrong_type", SUBMISSION, format!("expected a string, found {}", kind(value)), "write a string"),
-            );
+            continue;
+        };
+        if !kinds.contains(&kind(value)) {
+            let message = format!("expected {}, found {}", kinds[0], kind(value));
+            at(key, error("wrong_type", SUBMISSION, message, format!("write {}", kinds[0])));
         }
     }
     findings
@@ -152,4 +158,46 @@ fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
     }
     let message = || format!("made for the dataset {text}, checked against {manifest_sha256}");
     (text != manifest_sha256).then(|| warning("other_dataset", SUBMISSION, message(), action))
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::submission::Cost;
+    use serde_json::json;
+
+    use super::*;
+
+    /// The codes of what is found in a folder with this `submission.json`.
+    fn codes(file: &Value) -> Vec<String> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(SUBMISSION), file.to_string()).unwrap();
+        let (_, findings) = check(folder.path(), &"0".repeat(64));
+        findings.into_iter().map(|finding| finding.code).collect()
+    }
+
+    #[test]
+    fn every_key_that_scoring_reads_is_known() {
+        let file = SubmissionFile {
+            format: SUBMISSION_FORMAT.to_owned(),
+            method: "m".to_owned(),
+            description: "d".to_owned(),
+            url: Some("https://example.org".to_owned()),
+            licence: Some("MIT".to_owned()),
+            cost: Some(Cost { seconds_a_scene: 1.5, hardware: "a laptop".to_owned() }),
+            dataset_manifest_sha256: "0".repeat(64),
+        };
+        let whole = serde_json::to_value(&file).unwrap();
+        assert_eq!(whole.as_object().unwrap().len(), KEYS.len());
+        assert_eq!(codes(&whole), [""; 0]);
+        // The twins: another type, and an object that lacks a key.
+        for (key, value, expected) in [
+            ("url", json!(3), "wrong_type"),
+            ("cost", json!("cheap"), "wrong_type"),
+            ("cost", json!({"hardware": "a laptop"}), "bad_json"),
+        ] {
+            let mut changed = whole.clone();
+            changed[key] = value;
+            assert_eq!(codes(&changed), [expected], "{changed}");
+        }
+    }
 }
