@@ -194,7 +194,7 @@ fn modules(source: &Path) -> BTreeMap<Module, String> {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            let is_test = stem.starts_with("tests");
+            let is_test = stem == "tests" || stem.starts_with("tests_");
             let below = [module.as_slice(), std::slice::from_ref(&stem)].concat();
             if path.is_dir() && !is_test {
                 folders.push((path, below));
