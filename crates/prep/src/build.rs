@@ -212,10 +212,11 @@ fn prepare_output(options: &BuildOptions, key: &BuildKey) -> Result<bool, PrepEr
     Ok(false)
 }
 
-/// Whether every entry of the folder has one of these names.
+/// Whether every entry of the folder has one of these names; false where the folder cannot be read.
 pub(crate) fn holds_only(folder: &Path, names: &[&str]) -> bool {
     std::fs::read_dir(folder)
-        .is_ok_and(|entries| entries.flatten().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
+        .and_then(|entries| entries.collect::<Result<Vec<_>, _>>())
+        .is_ok_and(|entries| entries.iter().all(|entry| names.iter().any(|name| entry.file_name() == *name)))
 }
 
 /// The file that a finished scene leaves in the build folder.

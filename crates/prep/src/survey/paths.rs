@@ -66,8 +66,11 @@ pub(super) fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<
             continue;
         }
         let entries = std::fs::read_dir(&at).map_err(PrepError::io("list", &at))?;
-        let names = entries.flatten().map(|entry| path.join(entry.file_name()));
-        let mut names: Vec<PathBuf> = names.filter(|name| name.extension().is_some_and(|e| e == "json")).collect();
+        let mut names = Vec::new();
+        for entry in entries {
+            names.push(path.join(entry.map_err(PrepError::io("list", &at))?.file_name()));
+        }
+        names.retain(|name| name.extension().is_some_and(|e| e == "json"));
         names.sort();
         files.extend(names);
     }
