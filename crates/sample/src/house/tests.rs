@@ -87,7 +87,7 @@ fn the_bytes_are_these_in_every_run() {
         hash.update(bytes);
     }
     let hex: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    assert_eq!(hex, "518c8b1996defb21581c6408a75700239a9f12616b7393321d92cb6d55ade52b");
+    assert_eq!(hex, "68bf2a1b24de31d0ff234cebbdf57538994d2ba0b01d2508e2970cdad43c7b4c");
 }
 
 /// What is wrong with a mesh's lists, by the names of `FAULTS`.
