@@ -4,6 +4,7 @@ import hashlib
 import json
 import math
 import random
+import re
 import struct
 import zlib
 from pathlib import Path
@@ -29,8 +30,9 @@ CATEGORIES = [("Sofa", "Seat"), ("Dining Table", "Table"), ("WallInner", "Archit
 
 
 def pretty(value: object) -> str:
-    """JSON as MatEval writes it."""
-    return json.dumps(value, indent=2, ensure_ascii=False) + "\n"
+    """JSON as MatEval writes it: an exponent has no leading zero, as in 1e-6."""
+    text = json.dumps(value, indent=2, ensure_ascii=False) + "\n"
+    return re.sub(r"(?<=\de)([+-])0+(?=\d)", r"\1", text)
 
 
 def sha256(text: str) -> str:
