@@ -179,7 +179,7 @@ mod tests {
         assert_eq!(lengths(&LightGroups::together(0)), [0; 0]);
     }
 
-    /// 5 views of 100 x 50 pixels in 2 halves take 600,000 bytes a group: 2.4 MB hold four groups, one byte less holds
+    /// 5 views of 100 x 50 pixels in 2 halves take 600,000 bytes per group: 2.4 MB hold four groups, one byte less holds
     /// three.
     #[test]
     fn the_bound_merges_lights_and_says_so() {
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(lengths(&within(2_400_000).unwrap()), [3, 3, 2, 2]);
         assert_eq!(lengths(&within(2_399_999).unwrap()), [4, 3, 3]);
         assert!(within(2_399_999).unwrap().is_merged());
-        assert!(within(599_999).unwrap_err().to_string().contains("600000 bytes a group"));
+        assert!(within(599_999).unwrap_err().to_string().contains("600000 bytes per group"));
     }
 
     #[test]
