@@ -26,7 +26,6 @@ mod suite {
     mod part_labels;
     mod planted;
     mod publish;
-    mod readme;
     mod real_scenes;
     mod relit;
     mod reprojection;

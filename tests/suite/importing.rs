@@ -11,7 +11,7 @@ use mateval_scene::{TriangleMesh, glb};
 use serde_json::{Value, json};
 
 use super::command::{Run, baseline, mateval, run};
-use super::lifting::{ROOM, boxes, is_all, psnr, scored};
+use super::lifting::{ROOM, boxes, is_all, psnr, summary_of};
 
 fn import(dataset: &Path, files: &Path, out: &Path, words: &[&str]) -> Run {
     let mut command = mateval();
@@ -78,15 +78,12 @@ fn the_truth_in_other_uv_scores_as_the_truth() {
         count += 1;
     }
     assert!(count > 10, "{count}");
-    let words = |files: &Path| [files.to_string_lossy().into_owned(), "--method".to_owned(), "mine".to_owned()];
-    let words = words(&files);
-    let ours = scored(&ROOM, "import", &words.each_ref().map(String::as_str));
-    let truth = scored(&ROOM, "gt", &[]);
+    let out = folder.path().join("out");
+    import(&ROOM, &files, &out, &["--method", "mine"]).ends_with(0);
+    let [ours, truth] = [&out, &gt].map(|submission| summary_of(&ROOM, submission));
     for key in ["albedo.input", "albedo.novel"] {
         assert!(psnr(&ours, key) > psnr(&truth, key) - 1.0, "{key}: {ours} {truth}");
     }
-    let out = folder.path().join("out");
-    import(&ROOM, &files, &out, &[]).ends_with(0);
     for map in ["roughness", "metallic"] {
         let read = |root: &Path| {
             let path = root.join("scenes/room/floor").join(map).with_extension("png");
@@ -206,7 +203,7 @@ fn no_texel_is_lost_under_a_finer_texture() {
             (0..3).any(|c| (a[c] - b[c]).abs() > 16.0 / 255.0)
         };
         let share = owned.iter().filter(apart).count() as f64 / owned.len() as f64;
-        assert!(share < 0.02, "{id}: {share}");
+        assert!(share < 0.04, "{id}: {share}");
     }
 }
 

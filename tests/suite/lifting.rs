@@ -15,20 +15,34 @@ use super::command::{Run, baseline, build, mateval, run, score};
 use super::sample::{json, write_source};
 use mateval_testkit::kept_folder::kept_folder;
 
-/// The sample's room, 160x120 pixels, atlas sizes chosen by the tool.
+/// Width and height of the room's pictures, in pixels.
+const WIDTH: usize = 96;
+const HEIGHT: usize = 72;
+
+/// The sample's room, atlas sizes chosen by the tool.
 pub static ROOM: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("lifting");
-    let recipe = write_source(&folder.join("source"), "resolution = [160, 120]", &["room"]);
+    let recipe = write_source(&folder.join("source"), &format!("resolution = [{WIDTH}, {HEIGHT}]"), &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
     folder.join("dataset")
 });
 
+/// The summary of `nn` with the truth's pictures.
+static NN: LazyLock<Value> = LazyLock::new(|| scored(&ROOM, "nn", &[]));
+
 /// Summary of a baseline's score under `mateval-1`, without LPIPS.
-pub fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
+fn scored(dataset: &Path, name: &str, words: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
-    let (submission, result) = (folder.path().join("submission"), folder.path().join("result.json"));
+    let submission = folder.path().join("submission");
     run(baseline(name, dataset, &submission).args(words)).ends_with(0);
-    let mut command = score(&submission, dataset, &result);
+    summary_of(dataset, &submission)
+}
+
+/// Summary of a submission's score under `mateval-1`, without LPIPS.
+pub fn summary_of(dataset: &Path, submission: &Path) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let result = folder.path().join("result.json");
+    let mut command = score(submission, dataset, &result);
     run(command.env("MATEVAL_CACHE", folder.path().join("no-such-folder"))).ends_with(0);
     json(&result)["protocols"]["mateval-1"]["summary"].clone()
 }
@@ -63,9 +77,9 @@ fn scored_estimate(encoding: &str, picture: &Picture<LinearRgb>) -> Value {
 
 #[test]
 fn a_lifted_estimate_is_rendered_back_as_the_estimate() {
-    let lifted = scored(&ROOM, "nn", &[]);
-    assert!(psnr(&lifted, "albedo.input") >= 35.0, "{lifted}");
-    assert!(psnr(&lifted, "albedo.unobserved") < psnr(&lifted, "albedo.input"), "{lifted}");
+    let lifted = &*NN;
+    assert!(psnr(lifted, "albedo.input") >= 35.0, "{lifted}");
+    assert!(psnr(lifted, "albedo.unobserved") < psnr(lifted, "albedo.input"), "{lifted}");
     // Twin: a shift by half a pixel costs more than all other errors together.
     let picture = truth(&ROOM);
     let shifted = Picture::from_fn(picture.width(), picture.height(), |x, y| {
@@ -74,18 +88,15 @@ fn a_lifted_estimate_is_rendered_back_as_the_estimate() {
     });
     let shifted = scored_estimate("linear", &shifted);
     assert!(psnr(&shifted, "albedo.input") < 35.0, "{shifted}");
-    assert!(psnr(&shifted, "albedo.input") < psnr(&lifted, "albedo.input") - 3.0, "{shifted}");
+    assert!(psnr(&shifted, "albedo.input") < psnr(lifted, "albedo.input") - 3.0, "{shifted}");
 }
 
 #[test]
 fn baselines_score_in_the_expected_order() {
-    let [nn, part, instance, grey] = [
-        scored(&ROOM, "nn", &["--estimate", "gt"]),
-        scored(&ROOM, "median-part", &["--estimate", "gt"]),
-        scored(&ROOM, "median", &["--estimate", "gt"]),
-        scored(&ROOM, "grey", &[]),
-    ]
-    .map(|summary| psnr(&summary, "albedo.input"));
+    let input = |summary: &Value| psnr(summary, "albedo.input");
+    let gt = ["--estimate", "gt"];
+    let [part, instance] = ["median-part", "median"].map(|name| input(&scored(&ROOM, name, &gt)));
+    let (nn, grey) = (input(&NN), input(&scored(&ROOM, "grey", &[])));
     assert!(nn > part + 5.0 && part >= instance && instance > grey + 5.0, "{nn} {part} {instance} {grey}");
 }
 
@@ -242,14 +253,14 @@ fn pictures_are_side_by_side() {
     run(&mut command).ends_with(0).prints("room-albedo-error.png");
     let read = |name: &str| png_io::read_rgb_bytes(&out.join(name)).unwrap();
     let (albedo, error) = (read("room-albedo.png"), read("room-albedo-error.png"));
-    assert_eq!((albedo.width(), albedo.height()), (3 * 160 + 2 * 4, 5 * 120 + 4 * 4));
-    assert_eq!((error.width(), error.height()), (2 * 160 + 4, 5 * 120 + 5 * 4 + 12));
+    assert_eq!((albedo.width(), albedo.height()), (3 * WIDTH + 2 * 4, 5 * HEIGHT + 4 * 4));
+    assert_eq!((error.width(), error.height()), (2 * WIDTH + 4, 5 * HEIGHT + 5 * 4 + 12));
     // The error maps of the truth's own submission are nearly black, those of the grey one are not.
     let brightness = |left: usize| -> u64 {
-        let places = (left..left + 160).flat_map(|x| (0..120).map(move |y| (x, y)));
+        let places = (left..left + WIDTH).flat_map(|x| (0..HEIGHT).map(move |y| (x, y)));
         places.map(|(x, y)| error.get(x, y).iter().map(|v| u64::from(*v)).sum::<u64>()).sum()
     };
-    assert!(brightness(0) * 20 < brightness(164), "{} {}", brightness(0), brightness(164));
+    assert!(brightness(0) * 20 < brightness(WIDTH + 4), "{} {}", brightness(0), brightness(WIDTH + 4));
     run(&mut command).ends_with(2).says("--force");
     run(command.arg("--force")).ends_with(0);
 }
@@ -338,7 +349,7 @@ fn texgen_files_are_exported_and_its_textures_imported() {
     // resolve the surface.
     let all: usize = base_colors(&nn).iter().map(|(_, picture)| picture.pixels().len()).sum();
     assert!(kept * 10 > all && painted.iter().all(|half| half * 20 > all), "{kept} {painted:?} of {all}");
-    assert!((kept + painted[0] + painted[1]) * 100 > all * 97, "{kept} {painted:?} of {all}");
+    assert!((kept + painted[0] + painted[1]) * 100 > all * 95, "{kept} {painted:?} of {all}");
 
     std::fs::remove_dir_all(&results).unwrap();
     std::fs::create_dir(&results).unwrap();

@@ -9,18 +9,16 @@ use mateval_testkit::data::shared_data;
 use super::command::{baseline, build, run, score, verify};
 use super::sample::json;
 
-/// Builds staircase2 with this line in the recipe's head; returns its scene.json and the summary of `gt`'s scores.
-fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, serde_json::Value) {
+/// Builds staircase2 with this line in the recipe's head; returns the summary of `gt`'s scores.
+fn staircase(source: &Path, folder: &Path, line: &str) -> serde_json::Value {
     let recipe = folder.join("recipe.toml");
     let scene = "[[scene]]\nid = \"staircase2\"\nbitterli = \"staircase2/scene.xml\"\n";
-    std::fs::write(&recipe, format!("name = \"real\"\nresolution = [160, 90]\n{line}\n{scene}")).unwrap();
+    std::fs::write(&recipe, format!("name = \"real\"\nresolution = [96, 54]\n{line}\n{scene}")).unwrap();
     let [dataset, submission, result] = ["dataset", "gt", "RESULT.json"].map(|name| folder.join(name));
     run(build(&recipe, &dataset).arg("--source").arg(source)).ends_with(0);
-    run(&mut verify(&dataset)).ends_with(0);
     run(&mut baseline("gt", &dataset, &submission)).ends_with(0);
     run(score(&submission, &dataset, &result).env("MATEVAL_CACHE", folder)).ends_with(0);
-    let summary = json(&result)["protocols"]["mateval-1"]["summary"].clone();
-    (json(&dataset.join("scenes/staircase2/scene.json")), summary)
+    json(&result)["protocols"]["mateval-1"]["summary"].clone()
 }
 
 /// 30,911 triangles in OBJ files; rectangles and disks are additional. With the atlases that the tool chooses the truth
@@ -29,16 +27,18 @@ fn staircase(source: &Path, folder: &Path, line: &str) -> (serde_json::Value, se
 fn staircase2_is_built_verified_and_scored() {
     let Some(scene_file) = shared_data("bitterli/staircase2/scene.xml") else { return };
     let source = scene_file.parent().unwrap().parent().unwrap();
-    let scored = |line: &str| staircase(source, tempfile::tempdir().unwrap().path(), line);
-    let (scene, summary) = scored("");
+    let folder = tempfile::tempdir().unwrap();
+    let summary = staircase(source, folder.path(), "");
+    run(&mut verify(&folder.path().join("dataset"))).ends_with(0);
+    let scene = json(&folder.path().join("dataset/scenes/staircase2/scene.json"));
     let of_files = |instance: &&serde_json::Value| instance["name"].as_str().unwrap().starts_with("Mesh");
     let instances = scene["instances"].as_array().unwrap();
     let triangles: u64 = instances.iter().filter(of_files).map(|i| i["triangles"].as_u64().unwrap()).sum();
     assert_eq!((triangles, instances.len()), (30_911, 32));
     let psnr = |summary: &serde_json::Value, key: &str| summary[format!("{key}.psnr")].as_f64().unwrap();
-    assert!(psnr(&summary, "albedo.input") > 45.0, "{summary}");
+    assert!(psnr(&summary, "albedo.input") > 43.0, "{summary}");
     assert!((psnr(&summary, "albedo.input") - psnr(&summary, "albedo_aligned.input")).abs() < 0.1, "{summary}");
-    let (_, coarse) = scored("atlas_size = 64");
+    let coarse = staircase(source, tempfile::tempdir().unwrap().path(), "atlas_size = 64");
     assert!(psnr(&coarse, "albedo.input") < 38.0, "{coarse}");
 }
 

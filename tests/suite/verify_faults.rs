@@ -132,8 +132,18 @@ fn json_files() {
             expected: ("dangling_reference", "scenes/room/scene.json"),
             plant: |root| Room::of(root).edit_scene(|scene| scene["parts"][0]["instance"] = "nobody".into()),
         },
+        Fault {
+            what: "another version with other keys",
+            expected: ("wrong_format", "scenes/room/scene.json"),
+            plant: |root| {
+                Room::of(root).edit_scene(|scene| {
+                    scene["format"] = "mateval/9".into();
+                    scene["novelty"] = 1.into();
+                });
+            },
+        },
     ];
-    check_all(&faults, true, 5);
+    check_all(&faults, true, 6);
 }
 
 #[test]

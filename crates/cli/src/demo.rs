@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 
+use mateval_eval::result::ResultFile;
 use mateval_report::tables::{Grouping, TableFormat, tables};
 use mateval_scene::open::Dataset;
 
@@ -133,7 +134,7 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
 
 /// Prints the tables, and where to find what was made.
 fn print_closing(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
-    let results = files.iter().map(|path| mateval_scene::json::read(path)).collect::<Result<Vec<_>, _>>()?;
+    let results = files.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
     print(&tables(&results, "mateval-1", Grouping::Dataset, TableFormat::Markdown)?)?;
     let dataset = Dataset::open(&out.join("dataset"))?;

@@ -1,10 +1,11 @@
 //! The types of `RESULT.json`: every number, its inputs, and what is missing.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::submission::Cost;
-use mateval_scene::{Finding, InstanceId, SceneId, ViewId};
+use mateval_scene::{Finding, InstanceId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +42,13 @@ pub struct ResultFile {
     pub missing: Vec<MissingMetric>,
     /// Faults of the submission and what was scored instead, sorted.
     pub findings: Vec<Finding>,
+}
+
+impl ResultFile {
+    /// Reads a result; fails where it has another format, is not valid, or holds a number that this version does not know.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        json::read_format(path, RESULT_FORMAT)
+    }
 }
 
 /// A submission.

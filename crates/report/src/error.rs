@@ -22,16 +22,6 @@ pub enum ReportError {
         /// What was to be made of the scores, as in "a table".
         output: &'static str,
     },
-    /// A file has a format of another version: make it again, or use the version that reads it.
-    #[error("cannot read '{}': its format is '{found}', expected '{expected}'", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Its format.
-        found: String,
-        /// The format that this version reads.
-        expected: &'static str,
-    },
     /// A folder that is not a leaderboard would be replaced: choose another one.
     #[error("cannot write the leaderboard: '{}' exists and is not a leaderboard; choose another --out", path.display())]
     NotALeaderboard {

@@ -4,21 +4,13 @@ use std::fmt;
 use std::path::PathBuf;
 
 use mateval_eval::protocol::SCORER_VERSION;
-use mateval_eval::result::{RESULT_FORMAT, ResultFile};
+use mateval_eval::result::ResultFile;
 use mateval_eval::result_key::ResultKey;
 use mateval_scene::SceneId;
 
 /// One reason. Methods are named as their submissions name them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Mismatch {
-    /// A result has a format of another version.
-    #[error("the result of '{method}' has format '{found}', expected '{RESULT_FORMAT}'; score it again")]
-    Format {
-        /// The method.
-        method: String,
-        /// The result's format.
-        found: String,
-    },
     /// A result has no scores under the protocol.
     #[error(
         "the result of '{method}' has no scores under protocol '{protocol}', only under: {}; score it with \
@@ -206,12 +198,9 @@ impl fmt::Display for SubmissionVersion {
 }
 
 impl Mismatch {
-    /// The reason for which a result has no scores under a protocol, if it has none: another format, or another protocol.
+    /// The reason for which a result has no scores under a protocol, if it has none.
     pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
         let method = result.method.clone();
-        if result.format != RESULT_FORMAT {
-            return Some(Self::Format { method, found: result.format.clone() });
-        }
         let scored = || result.protocols.keys().cloned().collect();
         let is_scored = result.protocols.contains_key(protocol);
         (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })

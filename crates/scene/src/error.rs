@@ -25,7 +25,21 @@ pub enum SceneError {
         /// All its faults.
         findings: Vec<Finding>,
     },
-    /// A file that is valid, but of a version or kind that is not read here.
+    /// A file of another version than the one that is read here.
+    #[error(
+        "'{}' has the format '{found}', and this version of MatEval reads '{expected}': make the file again, or use the \
+         version that made it",
+        path.display()
+    )]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// Its format, shortened.
+        found: String,
+        /// The format that this version reads.
+        expected: &'static str,
+    },
+    /// A file that is valid, but of a kind that is not read here.
     #[error("'{}': unsupported: {what}", path.display())]
     Unsupported {
         /// The file.

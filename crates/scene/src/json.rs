@@ -4,10 +4,11 @@ use std::path::Path;
 
 use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_path_to_error::Segment;
 
+use crate::findings::shortened;
 use crate::{Finding, SceneError, Severity};
 
 /// Largest JSON file that is read, in bytes.
@@ -34,6 +35,29 @@ pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T, SceneError> {
 /// Reads a file of at most `most` bytes.
 pub fn read_within<T: DeserializeOwned>(path: &Path, most: u64) -> Result<T, SceneError> {
     parse(path, &read_at_most(path, most).map_err(SceneError::io("read", path))?)
+}
+
+/// Reads a file of the format `expected`. Another format is [`SceneError::Format`], whatever else differs from what this
+/// version reads.
+pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> Result<T, SceneError> {
+    let text = read_at_most(path, MAX_JSON_BYTES).map_err(SceneError::io("read", path))?;
+    parse_format(path, &text, expected)
+}
+
+/// Parses the bytes of a file of the format `expected`; `path` is for the error alone.
+pub fn parse_format<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &'static str) -> Result<T, SceneError> {
+    // A text without a format, or without JSON, fails below.
+    match serde_json::from_slice::<Head>(text) {
+        Ok(head) if head.format != expected => {
+            Err(SceneError::Format { path: path.to_owned(), found: shortened(&head.format), expected })
+        }
+        _ => parse(path, text),
+    }
+}
+
+#[derive(Deserialize)]
+struct Head {
+    format: String,
 }
 
 /// Parses the bytes of a file; `path` is for the error alone.
@@ -87,6 +111,20 @@ mod tests {
             [(r#"{"a/b": [{}, {"c": 1, "d": "x"}]}"#, "/a~1b/1/d"), (r#"{"a": 3}"#, "/a"), ("[]", ""), ("{", "")]
         {
             assert_eq!(pointer::<Nested>(text.as_bytes()), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn another_format_is_named_before_any_other_fault() {
+        let parsed = |text: &str| {
+            let result = parse_format::<crate::dataset::TargetsFile>(Path::new("t"), text.as_bytes(), "mateval/1");
+            result.map(|_| ()).map_err(|error| error.to_string())
+        };
+        let other = parsed(r#"{"an_unknown_key": 3, "format": "other/2"}"#).unwrap_err();
+        assert!(other.contains("'other/2'") && other.contains("'mateval/1'"), "{other}");
+        for text in ["[]", "{", "{}", r#"{"format": 3}"#, r#"{"format": "mateval/1", "an_unknown_key": 3}"#] {
+            let error = parsed(text).unwrap_err();
+            assert!(error.contains("bad_json"), "{text}: {error}");
         }
     }
 

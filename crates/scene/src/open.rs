@@ -26,8 +26,7 @@ impl Dataset {
     /// Other files are not hashed: see [`Dataset::check_files`].
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let path = root.join(DATASET);
-        let file: DatasetFile = json::read(&path)?;
-        check_format(&path, &file.format)?;
+        let file: DatasetFile = json::read_format(&path, FORMAT)?;
         let found = manifest::sha256_of_file(&root.join(MANIFEST))?;
         if found != file.manifest_sha256 {
             let what = format!(
@@ -117,29 +116,17 @@ fn unreadable(file: String, fault: &SceneError) -> Finding {
 }
 
 fn read_targets(root: &Path) -> Result<TargetsFile, SceneError> {
-    let path = root.join(TARGETS);
-    let targets: TargetsFile = json::read(&path)?;
-    check_format(&path, &targets.format)?;
-    Ok(targets)
+    json::read_format(&root.join(TARGETS), FORMAT)
 }
 
 fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, SceneError> {
     let path = SceneFolder::of(root, id).scene_file();
-    let scene: SceneFile = json::read(&path)?;
-    check_format(&path, &scene.format)?;
+    let scene: SceneFile = json::read_format(&path, FORMAT)?;
     if scene.id == *id {
         return Ok(scene);
     }
     let what = format!("id '{}' in the folder of '{id}'; run `mateval prep verify`", scene.id);
     Err(SceneError::Unsupported { path, what })
-}
-
-fn check_format(path: &Path, format: &str) -> Result<(), SceneError> {
-    if format == FORMAT {
-        return Ok(());
-    }
-    let what = format!("format '{format}'; this version reads '{FORMAT}'");
-    Err(SceneError::Unsupported { path: path.to_owned(), what })
 }
 
 fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {

@@ -11,6 +11,7 @@ use mateval_image::{LinearRgb, Picture, Texels, Texture, Wrap, png_io};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::dataset::FORMAT;
 use crate::glb::{self, GlbNode};
 use crate::layout::SceneFolder;
 use crate::material::{Lookup, Material};
@@ -134,7 +135,7 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
         .collect();
     glb::write(&reference.join("geometry.glb"), &nodes)?;
     let surfaces = scene.surfaces.iter().map(|s| SurfaceEntry { name: s.name.clone(), material: s.material }).collect();
-    let format = crate::dataset::FORMAT.to_owned();
+    let format = FORMAT.to_owned();
     let file =
         ReferenceFile { format: format.clone(), surfaces, materials: scene.materials.clone(), textures: entries };
     json::write(&reference.join("reference.json"), &file)?;
@@ -145,8 +146,8 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
 pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
     let reference = folder.reference();
     let path = reference.join("reference.json");
-    let file: ReferenceFile = json::read(&path)?;
-    let lights: LightsFile = json::read(&folder.lights())?;
+    let file: ReferenceFile = json::read_format(&path, FORMAT)?;
+    let lights: LightsFile = json::read_format(&folder.lights(), FORMAT)?;
     let nodes = glb::read(&reference.join("geometry.glb"))?;
     let faults = dangling(&file, &lights, nodes.len());
     if !faults.is_empty() {

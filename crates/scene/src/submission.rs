@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::findings::shortened;
 use crate::ids::{InstanceId, SceneId};
 use crate::{SceneError, json};
 
@@ -45,12 +44,7 @@ pub struct SubmissionFile {
 impl SubmissionFile {
     /// Parses the bytes of a submission's file; `path` is for the error alone. Fails where its format is another one.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self, SceneError> {
-        let file: Self = json::parse(path, bytes)?;
-        if file.format == SUBMISSION_FORMAT {
-            return Ok(file);
-        }
-        let what = format!("format '{}'; this version reads '{SUBMISSION_FORMAT}'", shortened(&file.format));
-        Err(SceneError::Unsupported { path: path.to_owned(), what })
+        json::parse_format(path, bytes, SUBMISSION_FORMAT)
     }
 }
 

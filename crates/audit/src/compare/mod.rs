@@ -135,7 +135,7 @@ fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
         return Ok(());
     }
     check_free(out, options.force, "--out")?;
-    match json::read::<CompareFile>(&out.join(COMPARE)).is_ok_and(|file| file.format == COMPARE_FORMAT) {
+    match json::read_format::<CompareFile>(&out.join(COMPARE), COMPARE_FORMAT).is_ok() {
         true => Ok(()),
         false => Err(AuditError::NotAComparison { path: out.clone() }),
     }

@@ -13,8 +13,9 @@ use mateval_prep::faults::Faults;
 use mateval_prep::scene_meshes;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use mateval_scene::{Finding, Progress, json, manifest, reference_io};
+use mateval_scene::{Finding, Progress, SceneError, json, manifest, reference_io};
 use mateval_tracer::World;
+use serde::de::DeserializeOwned;
 
 use crate::error::AuditError;
 
@@ -30,7 +31,7 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
     check_manifest(root, &mut faults);
     schema::check::<DatasetFile>(root, DATASET, &mut faults);
     schema::check::<TargetsFile>(root, TARGETS, &mut faults);
-    let dataset = faults.read(DATASET, json::read::<DatasetFile>(&dataset_path));
+    let dataset = read_json::<DatasetFile>(DATASET, &dataset_path, &mut faults);
     if let Some(dataset) = &dataset {
         check_dataset(root, dataset, &mut faults);
         for (at, id) in dataset.scenes.iter().enumerate() {
@@ -46,6 +47,17 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
     Ok(faults.all)
 }
 
+/// A file of the dataset; or none, after adding the reason why it could not be read.
+fn read_json<T: DeserializeOwned>(name: &str, path: &Path, faults: &mut Faults) -> Option<T> {
+    match json::read_format(path, FORMAT) {
+        Err(error @ SceneError::Format { .. }) => {
+            faults.add("wrong_format", name, "/format", error.to_string());
+            None
+        }
+        read => faults.read(name, read),
+    }
+}
+
 fn check_manifest(root: &Path, faults: &mut Faults) {
     if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
         faults.all.extend(found.into_iter().filter(|finding| !is_withheld(root, finding)));
@@ -59,9 +71,6 @@ fn is_withheld(root: &Path, finding: &Finding) -> bool {
 }
 
 fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
-    if dataset.format != FORMAT {
-        faults.add("wrong_format", DATASET, "/format", format!("'{}', expected '{FORMAT}'", dataset.format));
-    }
     match manifest::sha256_of_file(&root.join(MANIFEST)) {
         Ok(found) if found != dataset.manifest_sha256 => {
             let message = format!("'{}', but the SHA-256 of MANIFEST.sha256 is '{found}'", dataset.manifest_sha256);
@@ -79,7 +88,7 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
 }
 
 fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
-    let Some(file) = faults.read(TARGETS, json::read::<TargetsFile>(&root.join(TARGETS))) else { return };
+    let Some(file) = read_json::<TargetsFile>(TARGETS, &root.join(TARGETS), faults) else { return };
     let mut seen = std::collections::BTreeSet::new();
     for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
         faults.add("no_target", TARGETS, "/targets", format!("no view of scene '{scene}' is scored"));
@@ -104,7 +113,7 @@ fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
 
 fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
     schema::check::<SceneFile>(folder.path(), "scene.json", faults);
-    let Some(scene) = faults.read("scene.json", json::read::<SceneFile>(&folder.scene_file())) else { return };
+    let Some(scene) = read_json::<SceneFile>("scene.json", &folder.scene_file(), faults) else { return };
     if scene.id.as_str() != id {
         faults.add("wrong_id", "scene.json", "/id", format!("'{}', but its folder is '{id}'", scene.id));
     }

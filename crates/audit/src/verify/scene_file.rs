@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use glam::DMat3;
-use mateval_scene::dataset::{FORMAT, Part, SceneFile};
+use mateval_scene::dataset::{Part, SceneFile};
 use mateval_scene::layout::INPUT;
 
 use mateval_prep::faults::Faults;
@@ -12,11 +12,8 @@ const FILE: &str = "scene.json";
 /// Largest deviation of a camera's rotation from orthonormality, and of a view's camera from the turned input camera.
 const CAMERA_SLACK: f64 = 1e-9;
 
-/// Checks the format's version, the views, and the instances with their parts.
+/// Checks the views, and the instances with their parts.
 pub(super) fn check(scene: &SceneFile, faults: &mut Faults) {
-    if scene.format != FORMAT {
-        faults.add("wrong_format", FILE, "/format", format!("'{}', expected '{FORMAT}'", scene.format));
-    }
     check_views(scene, faults);
     check_numbers(scene, faults);
 }

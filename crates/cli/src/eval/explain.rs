@@ -45,7 +45,7 @@ pub struct ExplainArgs {
 /// Explains the scene's errors.
 pub fn run(args: &ExplainArgs) -> anyhow::Result<Outcome> {
     args.out.iter().try_for_each(|out| explain::check_out(out, args.force))?;
-    let result: ResultFile = json::read(&args.result)?;
+    let result = ResultFile::read(&args.result)?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let plan = ExplainPlan {
         result: &result,

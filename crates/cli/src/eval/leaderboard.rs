@@ -6,7 +6,6 @@ use anyhow::{Context as _, bail};
 use mateval_eval::result::ResultFile;
 use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::{LeaderboardPlan, Submissions, verified, write};
-use mateval_scene::json;
 use mateval_scene::open::Dataset;
 
 use super::strip_picture::StripArgs;
@@ -55,7 +54,7 @@ pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
     let mut results = Vec::new();
     let mut marks = Vec::new();
     for path in &args.results {
-        let mut result: ResultFile = json::read(path)?;
+        let mut result = ResultFile::read(path)?;
         marks.push(verified::read(path, &result)?);
         // Single pictures are most of a result's memory, and the site does not show them.
         result.protocols.values_mut().for_each(|scores| scores.pictures = Vec::new());

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use mateval_eval::result::ResultFile;
 use mateval_report::tables::{Grouping, TableFormat, tables};
-use mateval_scene::json;
 
 use crate::outcome::{Outcome, print, say};
 
@@ -42,7 +41,7 @@ enum FormatName {
 
 /// Prints the tables, and a warning for each metric that a result lacks.
 pub fn run(args: &TablesArgs) -> anyhow::Result<Outcome> {
-    let results = args.results.iter().map(|path| json::read(path)).collect::<Result<Vec<ResultFile>, _>>()?;
+    let results = args.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     let format = match args.format {
         FormatName::Markdown => TableFormat::Markdown,
         FormatName::Latex => TableFormat::Latex,

@@ -9,7 +9,7 @@ mod plan;
 mod sameness;
 
 use mateval_scene::manifest::sha256_of_file;
-use mateval_scene::{Finding, Progress, Severity, json};
+use mateval_scene::{Finding, Progress, Severity};
 
 use crate::error::EvalError;
 use crate::metric::Metric;
@@ -26,7 +26,7 @@ const MOST_LISTED: usize = 20;
 
 /// Verifies a result. Fails where that cannot be done: files that cannot be read, weights of LPIPS that are missing.
 pub fn verify(plan: VerifyPlan<'_>, progress: Progress<'_>) -> Result<VerificationFile, EvalError> {
-    let result: ResultFile = json::read(plan.result)?;
+    let result = ResultFile::read(plan.result)?;
     let verification = VerificationFile {
         format: VERIFICATION_FORMAT.to_owned(),
         tool: plan.tool.clone(),

@@ -7,7 +7,7 @@ use super::plan::{VerifyPlan, file_name};
 use crate::error::EvalError;
 use crate::metric::LPIPS_NET;
 use crate::protocol::Protocol;
-use crate::result::{RESULT_FORMAT, ResultFile};
+use crate::result::ResultFile;
 use crate::score::LpipsWeights;
 use mateval_submission::hashed_submission::hashed_submission;
 
@@ -24,10 +24,6 @@ pub(super) fn findings(plan: &VerifyPlan<'_>, result: &ResultFile) -> Result<Vec
         action: action.to_owned(),
     };
     let mut findings = Vec::new();
-    if result.format != RESULT_FORMAT {
-        let message = format!("the format is '{}'; this version makes '{RESULT_FORMAT}'", result.format);
-        findings.push(finding("other_format", "/format", message, "verify it with the version that made it"));
-    }
     findings.extend(rules(result, &finding)?);
     let (said, found) = (&result.dataset.manifest_sha256, &plan.dataset.file.manifest_sha256);
     if said != found {

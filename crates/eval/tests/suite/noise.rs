@@ -97,7 +97,7 @@ impl Space {
 /// The input view, and one that is turned against it.
 const VIEWS: [usize; 2] = [0, 1];
 
-/// Errors of encoded pictures, as in results. The spread of 50 seeds is itself known only to 10 or 20 %, so the bounds
+/// Errors of encoded pictures, as in results. The spread of 40 seeds is itself known only to 10 or 20 %, so the bounds
 /// apply to the mean over views and predictions; a single one may lie slightly outside.
 #[test]
 fn the_reported_error_is_the_spread() {

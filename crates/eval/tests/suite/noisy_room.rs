@@ -18,7 +18,7 @@ use super::sample::{dataset, hasty, write_truth};
 use mateval_testkit::kept_folder::kept_folder;
 
 /// The number of renders of everything.
-pub const SEEDS: usize = 50;
+pub const SEEDS: usize = 40;
 
 /// The truth comes first, then the predictions: one far from it (about 18 dB) and one near (about 35 dB).
 pub const OTHERS: [usize; 2] = [1, 2];
@@ -27,7 +27,7 @@ pub const OTHERS: [usize; 2] = [1, 2];
 const FACTORS: [[f32; 3]; 3] = [[1.0; 3], [0.6, 0.7, 0.8], [0.97, 0.95, 0.93]];
 
 /// Samples a pixel of each half of the pictures that count as free of noise.
-const MANY: u32 = 2048;
+const MANY: u32 = 1024;
 
 /// Size relative to the sample's pictures, so that thousands of samples take seconds.
 const SCALE: f64 = 0.75;
@@ -62,7 +62,7 @@ pub static ROOM: LazyLock<Room> = LazyLock::new(Room::new);
 /// 4, 16 and 64 samples.
 pub static LEVELS: LazyLock<[Level; 3]> = LazyLock::new(|| [4, 16, 64].map(|samples| ROOM.level(samples)));
 
-/// By prediction and view, with 4096 samples together. All predictions share one set of paths, so that their
+/// By prediction and view, with 2048 samples together. All predictions share one set of paths, so that their
 /// differences have even less noise.
 pub static EXACT: LazyLock<Vec<Vec<Pair>>> = LazyLock::new(|| {
     let all = ROOM.pictures(0..FACTORS.len(), MANY, 0..2);

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 
 use mateval_baselines::grey;
 use mateval_eval::protocol::Protocol;
+use mateval_eval::result::{RESULT_FORMAT, ResultFile};
 use mateval_eval::score::{LpipsWeights, ScorePlan, score};
 use mateval_eval::verify::{VerificationFile, VerifyPlan, verify};
 use mateval_image::texture_io::{Encoding, read_texture};
@@ -97,6 +98,19 @@ fn another_constant_is_found() {
     changed["dataset"]["manifest_sha256"] = "0".into();
     let both = refused(&changed, &SCORED.submission);
     assert_eq!(both, [one("other_dataset", "/dataset/manifest_sha256"), one("other_protocol", place)].concat());
+}
+
+#[test]
+fn a_result_of_another_version_is_named_as_such() {
+    let mut older = SCORED.result.clone();
+    older["format"] = "mateval-result/2".into();
+    older["protocols"]["mateval-1"]["start_radiance"] = 1.into();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("RESULT.json");
+    json::write(&path, &older).unwrap();
+    let error = ResultFile::read(&path).unwrap_err().to_string();
+    assert!(error.contains("RESULT.json") && error.contains("'mateval-result/2'"), "{error}");
+    assert!(error.contains(&format!("'{RESULT_FORMAT}'")), "{error}");
 }
 
 #[test]

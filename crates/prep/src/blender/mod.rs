@@ -10,7 +10,7 @@ mod view_files;
 
 use std::path::{Path, PathBuf};
 
-use mateval_scene::{SceneError, json};
+use mateval_scene::json;
 
 use crate::error::PrepError;
 pub use job::{BlenderJob, BlenderResult, JobPlan, JobView};
@@ -95,11 +95,6 @@ impl JobFolder {
         if !path.is_file() {
             return Ok(None);
         }
-        let result: BlenderResult = json::read(&path)?;
-        if result.format != job::RESULT_FORMAT {
-            let what = format!("format '{}', expected '{}'", result.format, job::RESULT_FORMAT);
-            return Err(SceneError::Unsupported { path, what }.into());
-        }
-        Ok(Some(result))
+        Ok(Some(json::read_format(&path, job::RESULT_FORMAT)?))
     }
 }

@@ -75,15 +75,13 @@ pub fn survey(options: &SurveyOptions, tool: &str, progress: Progress<'_>) -> Re
 
 /// Whether a folder holds a survey and no other files.
 fn is_only_a_survey(out: &Path) -> bool {
-    let Ok(file) = json::read::<SurveyFile>(&out.join(SURVEY)) else { return false };
+    let Ok(file) = json::read_format::<SurveyFile>(&out.join(SURVEY), SURVEY_FORMAT) else { return false };
     let rooms = file.houses.iter().flat_map(|house| &house.rooms);
     let pictures: Vec<&str> = rooms
         .flat_map(|room| &room.cameras)
         .filter_map(|camera| camera.thumbnail.strip_prefix("thumbnails/"))
         .collect();
-    file.format == SURVEY_FORMAT
-        && holds_only(out, &[SURVEY, RECIPE, PAGE, THUMBNAILS])
-        && holds_only(&out.join(THUMBNAILS), &pictures)
+    holds_only(out, &[SURVEY, RECIPE, PAGE, THUMBNAILS]) && holds_only(&out.join(THUMBNAILS), &pictures)
 }
 
 /// Searches one house; writes its thumbnails below `out` and adds its scenes to `texts`.

@@ -39,10 +39,6 @@ pub struct Erratum {
 impl ErrataFile {
     /// Reads the errata in the file `path`; fails if they have another format.
     pub fn read(path: &Path) -> Result<Self, ReportError> {
-        let errata: Self = json::read(path)?;
-        match errata.format == ERRATA_FORMAT {
-            true => Ok(errata),
-            false => Err(ReportError::Format { path: path.to_owned(), found: errata.format, expected: ERRATA_FORMAT }),
-        }
+        Ok(json::read_format(path, ERRATA_FORMAT)?)
     }
 }

@@ -36,10 +36,7 @@ pub fn read(path: &Path, result: &ResultFile) -> Result<Verified, ReportError> {
     if !sidecar.exists() {
         return Ok(Verified::No);
     }
-    let file: VerificationFile = json::read(&sidecar)?;
-    if file.format != VERIFICATION_FORMAT {
-        return Err(ReportError::Format { path: sidecar, found: file.format, expected: VERIFICATION_FORMAT });
-    }
+    let file: VerificationFile = json::read_format(&sidecar, VERIFICATION_FORMAT)?;
     let is_of_these_bytes = file.result_sha256 == sha256_of_file(path)?
         && file.submission_sha256 == result.submission.sha256
         && file.dataset_manifest_sha256 == result.dataset.manifest_sha256;

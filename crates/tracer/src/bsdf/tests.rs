@@ -9,6 +9,7 @@ use mateval_scene::material::{
     ColorInput, ConductorIor, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
 };
 use mateval_scene::reference::ReferenceScene;
+use rayon::prelude::*;
 
 use super::sample::LocalSample;
 use super::*;
@@ -166,18 +167,19 @@ fn deviation((statistic, freedom): (f64, f64)) -> f64 {
 
 #[test]
 fn samples_follow_their_density() {
-    let mut tests = 0;
-    for model in models() {
-        with_lobe(&model, |lobe| {
-            for wo in views(lobe) {
+    let tests = |model: &MaterialModel| {
+        with_lobe(model, |lobe| {
+            let views = views(lobe);
+            for &wo in &views {
                 let expected = expected(lobe, wo);
                 assert!(expected.iter().sum::<f64>() < 1.01, "{model:?} {wo} {}", expected.iter().sum::<f64>());
                 let z = deviation(chi_square(lobe, wo, &expected, 20_000));
                 assert!(z < 5.0, "{model:?} from {wo}: {z:.1} deviations");
-                tests += 1;
             }
-        });
-    }
+            views.len()
+        })
+    };
+    let tests: usize = models().par_iter().map(tests).sum();
     assert!(tests > 180, "{tests}");
 }
 
