@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
 use mateval_scene::Camera;
-use mateval_tracer::aov::{SUBPIXELS, hit_through, subpixels};
+use mateval_tracer::aov::{COARSE_SUBPIXELS, coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
 use crate::geometry::SceneGeometry;
@@ -69,7 +69,7 @@ impl SeenPixels {
         let shown: Vec<(usize, usize, usize)> = self.shown_pixels().collect();
         let point = |(x, y, instance): (usize, usize, usize)| {
             let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-            let mut places = subpixels(x, y);
+            let mut places = coarse_subpixels(x, y);
             places.sort_by(|a, b| a.distance_squared(centre).total_cmp(&b.distance_squared(centre)));
             let hits = std::iter::once(centre).chain(places);
             let mut hits = hits.filter_map(|place| hit_through(&geometry.world, &self.camera, place));
@@ -106,12 +106,12 @@ fn owner(geometry: &SceneGeometry<'_>, camera: &Camera, x: usize, y: usize) -> O
     if !geometry.valid.get(of_view.0, of_view.1) {
         return none;
     }
-    let hits = subpixels(x, y).map(|place| hit_through(&geometry.world, camera, place).map(|hit| hit.surface.0));
+    let hits = coarse_subpixels(x, y).map(|place| hit_through(&geometry.world, camera, place).map(|hit| hit.surface.0));
     let count = |instance: usize| hits.iter().filter(|hit| **hit == Some(instance)).count();
     let Some((most, instance)) = hits.iter().flatten().map(|&instance| (count(instance), instance)).max() else {
         return none;
     };
-    let whole = most == SUBPIXELS;
+    let whole = most == COARSE_SUBPIXELS;
     // The dataset's own picture shows another instance where the ray hit a cut-out texel, which does not cover it.
     let shown = geometry.instances.get(of_view.0, of_view.1);
     if whole && geometry.scene.instances[instance].index.0.get() != shown {

@@ -7,6 +7,7 @@
 
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, encoding_bias, lpips, noise_free, ssim};
+use mateval_scene::submission::MAP_SIZES;
 use mateval_submission::{map_file, memory_budget, prediction, texel_map};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,10 @@ use crate::metric::LPIPS_NET;
 pub struct FixedRules {
     /// Number of places, in a regular square, whose mean is a pixel of a map. The dataset's pictures are made with them.
     pub subpixels: usize,
+    /// Number of these places that are looked at first; where they agree, their mean is the pixel.
+    pub coarse_subpixels: usize,
+    /// The largest difference between values of such places that agree.
+    pub flat_range: f32,
     /// Surfaces of lower opacity are looked through in those pictures, as in the dataset's.
     pub cut_out_below_opacity: f32,
     /// Value that replaces a missing or unsound base colour, linear. The format promises it to methods that leave maps out.
@@ -31,6 +36,8 @@ pub struct FixedRules {
     pub base_color_range: [f32; 2],
     /// A roughness or metallic with values outside this range is unsound, by the format.
     pub scalar_range: [f32; 2],
+    /// The smallest and the largest side of a map, in texels, by the format.
+    pub map_sides: [usize; 2],
     /// A map whose file is larger than this, in bytes, is unsound, by the format.
     pub most_map_bytes: u64,
     /// An EXR map of more numbers than this is unsound, by the format.
@@ -89,12 +96,15 @@ impl FixedRules {
         let range = |range: std::ops::RangeInclusive<f32>| [*range.start(), *range.end()];
         Self {
             subpixels: mateval_tracer::aov::SUBPIXELS,
+            coarse_subpixels: mateval_tracer::aov::COARSE_SUBPIXELS,
+            flat_range: mateval_tracer::aov::FLAT_RANGE,
             cut_out_below_opacity: mateval_scene::material::CUT_OUT_BELOW_OPACITY,
             missing_base_color: mateval_scene::submission::GREY,
             missing_roughness: prediction::MISSING_ROUGHNESS,
             missing_metallic: prediction::MISSING_METALLIC,
             base_color_range: range(map_file::BASE_COLOR_RANGE),
             scalar_range: range(map_file::SCALAR_RANGE),
+            map_sides: [*MAP_SIZES.start(), *MAP_SIZES.end()],
             most_map_bytes: map_file::MAX_MAP_BYTES,
             most_exr_numbers: map_file::MAX_EXR_NUMBERS,
             most_scene_bytes: memory_budget::MAX_SCENE_BYTES,

@@ -1,10 +1,12 @@
 //! Pictures of submissions' maps, looked up at the truth's own first hits.
 
+use std::cell::OnceCell;
+
 use glam::Vec2;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::World;
-use mateval_tracer::aov::{hit_through, subpixels};
+use mateval_tracer::aov::{PixelMean, SUBPIXELS, hit_through, subpixels};
 use rayon::prelude::*;
 
 use mateval_submission::prediction::PredictedScene;
@@ -61,30 +63,34 @@ fn picture_row(
 ) -> Vec<Vec<Values>> {
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
     for x in 0..width {
-        let lookups = subpixels(x, y).map(|place| {
-            let hit = hit_through(world, camera, place)?;
-            let mesh = &atlases[hit.surface.0];
-            Some((hit.surface.0, hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?)))
-        });
+        let places = subpixels(x, y);
+        let looked_up: [OnceCell<Option<Lookup>>; SUBPIXELS] = [const { OnceCell::new() }; SUBPIXELS];
+        let lookup = |at: usize| {
+            *looked_up[at].get_or_init(|| {
+                let hit = hit_through(world, camera, places[at])?;
+                let mesh = &atlases[hit.surface.0];
+                let uv = hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?);
+                Some(Lookup { instance: hit.surface.0, uv })
+            })
+        };
         for (row, submission) in rows.iter_mut().zip(submissions) {
-            row.push(mean_values(submission, &lookups));
+            row.push(PixelMean::of(|at| values(submission, lookup(at)?)).mean);
         }
     }
     rows
 }
 
-fn mean_values(submission: &PredictedScene, lookups: &[Option<(usize, Vec2)>]) -> Values {
-    let mut sum = [0.0_f64; 5];
-    let mut count = 0_usize;
-    for (instance, uv) in lookups.iter().flatten() {
-        let Some(material) = &submission.materials[*instance] else { continue };
-        let uv = uv.to_array();
-        let [r, g, b] = material.base_color.sample(uv);
-        let values = [r, g, b, material.roughness.sample(uv)[0], material.metallic.sample(uv)[0]];
-        for (sum, value) in sum.iter_mut().zip(values) {
-            *sum += f64::from(value);
-        }
-        count += 1;
-    }
-    sum.map(|sum| if count == 0 { 0.0 } else { (sum / count as f64) as f32 })
+/// Where a sub-pixel looks a submission up.
+#[derive(Clone, Copy)]
+struct Lookup {
+    instance: usize,
+    /// In the instance's atlas.
+    uv: Vec2,
+}
+
+fn values(submission: &PredictedScene, Lookup { instance, uv }: Lookup) -> Option<Values> {
+    let material = submission.materials[instance].as_ref()?;
+    let uv = uv.to_array();
+    let [r, g, b] = material.base_color.sample(uv);
+    Some([r, g, b, material.roughness.sample(uv)[0], material.metallic.sample(uv)[0]])
 }

@@ -36,6 +36,11 @@ pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError
     Ok(alpha)
 }
 
+/// Reads the values of a picture's file, 0 to 1 for one of bytes, and its alpha channel, if it has one.
+pub fn read_texture_and_alpha(path: &Path, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
+    read_with_alpha(path, Encoding::Linear, wrap)
+}
+
 fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
     let bytes = read_file(path)?;
     if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {

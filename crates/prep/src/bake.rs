@@ -10,7 +10,7 @@ use mateval_scene::uv_atlas::UvAtlas;
 use crate::atlas::Unwrapped;
 
 /// The most lookups along a texel's side. A source with finer detail is undersampled.
-const MAX_LOOKUPS: f64 = 8.0;
+const MAX_LOOKUPS: f64 = 16.0;
 
 /// A material's three maps, as a submission holds them.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,11 +62,13 @@ pub fn bake(unwrapped: &Unwrapped, source: &TriangleMesh, material: &Material, t
     let texel = |x: usize, y: usize| {
         let (triangle, _) = atlas.owner(x, y)?;
         let corners = source_uv(triangle).unwrap_or([Vec2::ZERO; 3]);
-        let lookups = lookups_a_side(&atlas, triangle, corners, source_texels);
-        Some(mean_appearance(material, textures, lookups, |place| {
+        let source_uv = |place: DVec2| {
             let weights = atlas.barycentrics(triangle, DVec2::new(x as f64, y as f64) + place).as_vec3();
             corners[0] * weights.x + corners[1] * weights.y + corners[2] * weights.z
-        }))
+        };
+        let lookups =
+            [DVec2::X, DVec2::Y].map(|side| lookups_along(source_uv(side) - source_uv(DVec2::ZERO), source_texels));
+        Some(mean_appearance(material, textures, lookups, source_uv))
     };
     Some(bake_texels(&atlas, texel))
 }
@@ -106,38 +108,35 @@ fn bake_texels(atlas: &UvAtlas, texel: impl Fn(usize, usize) -> Option<Appearanc
     Baked { material: BakedMaterial::Textured { base_color, roughness, metallic }, clipped }
 }
 
-/// The largest number of texels that any texture of the material has along one unit of the surface's uv.
-fn texels_per_uv_unit(material: &Material, textures: &[Texture]) -> f64 {
-    material
-        .lookups()
-        .into_iter()
-        .filter_map(|lookup| textures.get(lookup.texture.0).map(|texture| (texture, lookup.uv)))
-        .map(|(texture, uv)| {
-            let [[a, b, _], [c, d, _]] = uv.0.map(|row| row.map(f64::from));
-            let stretch = (a * d - b * c).abs().sqrt();
-            stretch * ((texture.width() * texture.height()) as f64).sqrt()
-        })
-        .fold(0.0, f64::max)
+/// The largest number of texels that any texture of the material has along one unit of the surface's u, and of its v.
+fn texels_per_uv_unit(material: &Material, textures: &[Texture]) -> DVec2 {
+    let lookups = material.lookups();
+    let found = lookups.iter().filter_map(|lookup| textures.get(lookup.texture.0).map(|texture| (texture, lookup.uv)));
+    found.fold(DVec2::ZERO, |most, (texture, uv)| {
+        let size = DVec2::new(texture.width() as f64, texture.height() as f64);
+        let [[a, b, _], [c, d, _]] = uv.0.map(|row| row.map(f64::from));
+        most.max(DVec2::new((DVec2::new(a, c) * size).length(), (DVec2::new(b, d) * size).length()))
+    })
 }
 
-/// The number of lookups along a texel's side for which neighbouring lookups are half a source texel apart.
-fn lookups_a_side(atlas: &UvAtlas, triangle: usize, corners: [Vec2; 3], source_texels: f64) -> usize {
-    let [a, b, c] = corners.map(|uv| uv.as_dvec2());
-    let uv_area = ((b - a).perp_dot(c - a) / 2.0).abs();
-    let side = source_texels * (uv_area / atlas.texel_area(triangle).max(1e-12)).sqrt();
-    (2.0 * side).ceil().clamp(1.0, MAX_LOOKUPS) as usize
+/// The number of lookups along a texel's side, over which the source's uv changes by `step`, for which neighbouring lookups
+/// are half a source texel apart or nearer.
+fn lookups_along(step: Vec2, source_texels: DVec2) -> usize {
+    let texels = step.as_dvec2().abs().dot(source_texels);
+    // A sliver's steps may overflow.
+    if texels.is_finite() { (2.0 * texels).ceil().clamp(1.0, MAX_LOOKUPS) as usize } else { 1 }
 }
 
 fn mean_appearance(
     material: &Material,
     textures: &[Texture],
-    lookups: usize,
+    [columns, rows]: [usize; 2],
     source_uv: impl Fn(DVec2) -> Vec2,
 ) -> Appearance {
     let mut sum = [0.0_f64; 5];
-    for row in 0..lookups {
-        for column in 0..lookups {
-            let place = DVec2::new(column as f64 + 0.5, row as f64 + 0.5) / lookups as f64;
+    for row in 0..rows {
+        for column in 0..columns {
+            let place = DVec2::new((column as f64 + 0.5) / columns as f64, (row as f64 + 0.5) / rows as f64);
             // `bake` returns early for materials without an appearance.
             let Some(seen) = material.appearance(textures, source_uv(place)) else { continue };
             let [r, g, b] = seen.base_color;
@@ -146,7 +145,7 @@ fn mean_appearance(
             }
         }
     }
-    let [r, g, b, roughness, metallic] = sum.map(|sum| (sum / (lookups * lookups) as f64) as f32);
+    let [r, g, b, roughness, metallic] = sum.map(|sum| (sum / (columns * rows) as f64) as f32);
     Appearance { base_color: [r, g, b], roughness, metallic }
 }
 

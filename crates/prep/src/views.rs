@@ -6,7 +6,7 @@ use mateval_scene::Camera;
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_tracer::World;
-use mateval_tracer::aov::{PixelHit, hit_through, subpixels};
+use mateval_tracer::aov::{PixelHit, PixelMean, hit_through, is_veiled, subpixels};
 use rayon::prelude::*;
 
 /// Surfaces of a lower roughness count as specular.
@@ -44,7 +44,7 @@ pub struct GeometryPictures {
     pub instance: Picture<u16>,
     /// The triangle at pixel centres; none where the ray hits no surface.
     pub triangle: Picture<Option<SeenTriangle>>,
-    /// Pixels whose centre and every sub-pixel show a scored surface.
+    /// Pixels whose centre and every sub-pixel show a scored surface, and not through one of fractional opacity.
     pub valid: Mask,
     /// Valid pixels whose centre the input view does not show.
     pub unobserved: Mask,
@@ -172,29 +172,22 @@ impl<'a> ViewScene<'a> {
         }
     }
 
-    /// The means over the sub-pixels that show a scored surface, and whether all sub-pixels do.
+    /// The means over the sub-pixels that show a scored surface, and whether all sub-pixels do, through nothing that is
+    /// partly transparent.
     fn truth(&self, camera: &Camera, x: usize, y: usize) -> (PixelTruth, bool) {
-        let mut sum = [0.0_f64; 8];
-        let mut count = 0_usize;
         let places = subpixels(x, y);
-        for place in places {
-            let Some(seen) = hit_through(self.world, camera, place).and_then(|hit| self.scored_appearance(&hit)) else {
-                continue;
-            };
+        let mut veiled = false;
+        let PixelMean { mean, whole } = PixelMean::of(|at| {
+            let place = places[at];
+            veiled |= is_veiled(self.world, camera, place);
+            let seen = hit_through(self.world, camera, place).and_then(|hit| self.scored_appearance(&hit))?;
             let [r, g, b] = seen.base_color;
             let rest = 1.0 - seen.metallic;
-            let values = [r, g, b, r * rest, g * rest, b * rest, seen.roughness, seen.metallic];
-            for (sum, value) in sum.iter_mut().zip(values) {
-                *sum += f64::from(value);
-            }
-            count += 1;
-        }
-        if count == 0 {
-            return (PixelTruth::default(), false);
-        }
-        let [r, g, b, dr, dg, db, roughness, metallic] = sum.map(|sum| (sum / count as f64) as f32);
+            Some([r, g, b, r * rest, g * rest, b * rest, seen.roughness, seen.metallic])
+        });
+        let [r, g, b, dr, dg, db, roughness, metallic] = mean;
         let truth = PixelTruth { albedo: [r, g, b], diffuse_albedo: [dr, dg, db], roughness, metallic };
-        (truth, count == places.len())
+        (truth, whole && !veiled)
     }
 
     /// base_color, roughness and metallic, if the hit surface is scored: it is neither glass nor visibly emits light.

@@ -210,6 +210,10 @@ pub struct BumpMap {
 /// materials).
 pub const CUT_OUT_BELOW_OPACITY: f32 = 0.5;
 
+/// Opacities that are neither none nor whole. What is seen through them is a mixture, which no single colour, depth or id
+/// describes.
+pub const FRACTIONAL_OPACITY: std::ops::RangeInclusive<f32> = 0.05..=0.95;
+
 /// A surface's material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

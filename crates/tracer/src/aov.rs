@@ -8,16 +8,70 @@ use crate::ray::Ray;
 use crate::world::World;
 
 /// Sub-pixels along each side of a pixel.
-const SUBPIXELS_A_SIDE: usize = 4;
+const SUBPIXELS_A_SIDE: usize = 8;
 /// Sub-pixels per pixel.
 pub const SUBPIXELS: usize = SUBPIXELS_A_SIDE * SUBPIXELS_A_SIDE;
+/// Sub-pixels that are looked at first; the others only where these differ.
+pub const COARSE_SUBPIXELS: usize = SUBPIXELS / 4;
+/// Where no value of the coarse sub-pixels differs by more than this from another, their mean is the pixel's.
+pub const FLAT_RANGE: f32 = 1.0 / 512.0;
 
-/// The points at which pixel (x, y) is sampled: the centres of a regular 4x4 grid, the same for truth and prediction.
+/// The points at which pixel (x, y) is sampled, the same for truth and prediction: the centres of a regular 8x8 grid. The
+/// first [`COARSE_SUBPIXELS`] are one of each 2x2 of them, and about the pixel's centre like all.
 pub fn subpixels(x: usize, y: usize) -> [DVec2; SUBPIXELS] {
+    /// The four places of a block, in turn.
+    const IN_BLOCK: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
+    const BLOCKS_A_SIDE: usize = SUBPIXELS_A_SIDE / 2;
     std::array::from_fn(|index| {
-        let step = |index: usize| (index as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
-        DVec2::new(x as f64 + step(index % SUBPIXELS_A_SIDE), y as f64 + step(index / SUBPIXELS_A_SIDE))
+        let (block, turn) = match index.checked_sub(COARSE_SUBPIXELS) {
+            None => (index, 0),
+            Some(rest) => (rest / 3, 1 + rest % 3),
+        };
+        let (column, row) = (block % BLOCKS_A_SIDE, block / BLOCKS_A_SIDE);
+        let [right, down] = IN_BLOCK[(column + 2 * row + turn) % 4];
+        let step = |block: usize, offset: usize| ((2 * block + offset) as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
+        DVec2::new(x as f64 + step(column, right), y as f64 + step(row, down))
     })
+}
+
+/// The coarse points at which pixel (x, y) is sampled.
+pub fn coarse_subpixels(x: usize, y: usize) -> [DVec2; COARSE_SUBPIXELS] {
+    let all = subpixels(x, y);
+    std::array::from_fn(|index| all[index])
+}
+
+/// The mean of what a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelMean<const N: usize> {
+    /// The means over the places that show anything; 0 if none does.
+    pub mean: [f32; N],
+    /// Whether all places that were looked at show something.
+    pub whole: bool,
+}
+
+impl<const N: usize> PixelMean<N> {
+    /// The mean of the values that `look` gives for the sub-pixel of an index: of the coarse ones, or of all if the coarse
+    /// ones differ or some show nothing.
+    pub fn of(mut look: impl FnMut(usize) -> Option<[f32; N]>) -> Self {
+        let (mut sum, mut count) = ([0.0_f64; N], 0_usize);
+        let (mut low, mut high) = ([f32::INFINITY; N], [f32::NEG_INFINITY; N]);
+        let mut looked = 0;
+        for end in [COARSE_SUBPIXELS, SUBPIXELS] {
+            for values in (looked..end).filter_map(&mut look) {
+                for at in 0..N {
+                    sum[at] += f64::from(values[at]);
+                    (low[at], high[at]) = (low[at].min(values[at]), high[at].max(values[at]));
+                }
+                count += 1;
+            }
+            looked = end;
+            if count == looked && (0..N).all(|at| high[at] - low[at] <= FLAT_RANGE) {
+                break;
+            }
+        }
+        let mean = sum.map(|sum| if count == 0 { 0.0 } else { (sum / count as f64) as f32 });
+        Self { mean, whole: count == looked }
+    }
 }
 
 /// The first hit behind one point of a picture.
@@ -66,6 +120,11 @@ pub fn hit_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Pixel
     });
     let normal = towards_camera(shading.unwrap_or(geometric), geometric, direction);
     Some(PixelHit { surface: hit.surface, triangle, barycentrics: hit.barycentrics, depth, normal, front })
+}
+
+/// Whether a surface of fractional opacity is the first behind `pixel`. Such a point has no one colour or depth.
+pub fn is_veiled(world: &World, camera: &Camera, pixel: DVec2) -> bool {
+    world.meets_fractional_opacity(&Ray::endless(camera.position().as_vec3(), camera.direction(pixel).as_vec3()))
 }
 
 /// The shading normal on the side of the surface that the camera sees; the geometric normal where the shading normal
@@ -140,8 +199,28 @@ mod tests {
 
     #[test]
     fn subpixels_lie_in_the_pixel_and_about_its_centre() {
+        let mean = |places: &[DVec2]| places.iter().sum::<DVec2>() / places.len() as f64;
         let places = subpixels(3, 7);
-        assert_eq!(places.iter().sum::<DVec2>() / SUBPIXELS as f64, DVec2::new(3.5, 7.5));
-        assert!(places.iter().all(|p| p.x > 3.0 && p.x < 4.0 && p.y > 7.0 && p.y < 8.0));
+        assert_eq!(mean(&places), DVec2::new(3.5, 7.5));
+        assert_eq!(mean(&coarse_subpixels(3, 7)), DVec2::new(3.5, 7.5));
+        let mut cells = places.map(|p| ((p - DVec2::new(3.0, 7.0)) * 8.0).floor().as_u64vec2().to_array());
+        cells.sort_unstable();
+        assert_eq!(cells, std::array::from_fn(|at| [at as u64 / 8, at as u64 % 8]));
+    }
+
+    #[test]
+    fn a_pixel_is_looked_at_more_closely_where_it_is_not_flat() {
+        let looks = |value: fn(usize) -> Option<f32>| {
+            let mut count = 0;
+            let mean = PixelMean::of(|index| {
+                count += 1;
+                value(index).map(|value| [0.5, value])
+            });
+            (count, mean)
+        };
+        assert_eq!(looks(|_| Some(0.25)), (16, PixelMean { mean: [0.5, 0.25], whole: true }));
+        assert_eq!(looks(|at| Some((at % 2) as f32)), (64, PixelMean { mean: [0.5, 0.5], whole: true }));
+        assert_eq!(looks(|at| (at > 0).then_some(0.25)), (64, PixelMean { mean: [0.5, 0.25], whole: false }));
+        assert_eq!(looks(|_| None), (64, PixelMean { mean: [0.0, 0.0], whole: false }));
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 use mateval_image::Texture;
 use mateval_scene::TriangleMesh;
-use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, Lookup, Material};
+use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, FRACTIONAL_OPACITY, Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
 use rayon::prelude::*;
 
@@ -128,6 +128,15 @@ impl World {
             return self.accel.closest(ray);
         }
         self.accel.closest_where(ray, |hit| self.opacity(hit) >= CUT_OUT_BELOW_OPACITY)
+    }
+
+    /// Whether the nearest surface that is not wholly transparent is not wholly opaque either.
+    pub fn meets_fractional_opacity(&self, ray: &Ray) -> bool {
+        if !self.masked {
+            return false;
+        }
+        let hit = self.accel.closest_where(ray, |hit| self.opacity(hit) >= *FRACTIONAL_OPACITY.start());
+        hit.is_some_and(|hit| FRACTIONAL_OPACITY.contains(&self.opacity(&hit)))
     }
 
     /// The nearest hits of many rays; `hits[k]` belongs to `rays[k]`. A surface of opacity o is hit with probability o,

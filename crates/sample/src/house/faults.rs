@@ -48,8 +48,8 @@ macro_rules! in_model {
 }
 
 /// Every fault. All are in the third room, except the normals of two walls and the `local` of the outer walls.
-pub const FAULTS: [Fault; 44] = [
-    json_fault("furniture_uid_repeated", "/furniture/30", "the uid of /furniture/21 again, with another model"),
+pub const FAULTS: [Fault; 46] = [
+    json_fault("furniture_uid_repeated", "/furniture/33", "the uid of /furniture/21 again, with another model"),
     json_fault("category_chinese", "/furniture/17/category", "a category in Chinese, of a valid piece"),
     json_fault("category_missing", "/furniture/23", "no category"),
     json_fault("category_null", "/furniture/25/category", "null as category"),
@@ -92,7 +92,7 @@ pub const FAULTS: [Fault; 44] = [
     json_fault("pieces_intersect", "/scene/room/2/children/32/pos", "the piece intersects that of children/31"),
     json_fault("scale_mirrors", "/scene/room/2/children/33/scale", "-1 along x: a picture that reads backwards"),
     json_fault("scale_tiny", "/scene/room/2/children/34/scale", "a millionth"),
-    json_fault("child_without_record", "/scene/room/2/children/38/ref", "a uid that no piece of furniture has"),
+    json_fault("child_without_record", "/scene/room/2/children/41/ref", "a uid that no piece of furniture has"),
     file_fault("model_not_listed", "3D-FUTURE-model/model_info.json", "no entry for the model whose id ends in 21"),
     file_fault("texture_alpha_zero", in_model!("14", "texture.png"), "no texel has opacity"),
     file_fault("texture_truncated", in_model!("15", "texture.png"), "the second half of the file is missing"),
@@ -105,6 +105,12 @@ pub const FAULTS: [Fault; 44] = [
     file_fault("texture_grey_alpha", in_model!("19", "texture.png"), "grey with opacity, not RGBA"),
     file_fault("model_centimetres", in_model!("20", "raw_model.obj"), "a hundred times too large"),
     file_fault("texture_missing", in_model!("21", "texture.png"), "no such file"),
+    file_fault("model_drop_shadow", in_model!("22", "raw_model.obj"), "a painted shadow in a group like any other"),
+    file_fault(
+        "model_flat",
+        in_model!("23", "raw_model.obj"),
+        "a mat without thickness, which lies in the floor exactly",
+    ),
 ];
 
 /// Plants the faults of the JSON, except those that the lists of pieces and rooms already contain.

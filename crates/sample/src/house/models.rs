@@ -15,6 +15,8 @@ pub(super) enum Quirk {
     MisleadingMtl,
     /// The last part is a painted shadow.
     Shadow,
+    /// The last part is a painted shadow whose group is named like all others.
+    DropShadow,
     /// The texture's file ends in the middle.
     TruncatedTexture,
     /// The texture is grey with opacity.
@@ -239,6 +241,12 @@ fn faulty() -> Vec<Model> {
             ),
         ),
         with(Quirk::NoTexture, model("crate", [""; 5], &[OAK], shapes::crate_box())),
+        with(
+            Quirk::DropShadow,
+            model("basket", ["Others", "", "", "", ""], &[OCHRE, Swatch::DropShadow], shapes::basket()),
+        ),
+        model("mat", ["Others", "", "", "", ""], &[Plain([0.0; 3])], shapes::mat()),
+        model("sculpture", ["Others", "", "", "", ""], &[WHITE_WOOD, Plain([0.02; 3])], shapes::sculpture()),
     ]
 }
 
@@ -252,7 +260,8 @@ mod tests {
     #[test]
     fn models_stand_on_their_origin() {
         for model in all() {
-            let parts = model.parts.len() - usize::from(model.quirk == Some(Quirk::Shadow));
+            let has_shadow = matches!(model.quirk, Some(Quirk::Shadow | Quirk::DropShadow));
+            let parts = model.parts.len() - usize::from(has_shadow);
             let points = || model.parts[..parts].iter().flat_map(|(_, solid)| &solid.positions);
             let low = points().fold(DVec3::MAX, |low, p| low.min(*p));
             let middle = (low + points().fold(DVec3::MIN, |high, p| high.max(*p))) / 2.0;

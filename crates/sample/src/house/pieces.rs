@@ -57,7 +57,7 @@ const fn record(uid: &'static str, model: &'static str, title: &'static str) -> 
 }
 
 /// Every record. The nightstand 2002 is placed twice.
-pub(super) const RECORDS: [Record; 30] = [
+pub(super) const RECORDS: [Record; 33] = [
     record("1001/model", "l_sofa", "sofa/l-shaped sofa"),
     record("1002/model", "coffee_table", "table/coffee table"),
     record("1003/model", "tv_stand", "cabinet/tv stand"),
@@ -88,6 +88,9 @@ pub(super) const RECORDS: [Record; 30] = [
     record("3012/model", "vase that was lost", "accessory/vase"),
     Record { validity: Validity::Invalid, ..record("3013/model", "plant that is not public", "plants/plant") },
     Record { validity: Validity::Absent, ..record("3014/model", "door leaf that is not public", "door/door") },
+    record("3015/model", "basket", "accessory/basket"),
+    record("3016/model", "mat", "accessory/mat"),
+    record("3017/model", "sculpture", "accessory/sculpture"),
 ];
 
 const fn piece(uid: &'static str, room: usize, at: [f64; 3], turn: Turn) -> Piece {
@@ -95,7 +98,7 @@ const fn piece(uid: &'static str, room: usize, at: [f64; 3], turn: Turn) -> Piec
 }
 
 /// Every placement, room by room.
-pub(super) const PIECES: [Piece; 31] = [
+pub(super) const PIECES: [Piece; 34] = [
     piece("1001/model", 0, [1.6, 0.0, 3.59], NORTH),
     piece("1002/model", 0, [1.75, 0.0, 2.35], SOUTH),
     piece("1003/model", 0, [1.75, 0.0, 0.25], SOUTH),
@@ -127,6 +130,9 @@ pub(super) const PIECES: [Piece; 31] = [
     piece("3012/model", 2, [2.2, 0.0, 6.4], SOUTH),
     piece("3013/model", 2, [5.2, 0.0, 5.9], SOUTH),
     piece("3014/model", 2, [5.05, 0.0, 4.5], NORTH),
+    piece("3015/model", 2, [0.7, 0.0, 6.9], SOUTH),
+    piece("3016/model", 2, [1.9, 0.0, 6.2], SOUTH),
+    piece("3017/model", 2, [0.5, 0.0, 6.1], SOUTH),
 ];
 
 /// The record with this id.

@@ -225,6 +225,29 @@ pub(super) fn shelf() -> Parts {
     vec![(0, furniture::shelf()), (1, label(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0)))]
 }
 
+/// A basket, 0.5 m wide, and its painted shadow, which is a little wider.
+pub(super) fn basket() -> Parts {
+    let wall = [(0.0, 0.02), (0.2, 0.02), (0.25, 0.4), (0.23, 0.4), (0.18, 0.04), (0.0, 0.04)];
+    vec![
+        (0, turned(&wall)),
+        (0, turned(&[(0.0, 0.0), (0.15, 0.0), (0.15, 0.02), (0.0, 0.02)])),
+        (1, label(v(-0.3, 0.0, 0.3), v(0.6, 0.0, 0.0), v(0.0, 0.0, -0.6))),
+    ]
+}
+
+/// A black mat of no thickness, 1 m wide.
+pub(super) fn mat() -> Parts {
+    vec![(0, label(v(-0.5, 0.0, 0.35), v(1.0, 0.0, 0.0), v(0.0, 0.0, -0.7)))]
+}
+
+/// A sculpture on a dark plate of no thickness, which is as wide as the sculpture.
+pub(super) fn sculpture() -> Parts {
+    vec![
+        (1, label(v(-0.2, 0.0, 0.2), v(0.4, 0.0, 0.0), v(0.0, 0.0, -0.4))),
+        (0, cushion(v(-0.2, 0.0, -0.2), v(0.2, 0.7, 0.2), 0.15)),
+    ]
+}
+
 /// A side table: a round top on one leg.
 pub(super) fn side_table() -> Parts {
     let foot = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.02), (0.03, 0.04), (0.025, 0.5), (0.0, 0.5)];

@@ -1,200 +1,164 @@
-//! Separates sheets of architecture that coincide.
+//! Separates sheets that coincide: of architecture, and of furniture that lies in architecture.
 //!
-//! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind it.
-//! A ray meets either of two such sheets, and each shadows the other. The result depends on the renderer (Blender loses
-//! up to half of the light that leaves them), so it cannot serve as ground truth.
+//! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind it,
+//! and mats, lamps and feet in that of the floor. A ray meets either of two such sheets, and each shadows the other. The
+//! result depends on the renderer (Blender loses up to half of the light that leaves them), so it cannot serve as ground
+//! truth.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::Surface;
-use rstar::primitives::{GeomWithData, Rectangle};
-use rstar::{AABB, RTree};
 
 use super::furnished_house::PlacedSurface;
+use super::sheets::{Face, MOST_PAIRS, Sheets, faces, for_each_near};
 use crate::log::Log;
 
-/// Sheets no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
+/// Sheets of architecture no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
 const COINCIDENT_M: f64 = 1e-5;
+/// Furniture no further from architecture is meant to touch it: models stand on their origin to within a millimetre or so.
+const TOUCHES_M: f64 = 1e-3;
 /// The distance by which a sheet is moved: a hundred steps of a coordinate, a fiftieth of a pixel.
 const LAYER_M: f64 = 1e-4;
-/// Triangles that overlap by no more than this only touch.
-const TOUCHING_M: f64 = 1e-4;
-/// Triangles with a smaller area, in m^2, are ignored.
-const SMALLEST_AREA: f64 = 1e-8;
 /// No sheet is moved further than this many times [`LAYER_M`].
 const MOST_LAYERS: usize = 8;
-/// The most pairs of triangles that are compared. A real house has less than a hundredth as many.
-const MOST_PAIRS: usize = 50_000_000;
+/// Faces whose normals have a smaller cosine cross each other. The sides of a thin mat, for one, do not lie in the floor.
+const PARALLEL: f64 = 0.99;
+/// A piece whose middle is nearer to a plane, in metres, lies in it and stands on neither side.
+const LIES_M: f64 = 0.01;
 
-/// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces.
+/// By surface and triangle, how far the triangle moves.
+type Shifts = BTreeMap<usize, BTreeMap<usize, DVec3>>;
+
+/// Moves every sheet of architecture that coincides with a larger one slightly to the side that it faces, and every sheet of
+/// furniture that touches architecture slightly in front of it.
 ///
-/// A sheet is the set of triangles of one source mesh that lie in one plane and face one way. Of two that overlap, the
-/// smaller is moved, since a decoration is smaller than its wall; of two of equal area, the later.
+/// Of two sheets of architecture, the smaller is moved, since a decoration is smaller than its wall; of two of equal area,
+/// the later.
 pub(super) fn separate(surfaces: &mut [Surface], placed: &[PlacedSurface], log: &mut Log) {
-    // Which sheets overlap.
-    let faces = faces(surfaces, placed);
-    let Some(pairs) = overlapping_pairs(&faces) else {
-        let message = format!("more than {MOST_PAIRS} pairs of triangles of the architecture are near each other");
-        return log.warn("coincident_sheets", "/mesh", message, "did not move sheets that coincide with others");
-    };
-    let sheets = Sheets::new(&faces, &pairs);
-    let layers = sheets.layers();
-    let moved: Vec<usize> = (0..layers.len()).filter(|&sheet| layers[sheet] > 0).collect();
-    if moved.is_empty() {
-        return;
-    }
-    // How far each triangle moves.
-    let mut shifts: BTreeMap<usize, BTreeMap<usize, DVec3>> = BTreeMap::new();
-    for (face, &sheet) in faces.iter().zip(&sheets.of_face) {
-        if layers[sheet] > 0 {
-            let shift = sheets.all[sheet].normal * (layers[sheet] as f64 * LAYER_M);
-            shifts.entry(face.surface).or_default().insert(face.triangle, shift);
+    let architecture = faces(surfaces, placed, |placed| placed.origin.role.is_architecture());
+    let mut shifts = Shifts::new();
+    let all_compared = match layered(&architecture, log, &mut shifts) {
+        None => false,
+        Some(layer_of_face) => {
+            let furniture = faces(surfaces, placed, |placed| !placed.origin.role.is_architecture());
+            raise(surfaces, &architecture, &layer_of_face, furniture, log, &mut shifts)
         }
+    };
+    if !all_compared {
+        let message = format!("more than {MOST_PAIRS} pairs of triangles are near each other");
+        log.warn("coincident_sheets", "/mesh", message, "did not move all sheets that coincide with others");
     }
     for (surface, shift_of) in shifts {
         shift(&mut surfaces[surface].mesh, &shift_of);
     }
-    let area: f64 = moved.iter().map(|&sheet| sheets.all[sheet].area).sum();
-    let message = format!("{} sheets with a total area of {area:.2} m2 coincide with larger ones", moved.len());
-    log.note("coincident_sheets", "/mesh", message, "moved each by 0.1 mm, or more in a stack, to the side it faces");
 }
 
-/// A triangle of architecture, in world space.
-struct Face {
-    surface: usize,
-    triangle: usize,
-    part: usize,
-    corners: [DVec3; 3],
-    normal: DVec3,
-    area: f64,
-}
-
-impl Face {
-    fn distance(&self, point: DVec3) -> f64 {
-        self.normal.dot(point - self.corners[0]).abs()
-    }
-
-    fn bounds(&self, margin: f64) -> AABB<[f64; 3]> {
-        let [a, b, c] = self.corners;
-        let (low, high) = (a.min(b).min(c) - margin, a.max(b).max(c) + margin);
-        AABB::from_corners(low.to_array(), high.to_array())
-    }
-
-    /// Whether the two triangles lie in one plane and overlap.
-    fn coincides_with(&self, other: &Self) -> bool {
-        let (large, small) = if self.area >= other.area { (self, other) } else { (other, self) };
-        small.corners.iter().all(|&corner| large.distance(corner) <= COINCIDENT_M) && overlap(large, small)
-    }
-}
-
-fn faces(surfaces: &[Surface], placed: &[PlacedSurface]) -> Vec<Face> {
-    let of_architecture =
-        surfaces.iter().zip(placed).enumerate().filter(|(_, (_, placed))| placed.origin.role.is_architecture());
-    let faces = of_architecture.flat_map(|(number, (surface, placed))| {
-        (0..surface.mesh.triangles.len()).map(move |triangle| {
-            let corners = surface.mesh.corners(triangle).map(|corner| corner.as_dvec3());
-            let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-            let part = placed.origin.part_of_triangle.as_ref().map_or(0, |parts| parts[triangle]);
-            let (normal, area) = (across.normalize_or_zero(), across.length() / 2.0);
-            Face { surface: number, triangle, part, corners, normal, area }
-        })
+/// Moves the sheets of architecture. Returns the layer of each face; none where there are too many pairs.
+fn layered(faces: &[Face], log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usize>> {
+    let mut pairs = Vec::new();
+    let is_whole = for_each_near(faces, faces, COINCIDENT_M, |one, other| {
+        if one < other {
+            pairs.push([one, other]);
+        }
     });
-    faces.filter(|face| face.area >= SMALLEST_AREA).collect()
-}
-
-/// Pairs of faces that coincide, the lower index first; none where there are more than [`MOST_PAIRS`] to compare.
-fn overlapping_pairs(faces: &[Face]) -> Option<Vec<[usize; 2]>> {
-    let boxed = |(number, face): (usize, &Face)| {
-        let bounds = face.bounds(0.0);
-        GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), number)
-    };
-    let tree = RTree::bulk_load(faces.iter().enumerate().map(boxed).collect());
-    let (mut pairs, mut compared) = (Vec::new(), 0);
-    for (number, face) in faces.iter().enumerate() {
-        for near in tree.locate_in_envelope_intersecting(&face.bounds(COINCIDENT_M)) {
-            compared += 1;
-            if compared > MOST_PAIRS {
-                return None;
-            }
-            if number < near.data && face.coincides_with(&faces[near.data]) {
-                pairs.push([number, near.data]);
-            }
+    if !is_whole {
+        return None;
+    }
+    let sheets = Sheets::new(faces, &pairs);
+    let layers = sheets.layers(MOST_LAYERS);
+    for (face, &sheet) in faces.iter().zip(&sheets.of_face) {
+        if layers[sheet] > 0 {
+            let by = sheets.all[sheet].normal * (layers[sheet] as f64 * LAYER_M);
+            shifts.entry(face.surface).or_default().insert(face.triangle, by);
         }
     }
-    Some(pairs)
+    let moved = || (0..layers.len()).filter(|&sheet| layers[sheet] > 0);
+    if moved().next().is_some() {
+        let area: f64 = moved().map(|sheet| sheets.all[sheet].area).sum();
+        let message = format!("{} sheets with a total area of {area:.2} m2 coincide with larger ones", moved().count());
+        let action = "moved each by 0.1 mm, or more in a stack, to the side it faces";
+        log.note("coincident_sheets", "/mesh", message, action);
+    }
+    Some(sheets.of_face.iter().map(|&sheet| layers[sheet]).collect())
 }
 
-/// Whether two triangles in one plane overlap by more than [`TOUCHING_M`], by the separating axis theorem: no line along an
-/// edge of either separates them.
-fn overlap(one: &Face, other: &Face) -> bool {
-    let separates = |edge: DVec3| {
-        let axis = edge.cross(one.normal).normalize_or_zero();
-        let reach = |face: &Face| {
-            let along = face.corners.map(|corner| axis.dot(corner - one.corners[0]));
-            along.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)))
-        };
-        let (a, b) = (reach(one), reach(other));
-        a.1.min(b.1) - a.0.max(b.0) <= TOUCHING_M
-    };
-    ![one, other].iter().any(|face| (0..3).any(|k| separates(face.corners[(k + 1) % 3] - face.corners[k])))
-}
-
-/// The triangles of one source mesh that lie in one plane and face one way.
-struct Sheet {
-    normal: DVec3,
-    area: f64,
-    overlaps: Vec<usize>,
-}
-
-struct Sheets {
-    all: Vec<Sheet>,
-    of_face: Vec<usize>,
-}
-
-impl Sheets {
-    fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
-        let mut places = BTreeMap::new();
-        let mut all: Vec<Sheet> = Vec::new();
-        let of_face: Vec<usize> = faces
-            .iter()
-            .map(|face| {
-                // Rounding may split the faces of one plane into two sheets, which is harmless.
-                let plane = (face.normal * 1e3).round().as_i64vec3();
-                let offset = (face.normal.dot(face.corners[0]) * 1e3).round() as i64;
-                let key = (face.surface, face.part, plane.to_array(), offset);
-                let sheet = *places.entry(key).or_insert_with(|| {
-                    all.push(Sheet { normal: face.normal, area: 0.0, overlaps: Vec::new() });
-                    all.len() - 1
-                });
-                all[sheet].area += face.area;
-                sheet
-            })
-            .collect();
-        for [one, other] in pairs {
-            let (one, other) = (of_face[*one], of_face[*other]);
-            if one != other {
-                all[one].overlaps.push(other);
-                all[other].overlaps.push(one);
+/// Moves the sheets of furniture. Returns false where there are too many pairs.
+fn raise(
+    surfaces: &[Surface],
+    architecture: &[Face],
+    layer_of_face: &[usize],
+    furniture: Vec<Face>,
+    log: &mut Log,
+    shifts: &mut Shifts,
+) -> bool {
+    // The shift that takes each face in front of all architecture that it touches.
+    let mut middles: BTreeMap<usize, DVec3> = BTreeMap::new();
+    let mut wanted: BTreeMap<usize, DVec3> = BTreeMap::new();
+    let is_whole = for_each_near(&furniture, architecture, TOUCHES_M, |number, wall| {
+        let (face, layer, wall) = (&furniture[number], layer_of_face[wall], &architecture[wall]);
+        let middle = *middles.entry(face.surface).or_insert_with(|| middle(&surfaces[face.surface].mesh));
+        let side = if wall.height(middle) < -LIES_M { -1.0 } else { 1.0 };
+        // The wall's own layer is on the side that it faces.
+        let layer = if side > 0.0 { layer + 1 } else { 1 };
+        let lowest = face.corners.iter().map(|corner| side * wall.height(*corner)).fold(f64::INFINITY, f64::min);
+        let by = layer as f64 * LAYER_M - lowest;
+        let is_parallel = face.normal.dot(wall.normal).abs() > PARALLEL;
+        if is_parallel && lowest >= -TOUCHES_M && by > 0.0 {
+            let shift = side * by * wall.normal;
+            let before = wanted.entry(number).or_insert(shift);
+            if shift.length() > before.length() {
+                *before = shift;
             }
         }
-        Self { all, of_face }
+    });
+    if !is_whole {
+        return false;
     }
-
-    /// The number of steps by which each sheet is moved. From the largest sheet to the smallest, each takes the smallest
-    /// number that no sheet it overlaps has taken.
-    fn layers(&self) -> Vec<usize> {
-        let mut by_area: Vec<usize> =
-            (0..self.all.len()).filter(|&sheet| !self.all[sheet].overlaps.is_empty()).collect();
-        by_area.sort_by(|&a, &b| self.all[b].area.total_cmp(&self.all[a].area).then(a.cmp(&b)));
-        let mut layer: Vec<Option<usize>> = vec![None; self.all.len()];
-        for sheet in by_area {
-            let taken: Vec<usize> = self.all[sheet].overlaps.iter().filter_map(|&other| layer[other]).collect();
-            layer[sheet] = (0..=MOST_LAYERS).find(|step| !taken.contains(step)).or(Some(MOST_LAYERS));
+    if wanted.is_empty() {
+        return true;
+    }
+    // Whole sheets move, one above the other where they overlap each other too.
+    let touching = furniture.into_iter().enumerate().filter(|(number, _)| wanted.contains_key(number));
+    let (numbers, touching): (Vec<usize>, Vec<Face>) = touching.unzip();
+    let mut pairs = Vec::new();
+    let is_whole = for_each_near(&touching, &touching, TOUCHES_M, |one, other| {
+        if one < other {
+            pairs.push([one, other]);
         }
-        layer.into_iter().map(|layer| layer.unwrap_or(0)).collect()
+    });
+    let sheets = Sheets::new(&touching, &pairs);
+    let layers = sheets.layers(MOST_LAYERS);
+    let mut shift_of_sheet = vec![DVec3::ZERO; sheets.all.len()];
+    for (number, &sheet) in numbers.iter().zip(&sheets.of_face) {
+        let (shift, longest) = (wanted[number], &mut shift_of_sheet[sheet]);
+        if shift.length() > longest.length() {
+            *longest = shift;
+        }
     }
+    for (sheet, shift) in shift_of_sheet.iter_mut().enumerate() {
+        *shift += shift.normalize_or_zero() * (layers[sheet] as f64 * LAYER_M);
+    }
+    for (face, &sheet) in touching.iter().zip(&sheets.of_face) {
+        shifts.entry(face.surface).or_default().insert(face.triangle, shift_of_sheet[sheet]);
+    }
+    let area: f64 = sheets.all.iter().map(|sheet| sheet.area).sum();
+    let message = format!("{} sheets of furniture, {area:.2} m2 in all, lie in architecture", sheets.all.len());
+    log.note(
+        "furniture_in_architecture",
+        "/furniture",
+        message,
+        "moved each 0.1 mm in front of it, or more in a stack",
+    );
+    is_whole
+}
+
+/// The mean of a mesh's corners.
+fn middle(mesh: &TriangleMesh) -> DVec3 {
+    let corners = (0..mesh.triangles.len()).flat_map(|triangle| mesh.corners(triangle));
+    let (sum, count) = corners.fold((DVec3::ZERO, 0.0), |(sum, count), corner| (sum + corner.as_dvec3(), count + 1.0));
+    sum / f64::max(count, 1.0)
 }
 
 /// Moves triangles of a mesh, which get vertices of their own.
@@ -247,11 +211,17 @@ mod tests {
 
     /// The meshes after [`separate`], and the codes of the findings.
     fn separated(meshes: Vec<TriangleMesh>, role: &Role) -> (Vec<TriangleMesh>, Vec<String>) {
+        separated_in_roles(meshes.into_iter().map(|mesh| (mesh, role.clone())).collect())
+    }
+
+    fn separated_in_roles(meshes: Vec<(TriangleMesh, Role)>) -> (Vec<TriangleMesh>, Vec<String>) {
+        let (meshes, roles): (Vec<TriangleMesh>, Vec<Role>) = meshes.into_iter().unzip();
         let placed: Vec<PlacedSurface> = meshes
             .iter()
-            .map(|mesh| {
+            .zip(roles)
+            .map(|(mesh, role)| {
                 let part_of_triangle = Some(vec![0; mesh.triangles.len()]);
-                let origin = InstanceOrigin { role: role.clone(), part_of_triangle, ..InstanceOrigin::default() };
+                let origin = InstanceOrigin { role, part_of_triangle, ..InstanceOrigin::default() };
                 PlacedSurface { room: 0, origin, model: None, color: [1.0; 3] }
             })
             .collect();
@@ -319,5 +289,79 @@ mod tests {
         for triangle in 2..4 {
             assert_eq!(meshes[1].corners(triangle), folded.corners(triangle));
         }
+    }
+
+    /// Segments of one mesh that overlap in part: one moves, the other stays, and neighbours that only touch stay too.
+    #[test]
+    fn overlaps_within_a_mesh_are_separated() {
+        let mut rail = square(0.0, 2.0, true);
+        rail.append(&square(1.5, 1.0, true));
+        rail.append(&square(4.0, 1.0, true));
+        let (meshes, codes) = separated(vec![rail], &architecture());
+        let height = |triangles: [usize; 2]| triangles.map(|triangle| meshes[0].corners(triangle).map(|c| c.z));
+        assert_eq!(height([0, 1]), [[0.0; 3]; 2]);
+        assert_eq!(height([2, 3]), [[1e-4; 3]; 2]);
+        assert_eq!(height([4, 5]), [[0.0; 3]; 2]);
+        assert_eq!(codes, ["coincident_sheets"]);
+        // Twice the same triangles, with the same corners.
+        let mut twice = square(0.0, 2.0, true);
+        twice.triangles.extend(twice.triangles.clone());
+        let (meshes, _) = separated(vec![twice], &architecture());
+        let mut heights: Vec<f32> = (0..4).map(|triangle| meshes[0].corners(triangle)[0].z).collect();
+        heights.sort_by(f32::total_cmp);
+        assert_eq!(heights, [0.0, 0.0, 1e-4, 1e-4]);
+    }
+
+    fn at_height(mut mesh: TriangleMesh, z: f32) -> TriangleMesh {
+        mesh.positions.iter_mut().for_each(|position| position.z += z);
+        mesh
+    }
+
+    /// A flat piece in a floor, a little below or just above it, whichever way it faces, comes to lie on it; a piece on top of
+    /// another lies on both.
+    #[test]
+    fn furniture_lies_on_the_floor() {
+        let floor = || (square(0.0, 5.0, true), architecture());
+        for (z, faces_front) in [(0.0, true), (0.0, false), (-9e-4, true), (5e-5, true)] {
+            let mat = (at_height(square(1.0, 1.0, faces_front), z), Role::Furniture {});
+            let (meshes, codes) = separated_in_roles(vec![floor(), mat]);
+            assert_eq!(heights(&meshes[0]), (0.0, 0.0));
+            let (low, high) = heights(&meshes[1]);
+            assert!((low - 1e-4).abs() < 1e-8 && high == low, "{z}: {low} {high}");
+            assert_eq!(codes, ["furniture_in_architecture"]);
+        }
+        let mats = [1.0, 2.0].map(|side| (square(1.0, side, true), Role::Furniture {}));
+        let (meshes, _) = separated_in_roles([vec![floor()], mats.into()].concat());
+        assert_eq!([1, 2].map(|mesh| (heights(&meshes[mesh]).0 * 1e4).round()), [2.0, 1.0]);
+    }
+
+    /// A lamp below a ceiling that faces up: its plate is moved down, to the side of the lamp.
+    #[test]
+    fn furniture_stays_on_its_side() {
+        let mut lamp = square(1.0, 1.0, true);
+        lamp.append(&at_height(square(1.0, 1.0, false), -0.3));
+        let (meshes, _) =
+            separated_in_roles(vec![(square(0.0, 5.0, true), architecture()), (lamp, Role::LightFixture {})]);
+        assert_eq!(meshes[1].corners(0).map(|corner| corner.z), [-1e-4; 3]);
+        assert_eq!(meshes[1].corners(2).map(|corner| corner.z), [-0.3; 3]);
+    }
+
+    /// What stands higher, lies deeper, beside or across the floor stays.
+    #[test]
+    fn other_furniture_stays() {
+        let upright = |mut mesh: TriangleMesh| {
+            mesh.positions.iter_mut().for_each(|p| *p = Vec3::new(p.x, 1.0, p.y * 5e-4));
+            mesh
+        };
+        let pieces = [
+            at_height(square(1.0, 1.0, true), 2e-4),
+            at_height(square(1.0, 1.0, true), -2e-3),
+            square(7.0, 1.0, true),
+            upright(square(1.0, 1.0, true)),
+        ];
+        let floor = (square(0.0, 5.0, true), architecture());
+        let meshes = [vec![floor], pieces.map(|piece| (piece, Role::Furniture {})).into()].concat();
+        let before: Vec<TriangleMesh> = meshes.iter().map(|(mesh, _)| mesh.clone()).collect();
+        assert_eq!(separated_in_roles(meshes), (before, vec![]));
     }
 }

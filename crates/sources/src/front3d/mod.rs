@@ -7,8 +7,8 @@
 //!
 //! The steps:
 //! - `document` parses the JSON within limits; `house_reader` and `house_mesh` turn it into a [`House`];
-//! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `coincident` separates
-//!   surfaces that coincide; `cameras` adds the designers' cameras;
+//! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `drop_shadow` finds
+//!   painted shadows, `coincident` separates surfaces that coincide; `cameras` adds the designers' cameras;
 //! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
 //! - [`camera_sampler`] draws cameras in it;
 //! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
@@ -18,6 +18,7 @@ pub mod camera_sampler;
 mod cameras;
 mod coincident;
 mod document;
+mod drop_shadow;
 mod error;
 mod furnish;
 mod furnished_house;
@@ -31,6 +32,7 @@ mod limits;
 mod model;
 mod model_info;
 pub mod room_scene;
+mod sheets;
 
 pub use error::HouseError;
 pub use furnish::{furnish, read_house};

@@ -1,8 +1,11 @@
 //! 3D-FUTURE models: reads a model's mesh in metres and its parts, and reports what had to be repaired.
 
 use glam::{DMat4, DVec3, Vec3};
+use mateval_image::Wrap;
+use mateval_image::texture_io::read_texture_and_alpha;
 use mateval_scene::{Severity, TriangleMesh};
 
+use super::drop_shadow;
 use super::limits::Limits;
 use crate::log::Log;
 use crate::parts::labelled_parts;
@@ -79,12 +82,13 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
     }
     // What is kept of it, in metres.
     let (mesh, group_of_triangle) = without_shadows(read, &file, log);
-    let model = in_metres(mesh, group_of_triangle, &file, log);
-    if model.is_none() {
+    let Some((mesh, groups)) = in_metres(mesh, group_of_triangle, &file, log) else {
         let message = "expected a triangle with an area, found none";
         log.push(Severity::Warning, "bad_model", &file, "", message, "left its pieces out");
-    }
-    model
+        return None;
+    };
+    let (mesh, groups) = without_painted_shadow(mesh, groups, &format!("{jid}/texture.png"), library, &file, log);
+    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh })
 }
 
 fn missing_model(code: &'static str) -> &'static str {
@@ -112,8 +116,37 @@ fn without_shadows(read: ObjMesh, file: &str, log: &mut Log) -> (TriangleMesh, V
     (mesh, kept)
 }
 
-/// Drops triangles that are not finite or have no area, scales a model in centimetres, and finds its parts.
-fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<Model> {
+/// Drops the shadow that is painted under a model, whatever its group is called.
+fn without_painted_shadow(
+    mesh: TriangleMesh,
+    groups: Vec<usize>,
+    texture: &str,
+    library: &mut Library,
+    file: &str,
+    log: &mut Log,
+) -> (TriangleMesh, Vec<usize>) {
+    if !drop_shadow::is_possible(&mesh) {
+        return (mesh, groups);
+    }
+    // A texture that cannot be read is reported when the material is made.
+    let read = library.folder.path(texture).ok().and_then(|path| read_texture_and_alpha(&path, Wrap::Repeat).ok());
+    let Some((texels, Some(opacity))) = read else { return (mesh, groups) };
+    let shadow = drop_shadow::triangles(&mesh, &texels, &opacity);
+    if shadow.is_empty() {
+        return (mesh, groups);
+    }
+    let is_kept = |triangle: usize| shadow.binary_search(&triangle).is_err();
+    let area: f64 = mesh.picked(|triangle| !is_kept(triangle)).area();
+    let message = format!("{} black, translucent triangles of {area:.2} m2 below it: a painted shadow", shadow.len());
+    log.push(Severity::Note, "drop_shadow", file, "", message, "left them out");
+    let groups =
+        groups.iter().enumerate().filter(|(triangle, _)| is_kept(*triangle)).map(|(_, group)| *group).collect();
+    (mesh.picked(is_kept), groups)
+}
+
+/// Drops triangles that are not finite or have no area, and scales a model in centimetres. Returns the group of each
+/// remaining triangle too.
+fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<(TriangleMesh, Vec<usize>)> {
     // Triangles without area go first, and their group numbers with them.
     let sound: Vec<bool> = (0..mesh.triangles.len()).map(|t| has_area(mesh.corners(t))).collect();
     let dropped = sound.iter().filter(|sound| !**sound).count();
@@ -140,7 +173,7 @@ fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) 
     if mesh.triangles.is_empty() || mesh.triangles.len() != groups.len() {
         return None;
     }
-    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh })
+    Some((mesh, groups))
 }
 
 /// The longest side of the bounding box of all triangles, in the file's unit.

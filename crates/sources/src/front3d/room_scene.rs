@@ -7,7 +7,7 @@ use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::{Camera, SceneLights, SourceKind};
 use mateval_tracer::World;
-use mateval_tracer::aov::{hit_through, subpixels};
+use mateval_tracer::aov::{coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
 use super::furnished_house::FurnishedHouse;
@@ -44,12 +44,12 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     }
 }
 
-/// The surfaces that any sub-pixel of any view shows.
+/// The surfaces that any coarse sub-pixel of any view shows.
 fn seen(world: &World, views: &[Camera]) -> BTreeSet<usize> {
     let rows: Vec<(&Camera, usize)> =
         views.iter().flat_map(|view| (0..view.intrinsics.height as usize).map(move |y| (view, y))).collect();
     let seen_in_row = |(view, y): (&Camera, usize)| {
-        let places = (0..view.intrinsics.width as usize).flat_map(|x| subpixels(x, y));
+        let places = (0..view.intrinsics.width as usize).flat_map(|x| coarse_subpixels(x, y));
         places.filter_map(|place| hit_through(world, view, place)).map(|hit| hit.surface.0).collect::<BTreeSet<usize>>()
     };
     rows.into_par_iter().map(seen_in_row).reduce(BTreeSet::new, |mut all, more| {

@@ -84,7 +84,7 @@ fn optional_keys_may_be_missing() {
     let (house, findings) = read_house(&whole);
     assert!(findings.is_empty(), "{findings:?}");
     let expected = summary(&house.unwrap());
-    assert_eq!(expected.3.len(), 75 + 31);
+    assert_eq!(expected.3.len(), 75 + 34);
     let mut without_any = whole.clone();
     let mut seen = 0;
     for (holder, keys) in OPTIONAL {
