@@ -214,6 +214,20 @@ mod tests {
         }
     }
 
+    /// Stripes that are fine along u and absent along v. As many lookups along both sides as their mean asks for would miss
+    /// them.
+    #[test]
+    fn stretched_textures_are_filtered_along_both_sides() {
+        let stripes = (0..512 * 8).map(|at| (at % 2) as f32).collect();
+        let textures = [Texture::new(512, 8, Texels::Grey(stripes), Wrap::Repeat).unwrap()];
+        let look = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
+        let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();
+        let baked = bake(&unwrapped, &wall(), &material(look), &textures).unwrap();
+        for texel in base_color(baked).pixels() {
+            assert!(texel[0].abs_diff(188) <= 8, "{texel:?} is not the byte of linear 0.5");
+        }
+    }
+
     #[test]
     fn constants_and_clipping() {
         let unwrapped = unwrap(&wall(), SizeWish::Fixed(64)).unwrap();

@@ -197,6 +197,24 @@ mod tests {
         assert_eq!((hit.surface, hit.depth.round()), (SurfaceIndex(1), 4.0));
     }
 
+    /// Opacities from 0.04 to 0.97 over the sheet: whatever the wall behind it, only what is neither clear nor opaque is a
+    /// veil.
+    #[test]
+    fn fractional_opacity_is_a_veil() {
+        let mut scene = world().scene().clone();
+        let veiled = |value: f32, sheet: &mut ReferenceScene| {
+            let texture = Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).unwrap();
+            sheet.textures[0].texture = texture;
+            is_veiled(&World::new(Arc::new(sheet.clone())).unwrap(), &camera(), DVec2::new(32.3, 20.5))
+        };
+        let found = [0.0, 0.04, 0.06, 0.5, 0.94, 0.97, 1.0].map(|value| veiled(value, &mut scene));
+        assert_eq!(found, [false, false, true, true, true, false, false]);
+        // Nothing veils what stands before it.
+        scene.surfaces.swap(0, 1);
+        scene.surfaces[0].mesh.positions.iter_mut().for_each(|position| position.z = -1.0);
+        assert!(!veiled(0.5, &mut scene));
+    }
+
     #[test]
     fn subpixels_lie_in_the_pixel_and_about_its_centre() {
         let mean = |places: &[DVec2]| places.iter().sum::<DVec2>() / places.len() as f64;
