@@ -14,6 +14,7 @@ mod suite {
     mod command;
     mod compare;
     mod determinism;
+    mod flat_bases;
     mod full_disk;
     mod help;
     mod house;

@@ -8,7 +8,7 @@
 //! The steps:
 //! - `document` parses the JSON within limits; `house_reader` and `house_mesh` turn it into a [`House`];
 //! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `drop_shadow` finds
-//!   painted shadows, `coincident` separates surfaces that coincide; `cameras` adds the designers' cameras;
+//!   painted shadows, `coincident` moves apart the `sheets` that coincide; `cameras` adds the designers' cameras;
 //! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
 //! - [`camera_sampler`] draws cameras in it;
 //! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
