@@ -104,6 +104,9 @@ fn overlap(one: &Face, other: &Face) -> bool {
     ![one, other].iter().any(|face| (0..3).any(|k| separates(face.corners[(k + 1) % 3] - face.corners[k])))
 }
 
+/// Numbers the faces, given the sheet of each: faces of a sheet with different numbers become different sheets.
+type Split = fn(&[Face], &[usize]) -> Vec<usize>;
+
 /// The triangles of one part of a mesh that lie in one plane and face one way, without overlaps.
 pub(super) struct Sheet {
     pub(super) normal: DVec3,
@@ -124,8 +127,7 @@ impl Sheets {
     /// of its connected pieces is a sheet, and where that is not enough, each of the piece's triangles.
     pub(super) fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
         let mut of_face = numbered(faces.iter().map(plane_key));
-        let finer: [fn(&[Face], &[usize]) -> Vec<usize>; 2] = [connected_pieces, triangles_apart];
-        for finer in finer {
+        for finer in [connected_pieces as Split, triangles_apart] {
             let folded: BTreeSet<usize> =
                 pairs.iter().filter(|[a, b]| of_face[*a] == of_face[*b]).map(|[a, _]| of_face[*a]).collect();
             if folded.is_empty() {
