@@ -22,7 +22,7 @@ def main(results):
     lines = README.read_text().splitlines()
     lacking = []
     for method in DESCRIPTIONS:
-        summary = json.loads((results / f"{method}.json").read_text())["protocols"]["mateval-1"]["summary"]
+        summary = json.loads((results / f"{method}.json").read_text())["protocols"]["mateval-2"]["summary"]
         expected = row(method, [summary[key] for key in KEYS])
         if expected not in lines:
             lacking.append(expected)

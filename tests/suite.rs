@@ -13,6 +13,7 @@ mod suite {
     mod circles;
     mod command;
     mod compare;
+    mod converted;
     mod determinism;
     mod flat_bases;
     mod full_disk;

@@ -8,6 +8,8 @@ EDGE_COSINE = 1.0 / 7.0
 
 def reflectance(*, cosine: float, eta: float, k: float) -> float:
     """Returns the share of unpolarised light that a conductor with complex index eta + i k reflects at this cosine."""
+    if eta == 0.0 and k == 0.0:
+        return 1.0  # the limit of k towards 0, where both sides of the fraction below vanish
     sine2 = 1.0 - cosine * cosine
     t = eta * eta - k * k - sine2
     a2b2 = math.sqrt(t * t + 4.0 * eta * eta * k * k)

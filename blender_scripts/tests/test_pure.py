@@ -124,6 +124,13 @@ class Fresnel(unittest.TestCase):
         for eta, k, expected in ((0.2004, 3.9129, 0.9522), (0.9240, 2.4528, 0.6197), (1.1022, 2.1421, 0.5106)):
             self.assertAlmostEqual(reflectance(cosine=1.0, eta=eta, k=k), expected, places=3)
 
+    def test_a_metal_without_a_real_index_reflects_everything(self) -> None:
+        for k in (1.0, 0.3, 0.0):
+            for cosine in (1.0, 0.5, EDGE_COSINE, 1e-9):
+                self.assertAlmostEqual(reflectance(cosine=cosine, eta=0.0, k=k), 1.0)
+            self.assertAlmostEqual(edge_tint(eta=0.0, k=k), 1.0)
+        self.assertLess(reflectance(cosine=1.0, eta=0.1, k=0.3), 0.9)
+
     def test_everything_is_a_mirror_at_grazing_angles(self) -> None:
         self.assertAlmostEqual(reflectance(cosine=1e-9, eta=0.2, k=3.9), 1.0, places=6)
         self.assertAlmostEqual(fresnel(cosine=1e-9, eta=1.5), 1.0, places=6)

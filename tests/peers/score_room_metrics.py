@@ -1,6 +1,6 @@
 """MSE, PSNR and SSIM by scikit-image, LPIPS by the `lpips` package, for `score_room_mitsuba.py`.
 
-Follows the rules of protocol `mateval-1` as far as these packages allow: light and colours for SSIM and LPIPS clipped
+Follows the rules of protocol `mateval-2` as far as these packages allow: light and colours for SSIM and LPIPS clipped
 and sRGB-encoded, albedo's MSE and PSNR linear; SSIM over the windows that lie inside the mask; LPIPS of the prediction
 with the truth's pixels outside the mask, the sum of the map over the mask's pixels. Noise is not removed from the
 pictures.

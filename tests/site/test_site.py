@@ -50,7 +50,9 @@ def make_small(folder: Path) -> Path:
     entry = {"date": "2026-03-01", "title": "A lamp was missing", "text": "room-002 was rendered again.", "affects": ["room-002"]}
     (folder / "errata.json").write_text(results.pretty({"format": "mateval-errata/1", "entries": [entry]}))
     site = folder / "site"
-    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures",
+    ceiling = folder / "truth.json"
+    ceiling.write_text(results.pretty(results.result(method="gt", psnr=48.0, scenes=SCENES, seed=7)))
+    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures", "--ceiling", ceiling,
                     "--errata", folder / "errata.json"], check=True, stdout=subprocess.DEVNULL)
     return site
 
@@ -157,6 +159,31 @@ class TestLooks(unittest.TestCase):
                             page.picture(f"{PICTURES}/{name.replace('/', '-')}-{width}-{shade}.png", whole=True)
                     self.assertEqual(page.faults, [])
         self.assertEqual(looked_at, 28)
+
+    def test_the_ceiling_has_the_columns_of_the_board(self) -> None:
+        """As many cells as heads, the same ones hidden after a choice, and never sorted among the methods."""
+        page = Page(width=1400, height=900, dark=False)
+        self.addCleanup(page.close)
+        page.open((small / "index.html").as_uri())
+        shown = """(() => {
+          const hidden = (row) => [...row.cells].map((cell) => cell.hidden);
+          return { head: hidden(table.tHead.rows[0]), foot: hidden(table.tFoot.rows[0]), text: table.tFoot.innerText };
+        })()"""
+        first = page.run(shown)
+        self.assertEqual(first["head"], first["foot"])
+        self.assertIn("ceiling: the truth itself", first["text"])
+        page.run("document.querySelector('input[name=metric][value=ssim]').click()")
+        page.run("document.querySelector('thead th:not([hidden]) button').click()")
+        second = page.run(shown)
+        self.assertEqual(second["head"], second["foot"])
+        self.assertNotEqual(first["head"], second["head"])
+        self.assertEqual(page.run("table.tBodies[0].innerText.includes('ceiling')"), False)
+
+    def test_methods_that_the_truth_cannot_tell_apart_are_named(self) -> None:
+        text = (small / "index.html").read_text()
+        sentence = "CopyA and CopyB are 0.000 dB apart, the truth&#x27;s noise is 0.087 dB"
+        self.assertIn(sentence, text)
+        self.assertEqual(text.count("dB apart"), 1)
 
     def test_faults_of_appearance_are_found(self) -> None:
         """The twin: text of low contrast, a wide box, a script that fails, and a picture from another site."""

@@ -107,7 +107,8 @@ fn a_dataset_is_rendered_whole_and_twice_to_the_same_bytes() {
     assert!(photo == light(dataset, "input/rgb.exr") && photo != a);
     let record = json(&renders(dataset).join("input/render.json"));
     assert!(record["noise"]["mean_of_halves_mse"].as_f64().unwrap() > 0.0, "{record}");
-    assert!(record["approximations"].as_array().unwrap().iter().any(|line| line.as_str().unwrap().contains("plastic")));
+    // Converted materials mean the same to both renderers; glass alone is approximated.
+    assert!(record["approximations"].as_array().unwrap().iter().all(|line| line.as_str().unwrap().contains("glass")));
 
     // Ids and depth are those of our own tracer; those of the turned view differ.
     let agree = |ours: &str, theirs: &str| {

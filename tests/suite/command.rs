@@ -104,7 +104,7 @@ pub fn baseline(name: &str, dataset: &Path, submission: &Path) -> Command {
 /// `mateval eval score SUBMISSION --dataset DATASET --out RESULT` under both protocols.
 pub fn score(submission: &Path, dataset: &Path, result: &Path) -> Command {
     let mut command = mateval();
-    command.args(["eval", "score", "--protocol", "mateval-1", "--protocol", "paper"]).arg(submission);
+    command.args(["eval", "score", "--protocol", "mateval-2", "--protocol", "paper"]).arg(submission);
     command.arg("--dataset").arg(dataset).arg("--out").arg(result);
     command
 }

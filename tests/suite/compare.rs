@@ -20,7 +20,7 @@ use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 use super::command::{mateval, run};
 use super::planted::{rehash, roll};
-use super::sample::{copied_dataset, copy_folder, dataset, files_below};
+use super::sample::{copy_folder, dataset, files_below, own_materials};
 use mateval_testkit::kept_folder::kept_folder;
 
 /// Samples a pixel of each half, theirs and ours. At 96x72 pixels, three standard errors of a tile are then two to four
@@ -51,9 +51,10 @@ fn their_folder(dataset: &Path, view: &str) -> PathBuf {
     room(dataset).render(&RendererId::new("blender").unwrap(), &view)
 }
 
-/// A copy of the sample. With `lambert`, every material is replaced by Lambert with its base colour.
+/// A copy of the sample with the source's own materials. With `lambert`, every material is replaced by Lambert with its base colour.
 fn own_copy(lambert: bool) -> tempfile::TempDir {
-    let copy = copied_dataset();
+    let copy = tempfile::tempdir().unwrap();
+    copy_folder(own_materials(), copy.path());
     if lambert {
         let mut scene = reference_io::read(&room(copy.path())).unwrap();
         let textures = scene.texture_list();

@@ -3,18 +3,28 @@
 use std::path::Path;
 
 use super::command::{Run, mateval, run};
-use super::sample::{copied_dataset, dataset, files_below};
+use super::sample::{copied_dataset, dataset, files_below, own_materials};
 
 fn export(dataset: &Path, scene: &str, view: &str, out: &Path, more: &[&str]) -> Run {
     let words = ["--scene", scene, "--view", view, "--samples", "4"];
     run(mateval().args(["prep", "mitsuba"]).arg(dataset).args(words).arg("--out").arg(out).args(more))
 }
 
+/// Converted materials are Blender's, which Mitsuba does not have.
+#[test]
+fn converted_materials_are_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let done = export(dataset(), "room", "input", &folder.path().join("out"), &[]).ends_with(1);
+    done.says("blender_principled");
+}
+
+/// With the source's own materials.
 #[test]
 fn the_sample_is_represented_completely() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let done = export(dataset(), "room", "up_left", &out, &[]).ends_with(0);
+    let dataset = own_materials();
+    let done = export(dataset, "room", "up_left", &out, &[]).ends_with(0);
     let expected = format!("{}: means the same in Mitsuba, 0 differences\n", out.join("scene.xml").display());
     assert_eq!(done.stdout, expected);
     let files = files_below(&out);
@@ -26,11 +36,11 @@ fn the_sample_is_represented_completely() {
     assert!(text.contains("<integer name=\"sample_count\" value=\"4\"/>"));
 
     // A second export is refused; a forced one writes the same bytes.
-    export(dataset(), "room", "up_left", &out, &[]).ends_with(2).says("already exists");
-    export(dataset(), "room", "up_left", &out, &["--force"]).ends_with(0);
+    export(dataset, "room", "up_left", &out, &[]).ends_with(2).says("already exists");
+    export(dataset, "room", "up_left", &out, &["--force"]).ends_with(0);
     assert_eq!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
     // Another view has another camera.
-    export(dataset(), "room", "input", &out, &["--force"]).ends_with(0);
+    export(dataset, "room", "input", &out, &["--force"]).ends_with(0);
     assert_ne!(std::fs::read_to_string(out.join("scene.xml")).unwrap(), text);
 }
 

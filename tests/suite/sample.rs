@@ -10,16 +10,22 @@ use mateval_testkit::kept_folder::kept_folder;
 pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";
 
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
-    let dataset = built("sample");
+    let dataset = built("sample", SMALL);
     run(&mut render(&dataset, 1)).ends_with(0);
     dataset
 });
 
-static UNRENDERED: LazyLock<PathBuf> = LazyLock::new(|| built("unrendered"));
+static UNRENDERED: LazyLock<PathBuf> = LazyLock::new(|| built("unrendered", SMALL));
 
-fn built(name: &str) -> PathBuf {
+static OWN_MATERIALS: LazyLock<PathBuf> = LazyLock::new(|| {
+    let dataset = built("own_materials", &format!("materials = \"source\"\n{SMALL}"));
+    run(&mut render(&dataset, 1)).ends_with(0);
+    dataset
+});
+
+fn built(name: &str, head: &str) -> PathBuf {
     let folder = kept_folder(name);
-    let recipe = write_source(&folder.join("source"), SMALL, &["room"]);
+    let recipe = write_source(&folder.join("source"), head, &["room"]);
     let dataset = folder.join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
     dataset
@@ -33,6 +39,11 @@ pub fn dataset() -> &'static Path {
 /// Like [`dataset`], but without renders: scoring on it takes a second, because nothing is rendered.
 pub fn unrendered() -> &'static Path {
     &UNRENDERED
+}
+
+/// Like [`dataset`], but with the source's own materials.
+pub fn own_materials() -> &'static Path {
+    &OWN_MATERIALS
 }
 
 /// A copy of the shared dataset that a test may change.

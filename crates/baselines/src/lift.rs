@@ -78,10 +78,13 @@ pub struct PartialAtlas {
 /// let intrinsics = Intrinsics::from_fov_x(8, 8, 2.0 * f64::atan(0.5));
 /// let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
 /// let scene = serde_json::from_value(json!({
-///     "format": "mateval/1",
+///     "format": "mateval/2",
 ///     "id": "room",
-///     "source": { "kind": "bitterli", "house": "room", "files": [] },
+///     "source": {
+///         "kind": "bitterli", "house": "room", "states_roughness": true, "states_metallic": true, "files": []
+///     },
 ///     "lights": "own",
+///     "materials": "converted",
 ///     "exposure": 1.0,
 ///     "views": [{ "id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera }],
 ///     "instances": [{

@@ -24,7 +24,7 @@ use crate::outcome::Outcome;
 /// Subcommands of `baseline`, one per method.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Ceiling: the source materials, baked to the dataset's own atlases.
+    /// Ceiling: the true materials, baked to the dataset's own atlases.
     Gt(Places),
     /// Floor: base colour 0.5 (linear) everywhere.
     Grey(Places),

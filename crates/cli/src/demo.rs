@@ -70,6 +70,13 @@ struct Plan {
     baselines: Vec<baseline::Command>,
     score: ScoreArgs,
     leaderboard: LeaderboardArgs,
+    board: Board,
+}
+
+/// The results of a demo: those of methods, and that of the truth.
+struct Board {
+    results: Vec<PathBuf>,
+    ceiling: Option<PathBuf>,
 }
 
 /// Runs the steps one after the other and prints the results in tables.
@@ -96,7 +103,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     score::run(&plan.score)?;
     say("6/6 eval leaderboard");
     leaderboard::run(&plan.leaderboard)?;
-    print_closing(out, &plan.score.result_paths())?;
+    print_closing(out, &plan.board)?;
     Ok(Outcome::Good)
 }
 
@@ -117,8 +124,11 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     };
     let score_words = words(vec![path_option("dataset", &dataset), path_option("out", &results)], &submissions);
     let score: ScoreArgs = parse_args(&score_words)?;
+    let board = board(&args.baselines, score.result_paths());
     let mut shown = vec![path_option("dataset", &dataset), path_option("out", &args.out.join("leaderboard"))];
-    shown.extend(submissions.iter().map(|submission| path_option("submission", submission)));
+    shown.extend(board.ceiling.iter().map(|ceiling| path_option("ceiling", ceiling)));
+    let ranked = args.baselines.iter().filter(|baseline| board.ceiling.is_none() || **baseline != DemoBaseline::Gt);
+    shown.extend(ranked.map(|baseline| path_option("submission", &submission(baseline))));
     let render_words = words(vec![format!("--samples={}", args.samples).into()], std::slice::from_ref(&dataset));
     let mut render: RenderArgs = parse_args(&render_words)?;
     render.by = args.by.clone();
@@ -127,16 +137,25 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
         build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
         render,
         baselines: args.baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,
-        leaderboard: parse_args(&words(shown, &score.result_paths()))?,
+        leaderboard: parse_args(&words(shown, &board.results))?,
         score,
+        board,
     })
 }
 
+/// The truth is the ceiling, unless there is nothing below it.
+fn board(baselines: &[DemoBaseline], mut results: Vec<PathBuf>) -> Board {
+    let truth = baselines.iter().position(|baseline| *baseline == DemoBaseline::Gt);
+    let ceiling = truth.filter(|_| results.len() > 1).map(|at| results.remove(at));
+    Board { results, ceiling }
+}
+
 /// Prints the tables, and where to find what was made.
-fn print_closing(out: &Path, files: &[PathBuf]) -> anyhow::Result<()> {
-    let results = files.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+fn print_closing(out: &Path, board: &Board) -> anyhow::Result<()> {
+    let ceiling = board.ceiling.as_deref().map(ResultFile::read).transpose()?;
+    let results = board.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
-    print(&tables(&results, "mateval-1", Grouping::Dataset, TableFormat::Markdown)?)?;
+    print(&tables(&results, ceiling.as_ref(), "mateval-2", Grouping::Dataset, TableFormat::Markdown)?)?;
     let dataset = Dataset::open(&out.join("dataset"))?;
     for id in &dataset.file.scenes {
         let scene = dataset.folder(id);

@@ -2,6 +2,7 @@
 
 pub mod blender;
 pub mod build;
+mod companions;
 mod compare;
 mod mitsuba;
 mod publish;
@@ -21,6 +22,9 @@ pub enum Command {
     Survey(survey::SurveyArgs),
     /// Renders the dataset's RGB pictures.
     Render(render::RenderArgs),
+    /// Adds the pictures with which scoring corrects render noise, so that no user has to render them. Changes the manifest:
+    /// run it before the dataset is given to anyone.
+    Companions(companions::CompanionsArgs),
     /// Compares Blender's pictures with those of the built-in path tracer. Exit code 1: they disagree.
     Compare(compare::CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
@@ -39,6 +43,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Build(args) => build::run(args),
         Command::Survey(args) => survey::run(args),
         Command::Render(args) => render::run(args),
+        Command::Companions(args) => companions::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Publish(args) => publish::run(args),

@@ -6,6 +6,7 @@ use anyhow::{Context as _, bail};
 use mateval_audit::compare::file::CompareFile;
 use mateval_audit::stats::StatsFile;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
+use mateval_eval::companion_pictures::CompanionsFile;
 use mateval_eval::result::ResultFile;
 use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
@@ -16,7 +17,7 @@ use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
-use mateval_scene::reference_io::{LightsFile, ReferenceFile};
+use mateval_scene::reference_io::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_scene::submission::SubmissionFile;
 use mateval_submission::lint::LintFile;
 use schemars::{Schema, schema_for};
@@ -47,15 +48,17 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 20] {
+fn schemas() -> [(&'static str, Schema); 22] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
         ("scene", schema_for!(SceneFile)),
         ("reference", schema_for!(ReferenceFile)),
+        ("source_materials", schema_for!(SourceMaterialsFile)),
         ("lights", schema_for!(LightsFile)),
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
+        ("companions", schema_for!(CompanionsFile)),
         ("result", schema_for!(ResultFile)),
         ("explain", schema_for!(ExplainFile)),
         ("verification", schema_for!(VerificationFile)),

@@ -18,6 +18,18 @@ pub enum EvalError {
         /// What the system reported.
         source: std::io::Error,
     },
+    /// The pictures of companions changed while they were read.
+    #[error("the companions in '{}' were changed or removed while they were in use; score again", path.display())]
+    CompanionsVanished {
+        /// Their folder.
+        path: PathBuf,
+    },
+    /// The dataset names no renderer whose pictures are scored.
+    #[error("the dataset '{}' has no renders that are scored; run `mateval prep render DATASET`", dataset.display())]
+    NoScoredRenderer {
+        /// Its folder.
+        dataset: PathBuf,
+    },
     /// No protocol has the name.
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
     UnknownProtocol {
@@ -25,6 +37,15 @@ pub enum EvalError {
         name: String,
         /// The names that exist.
         known: &'static [&'static str],
+    },
+    /// The protocol was removed.
+    #[error(
+        "cannot score: protocol '{name}' was removed before any release, because under it the true material did not always \
+         score best; use 'mateval-2'"
+    )]
+    RemovedProtocol {
+        /// The name.
+        name: String,
     },
     /// A protocol was written for another version of the scorer.
     #[error(
@@ -163,4 +184,13 @@ pub enum EvalError {
         /// Why not.
         source: mateval_metrics::MetricError,
     },
+}
+
+impl EvalError {
+    /// Whether the file system refused.
+    pub(crate) fn is_io(&self) -> bool {
+        use mateval_image::ImageError;
+        use mateval_scene::SceneError;
+        matches!(self, Self::Io { .. } | Self::Image(ImageError::Io { .. }) | Self::Dataset(SceneError::Io { .. }))
+    }
 }

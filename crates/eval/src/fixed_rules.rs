@@ -6,7 +6,7 @@
 //! not depend on them.
 
 use mateval_light::light_fit;
-use mateval_metrics::{Psnr, encoding_bias, lpips, noise_free, ssim};
+use mateval_metrics::{Psnr, lpips, noise_free, ssim};
 use mateval_scene::submission::MAP_SIZES;
 use mateval_submission::{map_file, memory_budget, prediction, texel_map};
 use schemars::JsonSchema;
@@ -46,16 +46,10 @@ pub struct FixedRules {
     pub most_scene_bytes: usize,
     /// `specular` of predictions, which submissions do not hold.
     pub predicted_specular: f32,
-    /// Facets below this roughness do not reflect the lights of a stage; the tracer's definition of such lights.
-    pub stage_roughness: f32,
     /// The largest PSNR, in dB, which an MSE of 1e-10 or less has. Results of all protocols are shown in one table.
     pub psnr_cap_db: f64,
-    /// Number of standard errors below which an MSE of light may be 0, so that its PSNR is a lower bound: one-sided 95 %.
+    /// The PSNR of light is of at least this number of standard errors of its MSE: one-sided 95 %.
     pub lower_bound_standard_errors: f64,
-    /// Number of standard errors that the bound of the encoding bias includes.
-    pub bias_standard_errors: f64,
-    /// Share of the mean squared bias that this bound includes for terms of second order.
-    pub bias_second_order: f64,
     /// Width and height of the window of SSIM, in pixels, by its definition.
     pub ssim_window: usize,
     /// Standard deviation of that window, in pixels, by the definition of SSIM.
@@ -76,8 +70,6 @@ pub struct FixedRules {
     pub observed_roundings: f64,
     /// The least cosine between ray and surface in that comparison.
     pub observed_least_cosine: f64,
-    /// Factor of the squared length of radiances in the objective of the fit, which chooses among equally good ones.
-    pub fit_shortness: f64,
     /// Mean complementarity at which the fit ends.
     pub fit_tolerance: f64,
     /// The largest number of steps of the fit.
@@ -109,11 +101,8 @@ impl FixedRules {
             most_exr_numbers: map_file::MAX_EXR_NUMBERS,
             most_scene_bytes: memory_budget::MAX_SCENE_BYTES,
             predicted_specular: mateval_tracer::repaint::SPECULAR,
-            stage_roughness: mateval_tracer::bsdf::STAGE_ROUGHNESS,
             psnr_cap_db: Psnr::CAP_DB,
             lower_bound_standard_errors: noise_free::ONE_SIDED_95,
-            bias_standard_errors: encoding_bias::STANDARD_ERRORS,
-            bias_second_order: encoding_bias::SECOND_ORDER,
             ssim_window: ssim::WINDOW,
             ssim_sigma: ssim::SIGMA,
             ssim_k1: ssim::K1,
@@ -124,7 +113,6 @@ impl FixedRules {
             lpips_epsilon: lpips::EPSILON,
             observed_roundings: texel_map::SAME_PLACE_ROUNDINGS,
             observed_least_cosine: texel_map::LEAST_COSINE,
-            fit_shortness: light_fit::SHORTNESS,
             fit_tolerance: light_fit::TOLERANCE,
             fit_most_steps: light_fit::MOST_STEPS,
             fit_step_share: light_fit::STEP_SHARE,

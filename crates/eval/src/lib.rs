@@ -10,18 +10,28 @@
 //! 1. `material_score` looks up the maps in every view ([`material_pictures`]), removes their scale ([`alignment`]) and
 //!    compares the pictures with the truth's ([`measure`]).
 //! 2. It compares the maps texel by texel ([`texture_space`]).
-//! 3. [`light_score`] renders the maps under every light ([`predicted_light`]) and compares the renders ([`rgb`]).
+//! 3. `light_score` renders the maps under every light (`predicted_light`) and compares the renders ([`rgb`]).
+//!
+//! [`dataset_companions`] makes the pictures with which the third step corrects render noise part of a dataset.
 //!
 //! Scores stay nested by scene, view and picture until `result_writer` lists each value by its key ([`result_key`]) and
 //! takes the means ([`means`]): pictures to scenes, scenes to the dataset.
 
 pub mod alignment;
+mod cache_bound;
+pub mod companion_pictures;
+mod companion_store;
+mod companions;
+pub mod control_variate;
+pub mod dataset_companions;
 pub mod error;
+pub mod fitted_radiances;
 pub mod fixed_rules;
 pub mod instance_errors;
+mod light_pass;
 pub mod light_rules;
-pub mod light_score;
-pub mod lit_scene;
+mod light_score;
+mod lit_scene;
 pub mod mask_rule;
 pub mod material_pictures;
 mod material_score;
@@ -31,9 +41,11 @@ pub mod metric;
 pub mod noise_blocks;
 pub mod open_scene;
 pub mod pilot;
-pub mod predicted_light;
+mod predicted_light;
 pub mod protocol;
+mod reference_features;
 pub mod relit;
+pub mod rendered_view;
 pub mod result;
 pub mod result_key;
 mod result_writer;
@@ -44,6 +56,7 @@ mod scene_task;
 pub mod score;
 mod seeds;
 pub mod shown_scene;
+mod stored_light;
 pub mod texture_space;
 pub mod truth;
 pub mod truth_material;

@@ -58,12 +58,11 @@ pub struct LightRules {
 }
 
 /// The weights of track `relit`. Groups are ordered by the luminance of the truth's input view under each alone, over valid
-/// pixels, brightest first; groups that light nothing there are left out.
+/// pixels, brightest first; groups that bring less than [`Self::least_share`] of it are left out of the order. Every lighting
+/// is then scaled so that the truth's input view has the mean luminance of the photo.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RelitRules {
-    /// Lighting `dim`: the weight of all groups.
-    pub dim: f64,
     /// Lighting `warm_cool`: the weights of the first, third, ... group, by channel.
     pub warm: [f64; 3],
     /// Lighting `warm_cool`: the weights of the second, fourth, ... group.
@@ -71,22 +70,29 @@ pub struct RelitRules {
     /// The largest number of lightings `alone_1`, `alone_2`, ..., in which one group has weight 1 and all others 0. Scenes of
     /// one group have none.
     pub alone_at_most: usize,
+    /// The smallest share of the light of a group that takes part.
+    pub least_share: f64,
 }
 
-/// The numbers of samples, which follow from a pilot render with samples of its own.
+/// The numbers of samples, which follow from a pilot render with samples of its own. All are per pixel of each half; the
+/// quarters of a half take half as many.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseRules {
-    /// Samples per pixel of each of the pilot's halves.
+    /// Samples of the pilot.
     pub pilot_samples: u32,
-    /// The smallest number of samples per pixel of each half; doubled until `target_db` or `most_samples` is reached.
+    /// The smallest number of samples; doubled until the noise is small enough or `most_samples` is reached.
     pub least_samples: u32,
-    /// The largest number of samples per pixel of each half.
+    /// The largest number of samples.
     pub most_samples: u32,
-    /// The largest standard error of a scene's mean PSNR that our own noise may cause, in dB.
+    /// Samples of the converged pictures of the companions.
+    pub companion_samples: u32,
+    /// The largest standard error of a scene's mean PSNR that the noise of our own paths may cause, in dB.
     pub target_db: f64,
-    /// Where the truth's own noise is larger than `target_db`, ours may be this share of it.
+    /// Where the noise of truth and companions is larger than `target_db`, ours may be this share of it.
     pub truth_share: f64,
+    /// The largest mean variance of the encoded values of a half, which bounds what noise does to SSIM and LPIPS.
+    pub most_variance: f64,
     /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the input view.
     pub block_pixels: u32,
 }
@@ -103,13 +109,15 @@ impl LightRules {
             roulette_survival: settings.roulette_survival,
             stage: StageRules::default(),
             fit: FitRules::default(),
-            relit: RelitRules { dim: 0.3, warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3 },
+            relit: RelitRules { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3, least_share: 0.05 },
             noise: NoiseRules {
-                pilot_samples: 4,
-                least_samples: 16,
-                most_samples: 32,
+                pilot_samples: 2,
+                least_samples: 4,
+                most_samples: 64,
+                companion_samples: 128,
                 target_db: 0.02,
                 truth_share: 1.0,
+                most_variance: 4e-4,
                 block_pixels: 16,
             },
         }

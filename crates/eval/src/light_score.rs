@@ -1,28 +1,34 @@
 //! Submissions compared with a scene's truth under light.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use mateval_image::{Picture, SrgbRgb};
+use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_metrics::{MetricError, NoiseFreeMse, psnr_mean_error};
-use mateval_scene::dataset::View;
+use mateval_scene::RendererId;
 use mateval_scene::layout::INPUT;
-use mateval_scene::{Camera, RendererId};
+use mateval_tracer::LightMix;
 use rayon::prelude::*;
 
+use crate::companion_store::CompanionStore;
+use crate::companions::Companions;
+use crate::control_variate::base_color_ratio;
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
+use crate::light_pass::LightPass;
 use crate::light_rules::{NoiseRules, Track};
 use crate::lit_scene::{LitScene, Photo};
+use crate::material_pictures::material_pictures;
 use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
-use crate::relit::{LightingName, RelitLighting, lightings};
+use crate::relit::{LightingName, lightings};
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
 use crate::scene_score::{NoiseScore, ScoreSheet};
 use crate::scene_task::{MaskedRegion, SceneTask, regions};
-use crate::truth::{RgbTruth, ViewTruth};
+use crate::truth::{RgbTruth, TrueLight, ViewTruth};
 
 /// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures.
 pub(crate) fn score_light(
@@ -32,8 +38,23 @@ pub(crate) fn score_light(
     at: usize,
     sheets: &mut [Vec<ScoreSheet>],
 ) -> Result<(), EvalError> {
-    let scorer = LightScorer::new(task, renderer, truths, &task.protocols[at])?;
-    scorer.predict(&mut |submission, light| scorer.measure(light, &mut sheets[submission][at]))
+    let companions = companions(task, truths)?;
+    let scorer = LightScorer::new(task, renderer, truths, Some(&companions), &task.protocols[at])?;
+    let used = scorer.predict(&mut |submission, light| scorer.measure(light, &mut sheets[submission][at]))?;
+    sheets.iter_mut().for_each(|sheets| sheets[at].score.companions = used.clone());
+    Ok(())
+}
+
+/// Finds or makes the companions' pictures of every pass of protocol number `at`. Returns the hashes of their lists, by pass.
+pub(crate) fn keep_companions(
+    task: &SceneTask<'_>,
+    renderer: &RendererId,
+    truths: &[ViewTruth],
+    at: usize,
+) -> Result<BTreeMap<String, String>, EvalError> {
+    let companions = companions(task, truths)?;
+    let scorer = LightScorer::new(task, renderer, truths, Some(&companions), &task.protocols[at])?;
+    scorer.predict(&mut |_, _| Ok(()))
 }
 
 /// A view's light, exposed, clipped and encoded for display.
@@ -50,37 +71,43 @@ pub(crate) fn shown_light(
     renderer: &RendererId,
     truths: &[ViewTruth],
 ) -> Result<Vec<ShownLight>, EvalError> {
-    let scorer = LightScorer::new(task, renderer, truths, &task.protocols[0])?;
+    // A display does not need what companions bring.
+    let scorer = LightScorer::new(task, renderer, truths, None, &task.protocols[0])?;
     // Predictions arrive in any order.
     let mut predicted = BTreeMap::new();
     scorer.predict(&mut |submission, light| {
         let first = light.pictures.first().into_iter().flat_map(|picture| &picture.views);
-        let shown = |halves| EncodedLight::of_prediction(halves, task.scene.exposure).shown();
-        predicted.insert(submission, first.map(shown).collect::<Vec<_>>());
+        let shown = first
+            .zip(&task.views)
+            .map(|(rendered, view)| Ok(task.locate_error(view, EncodedLight::of_prediction(rendered))?.shown()));
+        predicted.insert(submission, shown.collect::<Result<Vec<_>, EvalError>>()?);
         Ok(())
     })?;
-    let references = scorer.references[&None].iter().enumerate();
+    let truth = &scorer.lit.lights[&None];
     let of_view = |at: usize| predicted.values().map(|views| views[at].clone()).collect();
-    let shown = |(at, reference): (usize, &LightReference)| ShownLight {
-        truth: reference.shown().clone(),
+    let shown = |(at, truth): (usize, &TrueLight)| ShownLight {
+        truth: truth.shown.picture().to_srgb(),
         predicted: of_view(at),
     };
-    Ok(references.map(shown).collect())
+    Ok(truth.iter().enumerate().map(shown).collect())
+}
+
+/// The scene's companions.
+fn companions(task: &SceneTask<'_>, truths: &[ViewTruth]) -> Result<Companions, EvalError> {
+    let scene = || task.scene.id.clone();
+    let input = task.views.iter().position(|view| view.id.as_str() == INPUT);
+    let input = input.ok_or_else(|| EvalError::InputNotTarget { scene: scene() })?;
+    Companions::read(task.folder, task.scene, task.world, &truths[input].instances)
 }
 
 /// Scores the renders of predictions against the truth, under one protocol.
 struct LightScorer<'a> {
     task: &'a SceneTask<'a>,
     protocol: &'a Protocol,
-    truths: &'a [ViewTruth],
-    photo: Photo<'a>,
-    lightings: Vec<RelitLighting>,
     /// The regions of each view.
     regions: Vec<Vec<MaskedRegion>>,
-    /// The references of each lighting (none: the scene's own lights) and view.
-    references: BTreeMap<Option<LightingName>, Vec<LightReference>>,
-    /// The noise blocks of each view.
-    blocks: Vec<Picture<u32>>,
+    lit: LitScene<'a>,
+    store: CompanionStore<'a>,
 }
 
 impl<'a> LightScorer<'a> {
@@ -88,6 +115,7 @@ impl<'a> LightScorer<'a> {
         task: &'a SceneTask<'a>,
         renderer: &RendererId,
         truths: &'a [ViewTruth],
+        companions: Option<&'a Companions>,
         protocol: &'a Protocol,
     ) -> Result<Self, EvalError> {
         let own = task.views.iter().map(|view| RgbTruth::read(task.folder, renderer, view));
@@ -100,41 +128,64 @@ impl<'a> LightScorer<'a> {
         } else {
             Vec::new()
         };
-        let cameras: Vec<Camera> = task.views.iter().map(|view| view.camera).collect();
-        Ok(Self {
-            task,
-            protocol,
-            truths,
-            photo,
-            regions: truths.iter().map(regions).collect(),
-            references: references(task, renderer, protocol, &own, &lightings)?,
-            blocks: noise_blocks(&protocol.light.noise, &cameras),
-            lightings,
-        })
-    }
-
-    /// Renders every submission and passes it to `each` with its number.
-    fn predict(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
-        let task = self.task;
+        let exposure = task.scene.exposure;
+        let own = own.iter().map(|truth| TrueLight::new(truth, exposure)).collect();
+        let mut lights: BTreeMap<Option<LightingName>, Vec<TrueLight>> = BTreeMap::from([(None, own)]);
+        for view in &task.views {
+            let relit = TrueLight::relit(task.folder, renderer, view, &lightings, exposure)?;
+            for (lighting, truth) in lightings.iter().zip(relit) {
+                lights.entry(Some(lighting.name)).or_default().push(truth);
+            }
+        }
         let lit = LitScene {
             scene: task.scene,
             world: task.world,
             atlases: task.atlases,
             views: task.views.clone(),
-            truths: self.truths,
-            references: &self.references[&None],
-            blocks: &self.blocks,
-            photo: self.photo.clone(),
-            lightings: self.lightings.clone(),
+            truths,
+            lights,
+            blocks: Vec::new(),
+            photo,
+            lightings,
+            companions,
+            ratios: companions.map_or_else(Vec::new, |companions| ratios(task, companions)),
         };
-        predicted_light(&lit, &self.protocol.light, task.predictions, task.progress, each)
+        let lit = LitScene { blocks: noise_blocks(&protocol.light.noise, &lit.cameras()), ..lit };
+        let of_dataset = task.folder.companions();
+        let store = CompanionStore::new(of_dataset, task.companions_made_in, task.inputs_sha256.clone());
+        Ok(Self { task, protocol, regions: truths.iter().map(regions).collect(), lit, store })
+    }
+
+    /// Renders every submission and passes it to `each` with its number. Returns the hashes of the companions' pictures that
+    /// were used, by pass.
+    fn predict(
+        &self,
+        each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>,
+    ) -> Result<BTreeMap<String, String>, EvalError> {
+        let (rules, progress) = (&self.protocol.light, self.task.progress);
+        let used = RefCell::new(BTreeMap::new());
+        let find = |pass: &LightPass<'_>, companions: &Companions, mixes: &[LightMix]| {
+            let found = self.store.find(&self.lit, rules, pass, companions, mixes, progress)?;
+            used.borrow_mut().insert(pass.name.to_owned(), found.sha256.clone());
+            Ok(found)
+        };
+        predicted_light(&self.lit, rules, self.task.predictions, &find, progress, each)?;
+        Ok(used.into_inner())
     }
 
     fn measure(&self, light: PredictedLight, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
         let PredictedLight { pictures, fit, samples, not_finite } = light;
+        let mut errors: BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>> = BTreeMap::new();
         for picture in &pictures {
-            self.measure_picture(picture, samples, sheet)?;
+            self.measure_picture(picture, &mut errors, sheet)?;
         }
+        let rules = &self.protocol.light.noise;
+        let measured = errors.into_iter().filter(|(_, mses)| !mses.is_empty());
+        sheet.score.noise.extend(measured.map(|((picture, views), mses)| NoiseScore {
+            picture,
+            views,
+            noise: psnr_noise(rules, &mses, samples),
+        }));
         if fit.is_some() {
             sheet.score.fit = fit;
         }
@@ -142,12 +193,26 @@ impl<'a> LightScorer<'a> {
         Ok(())
     }
 
-    fn measure_picture(&self, picture: &LitPicture, samples: u32, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
+    fn measure_picture(
+        &self,
+        picture: &LitPicture,
+        errors: &mut BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>>,
+        sheet: &mut ScoreSheet,
+    ) -> Result<(), EvalError> {
         let task = self.task;
         let kind = picture.track.picture();
-        let lights: Vec<EncodedLight> =
-            picture.views.par_iter().map(|halves| EncodedLight::of_prediction(halves, task.scene.exposure)).collect();
-        let references = &self.references[&picture.lighting];
+        let truths = &self.lit.lights[&picture.lighting];
+        let pairs: Vec<Result<(EncodedLight, LightReference), MetricError>> = picture
+            .views
+            .par_iter()
+            .zip(truths)
+            .map(|(rendered, truth)| {
+                let reference = LightReference::new(self.protocol, task.lpips, truth)?;
+                Ok((EncodedLight::of_prediction(rendered)?, reference))
+            })
+            .collect();
+        let pairs = pairs.into_iter().zip(&task.views).map(|(pair, view)| task.locate_error(view, pair));
+        let pairs: Vec<(EncodedLight, LightReference)> = pairs.collect::<Result<_, _>>()?;
         let jobs: Vec<(usize, &MaskedRegion)> = self
             .regions
             .iter()
@@ -157,11 +222,10 @@ impl<'a> LightScorer<'a> {
         let measured: Vec<Result<RgbMeasured, MetricError>> = jobs
             .par_iter()
             .map(|&(view, region)| {
-                let (light, reference, blocks) = (&lights[view], &references[view], &self.blocks[view]);
+                let ((light, reference), blocks) = (&pairs[view], &self.lit.blocks[view]);
                 rgb_metrics(self.protocol, task.lpips, light, reference, &region.mask, blocks)
             })
             .collect();
-        let mut errors: BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>> = BTreeMap::new();
         for (&(view, region), measured) in jobs.iter().zip(measured) {
             let view = task.views[view];
             let RgbMeasured { values, mse } = task.locate_error(view, measured)?;
@@ -170,27 +234,13 @@ impl<'a> LightScorer<'a> {
             sheet.score.add(&view.id, vec![score]);
         }
         if picture.track != Track::Relit {
-            let rules = &self.protocol.light.noise;
-            let measured = errors.into_iter().filter(|(_, mses)| !mses.is_empty());
-            sheet.score.noise.extend(measured.map(|((picture, views), mses)| NoiseScore {
-                picture,
-                views,
-                noise: psnr_noise(rules, &mses, samples),
-            }));
-            self.add_errors(kind, &lights, references, &mut sheet.errors);
+            self.add_errors(kind, &pairs, &mut sheet.errors);
         }
         Ok(())
     }
 
-    fn add_errors(
-        &self,
-        kind: PictureKind,
-        lights: &[EncodedLight],
-        references: &[LightReference],
-        errors: &mut InstanceErrors,
-    ) {
-        let pairs = lights.iter().zip(references);
-        for ((view, truth), (light, reference)) in self.task.views.iter().zip(self.truths).zip(pairs) {
+    fn add_errors(&self, kind: PictureKind, pairs: &[(EncodedLight, LightReference)], errors: &mut InstanceErrors) {
+        for ((view, truth), (light, reference)) in self.task.views.iter().zip(self.lit.truths).zip(pairs) {
             let error = |k: usize| light.noise_free_square(reference, k);
             errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
@@ -198,6 +248,20 @@ impl<'a> LightScorer<'a> {
             }
         }
     }
+}
+
+/// The base colour of every prediction over the truth's, by view.
+fn ratios(task: &SceneTask<'_>, companions: &Companions) -> Vec<Vec<Picture<LinearRgb>>> {
+    let mut ratios = vec![Vec::with_capacity(task.views.len()); task.predictions.len()];
+    let all: Vec<_> = task.predictions.iter().chain([&companions.truth]).cloned().collect();
+    for view in &task.views {
+        let mut pictures = material_pictures(task.world, task.atlases, &view.camera, &all);
+        let truth = pictures.pop().expect("the truth is the last").base_color;
+        for (ratios, predicted) in ratios.iter_mut().zip(pictures) {
+            ratios.push(base_color_ratio(&predicted.base_color, &truth));
+        }
+    }
+    ratios
 }
 
 fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
@@ -208,45 +272,29 @@ fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) ->
     Ok(Photo { view, light: own[place].shown.clone(), valid: &truths[place].valid })
 }
 
-fn references(
-    task: &SceneTask<'_>,
-    renderer: &RendererId,
-    protocol: &Protocol,
-    own: &[RgbTruth],
-    lightings: &[RelitLighting],
-) -> Result<BTreeMap<Option<LightingName>, Vec<LightReference>>, EvalError> {
-    let reference = |view: &View, truth: &RgbTruth| {
-        task.locate_error(view, LightReference::new(protocol, task.lpips, truth, task.scene.exposure))
-    };
-    let own: Vec<LightReference> =
-        task.views.iter().zip(own).map(|(view, truth)| reference(view, truth)).collect::<Result<_, _>>()?;
-    let mut references = BTreeMap::from([(None, own)]);
-    for view in &task.views {
-        let relit = RgbTruth::relit(task.folder, renderer, view, lightings)?;
-        for (lighting, truth) in lightings.iter().zip(&relit) {
-            references.entry(Some(lighting.name)).or_default().push(reference(view, truth)?);
-        }
-    }
-    Ok(references)
-}
-
-/// The noise in the mean PSNR of some views, and why it is as large as it is.
-fn psnr_noise(rules: &NoiseRules, views: &[NoiseFreeMse], samples: u32) -> PsnrNoise {
-    let noise = psnr_mean_error(&views.iter().collect::<Vec<_>>());
-    let state = match &noise {
-        Some(noise) if noise.prediction <= rules.target_db && noise.reference <= rules.target_db => {
+/// The noise in the mean PSNR of some pictures, and why it is as large as it is.
+fn psnr_noise(rules: &NoiseRules, pictures: &[NoiseFreeMse], samples: u32) -> PsnrNoise {
+    let noise = psnr_mean_error(&pictures.iter().collect::<Vec<_>>());
+    // Without any noise there is nothing to certify.
+    let state = noise.as_ref().map_or(NoiseState::Certified, |noise| {
+        let fixed = noise.shared.hypot(noise.reference);
+        if noise.paths <= rules.target_db && fixed <= rules.target_db {
             NoiseState::Certified
-        }
-        Some(noise) if noise.prediction <= rules.target_db.max(rules.truth_share * noise.reference) => {
+        } else if noise.paths <= rules.target_db.max(rules.truth_share * fixed) {
             NoiseState::LimitedByTruth
+        } else if samples >= rules.most_samples {
+            NoiseState::SampleCap
+        } else {
+            NoiseState::AboveTarget
         }
-        _ if samples >= rules.most_samples => NoiseState::SampleCap,
-        _ => NoiseState::AboveTarget,
-    };
+    });
+    let is_bound = |picture: &NoiseFreeMse| picture.mse < picture.bounded();
+    let noise = noise.as_ref();
     PsnrNoise {
-        standard_error_db: noise.as_ref().map(|noise| noise.total),
-        own_db: noise.as_ref().map(|noise| noise.prediction),
-        truth_db: noise.as_ref().map(|noise| noise.reference),
+        standard_error_db: noise.filter(|_| !pictures.iter().any(is_bound)).map(|noise| noise.total),
+        own_db: noise.map(|noise| noise.paths),
+        companions_db: noise.map(|noise| noise.shared),
+        truth_db: noise.map(|noise| noise.reference),
         samples,
         state,
     }

@@ -1,43 +1,56 @@
 //! A scene and its true renders: the input for rendering predictions and for fitting their lights.
 
+use std::collections::BTreeMap;
+
 use mateval_image::{LinearRgb, Mask, Picture};
-use mateval_scene::TriangleMesh;
 use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::World;
 
-use crate::relit::RelitLighting;
-use crate::rgb::LightReference;
-use crate::truth::ViewTruth;
+use crate::companions::Companions;
+use crate::relit::{LightingName, RelitLighting};
+use crate::truth::{TrueLight, ViewTruth};
 
 /// A scene, and the true renders that predictions are compared with.
-pub struct LitScene<'a> {
+pub(crate) struct LitScene<'a> {
     /// `scene.json`.
-    pub scene: &'a SceneFile,
+    pub(crate) scene: &'a SceneFile,
     /// Its true surfaces, materials and lights.
-    pub world: &'a World,
+    pub(crate) world: &'a World,
     /// The meshes of `instances.glb`, one for each surface of the world.
-    pub atlases: &'a [TriangleMesh],
+    pub(crate) atlases: &'a [TriangleMesh],
     /// The views that are scored.
-    pub views: Vec<&'a View>,
+    pub(crate) views: Vec<&'a View>,
     /// The truth of each view.
-    pub truths: &'a [ViewTruth],
-    /// The reference pictures of each view, under the scene's own lights.
-    pub references: &'a [LightReference],
+    pub(crate) truths: &'a [ViewTruth],
+    /// The true light of each view, by lighting (none: the scene's own lights).
+    pub(crate) lights: BTreeMap<Option<LightingName>, Vec<TrueLight>>,
     /// The noise blocks of each view, from [`crate::noise_blocks`].
-    pub blocks: &'a [Picture<u32>],
+    pub(crate) blocks: Vec<Picture<u32>>,
     /// The picture that radiances are fitted to.
-    pub photo: Photo<'a>,
+    pub(crate) photo: Photo<'a>,
     /// The lightings of track `relit`.
-    pub lightings: Vec<RelitLighting>,
+    pub(crate) lightings: Vec<RelitLighting>,
+    /// The companions of every prediction; without them, light takes more samples.
+    pub(crate) companions: Option<&'a Companions>,
+    /// The base colour of every prediction over that of the truth, by view.
+    pub(crate) ratios: Vec<Vec<Picture<LinearRgb>>>,
 }
 
 /// The input view as the truth shows it.
 #[derive(Clone)]
-pub struct Photo<'a> {
+pub(crate) struct Photo<'a> {
     /// The view.
-    pub view: &'a View,
+    pub(crate) view: &'a View,
     /// Its picture, linear, before exposure.
-    pub light: Picture<LinearRgb>,
+    pub(crate) light: Picture<LinearRgb>,
     /// The pixels that count.
-    pub valid: &'a Mask,
+    pub(crate) valid: &'a Mask,
+}
+
+impl LitScene<'_> {
+    /// The cameras of the views.
+    pub(crate) fn cameras(&self) -> Vec<Camera> {
+        self.views.iter().map(|view| view.camera).collect()
+    }
 }

@@ -1,5 +1,7 @@
 //! What metrics whose windows look across a mask's edge do outside the mask: the one place where mask rules differ.
 
+use std::sync::Arc;
+
 use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::lpips::MeanAndHalves;
 use mateval_metrics::mask::pixel_count;
@@ -10,14 +12,16 @@ use mateval_metrics::{
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::reference_features::ReferenceFeatures;
+
 /// What metrics whose windows look across a mask's edge do outside the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MaskRule {
     /// Both pictures are black outside; SSIM and LPIPS are averaged over the whole frame.
     BlackFill,
-    /// SSIM over the windows that lie wholly inside; LPIPS of the prediction with the truth's pixels outside, its map summed
-    /// over the picture and divided by the mask's pixels.
+    /// SSIM over the windows that lie wholly inside; LPIPS of the prediction with the truth's pixels outside, its map
+    /// averaged over the mask.
     Inside,
 }
 
@@ -50,64 +54,55 @@ impl MaskRule {
         })
     }
 
-    /// None where nothing counts or the picture is too small for the network.
+    /// None where nothing counts or the picture is too small for the network. `features` are those of the reference.
     pub(crate) fn lpips(
         self,
         lpips: &Lpips,
         prediction: &Picture<SrgbRgb>,
         reference: &Picture<SrgbRgb>,
+        features: &ReferenceFeatures,
         mask: &Mask,
     ) -> Result<Option<f64>, MetricError> {
-        let distance = match self {
-            Self::BlackFill => lpips.black_fill(prediction, reference, mask),
-            Self::Inside => lpips.masked(prediction, reference, mask),
-        };
-        Ok(unless_too_small(distance)?.flatten())
-    }
-
-    /// What [`Self::lpips_halves`] can share between the masks of a reference.
-    pub(crate) fn shared_features(
-        self,
-        lpips: &Lpips,
-        reference: &Picture<SrgbRgb>,
-    ) -> Result<Option<Features>, MetricError> {
-        match self {
-            Self::BlackFill => Ok(None),
-            Self::Inside => unless_too_small(lpips.features(reference)),
+        match (self.features(lpips, reference, features, mask)?, self) {
+            (None, _) => Ok(None),
+            (Some(features), Self::BlackFill) => lpips.black_fill_from(prediction, &features, mask),
+            (Some(features), Self::Inside) => lpips.masked_from(prediction, &features, mask),
         }
     }
 
-    /// [`Self::lpips`] of a noisy prediction; `shared` comes from [`Self::shared_features`].
+    /// [`Self::lpips`] of a noisy prediction.
     pub(crate) fn lpips_halves(
         self,
         lpips: &Lpips,
         prediction: MeanAndHalves<'_>,
         reference: &Picture<SrgbRgb>,
-        shared: Option<&Features>,
+        features: &ReferenceFeatures,
         mask: &Mask,
     ) -> Result<Option<f64>, MetricError> {
-        let distance = match self {
-            Self::BlackFill => match unless_too_small(lpips.black_filled_features(reference, mask))? {
-                Some(features) => lpips.extrapolated_black_fill(prediction, &features, mask)?,
-                None => None,
-            },
-            Self::Inside => match shared {
-                Some(features) => lpips.extrapolated_masked(prediction, reference, features, mask)?,
-                None => None,
-            },
+        let distance = match (self.features(lpips, reference, features, mask)?, self) {
+            (None, _) => None,
+            (Some(features), Self::BlackFill) => lpips.extrapolated_black_fill(prediction, &features, mask)?,
+            (Some(features), Self::Inside) => lpips.extrapolated_masked(prediction, &features, mask)?,
         };
         Ok(distance.map(|distance| distance.lpips))
+    }
+
+    /// The features of the reference that predictions are compared with; none where nothing counts or it is too small.
+    fn features(
+        self,
+        lpips: &Lpips,
+        reference: &Picture<SrgbRgb>,
+        features: &ReferenceFeatures,
+        mask: &Mask,
+    ) -> Result<Option<Arc<Features>>, MetricError> {
+        match self {
+            _ if pixel_count(mask) == 0 => Ok(None),
+            Self::BlackFill => features.black_filled(lpips, reference, mask),
+            Self::Inside => features.whole(lpips, reference),
+        }
     }
 }
 
 fn windows(inside: Option<MaskedSsim>) -> Counted {
     (inside.as_ref().map(|inside| inside.ssim), inside.map_or(0, |inside| inside.windows))
-}
-
-/// None for a picture that is too small for the network: it has no value, which is not an error.
-fn unless_too_small<T>(found: Result<T, MetricError>) -> Result<Option<T>, MetricError> {
-    match found {
-        Err(MetricError::TooSmall { .. }) => Ok(None),
-        other => other.map(Some),
-    }
 }

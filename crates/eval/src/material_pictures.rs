@@ -6,7 +6,7 @@ use glam::Vec2;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::World;
-use mateval_tracer::aov::{PixelMean, SUBPIXELS, hit_through, subpixels};
+use mateval_tracer::aov::{PixelMean, SUBPIXELS, place_through, subpixel};
 use rayon::prelude::*;
 
 use mateval_submission::prediction::PredictedScene;
@@ -63,13 +63,14 @@ fn picture_row(
 ) -> Vec<Vec<Values>> {
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
     for x in 0..width {
-        let places = subpixels(x, y);
         let looked_up: [OnceCell<Option<Lookup>>; SUBPIXELS] = [const { OnceCell::new() }; SUBPIXELS];
         let lookup = |at: usize| {
             *looked_up[at].get_or_init(|| {
-                let hit = hit_through(world, camera, places[at])?;
+                let hit = place_through(world, camera, subpixel(x, y, at))?;
                 let mesh = &atlases[hit.surface.0];
-                let uv = hit.interpolate(&mesh.triangles, mesh.uvs.as_deref()?);
+                let uvs = mesh.uvs.as_deref()?;
+                let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
+                let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
                 Some(Lookup { instance: hit.surface.0, uv })
             })
         };

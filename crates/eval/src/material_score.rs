@@ -1,6 +1,5 @@
 //! Submissions compared with a scene's truth without light: pictures of maps, and texels.
 
-use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::submission::Map;
 use rayon::prelude::*;
@@ -9,7 +8,7 @@ use crate::alignment::{channel_scales, scaled};
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
 use crate::material_pictures::{MaterialPictures, material_pictures};
-use crate::measure::{albedo_metrics, scalar_metrics};
+use crate::measure::{Albedo, AlbedoReference, albedo_metrics, scalar_metrics, unstated_scalar_metrics};
 use crate::protocol::{AlbedoSpace, Protocol};
 use crate::result::{InstanceTexelErrors, TexelErrors};
 use crate::result_key::{PictureKind, Region, Views};
@@ -19,17 +18,27 @@ use crate::texture_space::{InstanceTexels, TexelSums, texture_space};
 use crate::truth::ViewTruth;
 
 /// One submission's pictures of a view.
-#[derive(Clone, Copy)]
-struct Predicted<'a> {
-    pictures: &'a MaterialPictures,
-    /// The base colour, scaled by [`channel_scales`].
-    aligned: &'a Picture<LinearRgb>,
+struct Predicted {
+    pictures: MaterialPictures,
+    /// The base colour as it is, and scaled by [`channel_scales`].
+    albedos: [(PictureKind, Albedo); 2],
 }
 
-impl<'a> Predicted<'a> {
-    fn albedos(self) -> [(PictureKind, &'a Picture<LinearRgb>); 2] {
-        [(PictureKind::Albedo, &self.pictures.base_color), (PictureKind::AlbedoAligned, self.aligned)]
+impl Predicted {
+    fn new(pictures: MaterialPictures, truth: &ViewTruth) -> Self {
+        let raw = &pictures.base_color;
+        let aligned = scaled(raw, channel_scales(raw, &truth.albedo, &truth.valid));
+        let albedos =
+            [(PictureKind::Albedo, Albedo::new(raw.clone())), (PictureKind::AlbedoAligned, Albedo::new(aligned))];
+        Self { pictures, albedos }
     }
+}
+
+/// The truth of a view, and what is shared between submissions and protocols.
+struct Truth<'a> {
+    view: &'a ViewTruth,
+    albedo: AlbedoReference,
+    regions: Vec<MaskedRegion>,
 }
 
 impl SceneTask<'_> {
@@ -42,20 +51,20 @@ impl SceneTask<'_> {
         for (at, (view, truth)) in self.views.iter().zip(truths).enumerate() {
             (self.progress)(&format!("scene {}: materials", self.scene.id), at, self.views.len());
             let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
-            let regions = regions(truth);
-            let aligned: Vec<_> = pictures.iter().map(|pictures| aligned(pictures, truth)).collect();
-            let predicted: Vec<Predicted<'_>> =
-                pictures.iter().zip(&aligned).map(|(pictures, aligned)| Predicted { pictures, aligned }).collect();
+            let predicted: Vec<Predicted> =
+                pictures.into_par_iter().map(|pictures| Predicted::new(pictures, truth)).collect();
+            let albedo = AlbedoReference::new(truth.albedo.clone());
+            let truth = Truth { view: truth, albedo, regions: regions(truth) };
             let jobs: Vec<(usize, usize)> =
                 (0..sheets.len()).flat_map(|s| (0..self.protocols.len()).map(move |p| (s, p))).collect();
             let measured: Vec<_> = jobs
                 .par_iter()
-                .map(|&(s, p)| self.material_values(&self.protocols[p], view, predicted[s], truth, &regions))
+                .map(|&(s, p)| self.material_values(&self.protocols[p], view, &predicted[s], &truth))
                 .collect();
             for ((s, p), values) in jobs.into_iter().zip(measured) {
                 let sheet = &mut sheets[s][p];
                 sheet.score.add(&view.id, values?);
-                self.material_errors(&self.protocols[p], view, predicted[s], truth, &mut sheet.errors);
+                self.material_errors(&self.protocols[p], view, &predicted[s], &truth, &mut sheet.errors);
             }
         }
         Ok(())
@@ -67,23 +76,27 @@ impl SceneTask<'_> {
         &self,
         protocol: &Protocol,
         view: &View,
-        predicted: Predicted<'_>,
-        truth: &ViewTruth,
-        regions: &[MaskedRegion],
+        predicted: &Predicted,
+        truth: &Truth<'_>,
     ) -> Result<Vec<PictureScore>, EvalError> {
         let mut values = Vec::new();
-        for region in regions {
-            for (kind, picture) in predicted.albedos() {
-                let found = albedo_metrics(protocol, self.lpips, picture, &truth.albedo, &region.mask);
-                values.push(region.score(kind, None, self.locate_error(view, found)?));
+        for region in &truth.regions {
+            for (kind, albedo) in &predicted.albedos {
+                let found = albedo_metrics(protocol, self.lpips, albedo, &truth.albedo, &region.mask);
+                values.push(region.score(*kind, None, self.locate_error(view, found)?));
             }
+            let Predicted { pictures, .. } = predicted;
+            let source = &self.scene.source;
             let scalars = [
-                (PictureKind::Roughness, &predicted.pictures.roughness, &truth.roughness),
-                (PictureKind::Metallic, &predicted.pictures.metallic, &truth.metallic),
+                (PictureKind::Roughness, source.states_roughness, &pictures.roughness, &truth.view.roughness),
+                (PictureKind::Metallic, source.states_metallic, &pictures.metallic, &truth.view.metallic),
             ];
-            for (kind, picture, truth) in scalars {
-                let found = scalar_metrics(protocol, picture, truth, &region.mask);
-                values.push(region.score(kind, None, self.locate_error(view, found)?));
+            for (kind, is_stated, picture, truth) in scalars {
+                let found = match is_stated {
+                    true => self.locate_error(view, scalar_metrics(protocol, picture, truth, &region.mask))?,
+                    false => unstated_scalar_metrics(),
+                };
+                values.push(region.score(kind, None, found));
             }
         }
         Ok(values)
@@ -94,19 +107,20 @@ impl SceneTask<'_> {
         &self,
         protocol: &Protocol,
         view: &View,
-        predicted: Predicted<'_>,
-        truth: &ViewTruth,
+        predicted: &Predicted,
+        truth: &Truth<'_>,
         errors: &mut InstanceErrors,
     ) {
-        for (kind, picture) in predicted.albedos() {
-            let spaces = match protocol.albedo_space {
-                AlbedoSpace::Linear => [picture.clone(), truth.albedo.clone()],
-                AlbedoSpace::Srgb => [picture, &truth.albedo].map(|p| p.to_srgb().map(|SrgbRgb(v)| LinearRgb(v))),
+        let ViewTruth { instances, valid, unobserved, .. } = truth.view;
+        for (kind, albedo) in &predicted.albedos {
+            let (of, reference) = (albedo, &truth.albedo.albedo);
+            let error = |k: usize| match protocol.albedo_space {
+                AlbedoSpace::Linear => mean_square(of.linear.pixels()[k].0, reference.linear.pixels()[k].0),
+                AlbedoSpace::Srgb => mean_square(of.encoded.pixels()[k].0, reference.encoded.pixels()[k].0),
             };
-            let error = |k: usize| mean_square(spaces[0].pixels()[k].0, spaces[1].pixels()[k].0);
-            errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
-            if let Some(unobserved) = &truth.unobserved {
-                errors.add(kind, Views::Unobserved, &truth.instances, unobserved, error);
+            errors.add(*kind, Views::of(&view.id, Region::Valid), instances, valid, error);
+            if let Some(unobserved) = unobserved {
+                errors.add(*kind, Views::Unobserved, instances, unobserved, error);
             }
         }
     }
@@ -125,20 +139,18 @@ impl SceneTask<'_> {
     }
 }
 
-fn aligned(predicted: &MaterialPictures, truth: &ViewTruth) -> Picture<LinearRgb> {
-    scaled(&predicted.base_color, channel_scales(&predicted.base_color, &truth.albedo, &truth.valid))
-}
-
 fn mean_square(a: [f32; 3], b: [f32; 3]) -> f64 {
     (0..3).map(|c| (f64::from(a[c]) - f64::from(b[c])).powi(2)).sum::<f64>() / 3.0
 }
 
 fn texel_errors(scene: &SceneFile, instance: &InstanceTexels) -> InstanceTexelErrors {
+    // A constant of the source's reader is no truth to compare with.
+    let stated = |is_stated: bool, mse: Option<f64>| mse.filter(|_| is_stated);
     let errors = |sums: &TexelSums| TexelErrors {
         area_m2: sums.area_m2,
         base_color_mse: sums.mse(Map::BaseColor),
-        roughness_mse: sums.mse(Map::Roughness),
-        metallic_mse: sums.mse(Map::Metallic),
+        roughness_mse: stated(scene.source.states_roughness, sums.mse(Map::Roughness)),
+        metallic_mse: stated(scene.source.states_metallic, sums.mse(Map::Metallic)),
     };
     InstanceTexelErrors {
         scene: scene.id.clone(),

@@ -146,6 +146,7 @@ mod tests {
         let noise = |error: Option<f64>| PsnrNoise {
             standard_error_db: error,
             own_db: error,
+            companions_db: None,
             truth_db: None,
             samples: 16,
             state: NoiseState::Certified,

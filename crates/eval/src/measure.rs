@@ -1,6 +1,6 @@
 //! The metrics of one picture under one protocol.
 
-use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Psnr, mse};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::mask_rule::Counted;
 use crate::metric::Metric;
 use crate::protocol::{AlbedoSpace, Protocol};
+use crate::reference_features::ReferenceFeatures;
 
 /// One metric's value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,46 +32,69 @@ pub struct Measured {
 pub struct ValueNoise {
     /// Standard error, in the value's own unit; of a PSNR to first order, and at most the cap.
     pub standard_error: f64,
-    /// Of an MSE: the estimated bias from clipping and encoding noisy pixels; the value is not corrected.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bias: Option<f64>,
-    /// Upper bound of the absolute value of that bias.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bias_bound: Option<f64>,
-    /// Of a PSNR: the error may be noise alone; the value is a lower bound with a confidence of 95 %.
+    /// Of a PSNR: the error may be noise alone; the value is that of 1.645 standard errors of the MSE.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub lower_bound: bool,
 }
 
-/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of an albedo picture over the mask; linear pictures.
+/// An albedo picture, linear and as SSIM and LPIPS see it.
+pub struct Albedo {
+    /// Linear Rec. 709.
+    pub linear: Picture<LinearRgb>,
+    /// Clipped to 0..1 and encoded.
+    pub encoded: Picture<SrgbRgb>,
+}
+
+/// A true albedo picture, with what LPIPS compares of it.
+pub struct AlbedoReference {
+    /// The picture.
+    pub albedo: Albedo,
+    features: ReferenceFeatures,
+}
+
+impl Albedo {
+    /// Encodes a linear picture.
+    pub fn new(linear: Picture<LinearRgb>) -> Self {
+        Self { encoded: linear.to_srgb(), linear }
+    }
+}
+
+impl AlbedoReference {
+    /// Encodes a linear picture.
+    pub fn new(linear: Picture<LinearRgb>) -> Self {
+        Self { albedo: Albedo::new(linear), features: ReferenceFeatures::default() }
+    }
+}
+
+/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of an albedo picture over the mask.
 pub fn albedo_metrics(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
-    prediction: &Picture<LinearRgb>,
-    reference: &Picture<LinearRgb>,
+    prediction: &Albedo,
+    reference: &AlbedoReference,
     mask: &Mask,
 ) -> Result<Vec<Measured>, MetricError> {
     let pixels = mateval_metrics::mask::pixel_count(mask);
-    let (encoded, reference_encoded) = (prediction.to_srgb(), reference.to_srgb());
-    let mut measured = error_metrics(albedo_mse(protocol, prediction, reference, mask)?, pixels)?;
-    measured.push(ssim_metric(protocol.mask_rule.ssim(&encoded, &reference_encoded, mask)?));
+    let AlbedoReference { albedo: truth, features } = reference;
+    let mut measured = error_metrics(albedo_mse(protocol, prediction, truth, mask)?, pixels)?;
+    measured.push(ssim_metric(protocol.mask_rule.ssim(&prediction.encoded, &truth.encoded, mask)?));
     if let Some(lpips) = lpips {
-        let distance = protocol.mask_rule.lpips(lpips, &encoded, &reference_encoded, mask)?;
+        let distance = protocol.mask_rule.lpips(lpips, &prediction.encoded, &truth.encoded, features, mask)?;
         measured.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(measured)
 }
 
-/// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts. Linear pictures.
+/// MSE of an albedo picture over the mask, in the protocol's space; none where no pixel counts.
 pub fn albedo_mse(
     protocol: &Protocol,
-    prediction: &Picture<LinearRgb>,
-    reference: &Picture<LinearRgb>,
+    prediction: &Albedo,
+    reference: &Albedo,
     mask: &Mask,
 ) -> Result<Option<f64>, MetricError> {
     match protocol.albedo_space {
-        AlbedoSpace::Linear => mse(prediction, reference, Some(mask)),
-        AlbedoSpace::Srgb => mse(&prediction.to_srgb(), &reference.to_srgb(), Some(mask)),
+        AlbedoSpace::Linear => mse(&prediction.linear, &reference.linear, Some(mask)),
+        AlbedoSpace::Srgb => mse(&prediction.encoded, &reference.encoded, Some(mask)),
     }
 }
 
@@ -87,6 +111,11 @@ pub fn scalar_metrics(
     let mut measured = error_metrics(mse(prediction, reference, Some(mask))?, pixels)?;
     measured.push(ssim_metric(protocol.mask_rule.ssim(prediction, reference, mask)?));
     Ok(measured)
+}
+
+/// The metrics of [`scalar_metrics`] without values, for scenes whose source does not state the parameter.
+pub(crate) fn unstated_scalar_metrics() -> Vec<Measured> {
+    [Metric::Mse, Metric::Psnr, Metric::Ssim].map(|metric| Measured::plain(metric, None, 0)).to_vec()
 }
 
 /// An MSE, and its PSNR.
@@ -133,7 +162,8 @@ mod tests {
     #[test]
     fn the_protocols_differ_in_masks_and_encoding() {
         let (prediction, reference, mask) = pictures();
-        let [ours, paper] = ["mateval-1", "paper"]
+        let (prediction, reference) = (Albedo::new(prediction), AlbedoReference::new(reference));
+        let [ours, paper] = ["mateval-2", "paper"]
             .map(|name| albedo_metrics(&Protocol::named(name).unwrap(), None, &prediction, &reference, &mask).unwrap());
         // Half of the frame is black in both pictures: the paper's SSIM is nearer to one.
         assert!(value(&paper, Metric::Ssim) > value(&ours, Metric::Ssim));
@@ -144,11 +174,12 @@ mod tests {
     #[test]
     fn truth_is_exact_and_an_empty_mask_has_no_value() {
         let (_, reference, mask) = pictures();
-        let protocol = Protocol::named("mateval-1").unwrap();
-        let same = albedo_metrics(&protocol, None, &reference, &reference, &mask).unwrap();
-        assert!(same.iter().any(|m| m.metric == Metric::Psnr && m.exact && m.value == Some(100.0)));
+        let protocol = Protocol::named("mateval-2").unwrap();
+        let (same, reference) = (Albedo::new(reference.clone()), AlbedoReference::new(reference));
+        let found = albedo_metrics(&protocol, None, &same, &reference, &mask).unwrap();
+        assert!(found.iter().any(|m| m.metric == Metric::Psnr && m.exact && m.value == Some(100.0)));
         let nothing = Picture::filled(40, 30, false);
-        for measured in albedo_metrics(&protocol, None, &reference, &reference, &nothing).unwrap() {
+        for measured in albedo_metrics(&protocol, None, &same, &reference, &nothing).unwrap() {
             assert_eq!(measured.value, None, "{}", measured.metric);
         }
     }
@@ -158,7 +189,7 @@ mod tests {
         let reference = Picture::from_fn(40, 30, |x, y| (x as f32 + y as f32) / 100.0);
         let prediction = reference.map(|v| v + 0.1);
         let mask = Picture::from_fn(40, 30, |x, _| x >= 20);
-        let [ours, paper] = ["mateval-1", "paper"].map(|name| {
+        let [ours, paper] = ["mateval-2", "paper"].map(|name| {
             let measured = scalar_metrics(&Protocol::named(name).unwrap(), &prediction, &reference, &mask).unwrap();
             let metrics: Vec<Metric> = measured.iter().map(|m| m.metric).collect();
             assert_eq!(metrics, [Metric::Mse, Metric::Psnr, Metric::Ssim]);

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     fn rules() -> NoiseRules {
-        crate::protocol::Protocol::named("mateval-1").unwrap().light.noise
+        crate::protocol::Protocol::named("mateval-2").unwrap().light.noise
     }
 
     fn cameras() -> Vec<Camera> {

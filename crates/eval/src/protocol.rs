@@ -41,23 +41,24 @@ pub struct Protocol {
 }
 
 /// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
-pub const SCORER_VERSION: u32 = 5;
+pub const SCORER_VERSION: u32 = 6;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.
-    pub const NAMES: [&str; 2] = ["mateval-1", "paper"];
+    pub const NAMES: [&str; 2] = ["mateval-2", "paper"];
 
     /// A protocol by name.
     pub fn named(name: &str) -> Result<Self, EvalError> {
         let (mask_rule, albedo_space, light) = match name {
-            "mateval-1" => {
-                let tracks = vec![Track::Fitted, Track::True, Track::Relit];
+            "mateval-2" => {
+                let tracks = vec![Track::True, Track::Relit];
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
             "paper" => {
                 let light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
+            "mateval-1" => return Err(EvalError::RemovedProtocol { name: name.to_owned() }),
             _ => {
                 return Err(EvalError::UnknownProtocol { name: name.to_owned(), known: &Self::NAMES });
             }
@@ -119,7 +120,7 @@ mod tests {
 
     #[test]
     fn the_fingerprint_holds_everything() {
-        let base = Protocol::named("mateval-1").unwrap();
+        let base = Protocol::named("mateval-2").unwrap();
         let scene = SceneId::new("s").unwrap();
         let renderer = RendererId::new("r").unwrap();
         let print = |protocol: &Protocol| protocol.fingerprint("a", &[&scene], Some(&renderer), Some("w"));
@@ -146,17 +147,15 @@ mod tests {
     #[test]
     fn published_hashes_hold() {
         let text = include_str!("../../../dataset_spec/PROTOCOL.md");
-        for name in Protocol::NAMES {
-            let row = format!("| `{name}` | `{}` |", Protocol::named(name).unwrap().sha256());
-            assert!(text.contains(&row), "PROTOCOL.md should say: {row}");
-        }
+        let rows = Protocol::NAMES.map(|name| format!("| `{name}` | `{}` |", Protocol::named(name).unwrap().sha256()));
+        assert!(rows.iter().all(|row| text.contains(row)), "PROTOCOL.md should say:\n{}", rows.join("\n"));
     }
 
     /// Every number and word of a protocol, changed by itself, changes its hash.
     #[test]
     fn every_constant_is_in_the_hash() {
-        let base = serde_json::to_value(Protocol::named("mateval-1").unwrap()).unwrap();
-        let mut hashes = vec![Protocol::named("mateval-1").unwrap().sha256()];
+        let base = serde_json::to_value(Protocol::named("mateval-2").unwrap()).unwrap();
+        let mut hashes = vec![Protocol::named("mateval-2").unwrap().sha256()];
         let mut pointers = Vec::new();
         leaves(&base, String::new(), &mut pointers);
         for pointer in &pointers {
@@ -202,5 +201,11 @@ mod tests {
     fn an_unknown_name_says_what_is_known() {
         let error = Protocol::named("papr").unwrap_err().to_string();
         assert!(error.contains("'papr'") && error.contains("paper"), "{error}");
+    }
+
+    #[test]
+    fn the_first_protocol_is_refused_with_a_reason() {
+        let error = Protocol::named("mateval-1").unwrap_err().to_string();
+        assert!(error.contains("'mateval-1'") && error.contains("use 'mateval-2'"), "{error}");
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
-use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_image::{LUMINANCE, LinearRgb, Mask, Picture};
 use mateval_tracer::LightMix;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -16,22 +16,18 @@ use crate::word_enum::UnknownWord;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum LightingName {
-    /// `dim`: all groups dimmed.
-    Dim,
     /// `warm_cool`: alternately warm and cool groups.
     WarmCool,
     /// `alone_1`, `alone_2`, ...: one group alone, by its place among the brightest, from 1.
     Alone(usize),
 }
 
-const DIM: &str = "dim";
 const WARM_COOL: &str = "warm_cool";
 const ALONE: &str = "alone_";
 
 impl fmt::Display for LightingName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Dim => f.write_str(DIM),
             Self::WarmCool => f.write_str(WARM_COOL),
             Self::Alone(place) => write!(f, "{ALONE}{place}"),
         }
@@ -43,12 +39,12 @@ impl FromStr for LightingName {
 
     fn from_str(word: &str) -> Result<Self, UnknownWord> {
         let alone = || word.strip_prefix(ALONE)?.parse().ok().map(Self::Alone);
-        let known = [Some(Self::Dim), Some(Self::WarmCool), alone()];
+        let known = [Some(Self::WarmCool), alone()];
         // Only the printed form is accepted: `alone_01` is not.
         known.into_iter().flatten().find(|name| name.to_string() == word).ok_or_else(|| UnknownWord {
             what: "lighting's name",
             word: word.to_owned(),
-            expected: format!("{DIM}, {WARM_COOL}, {ALONE}1, {ALONE}2, ..."),
+            expected: format!("{WARM_COOL}, {ALONE}1, {ALONE}2, ..."),
         })
     }
 }
@@ -73,7 +69,7 @@ impl JsonSchema for LightingName {
     }
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "type": "string", "pattern": "^(dim|warm_cool|alone_[1-9][0-9]*)$" })
+        json_schema!({ "type": "string", "pattern": "^(warm_cool|alone_[1-9][0-9]*)$" })
     }
 }
 
@@ -91,7 +87,8 @@ pub struct RelitLighting {
 /// `groups` are the truth's pictures of the input view, linear, one for each light group in the scene's order; `valid` is
 /// that view's mask. A scene whose groups light nothing there has no lightings.
 pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<RelitLighting> {
-    let order = by_brightness(groups, valid);
+    let sums: Vec<[f64; 3]> = groups.iter().map(|picture| sum_of(picture, valid)).collect();
+    let order = by_brightness(rules, &sums);
     if order.is_empty() {
         return Vec::new();
     }
@@ -99,28 +96,42 @@ pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask
     for (place, &group) in order.iter().enumerate() {
         warm_cool[group] = if place % 2 == 0 { rules.warm } else { rules.cool };
     }
-    let mut lightings = vec![
-        RelitLighting { name: LightingName::Dim, weights: vec![[rules.dim; 3]; groups.len()] },
-        RelitLighting { name: LightingName::WarmCool, weights: warm_cool },
-    ];
+    let mut lightings = vec![RelitLighting { name: LightingName::WarmCool, weights: warm_cool }];
     if order.len() > 1 {
         lightings.extend(order.iter().take(rules.alone_at_most).enumerate().map(|(place, &alone)| {
             let weight = |group: usize| if group == alone { [1.0; 3] } else { [0.0; 3] };
             RelitLighting { name: LightingName::Alone(place + 1), weights: (0..groups.len()).map(weight).collect() }
         }));
     }
+    lightings.iter_mut().for_each(|lighting| expose(&mut lighting.weights, &sums));
     lightings
 }
 
-/// Groups that light anything, brightest first; equally bright groups keep their order.
-fn by_brightness(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<usize> {
-    let luminance = |picture: &Picture<LinearRgb>| -> f64 {
-        let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
-        lit.map(|(pixel, _)| pixel.luminance()).sum()
-    };
-    let mut order: Vec<(f64, usize)> = groups.iter().map(luminance).zip(0..).filter(|(sum, _)| *sum > 0.0).collect();
-    order.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    order.into_iter().map(|(_, group)| group).collect()
+/// Scales the weights so that the input view is as bright as under the scene's own lights.
+fn expose(weights: &mut LightMix, sums: &[[f64; 3]]) {
+    let own: f64 = sums.iter().map(|sum| luminance(*sum)).sum();
+    let pairs = sums.iter().zip(weights.iter());
+    let lit: f64 = pairs.map(|(sum, weight)| luminance([0, 1, 2].map(|c| sum[c] * weight[c]))).sum();
+    let scale = own / lit;
+    weights.iter_mut().flatten().for_each(|weight| *weight *= scale);
+}
+
+/// Groups that bring their share of the light, brightest first; equally bright groups keep their order.
+fn by_brightness(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<usize> {
+    let bright: Vec<f64> = sums.iter().map(|sum| luminance(*sum)).collect();
+    let least = rules.least_share * bright.iter().sum::<f64>();
+    let mut order: Vec<usize> = (0..bright.len()).filter(|&at| bright[at] > 0.0 && bright[at] >= least).collect();
+    order.sort_by(|&a, &b| bright[b].total_cmp(&bright[a]).then(a.cmp(&b)));
+    order
+}
+
+fn sum_of(picture: &Picture<LinearRgb>, valid: &Mask) -> [f64; 3] {
+    let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
+    lit.fold([0.0; 3], |sum, (LinearRgb(rgb), _)| [0, 1, 2].map(|c| sum[c] + f64::from(rgb[c])))
+}
+
+fn luminance(rgb: [f64; 3]) -> f64 {
+    LUMINANCE.iter().zip(rgb).map(|(weight, value)| weight * value).sum()
 }
 
 #[cfg(test)]
@@ -133,7 +144,7 @@ mod tests {
     }
 
     fn rules() -> RelitRules {
-        Protocol::named("mateval-1").unwrap().light.relit
+        Protocol::named("mateval-2").unwrap().light.relit
     }
 
     fn names(groups: &[Picture<LinearRgb>]) -> Vec<String> {
@@ -145,10 +156,10 @@ mod tests {
 
     #[test]
     fn names_are_parsed_from_what_they_print() {
-        for name in [LightingName::Dim, LightingName::WarmCool, LightingName::Alone(1), LightingName::Alone(12)] {
+        for name in [LightingName::WarmCool, LightingName::Alone(1), LightingName::Alone(12)] {
             assert_eq!(name.to_string().parse(), Ok(name));
         }
-        for word in ["", "dimmer", "alone", "alone_", "alone_01", "alone_+1", "Dim"] {
+        for word in ["", "dim", "alone", "alone_", "alone_01", "alone_+1", "Warm_cool"] {
             assert!(
                 word.parse::<LightingName>().unwrap_err().to_string().contains("is not a lighting's name"),
                 "{word}"
@@ -156,26 +167,63 @@ mod tests {
         }
     }
 
+    /// Weights divided by their first positive one: exposure scales all alike.
+    fn relative(lighting: &RelitLighting) -> LightMix {
+        let unit = lighting.weights.iter().flatten().copied().find(|weight| *weight > 0.0).unwrap();
+        lighting.weights.iter().map(|rgb| rgb.map(|weight| weight / unit)).collect()
+    }
+
     #[test]
     fn groups_take_turns_by_brightness() {
         let groups = [flat(1.0), flat(4.0), flat(0.0), flat(2.0), flat(0.5)];
         let all = lightings(&rules(), &groups, &Mask::filled(2, 1, true));
-        assert_eq!(names(&groups), ["dim", "warm_cool", "alone_1", "alone_2", "alone_3"]);
-        assert_eq!(all[0].weights, [[0.3; 3]; 5]);
+        assert_eq!(names(&groups), ["warm_cool", "alone_1", "alone_2", "alone_3"]);
         let RelitRules { warm, cool, .. } = rules();
-        assert_eq!(all[1].weights, [warm, warm, [1.0; 3], cool, cool]);
-        assert_eq!(all[2].weights, [[0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
-        assert_eq!(all[4].weights[0], [1.0; 3]);
+        let expected = [warm, warm, [1.0; 3], cool, cool].map(|rgb| rgb.map(|weight| weight / warm[0]));
+        for (found, expected) in relative(&all[0]).iter().flatten().zip(expected.as_flattened()) {
+            assert!((found - expected).abs() < 1e-12);
+        }
+        assert_eq!(relative(&all[1]), [[0.0; 3], [1.0; 3], [0.0; 3], [0.0; 3], [0.0; 3]]);
+        assert_eq!(relative(&all[3])[0], [1.0; 3]);
+    }
+
+    /// A group of 4 % of the light takes no turn and keeps weight 1 before exposure; one of 6 % does.
+    #[test]
+    fn faint_groups_take_no_turn() {
+        assert_eq!(names(&[flat(96.0), flat(4.0)]), ["warm_cool"]);
+        assert_eq!(names(&[flat(94.0), flat(6.0)]), ["warm_cool", "alone_1", "alone_2"]);
+    }
+
+    /// Every lighting shows the input view as bright as the scene's own lights do.
+    #[test]
+    fn lightings_are_as_bright_as_the_photo() {
+        let groups = [flat(1.0), flat(4.0), Picture::filled(2, 1, LinearRgb([0.5, 2.0, 9.0]))];
+        let mask = Mask::filled(2, 1, true);
+        let brightness = |weights: &[[f64; 3]]| -> f64 {
+            let pairs = groups.iter().zip(weights);
+            pairs
+                .map(|(group, w)| {
+                    let s = sum_of(group, &mask);
+                    luminance([0, 1, 2].map(|c| s[c] * w[c]))
+                })
+                .sum()
+        };
+        let own = brightness(&[[1.0; 3]; 3]);
+        let all = lightings(&rules(), &groups, &mask);
+        assert_eq!(all.len(), 4);
+        for lighting in &all {
+            assert!((brightness(&lighting.weights) / own - 1.0).abs() < 1e-12, "{}", lighting.name);
+        }
     }
 
     #[test]
-    fn one_group_has_two_and_darkness_none() {
-        assert_eq!(names(&[flat(1.0)]), ["dim", "warm_cool"]);
-        assert_eq!(names(&[flat(0.0), flat(3.0)]), ["dim", "warm_cool"]);
+    fn one_group_has_one_and_darkness_none() {
+        assert_eq!(names(&[flat(1.0)]), ["warm_cool"]);
+        assert_eq!(names(&[flat(0.0), flat(3.0)]), ["warm_cool"]);
         assert!(names(&[flat(0.0)]).is_empty() && names(&[]).is_empty());
         // What is not valid does not count.
         let groups = [flat(1.0), Picture::from_fn(2, 1, |x, _| LinearRgb([[9.0, 0.5][x]; 3]))];
         let valid = Mask::from_fn(2, 1, |x, _| x == 1);
-        assert_eq!(lightings(&rules(), &groups, &valid)[2].weights[0], [1.0; 3]);
+        assert_eq!(relative(&lightings(&rules(), &groups, &valid)[1])[0], [1.0; 3]);
     }
 }

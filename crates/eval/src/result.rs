@@ -9,22 +9,22 @@ use mateval_scene::{Finding, InstanceId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::fitted_radiances::FittedRadiances;
 use crate::measure::ValueNoise;
 use crate::metric::Metric;
-use crate::predicted_light::FittedRadiances;
 use crate::protocol::Protocol;
 use crate::relit::LightingName;
 use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
 use crate::word_enum::UnknownWord;
 
 /// The word for this version of a result.
-pub const RESULT_FORMAT: &str = "mateval-result/3";
+pub const RESULT_FORMAT: &str = "mateval-result/4";
 
 /// A submission's scores on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultFile {
-    /// Always `mateval-result/3`.
+    /// Always `mateval-result/4`.
     pub format: String,
     /// Program and version, as in `mateval 0.1.0`.
     pub tool: String,
@@ -86,6 +86,8 @@ pub struct ProtocolResult {
     pub summary_noise: BTreeMap<ResultKey, f64>,
     /// The uncertainty of each scene's mean PSNR of light due to render noise, by the same keys.
     pub noise: BTreeMap<SceneId, BTreeMap<ResultKey, PsnrNoise>>,
+    /// SHA-256, hex, of the `companions.json` whose pictures corrected the light of a scene, by scene and pass.
+    pub companions: BTreeMap<SceneId, BTreeMap<String, String>>,
     /// The radiances that were fitted, by scene.
     pub fits: BTreeMap<SceneId, FittedRadiances>,
     /// Every single value.
@@ -102,8 +104,10 @@ pub struct ProtocolResult {
 pub struct PsnrNoise {
     /// Standard error due to all noise, in dB; null where the error may be noise alone, so that PSNR is a lower bound.
     pub standard_error_db: Option<f64>,
-    /// The part due to the noise of our own renders.
+    /// The part due to the noise of our own paths, which more samples lower.
     pub own_db: Option<f64>,
+    /// The part due to the noise of the companions' converged pictures.
+    pub companions_db: Option<f64>,
     /// The part due to the noise of the truth.
     pub truth_db: Option<f64>,
     /// Samples per pixel of each of our halves.
@@ -116,9 +120,9 @@ pub struct PsnrNoise {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseState {
-    /// Our own noise is under the protocol's bound, and the truth's too.
+    /// The noise of our paths is under the protocol's bound, and that of truth and companions too.
     Certified,
-    /// The truth's noise is above the bound, and ours under the protocol's share of it.
+    /// The noise of truth and companions is above the bound, and that of our paths under the protocol's share of it.
     LimitedByTruth,
     /// The most samples were taken, and our noise is above the bound.
     SampleCap,
@@ -140,7 +144,8 @@ pub struct InstanceTexelErrors {
     pub unobserved: TexelErrors,
 }
 
-/// Means over texels by their area on the surface; null where there is no area.
+/// Means over texels by their area on the surface; null where there is no area, and of roughness and metallic where the
+/// scene's source does not state them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TexelErrors {

@@ -19,13 +19,16 @@ pub(crate) fn protocol_result(
     scores: Vec<(SceneId, SceneScore)>,
 ) -> ProtocolResult {
     let (mut pictures, mut texels, mut instances) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut noise, mut fits) = (BTreeMap::new(), BTreeMap::new());
+    let (mut noise, mut companions, mut fits) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::new());
     for (scene, score) in scores {
         pictures.extend(score.views.into_iter().flat_map(|view| picture_values(&scene, view)));
         texels.extend(score.texels);
         instances.extend(score.instances);
         if !score.noise.is_empty() {
             noise.insert(scene.clone(), score.noise.into_iter().map(keyed).collect());
+        }
+        if !score.companions.is_empty() {
+            companions.insert(scene.clone(), score.companions);
         }
         fits.extend(score.fit.map(|fit| (scene, fit)));
     }
@@ -37,6 +40,7 @@ pub(crate) fn protocol_result(
         scenes,
         summary_noise: summary_noise(&noise),
         noise,
+        companions,
         fits,
         pictures,
         texels,

@@ -1,32 +1,37 @@
 //! Metrics of rendered light, without the effect of render noise.
 //!
-//! Prediction and truth are two independent halves each, multiplied by the scene's exposure, clipped to 0..1 and
-//! sRGB-encoded. MSE and PSNR use the halves of both; SSIM and LPIPS compare the prediction's halves with the truth's
+//! Prediction and truth are multiplied by the scene's exposure, clipped to 0..1 and sRGB-encoded. MSE and PSNR use the
+//! quarters of the prediction and the halves of the truth; SSIM and LPIPS compare the prediction's halves with the truth's
 //! denoised picture.
 
+use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use mateval_metrics::lpips::MeanAndHalves;
-use mateval_metrics::{Features, Halves, Lpips, MetricError, NoiseFreeMse, Psnr, encoding_bias, noise_free_mse};
+use mateval_metrics::{
+    Halves, Lpips, MetricError, NoiseFreeMse, NoisyHalf, NoisyRender, Psnr, encoded_reference, noise_free_mse,
+};
 
 use crate::measure::{Measured, ValueNoise, rounded_lpips, ssim_metric};
 use crate::metric::Metric;
-use crate::protocol::Protocol;
-use crate::truth::RgbTruth;
+use crate::protocol::{MaskRule, Protocol};
+use crate::reference_features::ReferenceFeatures;
+use crate::rendered_view::RenderedView;
+use crate::truth::TrueLight;
 
-/// A picture under one light: two halves for MSE and PSNR, and one picture for display, SSIM and LPIPS.
+/// A prediction's picture under one light, encoded.
 pub struct EncodedLight {
-    /// Linear, multiplied by the exposure.
-    linear: [Picture<LinearRgb>; 2],
-    halves: [Picture<SrgbRgb>; 2],
-    /// The mean of a prediction's halves, or the truth's denoised picture.
+    /// For MSE, PSNR and SSIM.
+    render: NoisyRender<SrgbRgb>,
+    /// Both halves and their mean within 0..1, for LPIPS and display.
+    shown_halves: [Picture<SrgbRgb>; 2],
     shown: Picture<SrgbRgb>,
 }
 
 /// A truth, with the features that LPIPS compares.
 pub struct LightReference {
-    light: EncodedLight,
-    /// None without the network, where the mask rule needs other features, or for a picture that is too small.
-    features: Option<Features>,
+    halves: [Picture<SrgbRgb>; 2],
+    shown: Picture<SrgbRgb>,
+    features: ReferenceFeatures,
 }
 
 /// The metrics of one picture over one mask, and the MSE with its noise by block.
@@ -37,18 +42,35 @@ pub struct RgbMeasured {
     pub mse: Option<NoiseFreeMse>,
 }
 
-fn exposed(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<LinearRgb> {
-    picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)))
+/// Clips and encodes a noisy value. Values below 0, which only noise has, continue the curve's straight part, so that
+/// they still cancel those above.
+pub fn encode_noisy(LinearRgb(rgb): LinearRgb) -> SrgbRgb {
+    SrgbRgb(rgb.map(|v| if v < 0.0 { 12.92 * v } else { srgb_from_linear(v.min(1.0)) }))
+}
+
+fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    Picture::from_fn(a.width(), a.height(), |x, y| {
+        let (LinearRgb(a), LinearRgb(b)) = (a.get(x, y), b.get(x, y));
+        LinearRgb([0, 1, 2].map(|c| ((f64::from(a[c]) + f64::from(b[c])) / 2.0) as f32))
+    })
 }
 
 impl EncodedLight {
-    /// A prediction, from its halves.
-    pub fn of_prediction(halves: &[Picture<LinearRgb>; 2], exposure: f64) -> Self {
-        let mean = Picture::from_fn(halves[0].width(), halves[0].height(), |x, y| {
-            let (LinearRgb(a), LinearRgb(b)) = (halves[0].get(x, y), halves[1].get(x, y));
-            LinearRgb([0, 1, 2].map(|c| ((f64::from(a[c]) + f64::from(b[c])) / 2.0) as f32))
+    /// Fails if sizes differ, which those of one render never do.
+    pub fn of_prediction(view: &RenderedView) -> Result<Self, MetricError> {
+        let quarters = [0, 1].map(|half| [0, 1].map(|quarter| view.quarter(half, quarter)));
+        let half = |half: usize| NoisyHalf::encoded([&quarters[half][0], &quarters[half][1]], encode_noisy);
+        let (a, b) = (half(0)?, half(1)?);
+        let halves = [0, 1].map(|half| mean_of(&quarters[half][0], &quarters[half][1]));
+        // The first half with the converged companions of the second shows what the companions' own noise does.
+        let shared = view.with_other_companions(&halves[0]).map(|other| {
+            Picture::from_fn(other.width(), other.height(), |x, y| {
+                let [own, other] = [&halves[0], &other].map(|picture| encode_noisy(picture.get(x, y)).0);
+                SrgbRgb([0, 1, 2].map(|c| own[c] - other[c]))
+            })
         });
-        Self::new(halves, &mean, exposure)
+        let shown = mean_of(&halves[0], &halves[1]).to_srgb();
+        Ok(Self { render: NoisyRender { a, b, shared }, shown_halves: halves.map(|half| half.to_srgb()), shown })
     }
 
     /// The picture for display.
@@ -56,59 +78,37 @@ impl EncodedLight {
         self.shown
     }
 
-    /// One half alone, exposed and encoded.
-    pub(crate) fn half(picture: &Picture<LinearRgb>, exposure: f64) -> Picture<SrgbRgb> {
-        exposed(picture, exposure).to_srgb()
-    }
-
-    fn new(halves: &[Picture<LinearRgb>; 2], shown: &Picture<LinearRgb>, exposure: f64) -> Self {
-        let linear = [0, 1].map(|half| exposed(&halves[half], exposure));
-        let encoded = [0, 1].map(|half| linear[half].to_srgb());
-        Self { linear, halves: encoded, shown: Self::half(shown, exposure) }
+    /// The quarters, encoded for MSE.
+    pub(crate) fn render(&self) -> &NoisyRender<SrgbRgb> {
+        &self.render
     }
 
     /// The squared error of pixel `k`, mean over channels, free of noise: the product of both halves' differences.
     pub(crate) fn noise_free_square(&self, reference: &LightReference, k: usize) -> f64 {
-        let truth = &reference.light;
+        let halves = [&self.render.a.estimate, &self.render.b.estimate];
         let difference = |half: usize, c: usize| {
-            f64::from(self.halves[half].pixels()[k].0[c]) - f64::from(truth.halves[half].pixels()[k].0[c])
+            f64::from(halves[half].pixels()[k].0[c]) - f64::from(reference.halves[half].pixels()[k].0[c])
         };
         (0..3).map(|c| difference(0, c) * difference(1, c)).sum::<f64>() / 3.0
-    }
-
-    fn halves(&self) -> Halves<'_, SrgbRgb> {
-        Halves { a: &self.halves[0], b: &self.halves[1] }
-    }
-
-    fn linear(&self) -> Halves<'_, LinearRgb> {
-        Halves { a: &self.linear[0], b: &self.linear[1] }
     }
 }
 
 impl LightReference {
     /// Encodes a truth. Fails if a value is not finite.
-    pub fn new(
-        protocol: &Protocol,
-        lpips: Option<&Lpips>,
-        truth: &RgbTruth,
-        exposure: f64,
-    ) -> Result<Self, MetricError> {
-        let light = EncodedLight::new(&truth.halves, &truth.shown, exposure);
-        let features = match lpips {
-            Some(lpips) => protocol.mask_rule.shared_features(lpips, &light.shown)?,
-            None => None,
-        };
-        Ok(Self { light, features })
+    pub fn new(protocol: &Protocol, lpips: Option<&Lpips>, truth: &TrueLight) -> Result<Self, MetricError> {
+        let halves = Self::encoded_halves(truth)?;
+        let shown = truth.shown.picture().to_srgb();
+        let features = ReferenceFeatures::default();
+        if let Some(lpips) = lpips.filter(|_| protocol.mask_rule == MaskRule::Inside) {
+            features.whole(lpips, &shown)?;
+        }
+        Ok(Self { halves, shown, features })
     }
 
-    /// The truth's picture for display.
-    pub(crate) fn shown(&self) -> &Picture<SrgbRgb> {
-        &self.light.shown
-    }
-
-    /// The truth's halves, exposed and encoded.
-    pub(crate) fn halves(&self) -> Halves<'_, SrgbRgb> {
-        self.light.halves()
+    /// The truth's halves alone, encoded.
+    pub(crate) fn encoded_halves(truth: &TrueLight) -> Result<[Picture<SrgbRgb>; 2], MetricError> {
+        let [a, b] = [0, 1].map(|half| truth.halves[half].picture());
+        encoded_reference(Halves { a: &a, b: &b }, encode_noisy)
     }
 }
 
@@ -122,44 +122,38 @@ pub fn rgb_metrics(
     mask: &Mask,
     blocks: &Picture<u32>,
 ) -> Result<RgbMeasured, MetricError> {
-    let truth = &reference.light;
-    let mse = noise_free_mse(prediction.halves(), truth.halves(), mask, blocks)?;
-    let encode =
-        |LinearRgb(rgb): LinearRgb| SrgbRgb(rgb.map(|v| mateval_image::transfer::srgb_from_linear(v.clamp(0.0, 1.0))));
-    let bias = encoding_bias(prediction.linear(), truth.linear(), encode, mask, blocks)?;
+    let halves = Halves { a: &reference.halves[0], b: &reference.halves[1] };
+    let mse = noise_free_mse(&prediction.render, halves, mask, blocks)?;
     let pixels = mateval_metrics::mask::pixel_count(mask);
-    let mut values = noise_free_values(mse.as_ref(), bias.map(|bias| (bias.estimate, bias.bound)), pixels)?;
-    values.push(ssim_metric(protocol.mask_rule.ssim_halves(prediction.halves(), &truth.shown, mask)?));
+    let mut values = noise_free_values(mse.as_ref(), pixels)?;
+    values.push(ssim_metric(protocol.mask_rule.ssim_halves(prediction.render.halves(), &reference.shown, mask)?));
     if let Some(lpips) = lpips {
-        let seen = MeanAndHalves { mean: &prediction.shown, a: &prediction.halves[0], b: &prediction.halves[1] };
-        let shared = reference.features.as_ref();
-        let distance = protocol.mask_rule.lpips_halves(lpips, seen, &truth.shown, shared, mask)?;
+        let [a, b] = &prediction.shown_halves;
+        let seen = MeanAndHalves { mean: &prediction.shown, a, b };
+        let features = &reference.features;
+        let distance = protocol.mask_rule.lpips_halves(lpips, seen, &reference.shown, features, mask)?;
         values.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(RgbMeasured { values, mse })
 }
 
-fn noise_free_values(
-    mse: Option<&NoiseFreeMse>,
-    bias: Option<(f64, f64)>,
-    pixels: usize,
-) -> Result<Vec<Measured>, MetricError> {
-    let (Some(mse), Some((bias, bias_bound))) = (mse, bias) else {
+fn noise_free_values(mse: Option<&NoiseFreeMse>, pixels: usize) -> Result<Vec<Measured>, MetricError> {
+    let Some(mse) = mse else {
         return Ok([Metric::Mse, Metric::Psnr].map(|metric| Measured::plain(metric, None, pixels)).to_vec());
     };
-    let noise = |standard_error: f64| ValueNoise { standard_error, bias: None, bias_bound: None, lower_bound: false };
     let psnr = mse.psnr()?;
+    let standard_error = mse.standard_error();
     // To first order, if the error exceeds the noise.
     let slope = 10.0 / std::f64::consts::LN_10;
-    let psnr_error = if mse.mse > 0.0 { slope * mse.standard_error() / mse.mse } else { Psnr::CAP_DB };
+    let psnr_error = if psnr.exact { 0.0 } else { slope * standard_error / mse.bounded() };
     Ok(vec![
         Measured {
-            noise: Some(ValueNoise { bias: Some(bias), bias_bound: Some(bias_bound), ..noise(mse.standard_error()) }),
+            noise: Some(ValueNoise { standard_error, lower_bound: false }),
             ..Measured::plain(Metric::Mse, Some(mse.mse), pixels)
         },
         Measured {
             exact: psnr.exact,
-            noise: Some(ValueNoise { lower_bound: psnr.lower_bound, ..noise(psnr_error.min(Psnr::CAP_DB)) }),
+            noise: Some(ValueNoise { standard_error: psnr_error.min(Psnr::CAP_DB), lower_bound: psnr.lower_bound }),
             ..Measured::plain(Metric::Psnr, Some(psnr.db), pixels)
         },
     ])

@@ -1,11 +1,13 @@
 //! Scores of one submission in one scene under one protocol, nested by view and picture until the result is written.
 
+use std::collections::BTreeMap;
+
 use mateval_scene::ViewId;
 use serde::{Deserialize, Serialize};
 
+use crate::fitted_radiances::FittedRadiances;
 use crate::instance_errors::InstanceErrors;
 use crate::measure::Measured;
-use crate::predicted_light::FittedRadiances;
 use crate::relit::LightingName;
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
@@ -20,6 +22,8 @@ pub(crate) struct SceneScore {
     pub(crate) texels: Vec<InstanceTexelErrors>,
     pub(crate) instances: Vec<InstancePixelErrors>,
     pub(crate) noise: Vec<NoiseScore>,
+    /// SHA-256, hex, of the `companions.json` of each pass.
+    pub(crate) companions: BTreeMap<String, String>,
     pub(crate) fit: Option<FittedRadiances>,
     /// Number of contributions of light that were not finite and count as none.
     pub(crate) not_finite: u64,

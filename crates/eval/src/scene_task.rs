@@ -8,6 +8,7 @@ use mateval_scene::{Progress, RendererId, TriangleMesh};
 use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::World;
 
+use crate::companion_store::MadeIn;
 use crate::error::EvalError;
 use crate::protocol::Protocol;
 use crate::result_key::{Region, Surfaces};
@@ -26,6 +27,10 @@ pub(crate) struct SceneTask<'a> {
     pub(crate) lpips: Option<&'a Lpips>,
     /// The renderer whose pictures predicted renders are compared with. Without one, light is not scored.
     pub(crate) renderer: Option<&'a RendererId>,
+    /// Where converged pictures of companions are made that the dataset does not hold.
+    pub(crate) companions_made_in: MadeIn<'a>,
+    /// SHA-256, hex, of the scene's files that light depends on.
+    pub(crate) inputs_sha256: String,
     pub(crate) progress: Progress<'a>,
 }
 

@@ -13,10 +13,11 @@ use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SubmissionFile};
 use mateval_scene::{Finding, Progress, SceneId, Severity, json};
 
+use crate::companion_store::MadeIn;
 use crate::error::EvalError;
 use crate::light_rules::Track;
 use crate::metric::{LPIPS_NET, Metric};
-use crate::open_scene::{OpenScene, scored_views};
+use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
 use crate::protocol::Protocol;
 use crate::result::{MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId};
 use crate::result_writer::protocol_result;
@@ -67,6 +68,9 @@ pub struct ScorePlan<'a> {
     pub jobs: usize,
     /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run resumes.
     pub cache: Option<&'a Path>,
+    /// A folder in which the converged pictures of companions are kept between runs. Without one, and without those of the
+    /// dataset, each run makes its own.
+    pub companion_cache: Option<&'a Path>,
 }
 
 /// One submission while it is being scored.
@@ -104,14 +108,15 @@ struct Outcome {
 /// let plan = ScorePlan {
 ///     dataset: &dataset,
 ///     submissions: vec![Path::new("submission")],
-///     protocols: vec![Protocol::named("mateval-1")?],
+///     protocols: vec![Protocol::named("mateval-2")?],
 ///     scenes: Vec::new(),
 ///     lpips: LpipsWeights::Loaded(Box::new(lpips)),
 ///     tool: "my tool 1.0".to_owned(),
 ///     jobs: 1,
 ///     cache: None,
+///     companion_cache: None,
 /// };
-/// for (key, value) in &score(&plan, &|_, _, _| ())?[0].protocols["mateval-1"].summary {
+/// for (key, value) in &score(&plan, &|_, _, _| ())?[0].protocols["mateval-2"].summary {
 ///     println!("{key} {value}");
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -207,6 +212,8 @@ impl ScorePlan<'_> {
             protocols: &self.protocols,
             lpips: self.lpips.network(),
             renderer,
+            companions_made_in: self.companion_cache.map_or(MadeIn::ThisRun, MadeIn::Cache),
+            inputs_sha256: light_inputs_sha256(self.dataset, &scene.id)?,
             progress,
         })
     }

@@ -7,10 +7,11 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
 use mateval_scene::{Progress, RendererId};
 
+use crate::companion_store::MadeIn;
 use crate::error::EvalError;
 use crate::light_score::{ShownLight, shown_light};
 use crate::material_pictures::material_pictures;
-use crate::open_scene::{OpenScene, scored_views};
+use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
@@ -71,6 +72,8 @@ pub fn scene_light(
         protocols: std::slice::from_ref(protocol),
         lpips: None,
         renderer: Some(renderer),
+        companions_made_in: MadeIn::ThisRun,
+        inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
         progress,
     };
     let shown = shown_light(&task, renderer, &truths)?;

@@ -334,8 +334,9 @@ mod tests {
         }
         let atlas = json!({"size": 64, "charts": 1, "coverage": 0.5, "texel_m": 0.1, "half_pixel_m": null});
         let file = json!({
-            "format": "mateval/1", "id": "s", "source": {"kind": "bitterli", "house": "s", "files": []},
-            "lights": "own", "exposure": 1.0,
+            "format": "mateval/2", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
+                       "states_metallic": true, "files": []},
+            "lights": "own", "materials": "converted", "exposure": 1.0,
             "views": [{"id": "input", "x_deg": 0.0, "y_deg": 0.0, "camera": camera()}],
             "instances": [{"id": "a", "index": 1, "name": "a", "role": {"type": "other"}, "category": null,
                            "super_category": null, "triangles": 2, "atlas": atlas}],

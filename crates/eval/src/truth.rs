@@ -8,6 +8,7 @@ use mateval_tracer::LightBasis;
 
 use crate::error::EvalError;
 use crate::relit::RelitLighting;
+use crate::stored_light::StoredLight;
 
 /// A view's true maps and its masks.
 pub struct ViewTruth {
@@ -85,28 +86,6 @@ impl RgbTruth {
         Self::read_part(folder, renderer, view, &group_name(group))
     }
 
-    /// The view under each of `lightings`: weighted sums of the groups' pictures, each of which is read once.
-    pub fn relit(
-        folder: &SceneFolder,
-        renderer: &RendererId,
-        view: &View,
-        lightings: &[RelitLighting],
-    ) -> Result<Vec<Self>, EvalError> {
-        let Some(first) = lightings.first() else { return Ok(Vec::new()) };
-        let k = view.camera.intrinsics;
-        let basis = |ending: &str| -> Result<LightBasis, EvalError> {
-            let group = |group| Self::read_part(folder, renderer, view, &format!("{}{ending}", group_name(group)));
-            let pictures = (0..first.weights.len()).map(group).collect::<Result<_, _>>()?;
-            Ok(LightBasis::new(k.width as usize, k.height as usize, pictures)?)
-        };
-        let (a, b, shown) = (basis("_a")?, basis("_b")?, basis("")?);
-        let mixed = |lighting: &RelitLighting| {
-            let halves = [a.weighted(&lighting.weights)?, b.weighted(&lighting.weights)?];
-            Ok(Self { halves, shown: shown.weighted(&lighting.weights)? })
-        };
-        lightings.iter().map(mixed).collect()
-    }
-
     fn read_part(
         folder: &SceneFolder,
         renderer: &RendererId,
@@ -116,6 +95,50 @@ impl RgbTruth {
         let picture = exr_io::read_linear(&folder.render(renderer, &view.id).join(format!("{name}.exr")))?;
         check_sizes(view, &[size(&picture)])?;
         Ok(picture)
+    }
+}
+
+/// A view's light under one lighting, exposed: two independent halves, and the picture for SSIM and LPIPS.
+pub struct TrueLight {
+    /// The halves.
+    pub(crate) halves: [StoredLight; 2],
+    /// Denoised, or their mean.
+    pub(crate) shown: StoredLight,
+}
+
+impl TrueLight {
+    /// The light of a view under the scene's own lights.
+    pub fn new(truth: &RgbTruth, exposure: f64) -> Self {
+        let stored = |picture| StoredLight::exposed(picture, exposure);
+        Self { halves: [stored(&truth.halves[0]), stored(&truth.halves[1])], shown: stored(&truth.shown) }
+    }
+
+    /// The halves, exposed.
+    pub fn halves(&self) -> [Picture<LinearRgb>; 2] {
+        [0, 1].map(|half| self.halves[half].picture())
+    }
+
+    /// The view under each of `lightings`: weighted sums of the groups' pictures, each of which is read once.
+    pub fn relit(
+        folder: &SceneFolder,
+        renderer: &RendererId,
+        view: &View,
+        lightings: &[RelitLighting],
+        exposure: f64,
+    ) -> Result<Vec<Self>, EvalError> {
+        let Some(first) = lightings.first() else { return Ok(Vec::new()) };
+        let k = view.camera.intrinsics;
+        let mixed = |ending: &str| -> Result<Vec<StoredLight>, EvalError> {
+            let group = |group| RgbTruth::read_part(folder, renderer, view, &format!("{}{ending}", group_name(group)));
+            let pictures = (0..first.weights.len()).map(group).collect::<Result<_, _>>()?;
+            let basis = LightBasis::new(k.width as usize, k.height as usize, pictures)?;
+            let mix =
+                |lighting: &RelitLighting| Ok(StoredLight::exposed(&basis.weighted(&lighting.weights)?, exposure));
+            lightings.iter().map(mix).collect()
+        };
+        let (a, b, shown) = (mixed("_a")?, mixed("_b")?, mixed("")?);
+        let lights = a.into_iter().zip(b).zip(shown);
+        Ok(lights.map(|((a, b), shown)| Self { halves: [a, b], shown }).collect())
     }
 }
 

@@ -8,6 +8,7 @@
 
 mod suite {
     mod cache;
+    mod companions;
     mod damages;
     mod mask_rules;
     mod noise;

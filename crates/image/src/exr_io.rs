@@ -108,11 +108,12 @@ fn write_triples(
     write_channels(path, picture.width(), picture.height(), channels, precision)
 }
 
-fn write_channels(
+/// Writes channels of any names, each with a value for every pixel, row by row.
+pub fn write_channels(
     path: &Path,
     width: usize,
     height: usize,
-    channels: Vec<(&'static str, Vec<f32>)>,
+    channels: Vec<(&str, Vec<f32>)>,
     precision: Precision,
 ) -> Result<(), ImageError> {
     let stored = |values: Vec<f32>| match precision {

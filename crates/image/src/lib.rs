@@ -21,5 +21,5 @@ pub mod texture_io;
 pub mod transfer;
 
 pub use error::ImageError;
-pub use picture::{LinearRgb, Mask, Normal, Picture, SrgbRgb};
+pub use picture::{LUMINANCE, LinearRgb, Mask, Normal, Picture, SrgbRgb};
 pub use texture::{Texels, Texture, Wrap};

@@ -2,6 +2,9 @@
 
 use crate::ImageError;
 
+/// The luminance of linear Rec. 709 red, green and blue of 1 (ITU-R BT.709, section 3.2).
+pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
+
 /// Linear Rec. 709 red, green, blue; unbounded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinearRgb(pub [f32; 3]);
@@ -11,7 +14,8 @@ impl LinearRgb {
     #[inline]
     pub fn luminance(self) -> f64 {
         let [r, g, b] = self.0.map(f64::from);
-        0.2126 * r + 0.7152 * g + 0.0722 * b
+        let [of_r, of_g, of_b] = LUMINANCE;
+        of_r * r + of_g * g + of_b * b
     }
 }
 

@@ -40,6 +40,20 @@ pub enum LightError {
         /// Its value.
         value: [f32; 3],
     },
+    /// Two streams of samples show different lights.
+    #[error("cannot fit lights: the two bases have {} and {} light groups", groups[0], groups[1])]
+    StreamLights {
+        /// Number of light groups of each basis.
+        groups: [usize; 2],
+    },
+    /// A number that must be above 0 is not.
+    #[error("cannot fit lights: the {what} is {value}, expected a finite number above 0")]
+    NotPositive {
+        /// Its name.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// The solver found no finite weights.
     #[error(
         "cannot fit lights: no finite weights of {lights} lights found for {squares} averaged squares; please report this \

@@ -8,5 +8,6 @@ pub mod light_fit;
 pub mod light_stage;
 mod rectangle;
 pub mod rules;
+mod walls;
 
 pub use error::LightError;

@@ -4,8 +4,6 @@
 //! camera, one in front of each wall that no view sees. The layout follows PSDR-Room (Yan et al., SIGGRAPH Asia 2023), whose
 //! constants are not published; ours are [`StageRules`]. No light lies in a view, and none casts a shadow.
 
-use std::collections::BTreeMap;
-
 use glam::{DVec3, Vec3};
 use mateval_scene::Camera;
 use mateval_scene::dataset::SceneFile;
@@ -13,6 +11,7 @@ use mateval_tracer::{Ray, StageLight, World};
 
 use crate::rectangle::{Rectangle, forward, is_in_picture};
 use crate::rules::StageRules;
+use crate::walls::walls;
 
 /// One light of a stage, of radiance 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -114,37 +113,11 @@ impl LitRoom<'_> {
         (tilt < most * most).then(|| f64::from(hit.position.y))
     }
 
-    /// The walls: for each upright plane, the rectangle around the architecture's triangles in it, if it is large
-    /// enough. Sorted by their planes.
+    /// The walls of the architecture.
     fn walls(&self, architecture: &[usize]) -> Vec<Rectangle> {
-        let mut planes: BTreeMap<[i64; 3], Vec<DVec3>> = BTreeMap::new();
-        for &surface in architecture {
-            let mesh = &self.world.scene().surfaces[surface].mesh;
-            for triangle in 0..mesh.triangles.len() {
-                let corners = mesh.corners(triangle).map(|corner| corner.as_dvec3());
-                if let Some(plane) = self.upright_plane(corners) {
-                    planes.entry(plane).or_default().extend(corners);
-                }
-            }
-        }
-        let least = self.rules.least_wall_m;
-        let rectangles = planes.into_iter().filter_map(|(plane, corners)| around(plane, &corners));
-        rectangles.filter(|wall| wall.sides.iter().all(|side| side.length() >= least)).collect()
-    }
-
-    /// The plane of a triangle, as the horizontal coordinates of its normal and its distance from the centre, rounded
-    /// so that all triangles of a wall agree. None where the triangle is not upright.
-    fn upright_plane(&self, corners: [DVec3; 3]) -> Option<[i64; 3]> {
-        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
-        if normal.y.abs() > self.rules.upright_sine {
-            return None;
-        }
-        // Both orders of the corners give the normal towards the camera.
-        let normal = if normal.dot(self.centre - corners[0]) < 0.0 { -normal } else { normal };
-        let steps = |value: f64, step: f64| (value / step).round() as i64;
-        let distance = normal.dot(corners[0] - self.centre);
-        let StageRules { upright_sine, same_plane_m, .. } = *self.rules;
-        Some([steps(normal.x, upright_sine), steps(normal.z, upright_sine), steps(distance, same_plane_m)])
+        let meshes = architecture.iter().map(|&surface| &self.world.scene().surfaces[surface].mesh);
+        let triangles = meshes.flat_map(|mesh| (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle)));
+        walls(self.rules, triangles.map(|corners| corners.map(|corner| corner.as_dvec3())))
     }
 
     fn wall_light(&self, wall: &Rectangle) -> StageLight {
@@ -190,20 +163,6 @@ impl LitRoom<'_> {
         let hit = self.world.first_hit(&Ray::endless(self.centre.as_vec3(), direction.as_vec3()))?;
         Some(self.world.surface_hit(&hit).position.as_dvec3())
     }
-}
-
-/// The rectangle around corners in one upright plane.
-fn around(plane: [i64; 3], corners: &[DVec3]) -> Option<Rectangle> {
-    let normal = DVec3::new(plane[0] as f64, 0.0, plane[1] as f64).try_normalize()?;
-    let along = DVec3::Y.cross(normal);
-    let range = |axis: DVec3| {
-        let values = || corners.iter().map(|corner| corner.dot(axis));
-        [values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max)]
-    };
-    let ([left, right], [bottom, top]) = (range(along), range(DVec3::Y));
-    let depth = corners.iter().map(|corner| corner.dot(normal)).sum::<f64>() / corners.len() as f64;
-    let corner = normal * depth + along * left + DVec3::Y * bottom;
-    Some(Rectangle { corner, sides: [along * (right - left), DVec3::Y * (top - bottom)] })
 }
 
 #[cfg(test)]

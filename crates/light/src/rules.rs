@@ -23,15 +23,15 @@ pub struct StageRules {
     pub wall_share: f64,
     /// Distance from a wall to its light.
     pub wall_gap_m: f64,
-    /// Pieces of the architecture that are narrower or lower than this are not walls.
+    /// Connected pieces of the architecture that are narrower or lower than this are not walls.
     pub least_wall_m: f64,
     /// A wall's visibility is tested at a grid of places, with this many along each side.
     pub wall_samples: u32,
     /// Sine of the largest angle between a ceiling's normal and the vertical, and between a wall's normal and the
-    /// horizontal. Triangles of one wall agree in the rounded multiples of this of their normals' coordinates.
+    /// horizontal, and between the normals of one wall's triangles and of its largest one.
     pub upright_sine: f64,
-    /// Triangles belong to one wall where the distances of their planes from the camera round to the same multiple of
-    /// this.
+    /// The largest distance of a wall's corners from the plane of its largest triangle, and the largest gap within that plane
+    /// between connected triangles.
     pub same_plane_m: f64,
     /// A place is visible if nothing is nearer to the camera than the place by more than this.
     pub visible_within_m: f64,
@@ -66,11 +66,14 @@ pub struct FitRules {
     pub pool: u32,
     /// Samples per pixel of the light basis that the fit is made on; they come from a random stream of their own.
     pub samples: u32,
+    /// The factor of the ridge towards the start, above 0: the share of the photo's light that all lights at twice their
+    /// start add to the objective.
+    pub ridge: f64,
 }
 
 impl Default for FitRules {
     /// The values of every protocol today.
     fn default() -> Self {
-        Self { pool: 8, samples: 64 }
+        Self { pool: 8, samples: 64, ridge: 1e-2 }
     }
 }

@@ -8,29 +8,31 @@
 //! the responses of two trained networks (Zhang et al. 2018). The last two have two rules for pixels outside the mask,
 //! since their windows reach across its edge; [`mask`] holds the two ways to fill those pixels.
 //!
-//! Renders are noisy, and a metric counts noise as error. For a prediction in two independent halves, these modules
-//! estimate the metric without noise: [`mod@noise_free`] (with [`mod@encoding_bias`] for the bias of clipping and sRGB
-//! encoding), [`mod@ssim_halves`], and the extrapolated distances of [`Lpips`].
+//! Renders are noisy, and a metric counts noise as error. For a prediction in four independent quarters ([`noisy_render`]),
+//! these modules estimate the metric without noise: [`mod@noise_free`], [`mod@ssim_halves`], and the extrapolated
+//! distances of [`Lpips`].
 //!
 //! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
 //! the mask is an error; values outside the mask are not read.
 
-pub mod encoding_bias;
 pub mod error;
+pub mod halves;
 pub mod lpips;
 pub mod mask;
 pub mod mse;
 pub mod noise_free;
+pub mod noisy_render;
 pub mod pixel;
 pub mod psnr;
 pub mod ssim;
 pub mod ssim_halves;
 
-pub use encoding_bias::{EncodingBias, encoding_bias};
 pub use error::MetricError;
+pub use halves::Halves;
 pub use lpips::{ExtrapolatedLpips, Features, Lpips, MeanAndHalves, Net};
 pub use mse::mse;
-pub use noise_free::{BlockNoise, Halves, NoiseFreeMse, NoiseFreePsnr, NoisePsnr, noise_free_mse, psnr_mean_error};
+pub use noise_free::{BlockNoise, NoiseFreeMse, NoiseFreePsnr, NoisePsnr, Variances, noise_free_mse, psnr_mean_error};
+pub use noisy_render::{NoisyHalf, NoisyRender, encoded_reference};
 pub use pixel::Pixel;
 pub use psnr::Psnr;
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};

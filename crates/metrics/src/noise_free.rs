@@ -3,17 +3,19 @@
 //! Noise of few samples adds its variance to a squared error. Two independent halves of each picture avoid that: with
 //! X = A - Ia and Y = B - Ib, the expectation of the mean of X*Y is the squared true difference d², whatever the noise.
 //!
-//! The noise of this estimate follows from the same halves. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y,
-//! and D = (X² - Y²) / 2 = d (x - y) + (x² - y²) / 2 has mean 0 and, for Gaussian noise that is alike in both halves,
-//! the same covariances between any two pixels. Pixels whose noise is correlated form a block: D is summed within
-//! blocks, and the variance of the mean is the sum of the squared sums. D = m (A - B) - m (Ia - Ib) with m = (X + Y) /
-//! 2; its two uncorrelated parts are the prediction's noise and the reference's.
+//! The noise of this estimate follows from the same pictures, for three sources that are independent of each other:
 //!
-//! Noise that is not Gaussian adds to the variance of D half its fourth cumulant (never negative for heavy tails) and
-//! 2 d times its third; both vanish against the rest as the number of samples grows. With few samples of heavy-tailed
-//! noise the standard error is therefore too large: where one sample in ten finds light, simulations gave 1.3 times the
-//! true one at 4 samples and 1.1 at 16; where one in fifty does, 2.1 at 4, 1.5 at 16, 1.2 at 64. Two halves cannot
-//! separate a fourth cumulant from a variance, so this is not corrected.
+//! - The prediction's paths. Each half comes in quarters ([`NoisyRender`]), whose difference u (of A) or v (of B) has the
+//!   half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y. The expectation of
+//!   (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y as far as it comes from those paths, without any assumption about the
+//!   distribution of the noise beyond the independence of quarters. Two halves alone could not separate a fourth
+//!   cumulant from a variance.
+//! - The reference, of which there are two halves only: with m = (X + Y) / 2, the square of Σ m (Ia - Ib) less the square
+//!   of Σ (u + v) / 2 (Ia - Ib), which the paths' noise in m adds. It assumes Gaussian noise, which a reference of many
+//!   samples has.
+//! - Noise that both quarters of a half share ([`NoisyRender::shared`]), like the reference's.
+//!
+//! Pixels whose noise is correlated form a block: all sums are taken within blocks, and variances are added over them.
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_10;
@@ -21,23 +23,7 @@ use std::f64::consts::LN_10;
 use mateval_image::{Mask, Picture};
 
 use crate::pixel::{Pixel, check_finite, check_size, size_of};
-use crate::{MetricError, Psnr};
-
-/// One picture rendered twice, with the same number of samples and different seeds.
-#[derive(Clone, Copy, Debug)]
-pub struct Halves<'a, P> {
-    /// One half.
-    pub a: &'a Picture<P>,
-    /// The other half.
-    pub b: &'a Picture<P>,
-}
-
-impl<P: Pixel> Halves<'_, P> {
-    /// The pixel of both halves at an index of [`Picture::pixels`].
-    pub(crate) fn at(&self, index: usize) -> [P; 2] {
-        [self.a.pixels()[index], self.b.pixels()[index]]
-    }
-}
+use crate::{Halves, MetricError, NoisyRender, Psnr};
 
 /// An estimate of the mean squared error without noise. Its unit is that of the values, squared.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,114 +36,165 @@ pub struct NoiseFreeMse {
     pub blocks: Vec<(u32, BlockNoise)>,
 }
 
-/// The noise that one block adds to a [`NoiseFreeMse`]: a random value of mean 0, whose square estimates the block's
-/// part of the variance. Its unit is that of the MSE.
+/// Sums over one block from which the noise that it adds to a [`NoiseFreeMse`] follows, each divided by the number of all
+/// values that count. Their unit is that of the MSE.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockNoise {
-    /// From the prediction's noise: the block's sum of m (A - B), divided by the number of all values that count.
-    pub prediction: f64,
-    /// From the reference's noise: the same with m (Ia - Ib).
+    /// Σ Y u.
+    pub first_half: f64,
+    /// Σ X v.
+    pub second_half: f64,
+    /// Σ u v.
+    pub both_halves: f64,
+    /// Σ m (Ia - Ib).
+    pub reference: f64,
+    /// Σ (u + v) / 2 (Ia - Ib).
+    pub paths_in_reference: f64,
+    /// Σ m s, where s is the shared noise of the first half minus that of the second.
+    pub shared: f64,
+    /// Σ (u + v) / 2 s.
+    pub paths_in_shared: f64,
+}
+
+/// Variances of an estimate by the source of the noise. A source whose estimated variance is negative has 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Variances {
+    /// From the prediction's paths, which more samples lower.
+    pub paths: f64,
+    /// From the noise that the quarters of a half share.
+    pub shared: f64,
+    /// From the reference.
     pub reference: f64,
 }
 
 impl BlockNoise {
-    /// From both: the block's sum of D, divided likewise.
+    fn add_scaled(&mut self, factor: f64, other: &Self) {
+        self.first_half += factor * other.first_half;
+        self.second_half += factor * other.second_half;
+        self.both_halves += factor * other.both_halves;
+        self.reference += factor * other.reference;
+        self.paths_in_reference += factor * other.paths_in_reference;
+        self.shared += factor * other.shared;
+        self.paths_in_shared += factor * other.paths_in_shared;
+    }
+}
+
+impl Variances {
+    fn of<'a>(blocks: impl Iterator<Item = &'a BlockNoise>) -> Self {
+        let mut sum = Self::default();
+        for block in blocks {
+            sum.paths += block.first_half.powi(2) + block.second_half.powi(2) - block.both_halves.powi(2);
+            sum.shared += block.shared.powi(2) - block.paths_in_shared.powi(2);
+            sum.reference += block.reference.powi(2) - block.paths_in_reference.powi(2);
+        }
+        let Self { paths, shared, reference } = sum;
+        Self { paths: paths.max(0.0), shared: shared.max(0.0), reference: reference.max(0.0) }
+    }
+
+    /// From all sources.
     pub fn total(&self) -> f64 {
-        self.prediction - self.reference
+        self.paths + self.shared + self.reference
     }
 }
 
 /// Estimates the mean squared error, over the pixels of the mask and their channels, of the noise-free pictures that
-/// the halves are renders of.
+/// the prediction and the reference's halves are renders of.
 ///
-/// Values are compared as given, in the colour space of their type; where a curve was applied to noisy pixels,
-/// [`encoding_bias`](crate::encoding_bias()) estimates its effect. `blocks` holds the block id of each pixel: noise may
+/// Values are compared as given, in the colour space of their type. `blocks` holds the block id of each pixel: noise may
 /// be correlated within a block, not between two blocks. One id may occur in several views ([`psnr_mean_error`]).
 ///
 /// `None` where no pixel counts. Fails if sizes differ or a value inside the mask is not finite.
 pub fn noise_free_mse<P: Pixel>(
-    prediction: Halves<P>,
+    prediction: &NoisyRender<P>,
     reference: Halves<P>,
     mask: &Mask,
     blocks: &Picture<u32>,
 ) -> Result<Option<NoiseFreeMse>, MetricError> {
-    check_halves(prediction, reference, mask, blocks)?;
-    let (mut sum, mut pixels, mut values) = (0.0, 0, 0);
+    check(prediction, reference, mask, blocks)?;
+    let (mut sum, mut pixels, mut values) = (0.0, 0_usize, 0_usize);
     let mut by_block: BTreeMap<u32, BlockNoise> = BTreeMap::new();
     for (index, block) in blocks.pixels().iter().enumerate().filter(|&(index, _)| mask.pixels()[index]) {
-        let ([a, b], [ia, ib]) = (prediction.at(index), reference.at(index));
+        let pixel = |picture: &Picture<P>| picture.pixels()[index];
+        let NoisyRender { a, b, shared } = prediction;
+        let all = [&a.estimate, &b.estimate, reference.a, reference.b, &a.noise, &b.noise].map(pixel);
+        let shared = shared.as_ref().map(pixel).unwrap_or_default();
         let noise = by_block.entry(*block).or_default();
-        for channel in 0..a.channels().len() {
-            let [a, b, ia, ib] = [a, b, ia, ib].map(|pixel| f64::from(pixel.channels()[channel]));
-            let (x, y) = (a - ia, b - ib);
-            let m = (x + y) / 2.0;
+        for channel in 0..shared.channels().len() {
+            let [a, b, ia, ib, u, v] = all.map(|pixel| f64::from(pixel.channels()[channel]));
+            let (x, y, s) = (a - ia, b - ib, f64::from(shared.channels()[channel]));
+            let (m, w) = ((x + y) / 2.0, (u + v) / 2.0);
             sum += x * y;
-            noise.prediction += m * (a - b);
+            noise.first_half += y * u;
+            noise.second_half += x * v;
+            noise.both_halves += u * v;
             noise.reference += m * (ia - ib);
+            noise.paths_in_reference += w * (ia - ib);
+            noise.shared += m * s;
+            noise.paths_in_shared += w * s;
             values += 1;
         }
         pixels += 1;
     }
-    let share = |sum: f64| sum / values as f64;
-    let shared =
-        |noise: BlockNoise| BlockNoise { prediction: share(noise.prediction), reference: share(noise.reference) };
-    let blocks = by_block.into_iter().map(|(block, noise)| (block, shared(noise))).collect();
-    Ok((pixels > 0).then(|| NoiseFreeMse { mse: share(sum), pixels, blocks }))
+    let share = 1.0 / values.max(1) as f64;
+    let shared = |(block, noise): (u32, BlockNoise)| {
+        let mut divided = BlockNoise::default();
+        divided.add_scaled(share, &noise);
+        (block, divided)
+    };
+    let blocks = by_block.into_iter().map(shared).collect();
+    Ok((pixels > 0).then_some(NoiseFreeMse { mse: sum * share, pixels, blocks }))
 }
 
 /// Checks all sizes first, then the values inside the mask.
-pub(crate) fn check_halves<P: Pixel>(
-    prediction: Halves<P>,
+fn check<P: Pixel>(
+    prediction: &NoisyRender<P>,
     reference: Halves<P>,
     mask: &Mask,
     blocks: &Picture<u32>,
 ) -> Result<(), MetricError> {
-    let size = size_of(prediction.a);
-    check_size(size, "prediction's second half", size_of(prediction.b))?;
-    check_size(size, "reference's first half", size_of(reference.a))?;
-    check_size(size, "reference's second half", size_of(reference.b))?;
+    let NoisyRender { a, b, shared } = prediction;
+    let size = size_of(&a.estimate);
+    let mut pictures = vec![
+        ("prediction's first half", &a.estimate),
+        ("noise of the prediction's first half", &a.noise),
+        ("prediction's second half", &b.estimate),
+        ("noise of the prediction's second half", &b.noise),
+        ("reference's first half", reference.a),
+        ("reference's second half", reference.b),
+    ];
+    pictures.extend(shared.as_ref().map(|shared| ("shared noise of the prediction", shared)));
+    for (what, picture) in &pictures[1..] {
+        check_size(size, what, size_of(picture))?;
+    }
     check_size(size, "mask", size_of(mask))?;
     check_size(size, "picture of blocks", size_of(blocks))?;
-    check_finite("prediction's first half", prediction.a, Some(mask))?;
-    check_finite("prediction's second half", prediction.b, Some(mask))?;
-    check_finite("reference's first half", reference.a, Some(mask))?;
-    check_finite("reference's second half", reference.b, Some(mask))
+    pictures.into_iter().try_for_each(|(what, picture)| check_finite(what, picture, Some(mask)))
 }
 
 impl NoiseFreeMse {
-    /// The standard deviation of `mse`, from the noise of prediction and reference.
+    /// The variances of `mse`.
+    pub fn variances(&self) -> Variances {
+        Variances::of(self.blocks.iter().map(|(_, noise)| noise))
+    }
+
+    /// The standard deviation of `mse`.
     pub fn standard_error(&self) -> f64 {
-        self.root_of_squares(|noise| noise.total())
+        self.variances().total().sqrt()
     }
 
-    /// The part of [`standard_error`](Self::standard_error) that more samples of the prediction lower.
-    pub fn prediction_error(&self) -> f64 {
-        self.root_of_squares(|noise| noise.prediction)
+    /// The MSE that its PSNR is of: `mse`, or 1.645 standard errors where that is more.
+    pub fn bounded(&self) -> f64 {
+        self.mse.max(ONE_SIDED_95 * self.standard_error())
     }
 
-    /// The part of [`standard_error`](Self::standard_error) that comes from the reference.
-    pub fn reference_error(&self) -> f64 {
-        self.root_of_squares(|noise| noise.reference)
-    }
-
-    fn root_of_squares(&self, part: impl Fn(&BlockNoise) -> f64) -> f64 {
-        self.blocks.iter().map(|(_, noise)| part(noise).powi(2)).sum::<f64>().sqrt()
-    }
-
-    /// The PSNR, or its lower bound where `mse` is not significantly above 0. Fails if `mse` or the noise is not
-    /// finite.
+    /// The PSNR of [`Self::bounded`]: it never rises with `mse`, nor jumps. Fails if `mse` or the noise is not finite.
     pub fn psnr(&self) -> Result<NoiseFreePsnr, MetricError> {
-        let reach = ONE_SIDED_95 * self.standard_error();
-        if !(self.mse.is_finite() && reach.is_finite()) {
+        let bounded = self.bounded();
+        if !(self.mse.is_finite() && bounded.is_finite()) {
             return Err(MetricError::InvalidMse { mse: self.mse });
         }
-        if self.mse == 0.0 && reach == 0.0 || self.mse > reach {
-            let Psnr { db, exact } = Psnr::from_mse(self.mse)?;
-            return Ok(NoiseFreePsnr { db, exact, lower_bound: false });
-        }
-        // A negative estimate shows that the noise is at least as large; the bound never falls below the reach.
-        let bound = if self.mse > 0.0 { self.mse + reach } else { reach.max(-self.mse) };
-        Ok(NoiseFreePsnr { db: Psnr::from_mse(bound)?.db, exact: false, lower_bound: true })
+        let Psnr { db, exact } = Psnr::from_mse(bounded.max(0.0))?;
+        Ok(NoiseFreePsnr { db, exact, lower_bound: self.mse < bounded })
     }
 }
 
@@ -171,9 +208,8 @@ pub struct NoiseFreePsnr {
     pub db: f64,
     /// The MSE was 0 and had no noise.
     pub exact: bool,
-    /// The MSE was at most 1.645 standard errors and so may be 0. `db` is then the PSNR of the MSE's one-sided 95 %
-    /// upper bound, which is mse + 1.645 standard errors, or for a negative estimate the larger of 1.645 standard
-    /// errors and its absolute value. The true PSNR is probably higher.
+    /// The MSE was under 1.645 standard errors and so may be 0. `db` is then the PSNR of 1.645 standard errors, and the true
+    /// PSNR is probably higher.
     pub lower_bound: bool,
 }
 
@@ -182,34 +218,36 @@ pub struct NoiseFreePsnr {
 pub struct NoisePsnr {
     /// From all noise.
     pub total: f64,
-    /// From the predictions' noise.
-    pub prediction: f64,
+    /// From the predictions' paths.
+    pub paths: f64,
+    /// From the noise that the quarters of a half share.
+    pub shared: f64,
     /// From the references' noise.
     pub reference: f64,
 }
 
 /// The standard error of the mean PSNR of several views, decibels.
 ///
-/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE. A block's effects on all views are summed before they are squared,
-/// so that correlation between views counts. `None` without views or where an MSE is not above 0.
+/// To first order, dPSNR = -10 / ln 10 * dMSE / MSE, with 1.645 standard errors in place of an MSE that is less. A block's
+/// effects on all views are summed before they are squared, so that correlation between views counts. `None` without
+/// views, or where an MSE is at most 0 without noise.
 pub fn psnr_mean_error(views: &[&NoiseFreeMse]) -> Option<NoisePsnr> {
-    if views.is_empty() || !views.iter().all(|view| view.mse > 0.0) {
+    if views.is_empty() || !views.iter().all(|view| view.bounded() > 0.0) {
         return None;
     }
     let mut by_block: BTreeMap<u32, BlockNoise> = BTreeMap::new();
     for view in views {
-        let slope = -10.0 / LN_10 / view.mse / views.len() as f64;
+        let slope = -10.0 / LN_10 / view.bounded() / views.len() as f64;
         for (block, noise) in &view.blocks {
-            let sum = by_block.entry(*block).or_default();
-            sum.prediction += slope * noise.prediction;
-            sum.reference += slope * noise.reference;
+            by_block.entry(*block).or_default().add_scaled(slope, noise);
         }
     }
-    let root = |part: fn(&BlockNoise) -> f64| by_block.values().map(|noise| part(noise).powi(2)).sum::<f64>().sqrt();
+    let variances = Variances::of(by_block.values());
     Some(NoisePsnr {
-        total: root(BlockNoise::total),
-        prediction: root(|noise| noise.prediction),
-        reference: root(|noise| noise.reference),
+        total: variances.total().sqrt(),
+        paths: variances.paths.sqrt(),
+        shared: variances.shared.sqrt(),
+        reference: variances.reference.sqrt(),
     })
 }
 

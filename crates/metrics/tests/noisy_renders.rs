@@ -48,7 +48,7 @@ fn measure(lpips: &Lpips, [mean, a, b]: &[Picture<SrgbRgb>; 3]) -> [Extrapolated
     let mask: Mask = Picture::from_fn(SIDE, SIDE, |x, y| x > 20 || y > 30);
     let (whole, black) = (lpips.features(&reference).unwrap(), lpips.black_filled_features(&reference, &mask).unwrap());
     [
-        lpips.extrapolated_masked(prediction, &reference, &whole, &mask).unwrap().unwrap(),
+        lpips.extrapolated_masked(prediction, &whole, &mask).unwrap().unwrap(),
         lpips.extrapolated_black_fill(prediction, &black, &mask).unwrap().unwrap(),
     ]
 }

@@ -13,6 +13,7 @@ pub mod bake;
 pub mod blender;
 pub mod build;
 pub mod build_scene;
+pub mod conversion;
 pub mod error;
 pub mod faults;
 pub mod instances;

@@ -6,7 +6,7 @@ use mateval_scene::Camera;
 use mateval_scene::material::Appearance;
 use mateval_scene::reference::{Emission, ReferenceScene, SurfaceIndex};
 use mateval_tracer::World;
-use mateval_tracer::aov::{PixelHit, PixelMean, hit_through, is_veiled, subpixels};
+use mateval_tracer::aov::{PixelHit, PixelMean, hit_through, is_veiled, subpixel};
 use rayon::prelude::*;
 
 /// Surfaces of a lower roughness count as specular.
@@ -66,7 +66,7 @@ impl SeenTriangle {
     }
 }
 
-/// The true material in every pixel of a view, from the source materials, as means over the sub-pixels.
+/// The true material in every pixel of a view, from the true materials, as means over the sub-pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TruthPictures {
     /// base_color, linear.
@@ -175,10 +175,9 @@ impl<'a> ViewScene<'a> {
     /// The means over the sub-pixels that show a scored surface, and whether all sub-pixels do, through nothing that is
     /// partly transparent.
     fn truth(&self, camera: &Camera, x: usize, y: usize) -> (PixelTruth, bool) {
-        let places = subpixels(x, y);
         let mut veiled = false;
         let PixelMean { mean, whole } = PixelMean::of(|at| {
-            let place = places[at];
+            let place = subpixel(x, y, at);
             veiled |= is_veiled(self.world, camera, place);
             let seen = hit_through(self.world, camera, place).and_then(|hit| self.scored_appearance(&hit))?;
             let [r, g, b] = seen.base_color;

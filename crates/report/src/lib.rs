@@ -14,5 +14,6 @@ pub mod picture_set;
 pub mod ranking;
 pub mod strips;
 pub mod tables;
+mod truth_noise;
 
 pub use error::ReportError;

@@ -32,7 +32,7 @@ pub(crate) const SCALE_ROWS: usize = 12;
 pub enum Shown {
     /// base_color, with errors of linear values.
     Albedo,
-    /// Renders under a track of protocol `mateval-1`, with errors of sRGB values. Not [`Track::Relit`], which has
+    /// Renders under a track of protocol `mateval-2`, with errors of sRGB values. Not [`Track::Relit`], which has
     /// several lights.
     Light {
         /// The track.
@@ -120,7 +120,7 @@ pub(crate) fn rows(
         Shown::Albedo => Ok(scene_albedo(plan.dataset, scene, plan.submissions)?.into_iter().map(albedo_row).collect()),
         Shown::Light { track: Track::Relit, .. } => Err(ReportError::RelitTrack),
         Shown::Light { track, samples } => {
-            let mut protocol = Protocol::named("mateval-1")?;
+            let mut protocol = Protocol::named("mateval-2")?;
             protocol.light.tracks = vec![track];
             (protocol.light.noise.least_samples, protocol.light.noise.most_samples) = (samples, samples);
             let renderer = plan.dataset.file.scored_renderer.as_ref();

@@ -9,13 +9,13 @@ use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, Render
 use crate::role::{Role, SceneLights, SourceKind};
 
 /// The name of this version of the format.
-pub const FORMAT: &str = "mateval/1";
+pub const FORMAT: &str = "mateval/2";
 
 /// `dataset.json`: what this dataset is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetFile {
-    /// Always `mateval/1`.
+    /// Always `mateval/2`.
     pub format: String,
     /// The dataset's name, from its recipe.
     pub name: String,
@@ -49,7 +49,7 @@ pub struct Licence {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetsFile {
-    /// Always `mateval/1`.
+    /// Always `mateval/2`.
     pub format: String,
     /// One entry for each picture.
     pub targets: Vec<Target>,
@@ -69,7 +69,7 @@ pub struct Target {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// Always `mateval/1`.
+    /// Always `mateval/2`.
     pub format: String,
     /// The scene's id.
     pub id: SceneId,
@@ -77,6 +77,8 @@ pub struct SceneFile {
     pub source: SceneSource,
     /// The lights whose radiances track `fitted` fits: the scene's own, or a light stage's.
     pub lights: SceneLights,
+    /// The materials of which the truth is made.
+    pub materials: TrueMaterials,
     /// Multiplies every RGB picture before clipping.
     pub exposure: f64,
     /// The input view first, then the novel ones.
@@ -99,8 +101,24 @@ pub struct SceneSource {
     pub kind: SourceKind,
     /// Scenes of one house (or one Bitterli scene) are not independent of each other: rankings treat them as one.
     pub house: String,
+    /// Whether the source states the roughness of its materials. Otherwise that of the truth is a constant of the reader,
+    /// and predictions of roughness are not scored.
+    pub states_roughness: bool,
+    /// Whether the source states which materials are metallic. Otherwise metallic is not scored.
+    pub states_metallic: bool,
     /// Every file that was read, sorted by path.
     pub files: Vec<SourceFile>,
+}
+
+/// The materials of which a scene's truth is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrueMaterials {
+    /// The source's, converted to the model of every prediction, so that the maps describe a surface completely.
+    #[default]
+    Converted,
+    /// The source's own.
+    Source,
 }
 
 /// One file of a source.

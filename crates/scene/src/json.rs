@@ -117,12 +117,12 @@ mod tests {
     #[test]
     fn another_format_is_named_before_any_other_fault() {
         let parsed = |text: &str| {
-            let result = parse_format::<crate::dataset::TargetsFile>(Path::new("t"), text.as_bytes(), "mateval/1");
+            let result = parse_format::<crate::dataset::TargetsFile>(Path::new("t"), text.as_bytes(), "mateval/2");
             result.map(|_| ()).map_err(|error| error.to_string())
         };
         let other = parsed(r#"{"an_unknown_key": 3, "format": "other/2"}"#).unwrap_err();
-        assert!(other.contains("'other/2'") && other.contains("'mateval/1'"), "{other}");
-        for text in ["[]", "{", "{}", r#"{"format": 3}"#, r#"{"format": "mateval/1", "an_unknown_key": 3}"#] {
+        assert!(other.contains("'other/2'") && other.contains("'mateval/2'"), "{other}");
+        for text in ["[]", "{", "{}", r#"{"format": 3}"#, r#"{"format": "mateval/2", "an_unknown_key": 3}"#] {
             let error = parsed(text).unwrap_err();
             assert!(error.contains("bad_json"), "{text}: {error}");
         }

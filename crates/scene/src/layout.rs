@@ -75,7 +75,7 @@ impl SceneFolder {
         self.truth().join("views").join(view.as_str())
     }
 
-    /// `ground_truth/materials/<instance>`: the source materials baked to the atlas.
+    /// `ground_truth/materials/<instance>`: the true materials baked to the atlas.
     pub fn truth_material(&self, instance: &InstanceId) -> PathBuf {
         self.truth().join("materials").join(instance.as_str())
     }
@@ -83,6 +83,11 @@ impl SceneFolder {
     /// `ground_truth/renders/<renderer>/<view>`.
     pub fn render(&self, renderer: &RendererId, view: &ViewId) -> PathBuf {
         self.truth().join("renders").join(renderer.as_str()).join(view.as_str())
+    }
+
+    /// `ground_truth/companions`: converged pictures that scoring compares every prediction's paths with.
+    pub fn companions(&self) -> PathBuf {
+        self.truth().join("companions")
     }
 
     /// `ground_truth/lights.json`.
@@ -93,5 +98,10 @@ impl SceneFolder {
     /// `ground_truth/reference`: surfaces with their source uv, materials and textures.
     pub fn reference(&self) -> PathBuf {
         self.truth().join("reference")
+    }
+
+    /// `ground_truth/reference/source`: the source's own materials, where they were converted.
+    pub fn source_materials(&self) -> PathBuf {
+        self.reference().join("source")
     }
 }

@@ -3,7 +3,7 @@
 //! In: a converted scene, or a dataset's folder. Out: the same as files, or as checked Rust values.
 //!
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
-//! [`mod@reference`] describe a scene with its source materials and lights; [`role`] states what its instances are;
+//! [`mod@reference`] describe a scene with its materials and lights; [`role`] states what its instances are;
 //! [`dataset`], [`layout`], [`manifest`] and [`open`] are the files of a dataset, [`submission`] those of a submission.
 //! [`obj`], [`gltf_accessor`] and [`source_folder`] read untrusted files.
 
@@ -29,6 +29,7 @@ pub mod reference;
 pub mod reference_io;
 pub mod role;
 pub mod source_folder;
+pub mod source_materials;
 pub mod splitmix64;
 pub mod submission;
 pub mod super_categories;

@@ -274,6 +274,40 @@ impl Material {
         colors.chain(scalars.into_iter().chain(around).filter_map(ScalarInput::lookup)).collect()
     }
 
+    /// The textures of all lookups, to be replaced.
+    pub fn texture_indices_mut(&mut self) -> Vec<&mut TextureIndex> {
+        let (colors, mut scalars): (Vec<&mut ColorInput>, Vec<&mut ScalarInput>) = match &mut self.model {
+            MaterialModel::Diffuse { reflectance, alpha } => (vec![reflectance], alpha.iter_mut().collect()),
+            MaterialModel::Conductor { specular_reflectance, microfacets, .. } => {
+                (vec![specular_reflectance], microfacets.iter_mut().map(|m| &mut m.alpha).collect())
+            }
+            MaterialModel::Plastic { diffuse_reflectance, specular_reflectance, microfacets, .. } => {
+                let alpha = microfacets.iter_mut().map(|m| &mut m.alpha).collect();
+                (vec![diffuse_reflectance, specular_reflectance], alpha)
+            }
+            MaterialModel::Dielectric { specular_reflectance, specular_transmittance, microfacets, .. } => {
+                let alpha = microfacets.iter_mut().map(|m| &mut m.alpha).collect();
+                (vec![specular_reflectance, specular_transmittance], alpha)
+            }
+            MaterialModel::ThinDielectric { specular_reflectance, specular_transmittance, .. } => {
+                (vec![specular_reflectance, specular_transmittance], Vec::new())
+            }
+            MaterialModel::Principled { base_color, roughness, metallic, .. } => {
+                (vec![base_color], vec![roughness, metallic])
+            }
+        };
+        scalars.extend(self.opacity.iter_mut().chain(self.bump.iter_mut().map(|bump| &mut bump.height)));
+        let of_colors = colors.into_iter().filter_map(|color| match color {
+            ColorInput::Texture { texture, .. } => Some(texture),
+            ColorInput::Constant(_) => None,
+        });
+        let of_scalars = scalars.into_iter().filter_map(|scalar| match scalar {
+            ScalarInput::Texture { texture, .. } => Some(texture),
+            ScalarInput::Constant(_) => None,
+        });
+        of_colors.chain(of_scalars).collect()
+    }
+
     /// Whether the material has base_color, roughness and metallic. Glass does not.
     pub fn has_appearance(&self) -> bool {
         !matches!(self.model, MaterialModel::Dielectric { .. } | MaterialModel::ThinDielectric { .. })
@@ -281,8 +315,9 @@ impl Material {
 
     /// base_color, roughness and metallic at the surface's `uv`; none for dielectrics.
     ///
-    /// Diffuse and plastic materials have their reflectance as base_color, and metallic 0. Conductors have F0 times
-    /// specular reflectance, and metallic 1. Roughness is the square root of alpha: 0 if smooth, 1 if diffuse.
+    /// Principled materials, which every converted one is, have their own. In a scene with its source's materials, diffuse
+    /// and plastic ones have their reflectance as base_color, and metallic 0; conductors have F0 times specular reflectance,
+    /// and metallic 1. Roughness is the square root of alpha: 0 if smooth, 1 if diffuse.
     pub fn appearance(&self, textures: &[Texture], uv: Vec2) -> Option<Appearance> {
         let rough = |microfacets: &Option<Microfacets>| {
             microfacets.map_or(0.0, |m| m.alpha.at(textures, uv).clamp(0.0, 1.0).sqrt())

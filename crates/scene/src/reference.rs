@@ -1,4 +1,4 @@
-//! The reference scene: surfaces with their source materials and textures, and the lights. The ground truth is rendered
+//! The reference scene: surfaces with their materials and textures, and the lights. The ground truth is rendered
 //! and baked from it.
 
 use glam::Vec2;
@@ -111,7 +111,7 @@ pub struct LightGroup {
     pub camera_visible: bool,
 }
 
-/// A scene with its source materials and lights.
+/// A scene with the materials of its truth and its lights.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReferenceScene {
     /// All surfaces, including glass and lamps.

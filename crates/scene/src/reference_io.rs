@@ -16,19 +16,32 @@ use crate::glb::{self, GlbNode};
 use crate::layout::SceneFolder;
 use crate::material::{Lookup, Material};
 use crate::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface};
+use crate::source_materials::SourceMaterials;
 use crate::{Finding, SceneError, Severity, json};
 
 /// `reference.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReferenceFile {
-    /// Always `mateval/1`.
+    /// Always `mateval/2`.
     pub format: String,
     /// In the order of the nodes of `geometry.glb`.
     pub surfaces: Vec<SurfaceEntry>,
     /// The materials of the surfaces.
     pub materials: Vec<Material>,
     /// The textures of materials and lights.
+    pub textures: Vec<TextureEntry>,
+}
+
+/// `source/materials.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SourceMaterialsFile {
+    /// Always `mateval/2`.
+    pub format: String,
+    /// In the order of `materials` of `reference.json`.
+    pub materials: Vec<Material>,
+    /// The textures of these materials, in `source/textures/`.
     pub textures: Vec<TextureEntry>,
 }
 
@@ -112,7 +125,7 @@ impl From<WrapWord> for Wrap {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LightsFile {
-    /// Always `mateval/1`.
+    /// Always `mateval/2`.
     pub format: String,
     /// The groups of emitters; their surfaces and textures are indices of the lists in `reference.json`.
     pub groups: Vec<LightGroup>,
@@ -121,12 +134,7 @@ pub struct LightsFile {
 /// Writes the scene below the scene's `ground_truth`.
 pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneError> {
     let reference = folder.reference();
-    let textures = reference.join("textures");
-    std::fs::create_dir_all(&textures).map_err(SceneError::io("make", &textures))?;
-    let mut entries = Vec::new();
-    for (index, source) in scene.textures.iter().enumerate() {
-        entries.push(write_texture(&textures, index, source)?);
-    }
+    let textures = write_textures(&reference, &scene.textures)?;
     let nodes: Vec<GlbNode> = scene
         .surfaces
         .iter()
@@ -136,11 +144,42 @@ pub fn write(folder: &SceneFolder, scene: &ReferenceScene) -> Result<(), SceneEr
     glb::write(&reference.join("geometry.glb"), &nodes)?;
     let surfaces = scene.surfaces.iter().map(|s| SurfaceEntry { name: s.name.clone(), material: s.material }).collect();
     let format = FORMAT.to_owned();
-    let file =
-        ReferenceFile { format: format.clone(), surfaces, materials: scene.materials.clone(), textures: entries };
+    let file = ReferenceFile { format: format.clone(), surfaces, materials: scene.materials.clone(), textures };
     json::write(&reference.join("reference.json"), &file)?;
     json::write(&folder.lights(), &LightsFile { format, groups: scene.lights.clone() })
 }
+
+/// Writes the source's own materials below the reference scene.
+pub fn write_source_materials(folder: &SceneFolder, source: &SourceMaterials) -> Result<(), SceneError> {
+    let place = folder.source_materials();
+    let textures = write_textures(&place, &source.textures)?;
+    let file = SourceMaterialsFile { format: FORMAT.to_owned(), materials: source.materials.clone(), textures };
+    json::write(&place.join(SOURCE_MATERIALS), &file)
+}
+
+/// Reads the files of [`write_source_materials`]; none where the scene has none. Every index out of range is a finding of
+/// the error; `count` is the number of the scene's materials.
+pub fn read_source_materials(folder: &SceneFolder, count: usize) -> Result<Option<SourceMaterials>, SceneError> {
+    let place = folder.source_materials();
+    let path = place.join(SOURCE_MATERIALS);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let file: SourceMaterialsFile = json::read_format(&path, FORMAT)?;
+    let mut faults = Faults(Vec::new());
+    if file.materials.len() != count {
+        faults.add(SOURCE_MATERIALS, "/materials", format!("{} materials, expected {count}", file.materials.len()));
+    }
+    faults.check_materials(SOURCE_MATERIALS, &file.materials, &file.textures);
+    if !faults.0.is_empty() {
+        return Err(SceneError::Invalid { path, findings: faults.0 });
+    }
+    let textures = read_textures(&place, &file.textures)?;
+    Ok(Some(SourceMaterials { materials: file.materials, textures }))
+}
+
+/// The name of the file of the source's own materials.
+pub const SOURCE_MATERIALS: &str = "materials.json";
 
 /// Reads the files of [`write()`]. Every index out of range is a finding of the error.
 pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
@@ -153,8 +192,7 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
     if !faults.is_empty() {
         return Err(SceneError::Invalid { path, findings: faults });
     }
-    let textures =
-        file.textures.iter().map(|entry| read_texture_entry(&reference, entry)).collect::<Result<Vec<_>, _>>()?;
+    let textures = read_textures(&reference, &file.textures)?;
     let surfaces = file
         .surfaces
         .into_iter()
@@ -162,6 +200,17 @@ pub fn read(folder: &SceneFolder) -> Result<ReferenceScene, SceneError> {
         .map(|(entry, node)| Surface { name: entry.name, mesh: node.mesh, material: entry.material })
         .collect();
     Ok(ReferenceScene { surfaces, materials: file.materials, textures, lights: lights.groups })
+}
+
+/// Writes textures to the folder `textures` in `place`, which is made.
+fn write_textures(place: &Path, textures: &[SourceTexture]) -> Result<Vec<TextureEntry>, SceneError> {
+    let folder = place.join("textures");
+    std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
+    textures.iter().enumerate().map(|(index, source)| write_texture(&folder, index, source)).collect()
+}
+
+fn read_textures(place: &Path, entries: &[TextureEntry]) -> Result<Vec<SourceTexture>, SceneError> {
+    entries.iter().map(|entry| read_texture_entry(place, entry)).collect()
 }
 
 fn write_texture(folder: &Path, index: usize, source: &SourceTexture) -> Result<TextureEntry, SceneError> {
@@ -215,41 +264,60 @@ fn read_texture_entry(reference: &Path, entry: &TextureEntry) -> Result<SourceTe
     Ok(SourceTexture { name: entry.source.clone(), sha256: entry.source_sha256.clone(), texture })
 }
 
-/// Every index out of range, and every file name that leads out of `textures/`.
-fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Finding> {
-    let mut faults = Vec::new();
-    let mut fault = |file: &str, place: String, message: String| {
-        faults.push(Finding {
+/// References that lead nowhere.
+struct Faults(Vec<Finding>);
+
+impl Faults {
+    fn add(&mut self, file: &str, place: impl Into<String>, message: String) {
+        self.0.push(Finding {
             severity: Severity::Error,
             code: "dangling_reference".to_owned(),
             file: file.to_owned(),
-            place,
+            place: place.into(),
             message,
             action: "fetch or build the dataset again".to_owned(),
         });
-    };
-    if file.surfaces.len() != nodes {
-        fault("reference.json", "/surfaces".to_owned(), format!("{} surfaces, {nodes} nodes", file.surfaces.len()));
     }
-    for (at, surface) in file.surfaces.iter().enumerate() {
-        if surface.material.0 >= file.materials.len() {
-            fault("reference.json", format!("/surfaces/{at}/material"), format!("no material {}", surface.material.0));
+
+    /// Adds every texture's file name that leads out of `textures/`, and every index of a texture out of range.
+    fn check_materials(&mut self, file: &str, materials: &[Material], textures: &[TextureEntry]) {
+        for (at, texture) in textures.iter().enumerate() {
+            let mut parts = Path::new(&texture.file).components();
+            if !matches!((parts.next(), parts.next()), (Some(std::path::Component::Normal(_)), None)) {
+                self.add(file, format!("/textures/{at}/file"), format!("'{}' is not a file name", texture.file));
+            }
         }
-    }
-    for (at, texture) in file.textures.iter().enumerate() {
-        let mut parts = Path::new(&texture.file).components();
-        if !matches!((parts.next(), parts.next()), (Some(std::path::Component::Normal(_)), None)) {
-            fault("reference.json", format!("/textures/{at}/file"), format!("'{}' is not a file name", texture.file));
-        }
-    }
-    for (at, material) in file.materials.iter().enumerate() {
-        for Lookup { texture, channel, .. } in material.lookups() {
-            if texture.0 >= file.textures.len() || channel > 2 {
-                let message = format!("no channel {channel} of texture {}", texture.0);
-                fault("reference.json", format!("/materials/{at}"), message);
+        for (at, material) in materials.iter().enumerate() {
+            for Lookup { texture, channel, .. } in material.lookups() {
+                if texture.0 >= textures.len() || channel > 2 {
+                    let message = format!("no channel {channel} of texture {}", texture.0);
+                    self.add(file, format!("/materials/{at}"), message);
+                }
             }
         }
     }
+}
+
+/// Every index out of range, and every file name that leads out of `textures/`.
+fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Finding> {
+    let mut faults = Faults(Vec::new());
+    if file.surfaces.len() != nodes {
+        faults.add(
+            "reference.json",
+            "/surfaces".to_owned(),
+            format!("{} surfaces, {nodes} nodes", file.surfaces.len()),
+        );
+    }
+    for (at, surface) in file.surfaces.iter().enumerate() {
+        if surface.material.0 >= file.materials.len() {
+            faults.add(
+                "reference.json",
+                format!("/surfaces/{at}/material"),
+                format!("no material {}", surface.material.0),
+            );
+        }
+    }
+    faults.check_materials("reference.json", &file.materials, &file.textures);
     for (at, group) in lights.groups.iter().enumerate() {
         let sound = match &group.emission {
             Emission::Area { surfaces, map, .. } => {
@@ -260,10 +328,10 @@ fn dangling(file: &ReferenceFile, lights: &LightsFile, nodes: usize) -> Vec<Find
             Emission::Constant { .. } => true,
         };
         if !sound {
-            fault("lights.json", format!("/groups/{at}"), "a surface or texture that does not exist".to_owned());
+            faults.add("lights.json", format!("/groups/{at}"), "a surface or texture that does not exist".to_owned());
         }
     }
-    faults
+    faults.0
 }
 
 #[cfg(test)]

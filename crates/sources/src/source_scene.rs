@@ -37,6 +37,10 @@ pub struct SourceScene {
     pub kind: SourceKind,
     /// Whether the source describes the scene's lights.
     pub lights: SceneLights,
+    /// Whether the source states the roughness of its materials; otherwise it is a constant of the reader.
+    pub states_roughness: bool,
+    /// Whether the source states which materials are metallic; otherwise none is.
+    pub states_metallic: bool,
     /// The house; scenes with the same house are not independent of each other.
     pub house: String,
     /// The file that findings refer to by default.

@@ -150,7 +150,8 @@ fn default_of(map: Map) -> Texture {
     })
 }
 
-fn one_texel(value: f32) -> Texture {
+/// A texture of one value everywhere.
+pub fn one_texel(value: f32) -> Texture {
     Texture::new(1, 1, Texels::Grey(vec![value]), Wrap::Clamp).expect("one texel is what one pixel needs")
 }
 
@@ -161,7 +162,8 @@ pub fn compact_texture(file: MapFile, map: Map) -> Texture {
     if map != Map::BaseColor && texture.width() == 1 { one_texel(texture.texel(0, 0)[0]) } else { texture }
 }
 
-fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
+/// The value of [`PredictedScene::scattering_key`] for these materials.
+pub fn scattering_key(materials: &[Option<PredictedMaterial>]) -> String {
     let mut text = String::new();
     for material in materials {
         for texture in material.iter().flat_map(|material| [&material.roughness, &material.metallic]) {
@@ -193,8 +195,9 @@ mod tests {
                    "atlas": atlas})
         };
         serde_json::from_value(json!({
-            "format": "mateval/1", "id": "s", "source": {"kind": "bitterli", "house": "s", "files": []},
-            "lights": "own", "exposure": 1.0,
+            "format": "mateval/2", "id": "s", "source": {"kind": "bitterli", "house": "s", "states_roughness": true,
+                       "states_metallic": true, "files": []},
+            "lights": "own", "materials": "converted", "exposure": 1.0,
             "views": [], "instances": [instance("a", 1, true), instance("pane", 2, false), instance("b", 3, true)],
             "parts": [], "part_sets": [], "findings": [],
         }))

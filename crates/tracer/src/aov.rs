@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3, Vec2, Vec3};
 use mateval_scene::Camera;
 use mateval_scene::reference::SurfaceIndex;
 
+use crate::accel::Hit;
 use crate::ray::Ray;
 use crate::world::World;
 
@@ -16,28 +17,25 @@ pub const COARSE_SUBPIXELS: usize = SUBPIXELS / 4;
 /// Where no value of the coarse sub-pixels differs by more than this from another, their mean is the pixel's.
 pub const FLAT_RANGE: f32 = 1.0 / 512.0;
 
-/// The points at which pixel (x, y) is sampled, the same for truth and prediction: the centres of a regular 8x8 grid. The
-/// first [`COARSE_SUBPIXELS`] are one of each 2x2 of them, and about the pixel's centre like all.
-pub fn subpixels(x: usize, y: usize) -> [DVec2; SUBPIXELS] {
+/// The point at which sub-pixel `index` of pixel (x, y) is sampled, the same for truth and prediction: the centres of a
+/// regular 8x8 grid. The first [`COARSE_SUBPIXELS`] are one of each 2x2 of them, and about the pixel's centre like all.
+pub fn subpixel(x: usize, y: usize, index: usize) -> DVec2 {
     /// The four places of a block, in turn.
     const IN_BLOCK: [[usize; 2]; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
     const BLOCKS_A_SIDE: usize = SUBPIXELS_A_SIDE / 2;
-    std::array::from_fn(|index| {
-        let (block, turn) = match index.checked_sub(COARSE_SUBPIXELS) {
-            None => (index, 0),
-            Some(rest) => (rest / 3, 1 + rest % 3),
-        };
-        let (column, row) = (block % BLOCKS_A_SIDE, block / BLOCKS_A_SIDE);
-        let [right, down] = IN_BLOCK[(column + 2 * row + turn) % 4];
-        let step = |block: usize, offset: usize| ((2 * block + offset) as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
-        DVec2::new(x as f64 + step(column, right), y as f64 + step(row, down))
-    })
+    let (block, turn) = match index.checked_sub(COARSE_SUBPIXELS) {
+        None => (index, 0),
+        Some(rest) => (rest / 3, 1 + rest % 3),
+    };
+    let (column, row) = (block % BLOCKS_A_SIDE, block / BLOCKS_A_SIDE);
+    let [right, down] = IN_BLOCK[(column + 2 * row + turn) % 4];
+    let step = |block: usize, offset: usize| ((2 * block + offset) as f64 + 0.5) / SUBPIXELS_A_SIDE as f64;
+    DVec2::new(x as f64 + step(column, right), y as f64 + step(row, down))
 }
 
 /// The coarse points at which pixel (x, y) is sampled.
 pub fn coarse_subpixels(x: usize, y: usize) -> [DVec2; COARSE_SUBPIXELS] {
-    let all = subpixels(x, y);
-    std::array::from_fn(|index| all[index])
+    std::array::from_fn(|index| subpixel(x, y, index))
 }
 
 /// The mean of what a pixel shows.
@@ -98,6 +96,11 @@ impl PixelHit {
         let [a, b, c] = triangles[self.triangle].map(|vertex| values[vertex as usize]);
         a * self.barycentrics.x + b * self.barycentrics.y + c * self.barycentrics.z
     }
+}
+
+/// The first hit behind `pixel`, or `None`, as [`hit_through`] finds it, without depth and normal.
+pub fn place_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Hit> {
+    world.first_hit(&Ray::endless(camera.position().as_vec3(), camera.direction(pixel).as_vec3()))
 }
 
 /// The first hit behind `pixel`, or `None`. Masked-out texels (opacity below one half) do not count as hits, glass
@@ -218,7 +221,7 @@ mod tests {
     #[test]
     fn subpixels_lie_in_the_pixel_and_about_its_centre() {
         let mean = |places: &[DVec2]| places.iter().sum::<DVec2>() / places.len() as f64;
-        let places = subpixels(3, 7);
+        let places: [DVec2; SUBPIXELS] = std::array::from_fn(|index| subpixel(3, 7, index));
         assert_eq!(mean(&places), DVec2::new(3.5, 7.5));
         assert_eq!(mean(&coarse_subpixels(3, 7)), DVec2::new(3.5, 7.5));
         let mut cells = places.map(|p| ((p - DVec2::new(3.0, 7.0)) * 8.0).floor().as_u64vec2().to_array());

@@ -46,7 +46,7 @@ pub use error::{ExceededLimit, LightFault, MaterialFault, RequestFault, SceneFau
 pub use light_basis::{LightBasis, LightGroups};
 pub use ray::Ray;
 pub use render::{Render, RenderStats, render};
-pub use repaint::{Coat, Repaint, render_repainted};
+pub use repaint::{Coat, Repaint, Scattering, render_repainted};
 pub use sampler::Sampler;
 pub use settings::{LightSampling, RenderSettings};
 pub use shared_centre::{HalfLight, LightMix, Lighting, ViewLight, ViewsRender, render_views};

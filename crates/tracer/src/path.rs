@@ -262,7 +262,7 @@ fn sample_continuation<const K: usize>(
         }
         path.throughputs = path.throughputs.map(|throughput| throughput / settings.roulette_survival);
     }
-    // Sample a direction; the weights of stage lights leave out smooth facets.
+    // Sample a direction; the weights of stage lights leave out highlights.
     let sample = bsdf.sample([a, b, c])?;
     if world.emitters().are_on_stage() {
         let weights = bsdf.stage_weights(&sample);

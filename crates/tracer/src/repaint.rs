@@ -2,7 +2,8 @@
 //!
 //! Geometry, opacities, lights and surfaces without an atlas (glass) stay as they are in the world. The decisions along
 //! a path depend on roughness and metallic but never on base colour, so predictions that differ in base colour alone
-//! share their paths.
+//! share their paths. Predictions of two pairs of roughness and metallic share paths too, at the price of some noise: the
+//! directions come from both ([`Repaint::with_second`]).
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -35,17 +36,37 @@ pub struct Coat {
     pub metallic: Texture,
 }
 
+/// The maps of one surface that decide in which directions light scatters.
+#[derive(Clone, Debug)]
+pub struct Scattering {
+    /// Perceptual roughness, in the first channel.
+    pub roughness: Texture,
+    /// Metallic, in the first channel.
+    pub metallic: Texture,
+}
+
 /// Predictions for the surfaces of a world.
 #[derive(Debug)]
 pub struct Repaint {
     /// One per surface; `None` keeps the world's own material.
     coats: Vec<Option<Coat>>,
+    second: Option<SecondScattering>,
+    /// Factors of the base colours, one per prediction.
+    scales: Vec<f32>,
     /// The atlas uvs of all triangles of the world, surface by surface.
     uvs: Vec<[Vec2; 3]>,
     predictions: usize,
     flavour: PrincipledFlavour,
     eta: f32,
     tables: BlenderTables,
+}
+
+/// Roughness and metallic of the predictions from number `from` on.
+#[derive(Debug)]
+struct SecondScattering {
+    from: usize,
+    /// One per surface; some where the surface has a coat.
+    of_surface: Vec<Option<Scattering>>,
 }
 
 /// A world's surfaces with predicted materials. The variants are the predictions from `first` on.
@@ -55,6 +76,9 @@ struct Painted<'w> {
     repaint: &'w Repaint,
     first: usize,
 }
+
+/// The largest number of predictions that share one set of paths.
+pub const MOST_PREDICTIONS_AT_ONCE: usize = MOST_VARIANTS;
 
 /// Disney's `specular` of predictions, an index of refraction of 1.5.
 pub const SPECULAR: f32 = 0.5;
@@ -74,7 +98,30 @@ impl Repaint {
         let predictions = check_coats(&world.scene().surfaces, atlases, &coats)?;
         let uvs = atlases.iter().flat_map(corner_uvs).collect();
         let eta = eta_from_specular(SPECULAR);
-        Ok(Self { coats, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
+        let (second, scales) = (None, vec![1.0; predictions]);
+        Ok(Self { coats, second, scales, uvs, predictions, flavour, eta, tables: BlenderTables::new(eta) })
+    }
+
+    /// The same, with the base colours of each prediction multiplied by its entry of `scales`, each from 0 to 1. Fails
+    /// unless there is one for each prediction.
+    pub fn with_scales(self, scales: Vec<f32>) -> Result<Self, TracerError> {
+        let (found, expected) = (scales.len(), self.predictions);
+        if found != expected || !scales.iter().all(|scale| (0.0..=1.0).contains(scale)) {
+            return Err(RequestFault::Scales { found, expected }.into());
+        }
+        Ok(Self { scales, ..self })
+    }
+
+    /// The same, but predictions from number `from` on have the roughness and metallic of `of_surface`, which holds one
+    /// entry per surface. Directions are sampled from both densities in equal parts, for all predictions.
+    ///
+    /// Fails unless exactly the surfaces with a coat have an entry.
+    pub fn with_second(self, from: usize, of_surface: Vec<Option<Scattering>>) -> Result<Self, TracerError> {
+        let coated = |coats: &[Option<Coat>]| coats.iter().map(Option::is_some).collect::<Vec<_>>();
+        if coated(&self.coats) != of_surface.iter().map(Option::is_some).collect::<Vec<_>>() {
+            return Err(RequestFault::SecondScattering.into());
+        }
+        Ok(Self { second: Some(SecondScattering { from, of_surface }), ..self })
     }
 
     /// The number of predictions.
@@ -82,22 +129,25 @@ impl Repaint {
         self.predictions
     }
 
-    /// The principled material of a coat at `uv`, and the base colours of predictions `first..first + K` there.
-    /// Predictions beyond the last repeat it.
-    fn look_up<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> (Principled<'_>, [Vec3; K]) {
+    /// The base colours of a coat at `uv`, of predictions `first..first + K`. Predictions beyond the last repeat it.
+    fn base_colors<const K: usize>(&self, coat: &Coat, first: usize, uv: Vec2) -> [Vec3; K] {
+        from_fn(|k| {
+            let which = (first + k).min(self.predictions - 1);
+            let color = Vec3::from_array(coat.base_colors[which].sample(uv.to_array()));
+            color.clamp(Vec3::ZERO, Vec3::ONE) * self.scales[which]
+        })
+    }
+
+    /// The material of `base_color` with these maps at `uv`.
+    fn principled(&self, base_color: Vec3, [roughness, metallic]: [&Texture; 2], uv: Vec2) -> Principled<'_> {
         let scalar = |texture: &Texture| texture.sample(uv.to_array())[0].clamp(0.0, 1.0);
-        let base_colors: [Vec3; K] = from_fn(|k| {
-            let texture = &coat.base_colors[(first + k).min(self.predictions - 1)];
-            Vec3::from_array(texture.sample(uv.to_array())).clamp(Vec3::ZERO, Vec3::ONE)
-        });
-        let principled = Principled {
-            base_color: base_colors[0],
-            roughness: scalar(&coat.roughness),
-            metallic: scalar(&coat.metallic),
+        Principled {
+            base_color,
+            roughness: scalar(roughness),
+            metallic: scalar(metallic),
             eta: self.eta,
             style: Principled::style(self.flavour, Some(&self.tables)),
-        };
-        (principled, base_colors)
+        }
     }
 }
 
@@ -121,8 +171,14 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
 
     fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3) -> Bsdf<'w, K> {
         let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
-        let (principled, base_colors) = self.repaint.look_up(coat, self.first, uv);
-        Bsdf::of_principled(principled, &base_colors, place, wo)
+        let base_colors = self.repaint.base_colors(coat, self.first, uv);
+        let principled = |maps| self.repaint.principled(base_colors[0], maps, uv);
+        let second = self.repaint.second.as_ref().and_then(|second| {
+            let Scattering { roughness, metallic } = second.of_surface[place.surface.0].as_ref()?;
+            Some((principled([roughness, metallic]), second.from.saturating_sub(self.first)))
+        });
+        let first = principled([&coat.roughness, &coat.metallic]);
+        Bsdf::of_principled(first, second, &base_colors, place, wo)
     }
 }
 

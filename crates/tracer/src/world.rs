@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
 use crate::bsdf::{Bsdf, MaterialTables};
-use crate::emitter::{Emitters, StageLight};
+use crate::emitter::{Emitters, StageLight, escape_share};
 use crate::error::{SceneFault, SurfaceFault, TracerError};
 use crate::ray::Ray;
 use crate::sampler::unit_hash;
@@ -73,7 +73,7 @@ impl World {
                 (0..mesh.triangles.len()).map(move |triangle| TriangleRecord::new(mesh, TriangleIndex(triangle), size))
             })
             .collect();
-        Ok(Self {
+        let mut world = Self {
             records: Arc::new(on_huge_pages(records)),
             lookups: Arc::new(scene.materials.iter().map(Material::lookups).collect()),
             emitters: Emitters::new(&scene, &textures, size)?,
@@ -82,7 +82,13 @@ impl World {
             textures,
             scene,
             accel,
-        })
+        };
+        // Divide light samples between lamps and sky by how much of the sky reaches the places that lamps light.
+        if world.emitters.are_near_and_distant() {
+            let escaping = escape_share(&world.emitters, |from, direction| world.first_behind_glass(from, direction));
+            world.emitters.share_between(escaping);
+        }
+        Ok(world)
     }
 
     /// The same surfaces and materials, lit only by stage lights: the scene's own lamps no longer emit. Light group k
@@ -128,6 +134,20 @@ impl World {
             return self.accel.closest(ray);
         }
         self.accel.closest_where(ray, |hit| self.opacity(hit) >= CUT_OUT_BELOW_OPACITY)
+    }
+
+    /// The first surface along a direction that is not glass.
+    fn first_behind_glass(&self, from: &SurfaceHit, direction: Vec3) -> Option<SurfaceHit> {
+        /// Panes behind one another; after so many, glass counts as any surface.
+        const MOST_PANES: usize = 16;
+        let mut met = self.surface_hit(&self.first_hit(&from.spawn(direction))?);
+        for _ in 0..MOST_PANES {
+            if self.material_of(met.surface).has_appearance() {
+                break;
+            }
+            met = self.surface_hit(&self.first_hit(&met.spawn(direction))?);
+        }
+        Some(met)
     }
 
     /// Whether the nearest surface that is not wholly transparent is not wholly opaque either.

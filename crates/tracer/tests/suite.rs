@@ -4,6 +4,7 @@
 mod suite {
     mod bench_room;
     mod closed_forms;
+    mod escaping;
     mod estimators;
     mod light_basis;
     mod mapped_lamps;

@@ -4,8 +4,8 @@
 //! that holds it and a page with both pictures side by side.
 //!
 //! Between: `theirs` reads Blender's pictures and `ours` renders; `geometry` compares pictures without light, and `light`
-//! compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `previews` and
-//! `page` show the result.
+//! compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `source` compares
+//! converted materials with the source's own. `previews` and `page` show the result.
 
 pub mod bounds;
 pub mod file;
@@ -15,6 +15,7 @@ mod light;
 mod ours;
 mod page;
 mod previews;
+mod source;
 #[cfg(test)]
 mod tests;
 pub mod text;
@@ -167,6 +168,7 @@ fn compare_scene(
         false => ours::render(&world, &scene.id, &compared, samples, progress)?,
     }
     .into_iter();
+    let first_rgb = ours.as_slice().first().map(|light| light.rgb.clone());
     let (mut views, mut previews) = (Vec::new(), Vec::new());
     let step = format!("{} compare", scene.id);
     for (at, view) in scene.views.iter().enumerate() {
@@ -183,10 +185,25 @@ fn compare_scene(
         previews.extend(shown);
     }
     progress(&step, scene.views.len(), scene.views.len());
+    let source_materials = match (compared.first(), first_rgb) {
+        (Some(view), Some(rgb)) => {
+            let against =
+                source::Converted { folder, scene, view, world: &world, rgb: &rgb, kinds: &kinds, tile_bound };
+            against.compare(samples, progress)?
+        }
+        _ => None,
+    };
     let seeds = ours::seeds(&scene.id).map(|seed| format!("{seed:016x}"));
     let kinds = kinds.into_iter().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
-    let found =
-        SceneComparison { scene: scene.id.clone(), kinds, tile_bound, samples_each_half: samples, seeds, views };
+    let found = SceneComparison {
+        scene: scene.id.clone(),
+        kinds,
+        tile_bound,
+        samples_each_half: samples,
+        seeds,
+        source_materials,
+        views,
+    };
     Ok((found, previews))
 }
 

@@ -29,6 +29,7 @@ pub(super) fn page(file: &CompareFile, previews: &[Vec<ViewPreviews>]) -> String
             context! {
                 scene => scene.scene.as_str(), kinds, views,
                 tile_bound => 100.0 * scene.tile_bound, samples => scene.samples_each_half,
+                source => scene.source_materials.as_ref().map(text::source_sentence),
             }
         })
         .collect();

@@ -2,11 +2,14 @@
 
 use mateval_scene::text_table::{Table, row};
 
-use super::file::{Check, CompareFile, LightComparison, Quantity, SceneComparison, State, ViewComparison};
+use super::file::{
+    Check, CompareFile, LightComparison, Quantity, SceneComparison, SourceComparison, State, ViewComparison,
+};
 
 /// The tables, then every check that does not agree, then the verdict.
 pub fn text(file: &CompareFile) -> String {
-    let tables = [geometry(file), light(file), apart(file)].map(|table| table.text()).join("\n");
+    let tables =
+        [geometry(file), light(file), apart(file), source_materials(file)].map(|table| table.text()).join("\n");
     let faults: String = faults(file).iter().map(|fault| format!("{fault}\n")).collect();
     let gap = if faults.is_empty() { "" } else { "\n" };
     format!("{tables}{gap}{faults}\n{}\n", verdict(file))
@@ -143,6 +146,36 @@ fn apart(file: &CompareFile) -> Table {
         words: 3,
         rows,
     }
+}
+
+/// The same for one scene in one sentence.
+pub(super) fn source_sentence(source: &SourceComparison) -> String {
+    let psnr = source.psnr_db.map_or_else(|| "no error above the noise".to_owned(), |db| format!("{db:.1} dB"));
+    let mean = source.light.mean.and_then(|mean| mean.difference);
+    let mean = mean.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
+    format!("The source's own materials against the converted ones in {}: {psnr}, mean off {mean}", source.view)
+}
+
+/// How far the converted materials are from the source's own.
+fn source_materials(file: &CompareFile) -> Table {
+    let mut rows = vec![row(["scene", "view", "PSNR", "mean off", "tiles", "over", "median", "worst"])];
+    for scene in &file.scenes {
+        let Some(source) = &scene.source_materials else { continue };
+        let signed = |off: Option<f64>| off.map_or_else(|| "none".to_owned(), |off| format!("{:+.2} %", 100.0 * off));
+        let tiles = &source.light.tiles;
+        rows.push(row([
+            scene.scene.as_str(),
+            source.view.as_str(),
+            &source.psnr_db.map_or_else(|| "none".to_owned(), |db| format!("{db:.1} dB")),
+            &signed(source.light.mean.and_then(|mean| mean.difference)),
+            &tiles.count.to_string(),
+            &tiles.over.to_string(),
+            &percent(tiles.median),
+            &signed(tiles.worst.and_then(|worst| worst.off.difference)),
+        ]));
+    }
+    let title = "The source's own materials against the converted ones, both by the built-in tracer; no check";
+    Table { title: title.to_owned(), words: 2, rows }
 }
 
 fn percent(share: Option<f64>) -> String {

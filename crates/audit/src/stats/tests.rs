@@ -1,6 +1,6 @@
 //! Counts of hand-made scenes, properties of totals, and charts with untrusted names.
 
-use mateval_scene::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile};
+use mateval_scene::dataset::{Atlas, DatasetFile, FORMAT, SceneSource, TargetsFile, TrueMaterials};
 use mateval_scene::{InstanceId, InstanceIndex, SceneLights};
 use proptest::prelude::*;
 
@@ -29,8 +29,15 @@ fn scene(id: &str, kind: SourceKind, house: &str, things: &[Thing<'_>]) -> Scene
     SceneFile {
         format: FORMAT.to_owned(),
         id: SceneId::new(id).unwrap(),
-        source: SceneSource { kind, house: house.to_owned(), files: Vec::new() },
+        source: SceneSource {
+            kind,
+            house: house.to_owned(),
+            states_roughness: true,
+            states_metallic: true,
+            files: Vec::new(),
+        },
         lights: SceneLights::Own,
+        materials: TrueMaterials::Converted,
         exposure: 1.0,
         views: Vec::new(),
         instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),

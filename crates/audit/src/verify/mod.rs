@@ -111,6 +111,18 @@ fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
     }
 }
 
+/// Checks the source's own materials, where there are any. `count` is the number of the scene's materials.
+fn check_source_materials(folder: &SceneFolder, count: usize, faults: &mut Faults) {
+    if folder.source_materials().join(reference_io::SOURCE_MATERIALS).exists() {
+        schema::check::<reference_io::SourceMaterialsFile>(
+            &folder.source_materials(),
+            reference_io::SOURCE_MATERIALS,
+            faults,
+        );
+    }
+    faults.read("ground_truth/reference/source", reference_io::read_source_materials(folder, count));
+}
+
 fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
     schema::check::<SceneFile>(folder.path(), "scene.json", faults);
     let Some(scene) = read_json::<SceneFile>("scene.json", &folder.scene_file(), faults) else { return };
@@ -124,6 +136,7 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
             schema::check::<reference_io::ReferenceFile>(&folder.reference(), "reference.json", faults);
             schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
             let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
+            check_source_materials(folder, reference.materials.len(), faults);
             geometry::check_materials(folder, &scene, faults);
             if !geometry::matches_reference(&reference, &meshes, faults) {
                 return;

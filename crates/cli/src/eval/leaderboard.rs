@@ -19,11 +19,14 @@ pub struct LeaderboardArgs {
     /// RESULT.json files. One is marked as verified if RESULT.verified.json, written by `eval verify`, lies beside it.
     #[arg(required = true, value_name = "RESULT.json")]
     results: Vec<PathBuf>,
+    /// RESULT.json of the truth itself (`mateval baseline gt`), shown below the methods as the ceiling of each column.
+    #[arg(long, value_name = "RESULT.json")]
+    ceiling: Option<PathBuf>,
     /// Folder of the site; its index.html opens from the disk.
     #[arg(long)]
     out: PathBuf,
     /// Protocol whose scores are ranked.
-    #[arg(long, default_value = "mateval-1")]
+    #[arg(long, default_value = "mateval-2")]
     protocol: String,
     /// Accept results that lack scenes, and rank each on the scenes that it covers; they are marked.
     #[arg(long)]
@@ -67,12 +70,14 @@ pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
             sidecar.display()
         ));
     }
+    let ceiling = args.ceiling.as_deref().map(ResultFile::read).transpose()?;
     let dataset = args.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
     if let Some(pictures) = args.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
         bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
     }
     let plan = LeaderboardPlan {
         results: &results,
+        ceiling: ceiling.as_ref(),
         verified: marks,
         protocol: &args.protocol,
         partial: args.partial,

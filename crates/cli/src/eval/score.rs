@@ -32,7 +32,7 @@ pub struct ScoreArgs {
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
     /// Protocol to score under; may be given several times.
-    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-1"])]
+    #[arg(long = "protocol", value_name = "PROTOCOL", default_values = ["mateval-2"])]
     protocols: Vec<String>,
     /// Number of scenes that are scored at once. More take more memory and leave fewer threads idle.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
@@ -57,6 +57,7 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let opened = args.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
     let cache = args.cache.clone().unwrap_or_else(|| cache_beside(&args.out));
     std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
+    let companions = weights::cache_folder().join("companions");
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: opened.iter().map(Opened::root).collect(),
@@ -66,6 +67,7 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         tool: TOOL.to_owned(),
         jobs: usize::from(args.jobs),
         cache: Some(&cache),
+        companion_cache: Some(&companions),
     };
     let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
     for (result, out) in results.iter().zip(&outs) {

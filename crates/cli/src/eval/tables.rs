@@ -13,8 +13,11 @@ pub struct TablesArgs {
     /// RESULT.json files.
     #[arg(required = true, value_name = "RESULT.json")]
     results: Vec<PathBuf>,
+    /// RESULT.json of the truth itself (`mateval baseline gt`), shown in the last row as the ceiling of each column.
+    #[arg(long, value_name = "RESULT.json")]
+    ceiling: Option<PathBuf>,
     /// Protocol whose scores are shown.
-    #[arg(long, default_value = "mateval-1")]
+    #[arg(long, default_value = "mateval-2")]
     protocol: String,
     /// Format of the tables.
     #[arg(long, value_enum, default_value = "markdown")]
@@ -53,8 +56,9 @@ pub fn run(args: &TablesArgs) -> anyhow::Result<Outcome> {
         Some(GroupName::Category) => Grouping::Category,
         Some(GroupName::SuperCategory) => Grouping::SuperCategory,
     };
-    print(&tables(&results, &args.protocol, grouping, format)?)?;
-    for result in &results {
+    let ceiling = args.ceiling.as_deref().map(ResultFile::read).transpose()?;
+    print(&tables(&results, ceiling.as_ref(), &args.protocol, grouping, format)?)?;
+    for result in results.iter().chain(&ceiling) {
         for missing in &result.missing {
             say(&format!(
                 "warning: '{}': {} is missing: {}; run: {}",

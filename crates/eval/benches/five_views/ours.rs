@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_image::{LinearRgb, Picture};
-use mateval_light::light_fit::fit_lights;
+use mateval_light::light_fit::{FitTarget, fit_lights};
 use mateval_light::rules::FitRules;
 use mateval_scene::Camera;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
@@ -41,7 +41,8 @@ pub fn run(world: &World, folder: &Path, input: Camera, cameras: &[Camera], roun
     let mut stages = vec![stage];
     let photo = photo(folder);
     let (fit, stage) = Stage::measure("fit", 0, || {
-        fit_lights(&FitRules::default(), &stream_c[0].halves[0].basis, &photo, None).unwrap()
+        let target = FitTarget { photo: &photo, mask: None, exposure: 1.0 };
+        fit_lights(&FitRules::default(), &stream_c[0].halves[0].basis, &target).unwrap()
     });
     stages.push(stage);
     let mut errors: Vec<f64> = fit.weights.iter().flatten().map(|weight| (weight - 1.0).abs()).collect();

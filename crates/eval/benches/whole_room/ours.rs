@@ -30,6 +30,7 @@ pub fn score(room: &Room) -> (Run, ResultFile) {
         tool: "whole_room".to_owned(),
         jobs: 1,
         cache: None,
+        companion_cache: None,
     };
     let prefix = format!("scene {}: ", room.scene.id);
     let report = |step: &str, done: usize, all: usize| {

@@ -7,7 +7,7 @@ use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::result::ResultFile;
 use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
-use mateval_metrics::{Halves, NoiseFreeMse, noise_free_mse, psnr_mean_error};
+use mateval_metrics::{Halves, NoiseFreeMse, NoisyHalf, NoisyRender, noise_free_mse, psnr_mean_error};
 use mateval_scene::material::PrincipledFlavour;
 use mateval_tracer::{Coat, LightMix, Lighting, Repaint, StageLight, World, render_repainted};
 
@@ -39,13 +39,13 @@ fn psnr(track: usize, views: Views) -> ResultKey {
 
 /// Samples a pixel and half that the tracks took.
 pub fn samples(scored: &ResultFile) -> [u32; 2] {
-    let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
+    let noise = scored.protocols["mateval-2"].noise.values().next().unwrap();
     [0, 1].map(|track| noise[&psnr(track, Views::Input)].samples)
 }
 
 /// The fitted radiances, light by light.
 pub fn radiances(room: &Room, scored: &ResultFile) -> LightMix {
-    scored.protocols["mateval-1"].fits[&room.scene.id].lights.iter().map(|light| light.radiance).collect()
+    scored.protocols["mateval-2"].fits[&room.scene.id].lights.iter().map(|light| light.radiance).collect()
 }
 
 /// Two independent halves of every view under the lights of track `track` (see [`crate::TRACKS`]) of a world of the
@@ -114,18 +114,20 @@ fn certified(room: &Room, pair: &Pair, masks: &[Mask]) -> f64 {
     let views = noise_free(room, pair, masks);
     let (input, novel) = views.split_at(INPUT_VIEWS);
     let error = |views: &[NoiseFreeMse]| psnr_mean_error(&views.iter().collect::<Vec<_>>());
-    [input, novel].into_iter().filter_map(error).map(|noise| noise.prediction).fold(0.0, f64::max)
+    [input, novel].into_iter().filter_map(error).map(|noise| noise.reference).fold(0.0, f64::max)
 }
 
-/// The pair's error without noise, for each view.
+/// The pair's error without noise, for each view. The pair stands in the place of the reference, whose noise is estimated
+/// from two halves; the error is the same either way.
 fn noise_free(room: &Room, pair: &Pair, masks: &[Mask]) -> Vec<NoiseFreeMse> {
     let exposure = room.scene.exposure as f32;
     let blocks = noise_blocks(&room.protocol.light.noise, &room.cameras());
     let mse = |view: usize| {
         let [a, b] = [0, 1].map(|k| encoded(&pair[k][view], exposure));
         let [truth_a, truth_b] = [0, 1].map(|k| encoded(&room.light[view].halves[k], exposure));
-        let (prediction, truth) = (Halves { a: &a, b: &b }, Halves { a: &truth_a, b: &truth_b });
-        noise_free_mse(prediction, truth, &masks[view], &blocks[view]).unwrap().unwrap()
+        let half = |estimate: Picture<SrgbRgb>| NoisyHalf { noise: estimate.map(|_| SrgbRgb([0.0; 3])), estimate };
+        let truth = NoisyRender { a: half(truth_a), b: half(truth_b), shared: None };
+        noise_free_mse(&truth, Halves { a: &a, b: &b }, &masks[view], &blocks[view]).unwrap().unwrap()
     };
     (0..masks.len()).map(mse).collect()
 }
@@ -145,7 +147,7 @@ pub fn plain_samples(room: &Room, pair: &Pair, masks: &[Mask], samples: u32, sco
     let by_view: Vec<f64> =
         noise_free(room, pair, masks).iter().enumerate().map(|(view, mse)| too_small(view, mse)).collect();
     let (input, novel) = by_view.split_at(INPUT_VIEWS);
-    let noise = scored.protocols["mateval-1"].noise.values().next().unwrap();
+    let noise = scored.protocols["mateval-2"].noise.values().next().unwrap();
     let needed = |(values, views): (&[f64], Views)| {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         mean / noise[&psnr(track, views)].standard_error_db.unwrap()

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use mateval_eval::light_rules::Track;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::truth::{RgbTruth, ViewTruth};
 use mateval_light::light_stage::{self, NamedLight};
@@ -49,7 +50,7 @@ impl Room {
             weights,
             atlases: glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect(),
             predicted: read_scene(submission, &scene),
-            protocol: Protocol::named("mateval-1").unwrap(),
+            protocol: protocol(),
             truths: scene.views.iter().map(truth).collect(),
             light: scene.views.iter().map(light).collect(),
             world,
@@ -85,4 +86,11 @@ impl Room {
         });
         surfaces.flatten().collect()
     }
+}
+
+/// `mateval-2` with the tracks that both tools render.
+fn protocol() -> Protocol {
+    let mut protocol = Protocol::named("mateval-2").unwrap();
+    protocol.light.tracks = vec![Track::True, Track::Fitted];
+    protocol
 }

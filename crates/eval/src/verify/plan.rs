@@ -18,6 +18,8 @@ pub struct VerifyPlan<'a> {
     pub lpips: LpipsWeights,
     /// Name and version of this tool.
     pub tool: String,
+    /// A folder in which the converged pictures of companions are kept between runs.
+    pub companion_cache: Option<&'a Path>,
     /// Number of scenes that are scored at once.
     pub jobs: usize,
 }

@@ -1,6 +1,6 @@
 //! The effect of the paper's mask rule on a strip: most of the frame is black in both pictures and counts as equal.
 
-use mateval_eval::measure::{Measured, albedo_metrics};
+use mateval_eval::measure::{Albedo, AlbedoReference, Measured, albedo_metrics};
 use mateval_eval::metric::Metric;
 use mateval_eval::protocol::{MaskRule, Protocol};
 use mateval_image::{LinearRgb, Mask, Picture};
@@ -37,8 +37,9 @@ fn strips(columns: usize) -> [Mask; 2] {
 }
 
 fn measured(rule: MaskRule, mask: &Mask, lpips: Option<&Lpips>) -> Vec<Measured> {
-    let protocol = Protocol { mask_rule: rule, ..Protocol::named("mateval-1").unwrap() };
-    albedo_metrics(&protocol, lpips, &prediction(), &reference(), mask).unwrap()
+    let protocol = Protocol { mask_rule: rule, ..Protocol::named("mateval-2").unwrap() };
+    let (prediction, reference) = (Albedo::new(prediction()), AlbedoReference::new(reference()));
+    albedo_metrics(&protocol, lpips, &prediction, &reference, mask).unwrap()
 }
 
 fn value(measured: &[Measured], metric: Metric) -> Option<f64> {

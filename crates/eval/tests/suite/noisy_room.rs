@@ -1,4 +1,5 @@
-//! The room of the sample, rendered many times with its own materials and with others to be compared with them.
+//! The room of the sample, rendered many times in quarters, with its own materials and with others to be compared with
+//! them.
 //!
 //! All materials are rendered with every seed. Seeds form pairs: a prediction is compared with the truth of the other
 //! seed of its pair, so that they share no noise, and pairs are independent of each other.
@@ -7,9 +8,10 @@ use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::noise_blocks::noise_blocks;
+use mateval_eval::rgb::encode_noisy;
 use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, Texels, Texture};
-use mateval_metrics::Halves;
+use mateval_metrics::{Halves, NoisyHalf, NoisyRender};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
 use mateval_submission::prediction::{PredictedMaterial, read_scene};
 use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
@@ -38,6 +40,9 @@ const VIEWS: usize = 3;
 /// Two independent renders of one view.
 pub type Pair = [Picture<LinearRgb>; 2];
 
+/// Four independent renders of one view: the quarters of two halves.
+pub type Quarters = [Picture<LinearRgb>; 4];
+
 /// The room under its own lights.
 pub struct Room {
     cameras: Vec<Camera>,
@@ -54,7 +59,7 @@ pub struct Level {
     /// A pixel of each half.
     pub samples: u32,
     /// By prediction (the truth is the first), view and seed.
-    pub pairs: Vec<Vec<Vec<Pair>>>,
+    pub renders: Vec<Vec<Vec<Quarters>>>,
 }
 
 pub static ROOM: LazyLock<Room> = LazyLock::new(Room::new);
@@ -64,9 +69,9 @@ pub static LEVELS: LazyLock<[Level; 3]> = LazyLock::new(|| [4, 16, 64].map(|samp
 
 /// By prediction and view, with 2048 samples together. All predictions share one set of paths, so that their
 /// differences have even less noise.
-pub static EXACT: LazyLock<Vec<Vec<Pair>>> = LazyLock::new(|| {
-    let all = ROOM.pictures(0..FACTORS.len(), MANY, 0..2);
-    all.into_iter().map(|views| views.into_iter().map(|view| in_pairs(view).remove(0)).collect()).collect()
+pub static EXACT: LazyLock<Vec<Vec<Quarters>>> = LazyLock::new(|| {
+    let all = ROOM.pictures(0..FACTORS.len(), MANY / 2, 0..4);
+    all.into_iter().map(|views| views.into_iter().map(|view| in_fours(view).remove(0)).collect()).collect()
 });
 
 impl Room {
@@ -109,16 +114,16 @@ impl Room {
     }
 
     fn level(&self, samples: u32) -> Level {
-        let all = self.pictures(0..FACTORS.len(), samples, 0..2 * SEEDS as u64);
-        Level { samples, pairs: all.into_iter().map(|views| views.into_iter().map(in_pairs).collect()).collect() }
+        let all = self.pictures(0..FACTORS.len(), samples / 2, 0..4 * SEEDS as u64);
+        Level { samples, renders: all.into_iter().map(|views| views.into_iter().map(in_fours).collect()).collect() }
     }
 }
 
 impl Level {
     /// A prediction of one seed and the truth of another, seed by seed.
-    pub fn against(&self, other: usize, view: usize) -> impl Iterator<Item = (&Pair, &Pair)> {
-        let truths = &self.pairs[0][view];
-        self.pairs[other][view].iter().enumerate().map(|(seed, pair)| (pair, &truths[seed ^ 1]))
+    pub fn against(&self, other: usize, view: usize) -> impl Iterator<Item = (&Quarters, Pair)> {
+        let truths = &self.renders[0][view];
+        self.renders[other][view].iter().enumerate().map(|(seed, quarters)| (quarters, pair(&truths[seed ^ 1])))
     }
 }
 
@@ -145,8 +150,14 @@ fn scaled(texture: &Texture, factor: [f32; 3]) -> Texture {
     Texture::new(width, height, Texels::Linear(texels), texture.wrap()).unwrap()
 }
 
-fn in_pairs(pictures: Vec<Picture<LinearRgb>>) -> Vec<Pair> {
-    pictures.chunks(2).map(|two| [two[0].clone(), two[1].clone()]).collect()
+fn in_fours(pictures: Vec<Picture<LinearRgb>>) -> Vec<Quarters> {
+    pictures.chunks(4).map(|four| [0, 1, 2, 3].map(|k| four[k].clone())).collect()
+}
+
+/// The two halves of four quarters.
+pub fn pair(quarters: &Quarters) -> Pair {
+    let [a1, a2, b1, b2] = quarters;
+    [mean_of(&[a1.clone(), a2.clone()]), mean_of(&[b1.clone(), b2.clone()])]
 }
 
 /// The halves as metrics take them.
@@ -154,9 +165,26 @@ pub fn halves<P>(pair: &[Picture<P>; 2]) -> Halves<'_, P> {
     Halves { a: &pair[0], b: &pair[1] }
 }
 
-/// The halves, clipped and sRGB-encoded.
-pub fn encoded(pair: &Pair) -> [Picture<SrgbRgb>; 2] {
-    [0, 1].map(|half| pair[half].to_srgb())
+/// The quarters, encoded as scores are.
+pub fn encoded(quarters: &Quarters) -> NoisyRender<SrgbRgb> {
+    let [a1, a2, b1, b2] = quarters;
+    let half = |quarters| NoisyHalf::encoded(quarters, encode_noisy).unwrap();
+    NoisyRender { a: half([a1, a2]), b: half([b1, b2]), shared: None }
+}
+
+/// The quarters in linear light.
+pub fn linear(quarters: &Quarters) -> NoisyRender<LinearRgb> {
+    let half = |first: &Picture<LinearRgb>, second: &Picture<LinearRgb>| {
+        let combined = |sign: f32| {
+            Picture::from_fn(first.width(), first.height(), |x, y| {
+                let (LinearRgb(a), LinearRgb(b)) = (first.get(x, y), second.get(x, y));
+                LinearRgb([0, 1, 2].map(|c| 0.5 * (a[c] + sign * b[c])))
+            })
+        };
+        NoisyHalf { estimate: combined(1.0), noise: combined(-1.0) }
+    };
+    let [a1, a2, b1, b2] = quarters;
+    NoisyRender { a: half(a1, a2), b: half(b1, b2), shared: None }
 }
 
 /// The mean of both halves.

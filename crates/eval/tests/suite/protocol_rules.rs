@@ -4,21 +4,17 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, LazyLock};
 
 use mateval_eval::EvalError;
-use mateval_eval::lit_scene::{LitScene, Photo};
+use mateval_eval::light_rules::Track;
 use mateval_eval::measure::rounded_lpips;
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::pilot::samples_under_bound;
-use mateval_eval::predicted_light::predicted_light;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::relit::lightings;
-use mateval_eval::rgb::LightReference;
 use mateval_eval::score::score;
-use mateval_eval::truth::{RgbTruth, ViewTruth};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_stage;
 use mateval_metrics::NoisePsnr;
-use mateval_scene::{Camera, RendererId, TriangleMesh, glb, reference_io};
-use mateval_submission::prediction::{PredictedScene, read_scene};
+use mateval_scene::Camera;
 use mateval_testkit::box_room::{self, box_room, quad};
 use mateval_tracer::World;
 use serde_json::{Value, json};
@@ -30,7 +26,7 @@ use mateval_testkit::kept_folder::kept_folder;
 type Reading = (&'static str, fn(&Protocol) -> Value);
 
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
-const READINGS: [Reading; 16] = [
+const READINGS: [Reading; 17] = [
     ("/name", scores),
     ("/mask_rule", scores),
     ("/albedo_space", scores),
@@ -44,6 +40,7 @@ const READINGS: [Reading; 16] = [
     ("/light/relit/", relit),
     ("/light/noise/block_pixels", blocks),
     ("/light/noise/least_samples", light),
+    ("/light/noise/companion_samples", light),
     ("/light/noise/", samples),
     ("/fixed/", refusal),
     ("/scorer_version", refusal),
@@ -93,9 +90,10 @@ fn find_leaves(value: &Value, at: String, found: &mut Vec<String>) {
     }
 }
 
-/// `mateval-1` with so few samples that it is computed in a moment.
+/// `mateval-2` with all tracks, so that every rule is read, and so few samples that it is computed in a moment.
 fn quick() -> Protocol {
     let mut protocol = hasty();
+    protocol.light.tracks = vec![Track::Fitted, Track::True, Track::Relit];
     protocol.light.fit.samples = 2;
     protocol.light.noise.least_samples = 2;
     protocol.light.noise.most_samples = 64;
@@ -151,9 +149,9 @@ fn blocks(protocol: &Protocol) -> Value {
 /// Samples that pilots of several noises ask for, below and above the truth's own noise.
 fn samples(protocol: &Protocol) -> Value {
     let noises = [0.01, 0.02, 0.04, 0.08, 0.16, 9.0].map(|own| [0.0, 0.04].map(|reference| (own, reference)));
-    let asked = noises.as_flattened().iter().map(|&(prediction, reference)| {
-        let pilot = NoisePsnr { total: prediction, prediction, reference };
-        samples_under_bound(&protocol.light.noise, Some(pilot))
+    let asked = noises.as_flattened().iter().map(|&(paths, reference)| {
+        let pilot = NoisePsnr { total: paths, paths, shared: 0.0, reference };
+        [0.0, 5e-4].map(|variance| samples_under_bound(&protocol.light.noise, Some(pilot), variance))
     });
     json!(asked.collect::<Vec<_>>())
 }
@@ -167,57 +165,12 @@ fn refusal(protocol: &Protocol) -> Value {
     }
 }
 
-/// The input view of a prediction under every light: pictures, fitted radiances, samples.
+/// The scores under every light, the fitted radiances and the samples.
 fn light(protocol: &Protocol) -> Value {
-    let Lit { world, atlases, prediction, truth, own } = &*LIT;
-    let (scene, view) = (&dataset().scenes[0], &dataset().scenes[0].views[0]);
-    let reference = LightReference::new(protocol, None, own, scene.exposure).unwrap();
-    let groups: Vec<_> = (0..world.emitters().groups()).map(|_| Picture::filled(64, 48, LinearRgb([1.0; 3]))).collect();
-    let lit = LitScene {
-        scene,
-        world,
-        atlases,
-        views: vec![view],
-        truths: std::slice::from_ref(truth),
-        references: &[reference],
-        blocks: &noise_blocks(&protocol.light.noise, &[view.camera]),
-        photo: Photo { view, light: own.shown.clone(), valid: &truth.valid },
-        lightings: lightings(&protocol.light.relit, &groups, &truth.valid),
-    };
-    let mut rules = protocol.light.clone();
-    rules.noise.most_samples = rules.noise.least_samples;
-    let mut seen = Vec::new();
-    predicted_light(&lit, &rules, std::slice::from_ref(prediction), &|_, _, _| (), &mut |_, light| {
-        let pictures = light.pictures.iter().map(|picture| (picture.track, mean_of_half(&picture.views[0][0])));
-        seen.push(json!([pictures.collect::<Vec<_>>(), light.fit, light.samples]));
-        Ok(())
-    })
-    .unwrap();
-    Value::from(seen)
+    let mut protocol = protocol.clone();
+    protocol.light.noise.most_samples = protocol.light.noise.least_samples;
+    let results = score(&plan(&[&GREY], &protocol, &["living"]), &|_, _, _| ()).unwrap();
+    let result = results[0].protocols.values().next().unwrap();
+    let lit = result.summary.iter().filter(|(key, _)| key.to_string().starts_with("rgb_"));
+    json!([lit.collect::<Vec<_>>(), result.fits, result.noise])
 }
-
-fn mean_of_half(half: &Picture<LinearRgb>) -> f64 {
-    half.pixels().iter().flat_map(|pixel| pixel.0).map(f64::from).sum()
-}
-
-/// The scene of the sample that is lit by a stage, with the prediction `grey`.
-struct Lit {
-    world: World,
-    atlases: Vec<TriangleMesh>,
-    prediction: PredictedScene,
-    truth: ViewTruth,
-    own: RgbTruth,
-}
-
-static LIT: LazyLock<Lit> = LazyLock::new(|| {
-    let scene = &dataset().scenes[0];
-    let folder = dataset().folder(&scene.id);
-    let nodes = glb::read(&folder.instances()).unwrap();
-    Lit {
-        world: World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap(),
-        atlases: nodes.into_iter().map(|node| node.mesh).collect(),
-        prediction: read_scene(&GREY, scene),
-        truth: ViewTruth::read(&folder, &scene.views[0]).unwrap(),
-        own: RgbTruth::read(&folder, &RendererId::new("builtin").unwrap(), &scene.views[0]).unwrap(),
-    }
-});

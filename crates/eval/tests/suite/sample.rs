@@ -26,16 +26,18 @@ pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) 
         tool: "test".to_owned(),
         jobs: 1,
         cache: None,
+        companion_cache: None,
     }
 }
 
-/// `mateval-1` with as few samples as its rules can say.
+/// `mateval-2` with as few samples as its rules can say.
 pub fn hasty() -> Protocol {
-    let mut protocol = Protocol::named("mateval-1").unwrap();
+    let mut protocol = Protocol::named("mateval-2").unwrap();
     protocol.light.fit.samples = 4;
     protocol.light.noise.pilot_samples = 2;
     protocol.light.noise.least_samples = 2;
     protocol.light.noise.most_samples = 4;
+    protocol.light.noise.companion_samples = 8;
     protocol
 }
 

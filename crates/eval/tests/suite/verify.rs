@@ -31,10 +31,11 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
     let plan = ScorePlan {
         dataset: &dataset,
         submissions: vec![&submission],
-        protocols: vec![Protocol::named("mateval-1").unwrap()],
+        protocols: vec![Protocol::named("mateval-2").unwrap()],
         scenes: Vec::new(),
         lpips: missing(),
         tool: "test".to_owned(),
+        companion_cache: None,
         jobs: 1,
         cache: None,
     };
@@ -56,6 +57,7 @@ fn verified(result: &Value, submission: &Path) -> VerificationFile {
         dataset: &SCORED.dataset,
         lpips: missing(),
         tool: "test".to_owned(),
+        companion_cache: None,
         jobs: 1,
     };
     verify(plan, &|_, _, _| ()).unwrap()
@@ -80,7 +82,7 @@ fn a_clean_result_is_confirmed() {
 
 #[test]
 fn a_changed_digit_is_found() {
-    for place in ["/protocols/mateval-1/summary/albedo.input.mse", "/protocols/mateval-1/pictures/0/value"] {
+    for place in ["/protocols/mateval-2/summary/albedo.input.mse", "/protocols/mateval-2/pictures/0/value"] {
         let mut changed = SCORED.result.clone();
         let value = changed.pointer_mut(place).unwrap();
         let number = value.as_f64().unwrap();
@@ -92,8 +94,8 @@ fn a_changed_digit_is_found() {
 #[test]
 fn another_constant_is_found() {
     let mut changed = SCORED.result.clone();
-    changed["protocols"]["mateval-1"]["protocol"]["light"]["noise"]["target_db"] = 0.03.into();
-    let place = "/protocols/mateval-1/protocol/light/noise/target_db";
+    changed["protocols"]["mateval-2"]["protocol"]["light"]["noise"]["target_db"] = 0.03.into();
+    let place = "/protocols/mateval-2/protocol/light/noise/target_db";
     assert_eq!(refused(&changed, &SCORED.submission), one("other_protocol", place));
     changed["dataset"]["manifest_sha256"] = "0".into();
     let both = refused(&changed, &SCORED.submission);
@@ -104,7 +106,7 @@ fn another_constant_is_found() {
 fn a_result_of_another_version_is_named_as_such() {
     let mut older = SCORED.result.clone();
     older["format"] = "mateval-result/2".into();
-    older["protocols"]["mateval-1"]["start_radiance"] = 1.into();
+    older["protocols"]["mateval-2"]["start_radiance"] = 1.into();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("RESULT.json");
     json::write(&path, &older).unwrap();

@@ -1,76 +1,98 @@
 //! The radiances under which a scene looks most like its photo.
 //!
-//! In: a light basis of the input view and the photo. Out: one weight for each light group and channel, the non-negative
-//! ones with the least sum of absolute differences, and a proof that they are ([`NonnegativeL1`]). Both are first averaged
-//! over squares of [`FitRules::pool`] pixels, because L1 on noisy pixels is biased towards the median of the noise.
+//! In: a light basis of the input view, or two independent ones (`two_streams`), and the photo. Out: one weight for each
+//! light group and channel, and a proof that no others are better ([`RidgeFit`]). The weights are the non-negative ones with
+//! the least sum of absolute differences between photo and weighted basis, plus a ridge towards a start: one weight for all
+//! lights of a channel, with which the means of photo and basis agree. Where the photo is clipped, more light costs nothing.
+//! Photo and basis are first averaged over squares of [`FitRules::pool`] pixels, because L1 on noisy pixels is biased
+//! towards the median of the noise.
 
-mod nonnegative_l1;
+mod ridge_fit;
+mod rows;
+mod target;
+mod two_streams;
 
-use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_image::{LinearRgb, Picture};
 use mateval_tracer::LightBasis;
 
 use crate::error::LightError;
 use crate::rules::FitRules;
-pub use nonnegative_l1::{MOST_STEPS, NonnegativeL1, SHORTNESS, STEP_SHARE, TOLERANCE, ZERO_BELOW, solve};
+pub use ridge_fit::{MOST_STEPS, RidgeFit, RidgeProblem, STEP_SHARE, TOLERANCE, ZERO_BELOW};
+use rows::Rows;
+pub use rows::pooled;
+pub use target::FitTarget;
+pub use two_streams::{TwoStreamFit, fit_two_streams};
 
 /// Weights for a light basis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightFit {
     /// Red, green and blue of each light group, not negative; they multiply the scene's own radiances.
     pub weights: Vec<[f64; 3]>,
-    /// The solution of the fit for red, green and blue, each with the proof that no other weights fit better.
-    pub channels: [NonnegativeL1; 3],
-    /// The largest [`NonnegativeL1::relative_gap`] of the channels.
+    /// The weight of all lights that the ridge pulls towards, for each channel.
+    pub start: [f64; 3],
+    /// The solution of the fit for red, green and blue, as multiples of the start, each with its proof.
+    pub channels: [RidgeFit; 3],
+    /// The number of squares that the picture is divided into.
+    pub squares: usize,
+    /// The largest [`RidgeFit::relative_gap`] of the channels.
     pub relative_gap: f64,
 }
 
-/// Fits the basis to `target`, by the pixels in `mask` if there is one.
+/// Fits the basis to the photo.
 ///
-/// Fails if sizes differ, if no weights are found, or if a picture holds values that light cannot have: values that are not
-/// finite, or negative ones in the basis.
-pub fn fit_lights(
-    rules: &FitRules,
-    basis: &LightBasis,
-    target: &Picture<LinearRgb>,
-    mask: Option<&Mask>,
-) -> Result<LightFit, LightError> {
-    check(basis, target, mask)?;
-    let target = pooled(rules, target, mask);
-    let columns: Vec<[Vec<f64>; 3]> = basis.pictures().iter().map(|picture| pooled(rules, picture, mask)).collect();
-    let channels = [0, 1, 2].map(|channel| {
-        let columns: Vec<Vec<f64>> = columns.iter().map(|column| column[channel].clone()).collect();
-        solve(&columns, &target[channel])
-    });
-    let gaps = [0, 1, 2].map(|channel| channels[channel].relative_gap(&target[channel]));
-    let numbers = channels.iter().flat_map(|fit| &fit.weights).chain(&gaps);
+/// Fails if sizes differ, if ridge or exposure are not above 0, if no weights are found, or if a picture holds values that
+/// light cannot have: values that are not finite, or negative ones in the basis.
+pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<LightFit, LightError> {
+    check(rules, basis, target)?;
+    let lights = basis.pictures().len();
+    let squares = [target.photo.width(), target.photo.height()].map(|side| side.div_ceil(rules.pool.max(1) as usize));
+    let fits = [0, 1, 2].map(|channel| ChannelFit::new(rules, basis, target, channel));
+    let numbers = fits.iter().flat_map(|fit| fit.solution.multiples.iter().chain([&fit.gap, &fit.start]));
     if !numbers.into_iter().all(|v| v.is_finite()) {
-        return Err(LightError::NoSolution { lights: columns.len(), squares: target[0].len() });
+        return Err(LightError::NoSolution { lights, squares: squares[0] * squares[1] });
     }
-    let relative_gap = gaps.into_iter().fold(0.0, f64::max);
-    let weights = (0..columns.len()).map(|group| [0, 1, 2].map(|channel| channels[channel].weights[group]));
-    Ok(LightFit { weights: weights.collect(), channels, relative_gap })
+    let weight = |light: usize| [0, 1, 2].map(|channel| fits[channel].solution.multiples[light] * fits[channel].start);
+    Ok(LightFit {
+        weights: (0..lights).map(weight).collect(),
+        start: [0, 1, 2].map(|channel| fits[channel].start),
+        squares: squares[0] * squares[1],
+        relative_gap: fits.iter().map(|fit| fit.gap).fold(0.0, f64::max),
+        channels: fits.map(|fit| fit.solution),
+    })
 }
 
-/// Averages over squares of [`FitRules::pool`] pixels, by channel. Pixels outside the mask or the picture count as black,
-/// so that every pixel has the same weight.
-pub fn pooled(rules: &FitRules, picture: &Picture<LinearRgb>, mask: Option<&Mask>) -> [Vec<f64>; 3] {
-    let pool = rules.pool.max(1) as usize;
-    let (columns, rows) = (picture.width().div_ceil(pool), picture.height().div_ceil(pool));
-    let mut sums = [0, 1, 2].map(|_| vec![0.0; columns * rows]);
-    for y in 0..picture.height() {
-        for x in 0..picture.width() {
-            if mask.is_none_or(|mask| mask.get(x, y)) {
-                let square = y / pool * columns + x / pool;
-                for (sums, value) in sums.iter_mut().zip(picture.get(x, y).0) {
-                    sums[square] += f64::from(value) / (pool * pool) as f64;
-                }
-            }
+/// The fit of one channel.
+struct ChannelFit {
+    start: f64,
+    solution: RidgeFit,
+    gap: f64,
+}
+
+impl ChannelFit {
+    fn new(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>, channel: usize) -> Self {
+        let rows = Rows::new(rules, target, channel);
+        let photo = rows.of_photo();
+        let mut columns: Vec<Vec<f64>> = basis.pictures().iter().map(|picture| rows.of(picture)).collect();
+        // The start: one weight for all lights with which the means agree; 0 where nothing is lit.
+        let light: f64 = columns.iter().flatten().sum();
+        let start = if light > 0.0 { photo.iter().sum::<f64>().max(0.0) / light } else { 0.0 };
+        columns.iter_mut().flatten().for_each(|value| *value *= start);
+        // All lights at twice their start would make the ridge this share of the photo.
+        let size: f64 = photo.iter().map(|v| v.abs()).sum();
+        let ridge = rules.ridge * size / columns.len().max(1) as f64;
+        let problem = RidgeProblem { ridge, target: photo, at_least: rows.at_least(), columns };
+        let solution = problem.fit();
+        Self { start, gap: solution.relative_gap(&problem.target), solution }
+    }
+}
+
+fn check(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<(), LightError> {
+    let &FitTarget { photo: target, mask, exposure } = target;
+    for (what, value) in [("ridge", rules.ridge), ("exposure", exposure)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(LightError::NotPositive { what, value });
         }
     }
-    sums
-}
-
-fn check(basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>) -> Result<(), LightError> {
     let photo = [target.width(), target.height()];
     if let Some(mask) = mask.filter(|mask| !mask.same_size(target)) {
         return Err(LightError::MaskSize { mask: [mask.width(), mask.height()], photo });
@@ -96,83 +118,4 @@ fn first_pixel(picture: &Picture<LinearRgb>, wrong: impl Fn(f32) -> bool) -> Opt
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three lights on 30 x 20 pixels: from the left, from the top, from everywhere.
-    fn basis() -> LightBasis {
-        let picture = |light: fn(f32, f32) -> f32| {
-            Picture::from_fn(30, 20, |x, y| {
-                let value = light(x as f32 / 30.0, y as f32 / 20.0);
-                LinearRgb([value, 0.5 * value, 0.25 * value * value])
-            })
-        };
-        let pictures = vec![picture(|x, _| (1.0 - x) * (1.0 - x)), picture(|_, y| 1.0 - y), picture(|_, _| 0.5)];
-        LightBasis::new(30, 20, pictures).unwrap()
-    }
-
-    fn rules() -> FitRules {
-        FitRules::default()
-    }
-
-    const WEIGHTS: [[f64; 3]; 3] = [[0.5, 2.0, 0.0], [1.0, 0.0, 3.0], [0.0, 0.25, 1.0]];
-
-    fn error(fit: &LightFit) -> f64 {
-        let pairs = fit.weights.iter().flatten().zip(WEIGHTS.iter().flatten());
-        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn weights_of_each_channel_are_found() {
-        let fit = fit_lights(&rules(), &basis(), &basis().weighted(&WEIGHTS).unwrap(), None).unwrap();
-        assert!(error(&fit) < 1e-5, "{:?}", fit.weights);
-        assert!(fit.relative_gap < 1e-6, "{}", fit.relative_gap);
-    }
-
-    /// A window that no light of the basis explains does not count when it is masked out, and does when it fills half.
-    #[test]
-    fn pixels_outside_the_mask_do_not_count() {
-        let mut target = basis().weighted(&WEIGHTS).unwrap();
-        let mask = Mask::from_fn(30, 20, |x, _| x < 13);
-        for y in 0..20 {
-            (13..30).for_each(|x| target.set(x, y, LinearRgb([9.0; 3])));
-        }
-        assert!(error(&fit_lights(&rules(), &basis(), &target, Some(&mask)).unwrap()) < 1e-5);
-        assert!(error(&fit_lights(&rules(), &basis(), &target, None).unwrap()) > 0.1, "the twin passes");
-    }
-
-    #[test]
-    fn squares_are_averaged_and_edges_count_by_area() {
-        let picture = Picture::from_fn(12, 8, |x, y| LinearRgb([(x + y) as f32, 1.0, 0.0]));
-        let [red, green, blue] = pooled(&rules(), &picture, None);
-        assert_eq!((red[0], &green[..], &blue[..]), (7.0, &[1.0, 0.5][..], &[0.0, 0.0][..]));
-    }
-
-    #[test]
-    fn what_cannot_be_fitted_is_refused() {
-        let message = |basis: &LightBasis, target: &Picture<LinearRgb>, mask: Option<&Mask>| {
-            fit_lights(&rules(), basis, target, mask).unwrap_err().to_string()
-        };
-        let target = basis().sum();
-        let small = Picture::filled(4, 4, LinearRgb([1.0; 3]));
-        assert!(message(&basis(), &small, None).contains("the basis has 30x20 pixels, the photo 4x4"));
-        assert!(message(&basis(), &target, Some(&Mask::filled(4, 4, true))).contains("the mask"));
-        let mut broken = target.clone();
-        broken.set(3, 3, LinearRgb([f32::NAN; 3]));
-        assert!(message(&basis(), &broken, None).contains("pixel (3, 3) of the photo is [NaN"));
-        let mut negative = basis().pictures().to_vec();
-        negative[1].set(0, 0, LinearRgb([-1e-9; 3]));
-        let negative = LightBasis::new(30, 20, negative).unwrap();
-        assert!(message(&negative, &target, None).contains("light group 1"));
-    }
-
-    /// Black photos and no lights at all are fitted, by nothing.
-    #[test]
-    fn nothing_is_fitted_by_nothing() {
-        let black = fit_lights(&rules(), &basis(), &Picture::filled(30, 20, LinearRgb::default()), None).unwrap();
-        assert_eq!((black.weights, black.relative_gap), (vec![[0.0; 3]; 3], 0.0));
-        let none = LightBasis::new(30, 20, Vec::new()).unwrap();
-        let fit = fit_lights(&rules(), &none, &basis().sum(), None).unwrap();
-        assert!(fit.weights.is_empty() && fit.relative_gap == 0.0, "{fit:?}");
-    }
-}
+mod tests;

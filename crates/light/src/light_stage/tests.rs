@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mateval_scene::dataset::{FORMAT, Instance, SceneSource, View};
+use mateval_scene::dataset::{FORMAT, Instance, SceneSource, TrueMaterials, View};
 use mateval_scene::{InstanceId, InstanceIndex, Role, SceneId, SceneLights, SourceKind, TriangleMesh, ViewId};
 use mateval_testkit::box_room::{WALLS, box_room, camera, quad};
 
@@ -44,7 +44,7 @@ fn an_empty_room() {
     let walls = named(&lights, "wall");
     assert_eq!(walls.len(), 1);
     let [a, b, c] = walls[0].light.mesh.corners(0).map(|p| p.as_dvec3());
-    assert!(((b - a).length() * (c - b).length() - 0.64 * 10.0).abs() < 1e-4);
+    assert!(((b - a).cross(c - a).length() - 0.64 * 10.0).abs() < 1e-4);
     assert!((a.z - 5.999).abs() < 1e-5 && normal(&walls[0].light).z < -0.999);
 }
 
@@ -84,8 +84,15 @@ fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
     let scene = SceneFile {
         format: FORMAT.to_owned(),
         id: SceneId::new("room").unwrap(),
-        source: SceneSource { kind: SourceKind::Front3d, house: "house".to_owned(), files: Vec::new() },
+        source: SceneSource {
+            kind: SourceKind::Front3d,
+            house: "house".to_owned(),
+            states_roughness: false,
+            states_metallic: false,
+            files: Vec::new(),
+        },
         lights: SceneLights::Stage,
+        materials: TrueMaterials::Converted,
         exposure: 1.0,
         views: vec![View { id: ViewId::new("input").unwrap(), x_deg: 0.0, y_deg: 0.0, camera: camera() }],
         instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),

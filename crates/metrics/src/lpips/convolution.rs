@@ -7,6 +7,7 @@
 use rayon::prelude::*;
 
 use super::multiply::add_product;
+use super::reach::Window;
 use super::tensor::Tensor;
 
 /// Output pixels of one matrix product: enough for an efficient product, few enough that small pictures occupy several
@@ -29,9 +30,14 @@ impl Shape {
         self.kernel * self.kernel * self.inputs
     }
 
+    /// The window of the input that an output pixel reads.
+    pub(crate) fn window(&self) -> Window {
+        Window { side: self.kernel, stride: self.stride, padding: self.padding }
+    }
+
     /// Width or height of the output; `None` if the kernel does not fit.
     pub(crate) fn output_side(&self, side: usize) -> Option<usize> {
-        Some((side + 2 * self.padding).checked_sub(self.kernel)? / self.stride + 1)
+        self.window().output_side(side)
     }
 }
 
@@ -60,26 +66,30 @@ impl Convolution {
         Self { shape, weights: turned, bias }
     }
 
-    /// The convolution of the input, negative values replaced by 0. Panics if the kernel does not fit.
-    pub(crate) fn apply(&self, input: &Tensor) -> Tensor {
-        assert_eq!(input.channels, self.shape.inputs, "the input's channels do not fit the convolution");
+    /// Replaces those of the output's pixels, by index, by the convolution of the input, with 0 for negative values.
+    /// Panics if the output has another size or number of channels.
+    pub(crate) fn apply(&self, input: &Tensor, pixels: &[usize], output: &mut Tensor) {
         let side = |input| self.shape.output_side(input).expect("the picture's size was checked against the network");
-        let mut output = Tensor::zeros(side(input.width), side(input.height), self.shape.outputs);
+        assert_eq!(
+            (side(input.width), side(input.height)),
+            (output.width, output.height),
+            "another size of the output"
+        );
+        assert_eq!((input.channels, output.channels), (self.shape.inputs, self.shape.outputs), "other channels");
         let width = output.width;
-        let blocks = output.values.par_chunks_mut(BLOCK_PIXELS * self.shape.outputs).enumerate();
-        blocks.for_each_init(Vec::new, |patches, (block, values)| {
-            self.fill_block(input, width, block * BLOCK_PIXELS, patches, values);
+        let mut found = vec![0.0; pixels.len() * self.shape.outputs];
+        let blocks = found.par_chunks_mut(BLOCK_PIXELS * self.shape.outputs).zip(pixels.par_chunks(BLOCK_PIXELS));
+        blocks.for_each_init(Vec::new, |patches, (values, pixels)| {
+            self.fill_block(input, width, pixels, patches, values);
         });
-        output
+        output.set(pixels, found);
     }
 
-    /// Computes the output pixels from index `first` on; `width` is the output's. `patches` is memory for reuse.
-    fn fill_block(&self, input: &Tensor, width: usize, first: usize, patches: &mut Vec<f32>, values: &mut [f32]) {
+    /// Computes the output pixels of these indices; `width` is the output's. `patches` is memory for reuse.
+    fn fill_block(&self, input: &Tensor, width: usize, pixels: &[usize], patches: &mut Vec<f32>, values: &mut [f32]) {
         let (patch, outputs) = (self.shape.patch(), self.shape.outputs);
-        let pixels = values.len() / outputs;
-        patches.resize(pixels * patch, 0.0);
-        for (index, row) in patches.chunks_mut(patch).enumerate() {
-            let pixel = first + index;
+        patches.resize(pixels.len() * patch, 0.0);
+        for (&pixel, row) in pixels.iter().zip(patches.chunks_mut(patch)) {
             self.fill_patch(input, pixel % width, pixel / width, row);
         }
         values.chunks_mut(outputs).for_each(|pixel| pixel.copy_from_slice(&self.bias));
@@ -112,6 +122,15 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// The convolution at every pixel.
+    fn whole(convolution: &Convolution, input: &Tensor) -> Tensor {
+        let side = |n| convolution.shape.output_side(n).expect("fits");
+        let mut output = Tensor::zeros(side(input.width), side(input.height), convolution.shape.outputs);
+        let all: Vec<usize> = (0..output.width * output.height).collect();
+        convolution.apply(input, &all, &mut output);
+        output
+    }
 
     fn random(count: usize, seed: u64) -> Vec<f32> {
         let mut state = seed | 1;
@@ -165,7 +184,7 @@ mod tests {
             let shape = Shape { kernel, stride, padding, inputs, outputs };
             let (weights, bias) = (random(shape.patch() * outputs, seed), random(outputs, !seed));
             let input = Tensor { width, height, channels: inputs, values: random(width * height * inputs, seed ^ 7) };
-            let found = Convolution::new(shape, &weights, bias.clone()).apply(&input);
+            let found = whole(&Convolution::new(shape, &weights, bias.clone()), &input);
             prop_assert!(largest_difference(&found, &direct(&shape, &weights, &bias, &input, 0)) < 1e-4);
         }
     }
@@ -175,9 +194,24 @@ mod tests {
         let shape = Shape { kernel: 3, stride: 1, padding: 1, inputs: 2, outputs: 3 };
         let (weights, bias) = (random(54, 1), random(3, 2));
         let input = Tensor { width: 20, height: 17, channels: 2, values: random(680, 3) };
-        let found = Convolution::new(shape, &weights, bias.clone()).apply(&input);
+        let found = whole(&Convolution::new(shape, &weights, bias.clone()), &input);
         assert!(largest_difference(&found, &direct(&shape, &weights, &bias, &input, 0)) < 1e-5);
         assert!(largest_difference(&found, &direct(&shape, &weights, &bias, &input, 1)) > 0.1);
+    }
+
+    #[test]
+    fn only_the_named_pixels_change() {
+        let shape = Shape { kernel: 3, stride: 2, padding: 1, inputs: 4, outputs: 5 };
+        let convolution = Convolution::new(shape, &random(shape.patch() * 5, 7), random(5, 8));
+        let input = Tensor { width: 21, height: 17, channels: 4, values: random(21 * 17 * 4, 9) };
+        let all = whole(&convolution, &input);
+        let mut some = Tensor::zeros(all.width, all.height, 5);
+        let pixels: Vec<usize> = (0..all.width * all.height).filter(|pixel| pixel % 7 < 2).collect();
+        convolution.apply(&input, &pixels, &mut some);
+        for (pixel, (found, expected)) in some.values.chunks(5).zip(all.values.chunks(5)).enumerate() {
+            let expected = if pixels.contains(&pixel) { expected } else { &[0.0; 5] };
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{pixel}");
+        }
     }
 
     #[test]
@@ -187,7 +221,7 @@ mod tests {
         let input = Tensor { width: 45, height: 31, channels: 32, values: random(45 * 31 * 32, 6) };
         let with = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            pool.install(|| convolution.apply(&input))
+            pool.install(|| whole(&convolution, &input))
         };
         let one = with(1);
         assert!(one.values.iter().any(|&v| v > 0.0) && one.values.contains(&0.0));

@@ -11,7 +11,6 @@ use mateval_image::{Mask, Picture, SrgbRgb};
 
 use super::{Features, Lpips};
 use crate::MetricError;
-use crate::mask::{black_filled, pixel_count, reference_filled};
 use crate::pixel::{check_finite, check_size, size_of};
 
 /// The halves of a noisy render and their mean, sRGB-encoded and of one size.
@@ -51,62 +50,41 @@ pub struct ExtrapolatedLpips {
 }
 
 impl Lpips {
-    /// [`Lpips::masked`] (protocol `mateval-1`) extrapolated to no noise.
+    /// [`Lpips::masked_from`] (protocol `mateval-2`) extrapolated to no noise.
     ///
-    /// `reference_features` are [`Lpips::features`] of the whole `reference`, the same for every prediction and mask.
-    /// `None` where no pixel counts. Fails if sizes differ, a side is below
-    /// [`Net::least_side`](super::Net::least_side), a value inside the mask is not finite, or the features belong to
-    /// another network or size.
+    /// `reference` are [`Lpips::features`] of the whole reference, the same for every prediction and mask. `None` where no
+    /// pixel counts. Fails if sizes differ, a value inside the mask is not finite, or the features belong to another
+    /// network or size.
     pub fn extrapolated_masked(
         &self,
         prediction: MeanAndHalves,
-        reference: &Picture<SrgbRgb>,
-        reference_features: &Features,
+        reference: &Features,
         mask: &Mask,
     ) -> Result<Option<ExtrapolatedLpips>, MetricError> {
-        prediction.check(size_of(reference), mask)?;
-        let distance = |picture: &Picture<SrgbRgb>| {
-            let features = self.features_named("prediction", &reference_filled(picture, reference, mask)?)?;
-            self.masked_distance(&features, reference_features, pixel_count(mask))
-        };
-        extrapolated(prediction, mask, distance)
+        prediction.check((reference.width(), reference.height()), mask)?;
+        extrapolated(prediction, |picture| self.masked_from(picture, reference, mask))
     }
 
-    /// [`Lpips::black_fill`] (protocol `paper`) extrapolated to no noise.
+    /// [`Lpips::black_fill_from`] (protocol `paper`) extrapolated to no noise.
     ///
-    /// `reference_features` are [`Lpips::black_filled_features`] of the reference under the same mask. `None` where no
-    /// pixel counts. Fails as [`Lpips::extrapolated_masked`] does.
+    /// `reference` are [`Lpips::black_filled_features`] of the reference under the same mask. `None` where no pixel
+    /// counts. Fails as [`Lpips::extrapolated_masked`] does.
     pub fn extrapolated_black_fill(
         &self,
         prediction: MeanAndHalves,
-        reference_features: &Features,
+        reference: &Features,
         mask: &Mask,
     ) -> Result<Option<ExtrapolatedLpips>, MetricError> {
-        prediction.check((reference_features.width(), reference_features.height()), mask)?;
-        let distance = |picture: &Picture<SrgbRgb>| {
-            let features = self.black_filled_features(picture, mask)?;
-            self.distance(&features, reference_features).map(Some)
-        };
-        extrapolated(prediction, mask, distance)
-    }
-
-    /// The network's features of a picture with black outside the mask. Those of a reference serve every prediction
-    /// under the same mask. Values outside the mask are not read. Fails as [`Lpips::features`] does, and if the mask
-    /// has another size.
-    pub fn black_filled_features(&self, picture: &Picture<SrgbRgb>, mask: &Mask) -> Result<Features, MetricError> {
-        self.features(&black_filled(picture, mask)?)
+        prediction.check((reference.width(), reference.height()), mask)?;
+        extrapolated(prediction, |picture| self.black_fill_from(picture, reference, mask))
     }
 }
 
-/// Extrapolates from `distance` of mean and halves. `None`, without running networks, where no pixel counts.
+/// Extrapolates from `distance` of mean and halves. `None` where no pixel counts.
 fn extrapolated(
     prediction: MeanAndHalves,
-    mask: &Mask,
     distance: impl Fn(&Picture<SrgbRgb>) -> Result<Option<f64>, MetricError>,
 ) -> Result<Option<ExtrapolatedLpips>, MetricError> {
-    if pixel_count(mask) == 0 {
-        return Ok(None);
-    }
     let [of_mean, of_a, of_b] = [distance(prediction.mean)?, distance(prediction.a)?, distance(prediction.b)?];
     let (Some(of_mean), Some(of_a), Some(of_b)) = (of_mean, of_a, of_b) else { return Ok(None) };
     let of_halves = (of_a + of_b) / 2.0;

@@ -16,6 +16,7 @@ mod features;
 mod multiply;
 mod net;
 mod pool;
+mod reach;
 mod tensor;
 mod weights;
 
@@ -28,14 +29,15 @@ pub use features::{EPSILON, Features, SCALE, SHIFT};
 pub use net::{ALEX_FILE_NAME, ALEX_SHA256, Net, VGG_FILE_NAME, VGG_SHA256};
 
 use crate::MetricError;
-use crate::mask::{black_filled, pixel_count, reference_filled};
-use crate::pixel::check_pair;
+use crate::mask::{black_filled, pixel_count};
+use crate::pixel::{check_finite, check_pair, check_size, size_of};
+use distance::StageWeights;
 use net::Network;
 
 /// A network with its weights, ready to compare pictures.
 ///
 /// While [`Lpips::features`] runs it takes, beside the picture, about 0.1 kB a pixel for Alex, 0.6 kB for VGG, plus a
-/// few MB a thread. The resulting [`Features`] take 0.04 kB a pixel for Alex, 0.5 kB for VGG.
+/// few MB a thread. The resulting [`Features`] take 0.05 kB a pixel for Alex, 0.5 kB for VGG.
 #[derive(Debug)]
 pub struct Lpips {
     net: Net,
@@ -83,12 +85,25 @@ impl Lpips {
         if pixel_count(mask) == 0 {
             return Ok(None);
         }
-        self.whole(&black_filled(prediction, mask)?, &black_filled(reference, mask)?).map(Some)
+        self.black_fill_from(prediction, &self.black_filled_features(reference, mask)?, mask)
     }
 
-    /// The distance per pixel of the mask (protocol `mateval-1`): [`Lpips::masked_distance`] after the prediction's
-    /// pixels outside the mask were replaced by the reference's. `None` where no pixel counts. The prediction is not
-    /// read outside the mask, the reference is. Fails as [`Lpips::whole`] does.
+    /// [`Lpips::black_fill`] from the reference's [`Lpips::black_filled_features`] under the same mask.
+    pub fn black_fill_from(
+        &self,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Features,
+        mask: &Mask,
+    ) -> Result<Option<f64>, MetricError> {
+        self.filled_distance(prediction, reference, mask, || {
+            StageWeights::of_mean(&self.network, (mask.width(), mask.height()))
+        })
+    }
+
+    /// The mean over the mask (protocol `mateval-2`): the prediction's pixels outside the mask are replaced by the
+    /// reference's, each stage's map of distances is enlarged bilinearly to the picture's size, and the sum of the maps
+    /// is averaged over the pixels of the mask. `None` where no pixel counts. The prediction is not read outside the
+    /// mask, the reference is. Fails as [`Lpips::whole`] does.
     pub fn masked(
         &self,
         prediction: &Picture<SrgbRgb>,
@@ -99,9 +114,43 @@ impl Lpips {
         if pixel_count(mask) == 0 {
             return Ok(None);
         }
-        let filled = reference_filled(prediction, reference, mask)?;
-        let reference = self.features_named("reference", reference)?;
-        self.masked_distance(&self.features_named("prediction", &filled)?, &reference, pixel_count(mask))
+        self.masked_from(prediction, &self.features_named("reference", reference)?, mask)
+    }
+
+    /// [`Lpips::masked`] from the reference's [`Lpips::features`].
+    pub fn masked_from(
+        &self,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Features,
+        mask: &Mask,
+    ) -> Result<Option<f64>, MetricError> {
+        self.filled_distance(prediction, reference, mask, || StageWeights::inside(&self.network, mask))
+    }
+
+    /// The weighted distance of the reference from itself with the prediction's pixels inside the mask. The networks run
+    /// over those parts of the picture alone that these pixels change and the weights count. `None` where no pixel counts.
+    fn filled_distance(
+        &self,
+        prediction: &Picture<SrgbRgb>,
+        reference: &Features,
+        mask: &Mask,
+        weights: impl FnOnce() -> Vec<StageWeights>,
+    ) -> Result<Option<f64>, MetricError> {
+        features::check_reference(self.net, reference, size_of(prediction))?;
+        check_size(size_of(prediction), "mask", size_of(mask))?;
+        check_finite("prediction", prediction, Some(mask))?;
+        if pixel_count(mask) == 0 {
+            return Ok(None);
+        }
+        let input = features::filled_input(prediction, reference, mask);
+        Ok(Some(distance::weighted(&self.network, &input, reference, &weights())))
+    }
+
+    /// The network's features of a picture with black outside the mask. Those of a reference serve every prediction
+    /// under the same mask. Values outside the mask are not read. Fails as [`Lpips::features`] does, and if the mask
+    /// has another size.
+    pub fn black_filled_features(&self, picture: &Picture<SrgbRgb>, mask: &Mask) -> Result<Features, MetricError> {
+        self.features(&black_filled(picture, mask)?)
     }
 
     /// The network's features of a picture. Those of a reference serve every prediction.
@@ -119,20 +168,6 @@ impl Lpips {
     pub fn distance(&self, prediction: &Features, reference: &Features) -> Result<f64, MetricError> {
         features::check_pair(self.net, prediction, reference)?;
         Ok(distance::mean(&self.network, prediction, reference))
-    }
-
-    /// [`Lpips::masked`] from the features of a filled prediction ([`reference_filled`]) and of the reference: each
-    /// stage's map of distances is enlarged bilinearly to the picture's size, the maps are summed over stages and
-    /// pixels, and the sum is divided by `mask_pixels`. `None` where that is 0. Fails as [`Lpips::distance`] does.
-    pub fn masked_distance(
-        &self,
-        prediction: &Features,
-        reference: &Features,
-        mask_pixels: usize,
-    ) -> Result<Option<f64>, MetricError> {
-        features::check_pair(self.net, prediction, reference)?;
-        let sum = || distance::enlarged_sum(&self.network, prediction, reference);
-        Ok((mask_pixels > 0).then(|| sum() / mask_pixels as f64))
     }
 }
 

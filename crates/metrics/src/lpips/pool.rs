@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::reach::Window;
 use super::tensor::Tensor;
 
 /// A square window and its stride. Windows stay inside the input.
@@ -12,28 +13,36 @@ pub(crate) struct Pool {
 }
 
 impl Pool {
+    /// The window of the input that an output pixel reads.
+    pub(crate) fn window(&self) -> Window {
+        Window { side: self.window, stride: self.stride, padding: 0 }
+    }
+
     /// Width or height of the output; `None` if the window does not fit.
     pub(crate) fn output_side(&self, side: usize) -> Option<usize> {
-        Some(side.checked_sub(self.window)? / self.stride + 1)
+        self.window().output_side(side)
     }
 
-    /// The pooled input. Panics if the window does not fit.
-    pub(crate) fn apply(&self, input: &Tensor) -> Tensor {
+    /// Replaces those of the output's pixels, by index, by the pooled input. Panics if the output has another size.
+    pub(crate) fn apply(&self, input: &Tensor, pixels: &[usize], output: &mut Tensor) {
         let side = |input| self.output_side(input).expect("the picture's size was checked against the network");
-        let mut output = Tensor::zeros(side(input.width), side(input.height), input.channels);
-        let row = output.width * output.channels;
-        output.values.par_chunks_mut(row).enumerate().for_each(|(y, row)| self.fill_row(input, y, row));
-        output
+        assert_eq!(
+            (side(input.width), side(input.height)),
+            (output.width, output.height),
+            "another size of the output"
+        );
+        let width = output.width;
+        let mut found = vec![f32::NEG_INFINITY; pixels.len() * input.channels];
+        let pairs = found.par_chunks_mut(input.channels).with_min_len(64).zip(pixels);
+        pairs.for_each(|(values, &pixel)| self.fill_pixel(input, pixel % width, pixel / width, values));
+        output.set(pixels, found);
     }
 
-    fn fill_row(&self, input: &Tensor, y: usize, row: &mut [f32]) {
-        for (x, pixel) in row.chunks_mut(input.channels).enumerate() {
-            pixel.fill(f32::NEG_INFINITY);
-            for dy in 0..self.window {
-                let stretch = input.stretch(x * self.stride, y * self.stride + dy, self.window);
-                for candidates in stretch.chunks(input.channels) {
-                    pixel.iter_mut().zip(candidates).for_each(|(max, &value)| *max = max.max(value));
-                }
+    fn fill_pixel(&self, input: &Tensor, x: usize, y: usize, pixel: &mut [f32]) {
+        for dy in 0..self.window {
+            let stretch = input.stretch(x * self.stride, y * self.stride + dy, self.window);
+            for candidates in stretch.chunks(input.channels) {
+                pixel.iter_mut().zip(candidates).for_each(|(max, &value)| *max = max.max(value));
             }
         }
     }
@@ -48,8 +57,8 @@ mod tests {
         // Two channels: x + 10 y, and its negative.
         let values = (0..4).flat_map(|y| (0..6).map(move |x| (x + 10 * y) as f32)).flat_map(|v| [v, -v]).collect();
         let input = Tensor { width: 6, height: 4, channels: 2, values };
-        let output = Pool { window: 3, stride: 2 }.apply(&input);
-        assert_eq!((output.width, output.height), (2, 1));
+        let mut output = Tensor::zeros(2, 1, 2);
+        Pool { window: 3, stride: 2 }.apply(&input, &[0, 1], &mut output);
         assert_eq!(output.values, [22.0, 0.0, 24.0, -2.0]);
         assert_eq!(Pool { window: 3, stride: 2 }.output_side(2), None);
     }

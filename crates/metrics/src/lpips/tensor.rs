@@ -20,4 +20,16 @@ impl Tensor {
         let start = (y * self.width + x) * self.channels;
         &self.values[start..start + count * self.channels]
     }
+
+    /// Replaces the channels of these pixels, by index, by `values`, pixel after pixel.
+    pub(crate) fn set(&mut self, pixels: &[usize], values: Vec<f32>) {
+        // Every pixel once, in order: no copy is needed.
+        if values.len() == self.values.len() && pixels.is_sorted() {
+            self.values = values;
+            return;
+        }
+        for (&pixel, values) in pixels.iter().zip(values.chunks(self.channels)) {
+            self.values[pixel * self.channels..(pixel + 1) * self.channels].copy_from_slice(values);
+        }
+    }
 }

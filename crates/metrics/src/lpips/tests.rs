@@ -64,15 +64,14 @@ fn the_distance_by_its_definition() {
     let mut expected = 0.0;
     for (index, stage) in lpips.network.stages.iter().enumerate() {
         let (a, b) = (&fp.stages[index], &fr.stages[index]);
-        for pixel in a.values.chunks(a.channels) {
-            let length: f64 = pixel.iter().map(|&v| f64::from(v).powi(2)).sum();
-            assert!(length == 0.0 || (length - 1.0).abs() < 1e-6);
-        }
         let mut sum = 0.0;
-        for (i, (&a, &b)) in a.values.iter().zip(&b.values).enumerate() {
-            sum += f64::from(stage.linear[i % stage.linear.len()]) * (f64::from(a) - f64::from(b)).powi(2);
+        for pixel in 0..a.pixels() {
+            let length: f64 = a.normalized(pixel).map(|v| f64::from(v).powi(2)).sum();
+            assert!(length == 0.0 || (length - 1.0).abs() < 1e-6);
+            let pairs = stage.linear.iter().zip(a.normalized(pixel).zip(b.normalized(pixel)));
+            sum += pairs.map(|(&w, (a, b))| f64::from(w) * (f64::from(a) - f64::from(b)).powi(2)).sum::<f64>();
         }
-        expected += sum / (a.width * a.height) as f64;
+        expected += sum / a.pixels() as f64;
     }
     assert!(expected > 0.01);
     assert!((lpips.whole(&p, &r).unwrap() - expected).abs() < 1e-12);
@@ -97,7 +96,8 @@ fn features_of_other_networks_and_sizes_are_refused() {
     let features = lpips.features(&a).unwrap();
     for strange in [other.features(&a).unwrap(), lpips.features(&b).unwrap()] {
         assert!(matches!(lpips.distance(&strange, &features), Err(MetricError::FeaturesDiffer { .. })));
-        assert!(matches!(lpips.masked_distance(&features, &strange, 9), Err(MetricError::FeaturesDiffer { .. })));
+        let full = Picture::filled(20, 20, true);
+        assert!(matches!(lpips.masked_from(&a, &strange, &full), Err(MetricError::FeaturesDiffer { .. })));
     }
     assert!(matches!(lpips.whole(&a, &b), Err(MetricError::SizesDiffer { .. })));
 }
@@ -137,6 +137,78 @@ fn the_thread_count_changes_no_bit() {
     assert_eq!(with(1), with(4));
 }
 
+/// The mean over the mask of the enlarged maps, by its definition: every response computed, every map enlarged pixel by
+/// pixel. `counts` are the pixels that are summed; `mask` fills the prediction.
+fn masked_by_definition(
+    lpips: &Lpips,
+    prediction: &Picture<SrgbRgb>,
+    reference: &Picture<SrgbRgb>,
+    mask: &Mask,
+    counts: &Mask,
+) -> f64 {
+    let filled = crate::mask::reference_filled(prediction, reference, mask).unwrap();
+    let (fp, fr) = (lpips.features(&filled).unwrap(), lpips.features(reference).unwrap());
+    let mut sum = 0.0;
+    for (stage, (p, r)) in lpips.network.stages.iter().zip(fp.stages.iter().zip(&fr.stages)) {
+        let (width, height) = (p.tensor.width, p.tensor.height);
+        let map = |x: usize, y: usize| -> f64 {
+            let pairs = p.normalized(y * width + x).zip(r.normalized(y * width + x));
+            stage
+                .linear
+                .iter()
+                .zip(pairs)
+                .map(|(&w, (p, r))| f64::from(w) * (f64::from(p) - f64::from(r)).powi(2))
+                .sum()
+        };
+        let place = |at: usize, from: usize, to: usize| {
+            let position = ((at as f64 + 0.5) * from as f64 / to as f64 - 0.5).clamp(0.0, (from - 1) as f64);
+            (position as usize, (position as usize + 1).min(from - 1), position.fract())
+        };
+        for (y, x) in (0..mask.height()).flat_map(|y| (0..mask.width()).map(move |x| (y, x))) {
+            if counts.get(x, y) {
+                let (left, right, across) = place(x, width, mask.width());
+                let (top, bottom, down) = place(y, height, mask.height());
+                let row = |y: usize| map(left, y) * (1.0 - across) + map(right, y) * across;
+                sum += row(top) * (1.0 - down) + row(bottom) * down;
+            }
+        }
+    }
+    sum / pixel_count(mask) as f64
+}
+
+/// Masks of one block, of two, of scattered pixels, of everything. Summed over the whole picture instead, what spills out
+/// of the mask is noticed.
+#[test]
+fn inside_a_mask_by_its_definition() {
+    let (lpips, p, r) = (tiny(), noise(40, 34, 40), noise(40, 34, 41));
+    let masks: [fn(usize, usize) -> bool; 4] = [
+        |x, y| x > 21 && y < 9,
+        |x, y| x < 4 && y < 5 || x > 33 && y > 30,
+        |x, y| (7 * x + 5 * y) % 61 == 0,
+        |_, _| true,
+    ];
+    let everything = Picture::filled(40, 34, true);
+    for (at, mask) in masks.into_iter().enumerate() {
+        let mask = Picture::from_fn(40, 34, mask);
+        let found = lpips.masked(&p, &r, &mask).unwrap().unwrap();
+        let expected = masked_by_definition(&lpips, &p, &r, &mask, &mask);
+        assert!((found - expected).abs() < 1e-6 * expected, "{at}: {found} {expected}");
+        let spilt = masked_by_definition(&lpips, &p, &r, &mask, &everything);
+        assert!(at == 3 || spilt > 1.05 * found, "{at}: {found} {spilt}");
+    }
+}
+
+/// Black outside the mask: what is left out of the computation is what both pictures have in common.
+#[test]
+fn black_fill_by_its_definition() {
+    let (lpips, p, r) = (tiny(), noise(40, 34, 42), noise(40, 34, 43));
+    let mask = Picture::from_fn(40, 34, |x, y| x > 21 && y < 9 || x + y < 8);
+    let found = lpips.black_fill(&p, &r, &mask).unwrap().unwrap();
+    let whole = lpips.whole(&black_filled(&p, &mask).unwrap(), &black_filled(&r, &mask).unwrap()).unwrap();
+    assert!((found - whole).abs() < 1e-6 * whole, "{found} {whole}");
+    assert!((found - lpips.whole(&p, &r).unwrap()).abs() > 0.1 * whole);
+}
+
 /// The extrapolation equals its definition under both mask rules.
 #[test]
 fn the_extrapolation_by_its_definition() {
@@ -148,7 +220,7 @@ fn the_extrapolation_by_its_definition() {
     let expected =
         |distance: &dyn Fn(&Picture<SrgbRgb>) -> f64| 2.0 * distance(&mean) - (distance(&a) + distance(&b)) / 2.0;
     let (whole, black) = (lpips.features(&r).unwrap(), lpips.black_filled_features(&r, &mask).unwrap());
-    let found = lpips.extrapolated_masked(noisy, &r, &whole, &mask).unwrap().unwrap();
+    let found = lpips.extrapolated_masked(noisy, &whole, &mask).unwrap().unwrap();
     assert_eq!(found.lpips, expected(&|p| lpips.masked(p, &r, &mask).unwrap().unwrap()));
     assert_eq!(found.lpips, 2.0 * found.of_mean - found.of_halves);
     let found = lpips.extrapolated_black_fill(noisy, &black, &mask).unwrap().unwrap();
@@ -156,7 +228,7 @@ fn the_extrapolation_by_its_definition() {
     // The twin: features of the other mask rule give another value.
     assert_ne!(lpips.extrapolated_black_fill(noisy, &whole, &mask).unwrap(), Some(found));
     let none = Picture::filled(24, 18, false);
-    assert_eq!(lpips.extrapolated_masked(noisy, &r, &whole, &none).unwrap(), None);
+    assert_eq!(lpips.extrapolated_masked(noisy, &whole, &none).unwrap(), None);
     assert_eq!(lpips.extrapolated_black_fill(noisy, &black, &none).unwrap(), None);
     a.set(10, 3, SrgbRgb([f32::NAN; 3]));
     let error = lpips.extrapolated_black_fill(MeanAndHalves { mean: &mean, a: &a, b: &b }, &black, &mask).unwrap_err();
@@ -172,7 +244,7 @@ fn the_extrapolation_by_its_definition() {
 fn equal_halves_are_plain_lpips() {
     let (lpips, p, r, mask) = (tiny(), noise(20, 20, 25), noise(20, 20, 26), Picture::from_fn(20, 20, |x, _| x > 4));
     let same = MeanAndHalves { mean: &p, a: &p, b: &p };
-    let found = lpips.extrapolated_masked(same, &r, &lpips.features(&r).unwrap(), &mask).unwrap().unwrap();
+    let found = lpips.extrapolated_masked(same, &lpips.features(&r).unwrap(), &mask).unwrap().unwrap();
     assert_eq!(Some(found.lpips), lpips.masked(&p, &r, &mask).unwrap());
 }
 
@@ -201,7 +273,8 @@ proptest! {
         prop_assert_eq!(lpips.whole(&p, &p).unwrap(), 0.0);
         prop_assert!(whole > 0.0);
         prop_assert_eq!(lpips.whole(&r, &p).unwrap(), whole);
-        prop_assert_eq!(lpips.black_fill(&p, &r, &full).unwrap(), Some(whole));
+        let filled = lpips.black_fill(&p, &r, &full).unwrap().unwrap();
+        prop_assert!((filled - whole).abs() < 1e-9 * whole);
         prop_assert_eq!(lpips.masked(&p, &p, &full).unwrap(), Some(0.0));
     }
 }

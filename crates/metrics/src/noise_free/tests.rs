@@ -3,7 +3,7 @@
 use mateval_image::LinearRgb;
 
 use super::*;
-use crate::mse;
+use crate::{NoisyHalf, mse};
 use mateval_testkit::synthetic_noise::{
     Render, SCATTERS, Scatter, mean_and_deviation, mean_of, single_pixels, squares, waves,
 };
@@ -23,43 +23,69 @@ fn plain(scatter: Scatter, samples: u32) -> Render<'static> {
     Render { scatter, strength: 0.7, samples, blocks: None, view: 0 }
 }
 
-/// Two halves of a prediction and of a reference, each by the renders given.
-struct Halved([Picture<LinearRgb>; 4]);
+/// Four quarters of a prediction, of half the samples each, and two halves of a reference.
+struct Rendered {
+    prediction: NoisyRender<LinearRgb>,
+    reference: [Picture<LinearRgb>; 2],
+}
 
-impl Halved {
+impl Rendered {
     fn new(renders: [&Render; 2], truths: [&Picture<LinearRgb>; 2], seed: u64) -> Self {
-        Self(std::array::from_fn(|i| renders[i / 2].picture(truths[i / 2], 4 * seed + i as u64)))
+        let quarter = Render { samples: renders[0].samples / 2, ..*renders[0] };
+        let half = |first: u64| linear_half([0, 1].map(|which| quarter.picture(truths[0], 6 * seed + first + which)));
+        let prediction = NoisyRender { a: half(0), b: half(2), shared: None };
+        Self { prediction, reference: [4, 5].map(|which| renders[1].picture(truths[1], 6 * seed + which)) }
     }
 
     fn error(&self, blocks: &Picture<u32>) -> NoiseFreeMse {
-        let [a, b, ia, ib] = &self.0;
-        noise_free_mse(Halves { a, b }, Halves { a: ia, b: ib }, &all(), blocks).unwrap().unwrap()
+        let [a, b] = &self.reference;
+        noise_free_mse(&self.prediction, Halves { a, b }, &all(), blocks).unwrap().unwrap()
     }
 
     /// The error of the halves' means, including noise.
     fn plain_error(&self) -> f64 {
-        let [a, b, ia, ib] = &self.0;
-        mse(&mean_of(a, b), &mean_of(ia, ib), None).unwrap().unwrap()
+        let ([ia, ib], NoisyRender { a, b, .. }) = (&self.reference, &self.prediction);
+        mse(&mean_of(&a.estimate, &b.estimate), &mean_of(ia, ib), None).unwrap().unwrap()
     }
 }
 
-/// Computed by hand: X = (0.5, 0.25), Y = (0.25, 0.25), so X Y = (0.125, 0.0625) and D = (0.09375, 0).
+/// A half of two quarters, not encoded.
+fn linear_half([first, second]: [Picture<LinearRgb>; 2]) -> NoisyHalf<LinearRgb> {
+    let combined = |sign: f32| {
+        let pairs = first.pixels().iter().zip(second.pixels());
+        let pixels = pairs.map(|(a, b)| LinearRgb([0, 1, 2].map(|c| 0.5 * (a.0[c] + sign * b.0[c]))));
+        Picture::new(first.width(), first.height(), pixels.collect()).unwrap()
+    };
+    NoisyHalf { estimate: combined(1.0), noise: combined(-1.0) }
+}
+
+/// A render whose halves and their noise are given.
+fn render<P: Pixel>([a, u, b, v]: [&Picture<P>; 4]) -> NoisyRender<P> {
+    let half =
+        |estimate: &Picture<P>, noise: &Picture<P>| NoisyHalf { estimate: estimate.clone(), noise: noise.clone() };
+    NoisyRender { a: half(a, u), b: half(b, v), shared: None }
+}
+
+/// Computed by hand: X = (0.5, 0.25), Y = (0.25, 0.25), so X Y = (0.125, 0.0625); u = (0.125, 0), v = (0.25, 0.125), so
+/// Y u = (0.03125, 0), X v = (0.125, 0.03125), u v = (0.03125, 0). All sums are divided by 2.
 #[test]
 fn a_small_number_by_hand() {
     let picture = |values: [f32; 2]| Picture::new(2, 1, values.to_vec()).unwrap();
     let (a, b, i) = (picture([1.0, 0.5]), picture([0.75, 0.5]), picture([0.5, 0.25]));
+    let (u, v) = (picture([0.125, 0.0]), picture([0.25, 0.125]));
     let blocks = Picture::new(2, 1, vec![7, 3]).unwrap();
     let error = |mask: [bool; 2]| {
         let mask = Picture::new(2, 1, mask.to_vec()).unwrap();
-        noise_free_mse(Halves { a: &a, b: &b }, Halves { a: &i, b: &i }, &mask, &blocks).unwrap()
+        noise_free_mse(&render([&a, &u, &b, &v]), Halves { a: &i, b: &i }, &mask, &blocks).unwrap()
     };
     let found = error([true, true]).unwrap();
     assert_eq!((found.mse, found.pixels), (0.09375, 2));
-    assert_eq!(
-        found.blocks.iter().map(|(id, noise)| (*id, noise.total())).collect::<Vec<_>>(),
-        [(3, 0.0), (7, 0.046875)]
-    );
-    assert_eq!((found.standard_error(), found.prediction_error(), found.reference_error()), (0.046875, 0.046875, 0.0));
+    let first = BlockNoise { second_half: 0.015625, ..Default::default() };
+    let second = BlockNoise { first_half: 0.015625, second_half: 0.0625, both_halves: 0.015625, ..Default::default() };
+    assert_eq!(found.blocks, [(3, first), (7, second)]);
+    let paths = 0.015625_f64.powi(2) + 0.0625_f64.powi(2);
+    assert_eq!(found.variances(), Variances { paths, shared: 0.0, reference: 0.0 });
+    assert_eq!(found.standard_error(), paths.sqrt());
     assert_eq!(error([false, true]).unwrap().mse, 0.0625);
     assert_eq!(error([false, false]), None);
 }
@@ -70,22 +96,29 @@ fn what_does_not_fit_is_refused() {
     let mut bad = good.clone();
     bad.set(1, 0, f32::NAN);
     let (mask, ids) = (Picture::filled(2, 2, true), Picture::filled(2, 2, 0));
+    let sound = || render([&good; 4]);
     let both = |picture| Halves { a: picture, b: picture };
-    let error = |p, r, ids| noise_free_mse(p, r, &mask, ids).unwrap_err();
+    let error = |p: &NoisyRender<f32>, r, ids| noise_free_mse(p, r, &mask, ids).unwrap_err();
     let halves = Halves { a: &good, b: &bad };
     assert!(matches!(
-        error(both(&good), halves, &ids),
+        error(&sound(), halves, &ids),
         MetricError::NotFinite { picture: "reference's second half", x: 1, y: 0, .. }
     ));
-    assert!(matches!(error(halves, both(&good), &ids), MetricError::NotFinite { .. }));
-    assert!(matches!(error(both(&good), both(&wide), &ids), MetricError::SizesDiffer { .. }));
+    for at in 0..4 {
+        let mut pictures = [&good; 4];
+        pictures[at] = &bad;
+        assert!(matches!(error(&render(pictures), both(&good), &ids), MetricError::NotFinite { .. }), "{at}");
+    }
+    let shared = NoisyRender { shared: Some(wide.clone()), ..sound() };
+    assert!(matches!(error(&shared, both(&good), &ids), MetricError::SizesDiffer { .. }));
+    assert!(matches!(error(&sound(), both(&wide), &ids), MetricError::SizesDiffer { .. }));
     let blocks = Picture::filled(2, 1, 0);
     assert!(matches!(
-        error(both(&good), both(&good), &blocks),
+        error(&sound(), both(&good), &blocks),
         MetricError::SizesDiffer { what: "picture of blocks", .. }
     ));
     let left = Picture::from_fn(2, 2, |x, _| x == 0);
-    assert!(noise_free_mse(halves, both(&good), &left, &ids).unwrap().is_some());
+    assert!(noise_free_mse(&sound(), halves, &left, &ids).unwrap().is_some());
 }
 
 /// A Z-test over 300 seeds; the error of the mean pictures fails it.
@@ -100,10 +133,11 @@ fn the_estimate_has_no_bias() {
     };
     for (scatter, samples) in SCATTERS.into_iter().flat_map(|scatter| SAMPLES.map(|samples| (scatter, samples))) {
         let render = plain(scatter, samples);
-        let halved: Vec<_> = (0..300).map(|seed| Halved::new([&render; 2], [&prediction, &reference], seed)).collect();
-        let free: Vec<f64> = halved.iter().map(|halved| halved.error(&single_pixels(SIDE)).mse).collect();
+        let rendered: Vec<_> =
+            (0..300).map(|seed| Rendered::new([&render; 2], [&prediction, &reference], seed)).collect();
+        let free: Vec<f64> = rendered.iter().map(|rendered| rendered.error(&single_pixels(SIDE)).mse).collect();
         assert!(z(&free).abs() < 3.5, "{scatter:?} {samples}: z = {}", z(&free));
-        let noisy: Vec<f64> = halved.iter().map(Halved::plain_error).collect();
+        let noisy: Vec<f64> = rendered.iter().map(Rendered::plain_error).collect();
         assert!(samples > 4 || z(&noisy) > 20.0, "{scatter:?} {samples}: z = {} for the twin", z(&noisy));
     }
 }
@@ -122,10 +156,10 @@ fn the_standard_error_is_the_spread() {
     for (scatter, samples) in SCATTERS.into_iter().flat_map(|scatter| SAMPLES.map(|samples| (scatter, samples))) {
         for correlated in [false, true] {
             let render = Render { blocks: correlated.then_some(&blocks), ..plain(scatter, samples) };
-            let halved: Vec<_> =
-                (0..300).map(|seed| Halved::new([&render; 2], [&prediction, &reference], seed)).collect();
+            let rendered: Vec<_> =
+                (0..300).map(|seed| Rendered::new([&render; 2], [&prediction, &reference], seed)).collect();
             let found = |ids: &Picture<u32>| {
-                let errors: Vec<_> = halved.iter().map(|halved| halved.error(ids)).collect();
+                let errors: Vec<_> = rendered.iter().map(|rendered| rendered.error(ids)).collect();
                 let reported: Vec<f64> = errors.iter().map(NoiseFreeMse::standard_error).collect();
                 reported_over_true(&reported, &errors.iter().map(|error| error.mse).collect::<Vec<_>>())
             };
@@ -137,18 +171,20 @@ fn the_standard_error_is_the_spread() {
     }
 }
 
-/// Two views that share blocks; their mean PSNR.
+/// Two views that share blocks; their mean PSNR. References have four times the samples, as a dataset's have: two halves of
+/// few heavy-tailed samples overstate their own noise.
 #[test]
 fn the_error_of_a_mean_psnr_is_its_spread() {
     let references = [waves(SIDE), scaled(&waves(SIDE), 0.9)];
     let (blocks, others) = (squares(SIDE, 0), squares(SIDE, 1000));
     for (scatter, samples) in SCATTERS.into_iter().flat_map(|scatter| [16, 64].map(|samples| (scatter, samples))) {
-        let halved = |view: usize, seed| {
+        let rendered = |view: usize, seed| {
             let render = Render { blocks: Some(&blocks), view: view as u64, ..plain(scatter, samples) };
+            let reference = Render { samples: 4 * samples, ..render };
             let prediction = scaled(&references[view], 0.4);
-            Halved::new([&render; 2], [&prediction, &references[view]], seed)
+            Rendered::new([&render, &reference], [&prediction, &references[view]], seed)
         };
-        let pairs: Vec<_> = (0..200).map(|seed| [halved(0, seed), halved(1, seed)]).collect();
+        let pairs: Vec<_> = (0..200).map(|seed| [rendered(0, seed), rendered(1, seed)]).collect();
         let found = |second: &Picture<u32>| {
             let (mut reported, mut means) = (Vec::new(), Vec::new());
             for [first, other] in &pairs {
@@ -170,17 +206,20 @@ fn the_error_of_a_mean_psnr_is_its_spread() {
 fn the_thread_count_changes_no_bit() {
     let reference = waves(SIDE);
     let render = plain(Scatter::HeavyTailed, 4);
-    let halved = Halved::new([&render; 2], [&scaled(&reference, 0.8), &reference], 0);
+    let rendered = Rendered::new([&render; 2], [&scaled(&reference, 0.8), &reference], 0);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| halved.error(&squares(SIDE, 0)))
+        pool.install(|| rendered.error(&squares(SIDE, 0)))
     };
     assert_eq!(with(1), with(2));
-    assert_ne!(with(1), Halved::new([&render; 2], [&scaled(&reference, 0.8), &reference], 1).error(&squares(SIDE, 0)));
+    assert_ne!(
+        with(1),
+        Rendered::new([&render; 2], [&scaled(&reference, 0.8), &reference], 1).error(&squares(SIDE, 0))
+    );
 }
 
-/// The two sources of noise are separated: the picture with fewer samples has more noise, and both squares add up to
-/// the square of the whole.
+/// The sources of noise are separated: the picture with fewer samples has more noise. Noise that both quarters share is
+/// found where it is stated, and lost where it is not.
 #[test]
 fn whose_noise_it_is() {
     let reference = waves(SIDE);
@@ -188,21 +227,56 @@ fn whose_noise_it_is() {
     for scatter in SCATTERS {
         let (few, many) = (plain(scatter, 16), plain(scatter, 144));
         for (renders, ratio) in [([&few, &many], 3.0), ([&many, &few], 1.0 / 3.0)] {
-            let errors: Vec<_> = (0..50)
-                .map(|seed| Halved::new(renders, [&prediction, &reference], seed).error(&single_pixels(SIDE)))
+            let all: Vec<Variances> = (0..50)
+                .map(|seed| {
+                    Rendered::new(renders, [&prediction, &reference], seed).error(&single_pixels(SIDE)).variances()
+                })
                 .collect();
-            let square = |part: fn(&NoiseFreeMse) -> f64| errors.iter().map(|error| part(error).powi(2)).sum::<f64>();
-            let (p, r) = (square(NoiseFreeMse::prediction_error), square(NoiseFreeMse::reference_error));
-            let found = (p / r).sqrt();
+            let sum = |part: fn(&Variances) -> f64| all.iter().map(part).sum::<f64>();
+            let found = (sum(|v| v.paths) / sum(|v| v.reference)).sqrt();
             // The prediction is darker, so its noise is smaller.
-            assert!((0.6..1.1).contains(&(found / ratio)), "{scatter:?}: {found}");
-            assert!(((p + r) / square(NoiseFreeMse::standard_error) - 1.0).abs() < 0.05);
+            assert!((0.6..1.35).contains(&(found / ratio)), "{scatter:?}: {found}");
+            assert_eq!(sum(|v| v.shared), 0.0);
         }
     }
 }
 
+/// Each half has noise that both of its quarters share.
+#[test]
+fn shared_noise_counts() {
+    let reference = waves(SIDE);
+    let prediction = scaled(&reference, 0.8);
+    let (paths, shared, fine) =
+        (plain(Scatter::GaussianLike, 64), plain(Scatter::GaussianLike, 16), plain(Scatter::GaussianLike, 4096));
+    let none = scaled(&prediction, 0.0);
+    let rendered = |seed: u64| {
+        let mut rendered = Rendered::new([&paths, &fine], [&prediction, &reference], seed);
+        let noise = [0, 1].map(|half| difference(&shared.picture(&prediction, 100_000 + 2 * seed + half), &prediction));
+        let NoisyRender { a, b, shared } = &mut rendered.prediction;
+        a.estimate = difference(&a.estimate, &difference(&none, &noise[0]));
+        b.estimate = difference(&b.estimate, &difference(&none, &noise[1]));
+        *shared = Some(difference(&noise[0], &noise[1]));
+        rendered
+    };
+    let all: Vec<Rendered> = (0..200).map(rendered).collect();
+    let ratio = |reported: &dyn Fn(&NoiseFreeMse) -> f64| {
+        let errors: Vec<NoiseFreeMse> = all.iter().map(|rendered| rendered.error(&single_pixels(SIDE))).collect();
+        let estimates: Vec<f64> = errors.iter().map(|error| error.mse).collect();
+        reported_over_true(&errors.iter().map(reported).collect::<Vec<_>>(), &estimates)
+    };
+    let found = ratio(&NoiseFreeMse::standard_error);
+    assert!((0.8..1.25).contains(&found), "{found}");
+    let twin = ratio(&|error| (error.variances().total() - error.variances().shared).sqrt());
+    assert!(twin < 0.7, "{twin}");
+}
+
+fn difference(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+    Picture::from_fn(SIDE, SIDE, |x, y| LinearRgb([0, 1, 2].map(|c| a.get(x, y).0[c] - b.get(x, y).0[c])))
+}
+
+/// An estimate with this standard error, all from the reference.
 fn error_of(mse: f64, noise: f64) -> NoiseFreeMse {
-    NoiseFreeMse { mse, pixels: 1, blocks: vec![(0, BlockNoise { prediction: noise, reference: 0.0 })] }
+    NoiseFreeMse { mse, pixels: 1, blocks: vec![(0, BlockNoise { reference: noise, ..Default::default() })] }
 }
 
 #[test]
@@ -213,16 +287,32 @@ fn psnr_of_an_estimate() {
     assert_eq!(psnr(0.01, 0.006), plain(Psnr::from_mse(0.01).unwrap().db));
     assert_eq!(psnr(0.0, 0.0), NoiseFreePsnr { db: 100.0, exact: true, lower_bound: false });
     assert_eq!(psnr(1e-20, 0.0), plain(100.0));
-    // Not significant: 0.01 + 1.645 * 0.01.
-    for (mse, noise, bound) in
-        [(0.01, 0.01, 0.02645), (0.0, 0.01, 0.01645), (-0.01, 0.01, 0.01645), (-0.02, 0.01, 0.02)]
-    {
-        let found = psnr(mse, noise);
+    for mse in [0.01, 0.0, -0.01, -0.02] {
+        let found = psnr(mse, 0.01);
         assert!(found.lower_bound && !found.exact);
-        assert!((found.db + 10.0 * libm::log10(bound)).abs() < 1e-9, "{mse}: {}", found.db);
+        assert!((found.db + 10.0 * libm::log10(0.01645)).abs() < 1e-9, "{mse}: {}", found.db);
     }
     assert_eq!(psnr(-1e-20, 1e-20), NoiseFreePsnr { db: 100.0, exact: false, lower_bound: true });
     assert!(matches!(error_of(f64::NAN, 0.0).psnr(), Err(MetricError::InvalidMse { .. })));
+}
+
+/// No PSNR rises with its MSE, nor with its standard error; the twin, which takes an upper bound below 1.645 standard
+/// errors, does.
+#[test]
+fn a_smaller_error_never_has_the_smaller_psnr() {
+    let grid: Vec<f64> = (-400..=400).map(|k| f64::from(k) * 2.5e-5).collect();
+    let noises: Vec<f64> = (0..=40).map(|k| f64::from(k) * 1e-4).collect();
+    let rises = |psnr: &dyn Fn(f64, f64) -> f64| {
+        let over_mse = noises.iter().any(|&noise| grid.windows(2).any(|two| psnr(two[0], noise) < psnr(two[1], noise)));
+        let over_noise = grid.iter().any(|&mse| noises.windows(2).any(|two| psnr(mse, two[0]) < psnr(mse, two[1])));
+        over_mse || over_noise
+    };
+    assert!(!rises(&|mse, noise| error_of(mse, noise).psnr().unwrap().db));
+    assert!(rises(&|mse, noise| {
+        let reach = ONE_SIDED_95 * noise;
+        let bound = if mse > reach { mse } else { mse.max(0.0) + reach };
+        Psnr::from_mse(bound).unwrap().db
+    }));
 }
 
 /// Computed by hand: 10 / ln 10 * 0.002 / 0.01 is 0.86859 dB. Two equal views that share their block have the same
@@ -236,7 +326,10 @@ fn mean_psnr_errors_by_hand() {
     assert!((total(&[&view, &other]).unwrap() - one).abs() < 1e-15);
     other.blocks[0].0 = 1;
     assert!((total(&[&view, &other]).unwrap() - one / 2.0_f64.sqrt()).abs() < 1e-15);
-    assert_eq!(psnr_mean_error(&[&view]).unwrap().reference, 0.0);
+    let error = psnr_mean_error(&[&view]).unwrap();
+    assert_eq!((error.paths, error.shared), (0.0, 0.0));
     assert_eq!(total(&[]), None);
-    assert_eq!(total(&[&view, &error_of(0.0, 0.002)]), None);
+    // Under the bound, its slope is that of 1.645 standard errors; an exact view has no error that could be stated.
+    assert!((total(&[&error_of(0.0, 0.002)]).unwrap() - one * 0.01 / (1.645 * 0.002)).abs() < 1e-8);
+    assert_eq!(total(&[&view, &error_of(0.0, 0.0)]), None);
 }

@@ -61,7 +61,10 @@ pub fn build(
     // The remaining files.
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;
-    scene_file::write(plan, entry, &atlases, folder)?;
+    if let Some(source) = &plan.source_materials {
+        reference_io::write_source_materials(folder, source)?;
+    }
+    scene_file::write(plan, recipe, entry, &atlases, folder)?;
     Ok(Built { licence, absent })
 }
 

@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
-use mateval_scene::dataset::View;
+use mateval_scene::dataset::{TrueMaterials, View};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::source_materials::SourceMaterials;
 use mateval_scene::{Finding, SceneLights, SourceKind};
 use mateval_sources::source_scene::SourceScene;
 
 use super::fault::SceneFault;
 use super::turned_views::views_of;
+use crate::conversion::convert;
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
 use crate::part_labels;
@@ -23,7 +25,12 @@ pub(super) struct Plan {
     /// The house that it belongs to.
     pub(super) house: String,
     pub(super) lights: SceneLights,
+    /// Whether the source states roughness and metallic.
+    pub(super) states_roughness: bool,
+    pub(super) states_metallic: bool,
     pub(super) scene: std::sync::Arc<ReferenceScene>,
+    /// The source's own materials, where they were converted.
+    pub(super) source_materials: Option<SourceMaterials>,
     pub(super) instances: Vec<InstanceEntry>,
     /// The source's own parts first.
     pub(super) part_splits: Vec<PartSplit>,
@@ -50,10 +57,32 @@ pub(super) fn plan(
     let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
     let views = views_of(recipe, read.camera);
-    let scene = std::sync::Arc::new(read.scene);
-    let SourceScene { kind, lights, house, findings, file, files, absent, .. } = read;
-    let house = entry.house.clone().unwrap_or(house);
-    Ok((Plan { kind, house, lights, scene, instances, part_splits, views, findings, file, files }, absent))
+    let SourceScene { kind, lights, states_roughness, states_metallic, file, files, absent, .. } = read;
+    let mut findings = read.findings;
+    let (scene, source_materials) = match recipe.materials {
+        TrueMaterials::Source => (read.scene, None),
+        TrueMaterials::Converted => {
+            let converted = convert(read.scene, &file)?;
+            findings.extend(converted.findings);
+            (converted.scene, converted.source)
+        }
+    };
+    let plan = Plan {
+        kind,
+        house: entry.house.clone().unwrap_or(read.house),
+        lights,
+        states_roughness,
+        states_metallic,
+        scene: std::sync::Arc::new(scene),
+        source_materials,
+        instances,
+        part_splits,
+        views,
+        findings,
+        file,
+        files,
+    };
+    Ok((plan, absent))
 }
 
 /// The source's own parts, then those of the recipe's labels.

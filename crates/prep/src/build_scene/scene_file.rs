@@ -7,11 +7,12 @@ use mateval_scene::layout::SceneFolder;
 use super::materials::InstanceAtlas;
 use super::plan::Plan;
 use crate::error::PrepError;
-use crate::recipe::RecipeScene;
+use crate::recipe::{Recipe, RecipeScene};
 
 /// Writes `scene.json`.
 pub(super) fn write(
     plan: Plan,
+    recipe: &Recipe,
     entry: &RecipeScene,
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
@@ -49,8 +50,15 @@ pub(super) fn write(
     let file = SceneFile {
         format: FORMAT.to_owned(),
         id: entry.id.clone(),
-        source: SceneSource { kind: plan.kind, house: plan.house, files },
+        source: SceneSource {
+            kind: plan.kind,
+            house: plan.house,
+            states_roughness: plan.states_roughness,
+            states_metallic: plan.states_metallic,
+            files,
+        },
         lights: plan.lights,
+        materials: recipe.materials,
         exposure: entry.exposure,
         views: plan.views,
         instances,

@@ -34,6 +34,8 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
     Ok(SourceScene {
         kind: SourceKind::Bitterli,
         lights: SceneLights::Own,
+        states_roughness: true,
+        states_metallic: true,
         house: folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
         file: xml.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         origins: vec![InstanceOrigin::default(); read.scene.surfaces.len()],

@@ -15,6 +15,7 @@ mod views;
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use mateval_scene::dataset::TrueMaterials;
 use serde::Deserialize;
 
 use crate::error::PrepError;
@@ -48,6 +49,9 @@ pub struct Recipe {
     pub views: Vec<Offset>,
     /// Texels a side of every atlas; if absent, chosen by what the input view shows.
     pub atlas_size: Option<u32>,
+    /// The materials of which the truth is made.
+    #[serde(default)]
+    pub materials: TrueMaterials,
     /// Samples a pixel of each half of a rendered picture.
     #[serde(default = "default_samples")]
     pub samples: u32,

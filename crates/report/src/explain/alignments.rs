@@ -10,7 +10,7 @@ use super::file::{AlignedBy, AlignmentScores};
 use super::scales::best_scale;
 use crate::error::ReportError;
 use mateval_eval::alignment::scaled;
-use mateval_eval::measure::albedo_mse;
+use mateval_eval::measure::{Albedo, albedo_mse};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result_key::Views;
 use mateval_eval::shown_scene::SceneAlbedo;
@@ -49,13 +49,14 @@ fn scores_with(by: AlignedBy, protocol: &Protocol, views: &[SceneAlbedo]) -> Res
     let scales = scales(by, views);
     let mut values: BTreeMap<Views, Vec<f64>> = BTreeMap::new();
     for (number, view) in views.iter().enumerate() {
-        let aligned = aligned(by, &scales, number, view);
+        let aligned = Albedo::new(aligned(by, &scales, number, view));
+        let truth = Albedo::new(view.truth.albedo.clone());
         // Only the input view has no unobserved pixels.
         let whole = if view.truth.unobserved.is_none() { Views::Input } else { Views::Novel };
         let regions = [(whole, Some(&view.truth.valid)), (Views::Unobserved, view.truth.unobserved.as_ref())];
         for (name, mask) in regions {
             let Some(mask) = mask else { continue };
-            let mse = albedo_mse(protocol, &aligned, &view.truth.albedo, mask)?;
+            let mse = albedo_mse(protocol, &aligned, &truth, mask)?;
             values.entry(name).or_default().extend(mse);
         }
     }
@@ -145,7 +146,7 @@ mod tests {
 
     #[test]
     fn scales_of_instances_remove_errors_that_a_scale_of_the_scene_cannot() {
-        let protocol = Protocol::named("mateval-1").unwrap();
+        let protocol = Protocol::named("mateval-2").unwrap();
         let scores = alignments(&SceneId::new("s").unwrap(), &protocol, &views()).unwrap();
         assert_eq!(scores.len(), 6 * 3);
         let mse = |by: AlignedBy, views: Views| {

@@ -5,7 +5,7 @@ use mateval_scene::SceneId;
 use mateval_scene::dataset_id::DatasetId;
 
 use super::columns::{self, Column};
-use super::file::{LEADERBOARD_FORMAT, LeaderboardDataset, LeaderboardFile, LeaderboardMethod};
+use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardDataset, LeaderboardFile, LeaderboardMethod};
 use super::heads::MethodHead;
 use super::plan::LeaderboardPlan;
 use super::verified::Verified;
@@ -15,6 +15,8 @@ use crate::ranking::file::{RankedMethod, Ranking};
 /// Everything that pages are made from. Results, scores and heads are in the order of the ranking's methods.
 pub(super) struct Board<'a> {
     pub(super) results: &'a [ResultFile],
+    /// The result of the truth itself.
+    pub(super) ceiling: Option<&'a ResultFile>,
     pub(super) scores: Vec<&'a ProtocolResult>,
     pub(super) file: LeaderboardFile,
     pub(super) heads: Vec<MethodHead>,
@@ -24,7 +26,12 @@ pub(super) struct Board<'a> {
 
 impl<'a> Board<'a> {
     /// Gathers what pages show from the plan's results and their ranking.
-    pub(super) fn new(plan: &LeaderboardPlan<'a>, ranking: Ranking, pictures: PictureSet) -> Self {
+    pub(super) fn new(
+        plan: &LeaderboardPlan<'a>,
+        ranking: Ranking,
+        ceiling: Option<Ceiling>,
+        pictures: PictureSet,
+    ) -> Self {
         let method = |((method, result), verified): ((&RankedMethod, &ResultFile), &Verified)| {
             let submission = result.submission.clone();
             LeaderboardMethod {
@@ -49,6 +56,7 @@ impl<'a> Board<'a> {
             ranking.methods.iter().zip(&methods).map(|(ranked, method)| MethodHead::new(ranked, method, &ranking));
         Self {
             results: plan.results,
+            ceiling: plan.ceiling,
             scores: plan.results.iter().filter_map(|result| result.protocols.get(plan.protocol)).collect(),
             heads: heads.collect(),
             columns: columns::columns(&ranking),
@@ -57,6 +65,7 @@ impl<'a> Board<'a> {
                 format: LEADERBOARD_FORMAT.to_owned(),
                 tool: plan.tool.clone(),
                 dataset,
+                ceiling,
                 methods,
                 ranking,
             },

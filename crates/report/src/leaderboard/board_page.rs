@@ -15,6 +15,7 @@ use crate::error::ReportError;
 use mateval_eval::result_key::ResultKey;
 
 use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
+use crate::truth_noise::{self, Measured, close_pairs};
 
 #[derive(Serialize)]
 struct BoardPage<'a> {
@@ -23,6 +24,9 @@ struct BoardPage<'a> {
     choices: Choices,
     first: &'a Column,
     rows: Vec<Row<'a>>,
+    ceiling: Option<CeilingRow<'a>>,
+    /// One sentence a column, on methods that are closer to each other than the noise of the truth's pictures.
+    too_close: Vec<String>,
     has_intervals: bool,
     has_tables: bool,
 }
@@ -35,6 +39,12 @@ struct Row<'a> {
     facts: Vec<Option<Fact>>,
     #[serde(skip)]
     value: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct CeilingRow<'a> {
+    name: &'a str,
+    cells: Vec<Option<String>>,
 }
 
 /// Writes `index.html`, and one script for each number with the comparison of all pairs of methods.
@@ -53,6 +63,8 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         choices: choices(&board.columns),
         first,
         rows,
+        ceiling: ceiling_row(board),
+        too_close: board.columns.iter().filter_map(|column| too_close(board, column)).collect(),
         has_intervals: standings().any(|standing| standing.interval.is_some()),
         has_tables: site.path(super::downloads::TABLES).exists(),
     };
@@ -84,6 +96,23 @@ fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column) -> Row<'a> {
         facts: facts(&board.file.methods[at], board.scores[at]),
         value: first.map(|standing| standing.value),
     }
+}
+
+fn ceiling_row<'a>(board: &'a Board<'_>) -> Option<CeilingRow<'a>> {
+    let ceiling = board.file.ceiling.as_ref()?;
+    let cell = |column: &Column| ceiling.values.get(&column.key).map(|value| column.text(*value));
+    Some(CeilingRow { name: &ceiling.method, cells: board.columns.iter().map(cell).collect() })
+}
+
+/// A sentence on the methods that the noise of the truth cannot tell apart by a column; none without such.
+fn too_close(board: &Board<'_>, column: &Column) -> Option<String> {
+    let methods = board.heads.iter().zip(&board.scores).filter_map(|(head, scores)| {
+        let psnr = standing(board.ranking(), column.key, &head.id)?.value;
+        let truth_noise = truth_noise::of_dataset(scores, &column.key)?;
+        Some(Measured { method: &head.name, psnr, truth_noise })
+    });
+    let texts: Vec<String> = close_pairs(methods.collect()).iter().map(ToString::to_string).collect();
+    (!texts.is_empty()).then(|| format!("{} {}: {}.", column.title, column.metric_title, texts.join("; ")))
 }
 
 /// All pairs of methods by one number, row against column: the share of draws that the row's method wins, in percent,

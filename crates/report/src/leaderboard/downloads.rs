@@ -29,7 +29,7 @@ pub(super) fn write(board: &Board<'_>, protocol: &str, site: &SiteWriter<'_>) ->
     };
     if !whole.is_empty() {
         for (file, format) in [(TABLES, TableFormat::Latex), ("downloads/tables.csv", TableFormat::Csv)] {
-            site.file(file, &tables(&whole, protocol, Grouping::Dataset, format)?)?;
+            site.file(file, &tables(&whole, board.ceiling, protocol, Grouping::Dataset, format)?)?;
         }
     }
     for (head, scores) in board.heads.iter().zip(&board.scores) {

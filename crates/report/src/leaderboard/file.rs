@@ -1,5 +1,8 @@
 //! `leaderboard.json`: everything that a leaderboard shows about its methods, for programs.
 
+use std::collections::BTreeMap;
+
+use mateval_eval::result_key::ResultKey;
 use mateval_scene::submission::Cost;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,6 +26,9 @@ pub struct LeaderboardFile {
     pub tool: String,
     /// The dataset that all submissions were scored on.
     pub dataset: LeaderboardDataset,
+    /// The scores of the truth itself, which no method is expected to exceed; they are not ranked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ceiling: Option<Ceiling>,
     /// What each submission states about its method, in the ranking's order.
     pub methods: Vec<LeaderboardMethod>,
     /// Scores, intervals and ranks.
@@ -39,6 +45,18 @@ pub struct LeaderboardDataset {
     pub version: String,
     /// SHA-256 of its manifest, hex.
     pub manifest_sha256: String,
+}
+
+/// The scores of the truth itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ceiling {
+    /// The name of its submission.
+    pub method: String,
+    /// Means over scenes.
+    pub values: BTreeMap<ResultKey, f64>,
+    /// The standard error of such a mean due to the noise of the truth's pictures, in dB; light's PSNR alone has one.
+    pub truth_noise_db: BTreeMap<ResultKey, f64>,
 }
 
 /// What a submission states about its method.

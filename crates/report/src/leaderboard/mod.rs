@@ -9,6 +9,7 @@
 
 mod board;
 mod board_page;
+mod ceiling;
 mod columns;
 mod downloads;
 pub mod errata;
@@ -48,9 +49,10 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     check_place(out, force)?;
     progress("ranking", 0, 1);
     let ranking = rank(plan.results, plan.protocol, plan.partial)?;
+    let ceiling = plan.ceiling.map(|result| ceiling::of(result, &ranking)).transpose()?;
     let work = WorkFolder::start(out)?;
     let pictures = pictures::gather(plan, &ranking, &work.path().join("pictures"), progress)?;
-    let board = Board::new(plan, ranking, pictures);
+    let board = Board::new(plan, ranking, ceiling, pictures);
     let site = SiteWriter::new(work.path(), site(&board));
     site.assets()?;
     downloads::write(&board, plan.protocol, &site)?;

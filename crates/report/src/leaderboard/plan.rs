@@ -13,7 +13,9 @@ use crate::strips::Shown;
 pub struct LeaderboardPlan<'a> {
     /// The results.
     pub results: &'a [ResultFile],
-    /// Whether each of them was verified.
+    /// The result of the truth itself, which is shown below the methods and not ranked.
+    pub ceiling: Option<&'a ResultFile>,
+    /// Whether each of the results was verified.
     pub verified: Vec<Verified>,
     /// The protocol whose scores are ranked.
     pub protocol: &'a str,

@@ -24,8 +24,9 @@ fn three() -> [ResultFile; 3] {
 fn plan(results: &[ResultFile]) -> LeaderboardPlan<'_> {
     LeaderboardPlan {
         results,
+        ceiling: None,
         verified: vec![Verified::Confirmed, Verified::No, Verified::Stale],
-        protocol: "mateval-1",
+        protocol: "mateval-2",
         partial: false,
         errata: None,
         pictures: None,
@@ -61,7 +62,7 @@ fn a_site_has_all_its_pages() {
         "{scene}"
     );
     assert!(text("scenes/s01.html").contains("No pictures were given"));
-    assert!(text("protocol.html").contains(&results[0].protocols["mateval-1"].fingerprint));
+    assert!(text("protocol.html").contains(&results[0].protocols["mateval-2"].fingerprint));
     assert!(text("errata.html").contains("None are known"));
     assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));
     assert!(out.join("pictures/good/s00/input/albedo-error.png").is_file() && !out.join("pictures/no id").exists());
@@ -69,6 +70,24 @@ fn a_site_has_all_its_pages() {
     assert_eq!((file.methods.len(), file.ranking.keys.len()), (3, 2));
     let lines = text("downloads/leaderboard.csv").lines().count();
     assert_eq!((lines, text("methods/bad.csv").lines().count()), (1 + 3 * 2, 1 + 12));
+}
+
+#[test]
+fn the_ceiling_is_shown_and_not_ranked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (results, ceiling) = (three(), result("gt", &scores(48.0, 0.0)));
+    let out = folder.path().join("site");
+    write(&LeaderboardPlan { ceiling: Some(&ceiling), ..plan(&results) }, &out, false, &quiet).unwrap();
+    let index = std::fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(index.contains("<tfoot>") && index.contains("ceiling: the truth itself"), "{index}");
+    let file: LeaderboardFile = json::read(&out.join(LEADERBOARD_PATH)).unwrap();
+    assert_eq!((file.ranking.methods.len(), file.ceiling.map(|ceiling| ceiling.method)), (3, Some("gt".to_owned())));
+    assert!(std::fs::read_to_string(out.join("downloads/tables.csv")).unwrap().contains("\"gt (ceiling)\""));
+    let mut other = ceiling;
+    other.dataset.scenes.pop();
+    let plan = LeaderboardPlan { ceiling: Some(&other), ..plan(&results) };
+    let error = write(&plan, &out, true, &quiet).unwrap_err().to_string();
+    assert!(error.contains("'good' and 'gt' were scored on different scenes"), "{error}");
 }
 
 #[test]

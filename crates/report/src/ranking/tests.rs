@@ -152,7 +152,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             (scene(at), values.into())
         })
         .collect();
-    let protocol = Protocol::named("mateval-1").unwrap();
+    let protocol = Protocol::named("mateval-2").unwrap();
     let ids: Vec<SceneId> = scenes.keys().cloned().collect();
     let scores = ProtocolResult {
         fingerprint: protocol.fingerprint("m", &ids.iter().collect::<Vec<_>>(), None, None),
@@ -161,6 +161,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
         scenes,
         summary_noise: BTreeMap::new(),
         noise: BTreeMap::new(),
+        companions: Default::default(),
         fits: BTreeMap::new(),
         pictures: Vec::new(),
         texels: Vec::new(),
@@ -187,7 +188,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             scored_renderer: None,
         },
         lpips_weights: BTreeMap::from([("alex".to_owned(), None)]),
-        protocols: BTreeMap::from([("mateval-1".to_owned(), scores)]),
+        protocols: BTreeMap::from([("mateval-2".to_owned(), scores)]),
         missing: Vec::new(),
         findings: Vec::new(),
     }
@@ -206,7 +207,7 @@ fn standings<'a>(ranking: &'a Ranking, key: &ResultKey) -> &'a [Standing] {
 fn copies_share_a_rank() {
     let results =
         [result("Good", &scores(30.0, 0.1)), result("bad", &scores(20.0, 0.0)), result("good!", &scores(30.0, 0.1))];
-    let ranking = rank(&results, "mateval-1", false).unwrap();
+    let ranking = rank(&results, "mateval-2", false).unwrap();
     let ids: Vec<&str> = ranking.methods.iter().map(|method| method.id.as_str()).collect();
     assert_eq!(ids, ["good", "bad", "good-2"]);
     for key in &[PSNR, MSE] {
@@ -226,7 +227,7 @@ fn the_same_bytes_whatever_the_threads() {
     let results = [result("a", &scores(25.0, 0.3)), result("b", &scores(25.1, -0.2)), result("c", &scores(24.0, 0.5))];
     let text = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-1", false)).unwrap())
+        mateval_scene::json::to_text(&pool.install(|| rank(&results, "mateval-2", false)).unwrap())
     };
     assert_eq!(text(1), text(3));
 }
@@ -246,7 +247,7 @@ fn many_methods_need_more_draws() {
 fn few_houses_give_no_intervals() {
     let [four, five] = [4, 5].map(|scenes| {
         let cut = |method: &str, mean| result(method, &scores(mean, 0.1)[..scenes]);
-        rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-1", false).unwrap()
+        rank(&[cut("a", 30.0), cut("b", 20.0)], "mateval-2", false).unwrap()
     });
     let first = |ranking: &Ranking| standings(ranking, &PSNR)[0].clone();
     assert!(first(&four).interval.is_none() && first(&five).interval.is_some());
@@ -258,9 +259,9 @@ fn few_houses_give_no_intervals() {
 fn partial_results_are_accepted_only_on_request() {
     let part = result("part", &scores(40.0, 0.0)[..6]);
     let results = [result("whole", &scores(30.0, 0.0)), part.clone(), result("low", &scores(20.0, 0.0))];
-    let error = rank(&results, "mateval-1", false).unwrap_err().to_string();
+    let error = rank(&results, "mateval-2", false).unwrap_err().to_string();
     assert!(error.contains("'part' was scored on 6 of 12 scenes") && error.contains("--partial"), "{error}");
-    let ranking = rank(&results, "mateval-1", true).unwrap();
+    let ranking = rank(&results, "mateval-2", true).unwrap();
     let partial: Vec<bool> = ranking.methods.iter().map(|method| method.partial).collect();
     assert_eq!((partial, ranking.methods[1].not_scored.len()), (vec![false, true, false], 6));
     let standings = standings(&ranking, &PSNR);
@@ -268,7 +269,7 @@ fn partial_results_are_accepted_only_on_request() {
     let pairs: Vec<usize> = ranking.keys[&PSNR].pairs.iter().map(|pair| pair.scenes).collect();
     assert_eq!(pairs, [6, 12, 6]);
     // The intervals of complete results do not depend on the partial one.
-    let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-1", false).unwrap();
+    let alone = rank(&[results[0].clone(), results[2].clone()], "mateval-2", false).unwrap();
     let interval = |ranking: &Ranking| ranking.keys[&PSNR].standings[0].interval;
     assert_eq!(interval(&ranking), interval(&alone));
 }
@@ -284,7 +285,7 @@ fn scenes_left_out_of_a_submission() {
         observed: TexelErrors::default(),
         unobserved: TexelErrors::default(),
     };
-    gaps.protocols.get_mut("mateval-1").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
+    gaps.protocols.get_mut("mateval-2").unwrap().texels = (0..12).map(|at| texels(scene(at))).collect();
     let missing = |file: &str| Finding {
         severity: Severity::Warning,
         code: "missing_map".to_owned(),
@@ -296,7 +297,7 @@ fn scenes_left_out_of_a_submission() {
     gaps.findings = vec![missing("scenes/s03/sofa/base_color.png"), missing("scenes/s04/sofa/roughness.png")];
     let results = [gaps, result("whole", &scores(31.0, 0.0))];
     for (partial, scenes) in [(false, 12), (true, 11)] {
-        let ranking = rank(&results, "mateval-1", partial).unwrap();
+        let ranking = rank(&results, "mateval-2", partial).unwrap();
         assert_eq!(ranking.methods[0].left_out, [scene(3)]);
         assert_eq!(standings(&ranking, &PSNR)[0].scenes, scenes);
         assert_eq!(ranking.methods[0].partial, partial);
@@ -309,30 +310,30 @@ fn results_that_cannot_be_ranked_together() {
     let refused = |change: fn(&mut ResultFile)| {
         let mut other = result("other", &scores(20.0, 0.0));
         change(&mut other);
-        rank(&[good.clone(), other], "mateval-1", true).unwrap_err().to_string()
+        rank(&[good.clone(), other], "mateval-2", true).unwrap_err().to_string()
     };
     let scored_anew = |result: &mut ResultFile, manifest: &str| {
         result.dataset.manifest_sha256 = manifest.to_owned();
         let ids: Vec<&SceneId> = result.dataset.scenes.iter().collect();
-        let scores = result.protocols.get_mut("mateval-1").unwrap();
+        let scores = result.protocols.get_mut("mateval-2").unwrap();
         scores.fingerprint = scores.protocol.fingerprint(manifest, &ids, None, None);
     };
     let mut other = result("other", &scores(20.0, 0.0));
     scored_anew(&mut other, "another");
-    let error = rank(&[good.clone(), other], "mateval-1", true).unwrap_err().to_string();
+    let error = rank(&[good.clone(), other], "mateval-2", true).unwrap_err().to_string();
     assert!(error.contains("'good' and 'other' have different fingerprints"), "{error}");
     let error = refused(|other| other.dataset.manifest_sha256 = "another".to_owned());
     assert!(error.contains("it was changed"), "{error}");
     let error = refused(|other| other.dataset.houses.clear());
     assert!(error.contains("the house of scene 's00'"), "{error}");
     let mut other = result("other", &scores(20.0, 0.0));
-    let scenes = &mut other.protocols.get_mut("mateval-1").unwrap().scenes;
+    let scenes = &mut other.protocols.get_mut("mateval-2").unwrap().scenes;
     scenes.get_mut(&scene(3)).unwrap().insert(PSNR, 1e300);
-    let error = rank(&[good.clone(), other], "mateval-1", false).unwrap_err().to_string();
+    let error = rank(&[good.clone(), other], "mateval-2", false).unwrap_err().to_string();
     assert!(error.contains("1e300 for 'albedo.input.psnr', which is not a possible score"), "{error}");
     let error = refused(|other| other.dataset.houses.values_mut().for_each(|house| house.push('2')));
     assert!(error.contains("assign scene 's00' to different houses"), "{error}");
     let error = refused(|other| other.protocols.clear());
-    assert!(error.contains("score it with --protocol mateval-1"), "{error}");
-    assert!(rank(&[], "mateval-1", false).is_err());
+    assert!(error.contains("score it with --protocol mateval-2"), "{error}");
+    assert!(rank(&[], "mateval-2", false).is_err());
 }

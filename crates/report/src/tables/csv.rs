@@ -15,7 +15,7 @@ pub(super) fn text(table: &Table<'_>) -> String {
     let mut lines = vec![names.chain(heads).collect::<Vec<_>>().join(",")];
     for group in &table.groups {
         for (method, cells) in &group.rows {
-            let names = table.group_head.iter().map(|_| group.name).chain([*method]).map(quoted);
+            let names = table.group_head.iter().map(|_| group.name).chain([method.as_str()]).map(quoted);
             let cells = table.columns.iter().zip(cells).flat_map(|(column, cell)| numbers(column, cell));
             lines.push(names.chain(cells).collect::<Vec<_>>().join(","));
         }

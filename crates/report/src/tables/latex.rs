@@ -27,12 +27,17 @@ pub(super) fn text(table: &Table<'_>) -> String {
     for group in &table.groups {
         text.push_str("\\midrule\n");
         for (method, cells) in &group.rows {
-            let names = table.group_head.iter().map(|_| group.name).chain([*method]).map(latex_text);
+            let names = table.group_head.iter().map(|_| group.name).chain([method.as_str()]).map(latex_text);
             let cells = cells.iter().map(|cell| cell.text(("\\textbf{", "}"), ("\\underline{", "}"), "$\\pm$"));
             let _ = writeln!(text, "{} \\\\", names.chain(cells).collect::<Vec<_>>().join(" & "));
         }
     }
-    text.push_str("\\bottomrule\n\\end{tabular}\n\n");
+    text.push_str("\\bottomrule\n\\end{tabular}\n");
+    for sentence in &table.too_close {
+        let sentence = sentence.replace(['\n', '\r'], " ");
+        let _ = writeln!(text, "% Closer than the noise of the truth's own pictures: {sentence}");
+    }
+    text.push('\n');
     text
 }
 

@@ -35,19 +35,20 @@ pub enum TableFormat {
 
 /// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
 /// column without values is left out. A value is shown as missing if another result has it for that scene or category,
-/// and as a dash if none has.
+/// and as a dash if none has. The result of the truth itself, the `ceiling`, has the last row of each group and no mark.
 pub fn tables(
     results: &[ResultFile],
+    ceiling: Option<&ResultFile>,
     protocol: &str,
     grouping: Grouping,
     format: TableFormat,
 ) -> Result<String, ReportError> {
-    check_comparable(results, protocol)?;
+    check_comparable(results, ceiling, protocol)?;
     let layouts = match grouping {
         Grouping::Dataset | Grouping::Scene => layouts::all(),
         Grouping::Category | Grouping::SuperCategory => layouts::pooled(),
     };
-    let groups = rows::groups(results, protocol, grouping);
+    let groups = rows::groups(results, ceiling, protocol, grouping);
     let tables = layouts.iter().filter_map(|layout| table::Table::fill(layout, grouping, &groups));
     let text: String = tables
         .map(|table| match format {
@@ -63,11 +64,11 @@ pub fn tables(
 }
 
 /// Fails with every reason for which the results cannot stand side by side.
-fn check_comparable(results: &[ResultFile], protocol: &str) -> Result<(), ReportError> {
+fn check_comparable(results: &[ResultFile], ceiling: Option<&ResultFile>, protocol: &str) -> Result<(), ReportError> {
     let first = results.first().ok_or(ReportError::NoResults)?;
     let fingerprint = |result: &ResultFile| result.protocols.get(protocol).map(|scores| scores.fingerprint.clone());
     let mut mismatches = Vec::new();
-    for result in results {
+    for result in results.iter().chain(ceiling) {
         let of_result = Mismatch::of_result(result, protocol);
         let (first_name, other) = (first.method.clone(), result.method.clone());
         if of_result.is_none() && fingerprint(first).is_some_and(|first| Some(first) != fingerprint(result)) {

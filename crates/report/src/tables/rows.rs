@@ -7,6 +7,7 @@ use mateval_scene::SceneId;
 use super::grouping::Grouping;
 use super::pooled::{OTHER, pooled};
 use super::value::{CellKey, Value};
+use crate::truth_noise;
 use mateval_eval::result::{ProtocolResult, ResultFile};
 use mateval_eval::result_key::ResultKey;
 
@@ -21,19 +22,29 @@ pub(super) struct Group {
     /// The scene or category; empty for the whole dataset.
     pub(super) name: String,
     pub(super) rows: Vec<Row>,
+    /// The truth's own numbers, which no method is expected to exceed.
+    pub(super) ceiling: Option<Row>,
 }
 
 /// The groups, with methods in the order of the results. Scenes are in the dataset's order, categories by name with
 /// `other` last.
-pub(super) fn groups(results: &[ResultFile], protocol: &str, grouping: Grouping) -> Vec<Group> {
+pub(super) fn groups(
+    results: &[ResultFile],
+    ceiling: Option<&ResultFile>,
+    protocol: &str,
+    grouping: Grouping,
+) -> Vec<Group> {
+    let all = results.iter().chain(ceiling);
     let scored: Vec<(&str, &ProtocolResult)> =
-        results.iter().filter_map(|result| Some((result.method.as_str(), result.protocols.get(protocol)?))).collect();
+        all.filter_map(|result| Some((result.method.as_str(), result.protocols.get(protocol)?))).collect();
     let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
         let row = |(at, (method, scores)): (usize, &(&str, &ProtocolResult))| Row {
             method: (*method).to_owned(),
             values: values(at, scores),
         };
-        Group { name: name.to_owned(), rows: scored.iter().enumerate().map(row).collect() }
+        let mut rows: Vec<Row> = scored.iter().enumerate().map(row).collect();
+        let ceiling = ceiling.and_then(|_| rows.pop());
+        Group { name: name.to_owned(), rows, ceiling }
     };
     match grouping {
         Grouping::Dataset => vec![group("", &|_, scores| of_dataset(scores))],
@@ -54,7 +65,9 @@ pub(super) fn groups(results: &[ResultFile], protocol: &str, grouping: Grouping)
 
 fn of_dataset(scores: &ProtocolResult) -> BTreeMap<CellKey, Value> {
     let value = |(key, value): (&ResultKey, &f64)| {
-        (CellKey::from(*key), Value { value: *value, standard_error: scores.summary_noise.get(key).copied() })
+        let standard_error = scores.summary_noise.get(key).copied();
+        let truth_noise = truth_noise::of_dataset(scores, key);
+        (CellKey::from(*key), Value { value: *value, standard_error, truth_noise })
     };
     scores.summary.iter().map(value).collect()
 }
@@ -63,7 +76,8 @@ fn of_scene(scores: &ProtocolResult, scene: &SceneId) -> BTreeMap<CellKey, Value
     let noise = scores.noise.get(scene);
     let value = |(key, value): (&ResultKey, &f64)| {
         let standard_error = noise.and_then(|noise| noise.get(key)?.standard_error_db);
-        (CellKey::from(*key), Value { value: *value, standard_error })
+        let truth_noise = truth_noise::of_scene(scores, scene, key);
+        (CellKey::from(*key), Value { value: *value, standard_error, truth_noise })
     };
     scores.scenes.get(scene).into_iter().flatten().map(value).collect()
 }

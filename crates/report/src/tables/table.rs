@@ -4,8 +4,9 @@ use mateval_eval::metric::Better;
 
 use super::grouping::Grouping;
 use super::layouts::Layout;
-use super::rows::Group;
+use super::rows::{Group, Row};
 use super::value::{CellKey, Quantity, Value};
+use crate::truth_noise::{Measured, close_pairs};
 
 /// A table without empty columns.
 pub(super) struct Table<'a> {
@@ -16,6 +17,8 @@ pub(super) struct Table<'a> {
     pub(super) blocks: Vec<(&'static str, usize)>,
     pub(super) columns: Vec<Column>,
     pub(super) groups: Vec<TableGroup<'a>>,
+    /// Which methods are closer to each other than the noise of the truth's pictures, one sentence a column.
+    pub(super) too_close: Vec<String>,
 }
 
 /// A column.
@@ -29,8 +32,8 @@ pub(super) struct Column {
 /// Rows that are compared with each other.
 pub(super) struct TableGroup<'a> {
     pub(super) name: &'a str,
-    /// Methods and their cells.
-    pub(super) rows: Vec<(&'a str, Vec<Cell>)>,
+    /// Methods and their cells; the ceiling comes last.
+    pub(super) rows: Vec<(String, Vec<Cell>)>,
 }
 
 /// One value as it is shown.
@@ -60,7 +63,8 @@ impl<'a> Table<'a> {
         for block in &layout.blocks {
             let of_block = block.quantities.iter().filter_map(|&quantity| {
                 let key = CellKey { picture: block.picture, views: block.views, quantity };
-                let mut values = groups.iter().flat_map(|g| &g.rows).filter_map(|row| row.values.get(&key)).peekable();
+                let rows = groups.iter().flat_map(|group| group.rows.iter().chain(&group.ceiling));
+                let mut values = rows.filter_map(|row| row.values.get(&key)).peekable();
                 values.peek()?;
                 let has_errors = values.any(|value| value.standard_error.is_some());
                 Some(Column { block: block.title, has_errors, key })
@@ -78,7 +82,16 @@ impl<'a> Table<'a> {
             Grouping::Category => Some("Category"),
             Grouping::SuperCategory => Some("Super-category"),
         };
-        (!columns.is_empty()).then_some(Self { title: &layout.title, group_head, blocks, columns, groups: filled })
+        let too_close = groups.iter().flat_map(|group| columns.iter().filter_map(|column| too_close(group, column)));
+        let too_close = too_close.collect();
+        (!columns.is_empty()).then_some(Self {
+            title: &layout.title,
+            group_head,
+            blocks,
+            columns,
+            groups: filled,
+            too_close,
+        })
     }
 }
 
@@ -88,17 +101,38 @@ impl<'a> TableGroup<'a> {
             .iter()
             .map(|column| {
                 let scaled = |value: &Value| Value { value: value.value * column.key.quantity.style().scale, ..*value };
-                let values: Vec<_> = group.rows.iter().map(|row| row.values.get(&column.key).map(scaled)).collect();
-                marked(&values, column.key.quantity)
+                let of = |row: &Row| row.values.get(&column.key).map(scaled);
+                let values: Vec<_> = group.rows.iter().map(of).collect();
+                let mut cells = marked(&values, column.key.quantity);
+                cells.extend(group.ceiling.as_ref().map(|row| Cell {
+                    value: of(row),
+                    has_rivals: values.iter().any(Option::is_some),
+                    digits: column.key.quantity.style().digits,
+                    mark: Mark::None,
+                }));
+                cells
             })
             .collect();
         if by_column.iter().flatten().all(|cell| cell.value.is_none()) {
             return None;
         }
         let cells = |row: usize| by_column.iter().map(|column| column[row]).collect();
-        let rows = group.rows.iter().enumerate().map(|(at, row)| (row.method.as_str(), cells(at))).collect();
+        let names = group.rows.iter().map(|row| row.method.clone());
+        let names = names.chain(group.ceiling.iter().map(|row| format!("{} (ceiling)", row.method)));
+        let rows = names.enumerate().map(|(at, name)| (name, cells(at))).collect();
         Some(Self { name: &group.name, rows })
     }
+}
+
+/// A sentence on the methods of a group that the noise of the truth cannot tell apart by a column; none without such.
+fn too_close(group: &Group, column: &Column) -> Option<String> {
+    let methods = group.rows.iter().filter_map(|row| {
+        let value = row.values.get(&column.key)?;
+        Some(Measured { method: &row.method, psnr: value.value, truth_noise: value.truth_noise? })
+    });
+    let texts: Vec<String> = close_pairs(methods.collect()).iter().map(ToString::to_string).collect();
+    let scene = if group.name.is_empty() { String::new() } else { format!("{}, ", group.name) };
+    (!texts.is_empty()).then(|| format!("{scene}{}: {}", column.head(), texts.join("; ")))
 }
 
 /// Marks the best and the second best value. Equal values share a mark, and a single value has none.
@@ -140,7 +174,7 @@ impl Column {
 impl Cell {
     /// The rounded value between its marks, and its standard error after `plus_minus`.
     pub(super) fn text(&self, best: (&str, &str), second: (&str, &str), plus_minus: &str) -> String {
-        let Some(Value { value, standard_error }) = self.value else {
+        let Some(Value { value, standard_error, .. }) = self.value else {
             return if self.has_rivals { "missing" } else { "-" }.to_owned();
         };
         let digits = self.digits;

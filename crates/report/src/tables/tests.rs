@@ -22,6 +22,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
     let noise = PsnrNoise {
         standard_error_db: Some(0.25),
         own_db: None,
+        companions_db: None,
         truth_db: None,
         samples: 16,
         state: NoiseState::Certified,
@@ -33,6 +34,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         noise: BTreeMap::from([(scene("b"), BTreeMap::from([(key, noise)]))]),
         summary,
         summary_noise,
+        companions: Default::default(),
         fits: BTreeMap::new(),
         pictures: Vec::new(),
         texels: Vec::new(),
@@ -76,7 +78,7 @@ fn three() -> [ResultFile; 3] {
 }
 
 fn shown(results: &[ResultFile], grouping: Grouping, format: TableFormat) -> String {
-    tables(results, "paper", grouping, format).unwrap()
+    tables(results, None, "paper", grouping, format).unwrap()
 }
 
 #[test]
@@ -92,6 +94,44 @@ fn markdown_by_the_byte() {
 
 ";
     assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Markdown), expected);
+}
+
+/// `result` with this noise of the truth in its only scene that has scores.
+fn with_truth_noise(mut result: ResultFile, truth_db: f64) -> ResultFile {
+    let scores = result.protocols.get_mut("paper").unwrap();
+    scores.noise.values_mut().flat_map(BTreeMap::values_mut).for_each(|noise| noise.truth_db = Some(truth_db));
+    result
+}
+
+#[test]
+fn the_ceiling_comes_last_and_close_methods_are_told() {
+    let light = |method, psnr| with_truth_noise(result(method, &[("rgb_true.input.psnr", psnr)]), 0.25);
+    let results = [light("a", 20.2), light("b", 20.4), light("c", 20.0), light("d", 15.0)];
+    let ceiling = light("gt", 45.0);
+    let of = |format| tables(&results, Some(&ceiling), "paper", Grouping::Dataset, format).unwrap();
+    let expected = "\
+### RGB, true light
+
+| Method | Input view PSNR ↑ |
+|---|---:|
+| a | <u>20.20</u> ± 0.02 |
+| b | **20.40** ± 0.02 |
+| c | 20.00 ± 0.02 |
+| d | 15.00 ± 0.02 |
+| gt (ceiling) | 45.00 ± 0.02 |
+
+Closer than the noise of the truth's own pictures:
+
+- Input view PSNR ↑: b and a are 0.200 dB apart, the truth's noise is 0.250 dB; a and c are 0.200 dB apart, the truth's noise is 0.250 dB
+
+";
+    assert_eq!(of(TableFormat::Markdown), expected);
+    assert!(of(TableFormat::Latex).ends_with("0.250 dB\n\n"), "{}", of(TableFormat::Latex));
+    assert!(of(TableFormat::Csv).contains("\"gt (ceiling)\",45,0.016"), "{}", of(TableFormat::Csv));
+    let mut other = ceiling;
+    other.protocols.get_mut("paper").unwrap().fingerprint = "another".to_owned();
+    let error = tables(&results, Some(&other), "paper", Grouping::Dataset, TableFormat::Csv).unwrap_err();
+    assert!(error.to_string().contains("'a' and 'gt' have different fingerprints"), "{error}");
 }
 
 #[test]
@@ -225,11 +265,11 @@ fn missing_values_and_values_that_cannot_exist() {
 fn fingerprints_are_not_mixed() {
     let mut other = result("b", &[]);
     other.protocols.get_mut("paper").unwrap().fingerprint = "g".to_owned();
-    let csv = |results: &[ResultFile], protocol| tables(results, protocol, Grouping::Dataset, TableFormat::Csv);
+    let csv = |results: &[ResultFile], protocol| tables(results, None, protocol, Grouping::Dataset, TableFormat::Csv);
     let error = csv(&[result("a", &[]), other], "paper").unwrap_err();
     assert!(error.to_string().contains("different fingerprints"));
-    let error = csv(&[result("a", &[])], "mateval-1").unwrap_err();
-    assert!(error.to_string().contains("--protocol mateval-1"));
+    let error = csv(&[result("a", &[])], "mateval-2").unwrap_err();
+    assert!(error.to_string().contains("--protocol mateval-2"));
     let error = csv(&[result("a", &[])], "paper").unwrap_err();
     assert!(error.to_string().contains("no score under protocol 'paper'"));
 }

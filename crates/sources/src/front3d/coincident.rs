@@ -93,35 +93,13 @@ fn raise(
     log: &mut Log,
     shifts: &mut Shifts,
 ) -> bool {
-    // The shift that takes each face in front of all architecture that it touches.
-    let mut middles: BTreeMap<usize, DVec3> = BTreeMap::new();
-    let mut wanted: BTreeMap<usize, DVec3> = BTreeMap::new();
-    let is_whole = for_each_near(&furniture, architecture, TOUCHES_M, |number, wall| {
-        let (face, layer, wall) = (&furniture[number], layer_of_face[wall], &architecture[wall]);
-        let middle = *middles.entry(face.surface).or_insert_with(|| middle(&surfaces[face.surface].mesh));
-        let side = if wall.height(middle) < -LIES_M { -1.0 } else { 1.0 };
-        // The wall's own layer is on the side that it faces.
-        let layer = if side > 0.0 { layer + 1 } else { 1 };
-        let lowest = face.corners.iter().map(|corner| side * wall.height(*corner)).fold(f64::INFINITY, f64::min);
-        let by = layer as f64 * LAYER_M - lowest;
-        let is_parallel = face.normal.dot(wall.normal).abs() > PARALLEL;
-        if is_parallel && lowest >= -TOUCHES_M && by > 0.0 {
-            let shift = side * by * wall.normal;
-            let before = wanted.entry(number).or_insert(shift);
-            if shift.length() > before.length() {
-                *before = shift;
-            }
-        }
-    });
-    if !is_whole {
-        return false;
-    }
+    let Some(wanted) = wanted_shifts(surfaces, architecture, layer_of_face, &furniture) else { return false };
     if wanted.is_empty() {
         return true;
     }
     // Whole sheets move, one above the other where they overlap each other too.
     let touching = furniture.into_iter().enumerate().filter(|(number, _)| wanted.contains_key(number));
-    let (numbers, touching): (Vec<usize>, Vec<Face>) = touching.unzip();
+    let touching: Vec<Face> = touching.map(|(_, face)| face).collect();
     let mut pairs = Vec::new();
     let is_whole = for_each_near(&touching, &touching, TOUCHES_M, |one, other| {
         if one < other {
@@ -129,16 +107,12 @@ fn raise(
         }
     });
     let sheets = Sheets::new(&touching, &pairs);
-    let layers = sheets.layers(MOST_LAYERS);
     let mut shift_of_sheet = vec![DVec3::ZERO; sheets.all.len()];
-    for (number, &sheet) in numbers.iter().zip(&sheets.of_face) {
-        let (shift, longest) = (wanted[number], &mut shift_of_sheet[sheet]);
-        if shift.length() > longest.length() {
-            *longest = shift;
-        }
+    for (shift, &sheet) in wanted.values().zip(&sheets.of_face) {
+        shift_of_sheet[sheet] = longer(*shift, shift_of_sheet[sheet]);
     }
-    for (sheet, shift) in shift_of_sheet.iter_mut().enumerate() {
-        *shift += shift.normalize_or_zero() * (layers[sheet] as f64 * LAYER_M);
+    for (shift, layer) in shift_of_sheet.iter_mut().zip(sheets.layers(MOST_LAYERS)) {
+        *shift += shift.normalize_or_zero() * (layer as f64 * LAYER_M);
     }
     for (face, &sheet) in touching.iter().zip(&sheets.of_face) {
         shifts.entry(face.surface).or_default().insert(face.triangle, shift_of_sheet[sheet]);
@@ -152,6 +126,38 @@ fn raise(
         "moved each 0.1 mm in front of it, or more in a stack",
     );
     is_whole
+}
+
+/// The shift that takes each face of furniture in front of all architecture that it touches, by its index; none where there
+/// are too many pairs.
+fn wanted_shifts(
+    surfaces: &[Surface],
+    architecture: &[Face],
+    layer_of_face: &[usize],
+    furniture: &[Face],
+) -> Option<BTreeMap<usize, DVec3>> {
+    let mut middles: BTreeMap<usize, DVec3> = BTreeMap::new();
+    let mut wanted: BTreeMap<usize, DVec3> = BTreeMap::new();
+    let is_whole = for_each_near(furniture, architecture, TOUCHES_M, |number, wall| {
+        let (face, layer, wall) = (&furniture[number], layer_of_face[wall], &architecture[wall]);
+        let middle = *middles.entry(face.surface).or_insert_with(|| middle(&surfaces[face.surface].mesh));
+        let side = if wall.height(middle) < -LIES_M { -1.0 } else { 1.0 };
+        // The wall's own layer is on the side that it faces.
+        let layer = if side > 0.0 { layer + 1 } else { 1 };
+        let lowest = face.corners.iter().map(|corner| side * wall.height(*corner)).fold(f64::INFINITY, f64::min);
+        let by = layer as f64 * LAYER_M - lowest;
+        let is_parallel = face.normal.dot(wall.normal).abs() > PARALLEL;
+        if is_parallel && lowest >= -TOUCHES_M && by > 0.0 {
+            let before = wanted.entry(number).or_insert(DVec3::ZERO);
+            *before = longer(side * by * wall.normal, *before);
+        }
+    });
+    is_whole.then_some(wanted)
+}
+
+/// The longer of two vectors; of equal ones the second.
+fn longer(one: DVec3, other: DVec3) -> DVec3 {
+    if one.length() > other.length() { one } else { other }
 }
 
 /// The mean of a mesh's corners.

@@ -32,6 +32,8 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     SourceScene {
         kind: SourceKind::Front3d,
         lights: SceneLights::Stage,
+        states_roughness: false,
+        states_metallic: false,
         house: house.house.uid.clone(),
         file: house.file.clone(),
         scene,

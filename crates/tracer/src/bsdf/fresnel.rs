@@ -52,6 +52,10 @@ pub(crate) fn conductor(cos: f32, ior: &ConductorIor) -> Vec3 {
 }
 
 fn conductor_channel(cos: f32, eta: f32, k: f32) -> f32 {
+    if eta == 0.0 {
+        // Nothing enters. For k = 0, the limit, the quotients below are 0 / 0.
+        return 1.0;
+    }
     let (cos2, sin2) = (cos * cos, 1.0 - cos * cos);
     let difference = eta * eta - k * k - sin2;
     let sum = (difference * difference + 4.0 * eta * eta * k * k).sqrt();
@@ -114,6 +118,14 @@ mod tests {
         let glass = ConductorIor::EtaK { eta: [1.5; 3], k: [0.0; 3] };
         for cos in [0.05, 0.3, 0.7, 1.0] {
             assert!((conductor(cos, &glass).x - dielectric(cos, 1.5).0).abs() < 1e-5, "{cos}");
+        }
+    }
+
+    #[test]
+    fn a_conductor_without_a_real_index_is_a_mirror() {
+        for k in [0.0, 0.3, 1.0] {
+            let ior = ConductorIor::EtaK { eta: [0.0; 3], k: [k; 3] };
+            assert!([0.0, 0.3, 1.0].iter().all(|cos| conductor(*cos, &ior) == Vec3::ONE), "{k}");
         }
     }
 

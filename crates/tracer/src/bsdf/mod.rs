@@ -8,12 +8,15 @@ mod bump;
 mod facets;
 mod fresnel;
 mod lobe;
+mod part;
 mod principled_tables;
+mod principled_variants;
 mod rough_boundary;
 mod sample;
 mod tables;
 #[cfg(test)]
 mod tests;
+mod uniform_reflectance;
 
 use glam::Vec3;
 use mateval_image::Texture;
@@ -23,10 +26,13 @@ use mateval_scene::material::Material;
 use crate::frame::Frame;
 use crate::surface_hit::SurfaceHit;
 pub(crate) use fresnel::eta_from_specular;
+use lobe::Lobe;
 pub(crate) use lobe::Principled;
-use lobe::{Lobe, PrincipledView, Tint};
+pub(crate) use part::BsdfPart;
 pub(crate) use principled_tables::BlenderTables;
+use principled_variants::{PrincipledVariants, SecondPrincipled};
 pub(crate) use tables::{MaterialTables, Table};
+pub use uniform_reflectance::ReflectanceMeter;
 
 /// The BSDF of a surface at one point, for `K` base colours at once.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +44,7 @@ pub struct Bsdf<'w, const K: usize = 1> {
     wo: Vec3,
     lobe: Lobe<'w>,
     /// For principled materials, which most are: the terms that depend on `wo` and on the base colours alone.
-    principled: Option<(PrincipledView, [Tint; K])>,
+    principled: Option<PrincipledVariants<K>>,
 }
 
 /// A sampled direction.
@@ -57,9 +63,6 @@ pub struct BsdfSample<const K: usize = 1> {
 /// The smallest cosine between the viewer and a shading normal on the visible side; smaller ones are raised to it.
 const GRAZING: f32 = 1e-3;
 
-/// Facets smoother than this roughness do not reflect stage lights ([`crate::StageLight`]).
-pub const STAGE_ROUGHNESS: f32 = 0.2;
-
 impl Bsdf<'_> {
     /// The value times the cosine of `wi`, per channel, and the density with which [`Self::sample`] samples `wi`, per
     /// solid angle. Delta lobes are left out. See `Self::evaluate_all`.
@@ -67,15 +70,6 @@ impl Bsdf<'_> {
         let ([value], density) = self.evaluate_all(wi, BsdfPart::All);
         (value, density)
     }
-}
-
-/// The part of a BSDF to evaluate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BsdfPart {
-    /// All of it.
-    All,
-    /// The part that reflects stage lights: facets below [`STAGE_ROUGHNESS`] are left out.
-    Stage,
 }
 
 impl<'w, const K: usize> Bsdf<'w, K> {
@@ -100,14 +94,17 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         Self::at(hit, normal, wo, lobe, material.two_sided, None)
     }
 
-    /// The BSDF of a two-sided `principled` material at `hit`, seen from `wo`, for each of `base_colors`.
+    /// The BSDF of a two-sided `principled` material at `hit`, seen from `wo`, for each of `base_colors`. With a
+    /// `second` material and a number, the base colours from that number on have its roughness and metallic.
     pub(crate) fn of_principled(
         principled: Principled<'w>,
+        second: Option<SecondPrincipled<'w>>,
         base_colors: &[Vec3; K],
         hit: &SurfaceHit,
         wo: Vec3,
     ) -> Self {
-        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(principled), true, Some(base_colors))
+        let colors = Some((base_colors, second.as_ref()));
+        Self::at(hit, hit.shading_normal, wo, Lobe::Principled(principled), true, colors)
     }
 
     fn at(
@@ -116,7 +113,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         wo: Vec3,
         mut lobe: Lobe<'w>,
         two_sided: bool,
-        colors: Option<&[Vec3; K]>,
+        colors: Option<(&[Vec3; K], Option<&SecondPrincipled<'w>>)>,
     ) -> Self {
         // Face the viewer, unless light passes to the other side.
         let mut geometric = hit.geometric_normal;
@@ -135,12 +132,9 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         // Compute what does not depend on the light.
         let principled = match &lobe {
             Lobe::Principled(principled) if wo.z > 0.0 => {
-                let view = principled.seen_from(wo);
-                let tints = match colors {
-                    Some(colors) => colors.map(|color| view.tint(color)),
-                    None => [view.tint(principled.base_color); K],
-                };
-                Some((view, tints))
+                let own = [principled.base_color; K];
+                let (base_colors, second) = colors.unwrap_or((&own, None));
+                Some(PrincipledVariants::new(principled, second, base_colors, wo))
             }
             _ => None,
         };
@@ -159,13 +153,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
         }
         match &self.principled {
             Some(_) if local.z <= 0.0 => ([Vec3::ZERO; K], 0.0),
-            Some((view, tints)) => {
-                let mut response = view.response(local);
-                if part == BsdfPart::Stage && view.is_smoother_than(STAGE_ROUGHNESS) {
-                    response = response.of_base_alone();
-                }
-                (tints.map(|tint| tint.value(&response)), response.density)
-            }
+            Some(variants) => variants.evaluate(local, part),
             None => ([self.lobe.eval(self.wo, local); K], self.lobe.density(self.wo, local)),
         }
     }
@@ -174,9 +162,9 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     /// absorbed.
     pub fn sample(&self, u: [f32; 3]) -> Option<BsdfSample<K>> {
         let (local, weights, density, delta) = match &self.principled {
-            Some((view, tints)) => {
-                let (wi, response) = view.sample(u)?;
-                (wi, tints.map(|tint| tint.value(&response) / response.density), response.density, false)
+            Some(variants) => {
+                let (wi, weights, density) = variants.sample(u)?;
+                (wi, weights, density, false)
             }
             None => {
                 let sample = self.lobe.sample(self.wo, u)?;
@@ -192,7 +180,7 @@ impl<'w, const K: usize> Bsdf<'w, K> {
     pub(crate) fn stage_weights(&self, sample: &BsdfSample<K>) -> [Vec3; K] {
         match &self.principled {
             _ if sample.delta => [Vec3::ZERO; K],
-            Some((view, _)) if view.is_smoother_than(STAGE_ROUGHNESS) => {
+            Some(_) => {
                 let (values, _) = self.evaluate_all(sample.wi, BsdfPart::Stage);
                 values.map(|value| value / sample.density)
             }

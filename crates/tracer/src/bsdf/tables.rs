@@ -31,7 +31,7 @@ pub(crate) struct Table {
 
 /// The tables computed so far, by the parameters that they depend on.
 #[derive(Default)]
-struct Known {
+pub(super) struct Known {
     /// Keyed by the bits of eta.
     reflections: BTreeMap<u32, Arc<BlenderTables>>,
     /// Keyed by whether the distribution is GGX, the bits of eta, and the bits of alpha if that is constant.
@@ -57,7 +57,7 @@ impl MaterialTables {
     }
 }
 
-fn table(material: &Material, known: &mut Known) -> Table {
+pub(super) fn table(material: &Material, known: &mut Known) -> Table {
     match &material.model {
         MaterialModel::Plastic { eta, microfacets: None, .. } => {
             Table { inside: fresnel::diffuse_reflectance(1.0 / eta), ..Table::default() }
@@ -91,7 +91,7 @@ impl Known {
 }
 
 /// Fails unless every constant is finite, every index of refraction above 0, and every texture and channel exist.
-fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
+pub(super) fn check(material: &Material, textures: usize) -> Result<(), MaterialFault> {
     let inputs = material.model.inputs();
     for eta in inputs.etas {
         if !(eta.is_finite() && eta > 0.0) {

@@ -200,6 +200,11 @@ impl AreaEmitter {
         self.surfaces.is_empty()
     }
 
+    /// Whether backs emit too.
+    pub(crate) fn is_two_sided(&self) -> bool {
+        self.emission.two_sided
+    }
+
     /// Whether the side of `hit` towards `direction` emits.
     pub(crate) fn emits(&self, hit: &SurfaceHit, direction: Vec3) -> bool {
         self.emission.two_sided || hit.is_front(direction)

@@ -1,12 +1,14 @@
 //! Emitters, and sampling of light that reaches a point.
 //!
-//! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone (on
-//! estimated solid angles, with a share of 0.2 spread evenly), never on radiance. So pictures of each light group
-//! alone, and of any weighting of the groups, can come from the same paths.
+//! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone, never
+//! on radiance: among area emitters on estimated solid angles, with a share of 0.2 spread evenly, and between these and
+//! emitters at infinity on the share of rays that leave the scene. So pictures of each light group alone, and of any
+//! weighting of the groups, can come from the same paths.
 
 mod area;
 mod distribution;
 mod environment;
+mod escape;
 mod radiance_map;
 
 use glam::Vec3;
@@ -20,6 +22,7 @@ use crate::ray::Ray;
 use crate::surface_hit::SurfaceHit;
 use area::{AreaEmitter, LANES, Outlines, SurfaceEmission};
 use environment::EnvironmentMap;
+pub(crate) use escape::escape_share;
 use radiance_map::RadianceMap;
 
 /// The emitters of all light groups of a scene.
@@ -33,6 +36,8 @@ pub struct Emitters {
     /// The stage lights as surfaces, in the order of `areas`.
     stage: Option<Accel>,
     distant: Vec<DistantEmitter>,
+    /// The probability of sampling an emitter at infinity.
+    distant_share: f32,
     /// For each light group, whether the camera sees its emitters.
     camera_visible: Vec<bool>,
     scene_size: f32,
@@ -42,6 +47,8 @@ pub struct Emitters {
 struct DistantEmitter {
     light: LightIndex,
     kind: DistantKind,
+    /// The probability of sampling it, above 0.
+    probability: f32,
 }
 
 #[derive(Debug)]
@@ -63,12 +70,12 @@ pub struct EmitterSample {
     pub density: f32,
     /// The point on the emitter; `None` for an emitter at infinity.
     pub place: Option<SurfaceHit>,
-    /// Whether the emitter is a stage light, which smooth facets do not reflect.
+    /// Whether the emitter is a stage light, which facets do not mirror.
     pub on_stage: bool,
 }
 
-/// A light added to a scene so that it is lit as in a photo. It blocks no light, and it is invisible to the camera and
-/// in facets below [`crate::bsdf::STAGE_ROUGHNESS`].
+/// A light added to a scene so that it is lit as in a photo. It blocks no light, it is invisible to the camera, and it
+/// makes no highlights: surfaces reflect it diffusely.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageLight {
     /// World space, in metres. The front emits.
@@ -90,6 +97,10 @@ pub struct Emitted {
 
 /// The probability mass that is spread evenly over all area emitters.
 const UNIFORM_SHARE: f32 = 0.2;
+/// The share of escaping rays at which an emitter at infinity counts half as much as where all escape.
+const FEW_ESCAPE: f32 = 0.005;
+/// The least weight of an emitter at infinity, so that it is sampled even where no probe reaches it.
+const LEAST_SKY: f32 = 0.01;
 /// Above this number of emitting surfaces, the surfaces of a light group are sampled as one emitter.
 const SEPARATE_SURFACES: usize = 64;
 
@@ -102,6 +113,7 @@ impl Emitters {
             area_of: vec![None; scene.surfaces.len()],
             stage: None,
             distant: Vec::new(),
+            distant_share: 0.0,
             camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
             scene_size,
         };
@@ -116,7 +128,33 @@ impl Emitters {
                 .map_err(|fault| SceneFault::Light { light: LightIndex(index), name: group.name.clone(), fault })?;
         }
         emitters.outlines = Outlines::new(&emitters.areas);
+        emitters.share_between(1.0);
         Ok(emitters)
+    }
+
+    /// Whether both area emitters and emitters at infinity exist, so that samples are divided between them.
+    pub(crate) fn are_near_and_distant(&self) -> bool {
+        !self.areas.is_empty() && !self.distant.is_empty()
+    }
+
+    /// Divides samples between area emitters and emitters at infinity, if the share `escaping` of rays leaves the scene.
+    ///
+    /// All lamps together count as 1. Where rays leave the scene, a map's light may be far brighter than theirs, so it counts
+    /// nearly as much; where almost none do, almost nothing. Radiances must not count. Constant radiance counts least
+    /// everywhere: samples of the BSDF find it as well as samples of the sphere do.
+    pub(crate) fn share_between(&mut self, escaping: f32) {
+        let weight = |kind: &DistantKind| match kind {
+            DistantKind::Map(_) => (escaping / (escaping + FEW_ESCAPE)).max(LEAST_SKY),
+            DistantKind::Constant(_) => LEAST_SKY,
+        };
+        let near = if self.areas.is_empty() { 0.0 } else { 1.0 };
+        let total = near + self.distant.iter().map(|emitter| weight(&emitter.kind)).sum::<f32>();
+        self.distant.iter_mut().for_each(|emitter| emitter.probability = weight(&emitter.kind) / total);
+        self.distant_share = if self.areas.is_empty() && !self.distant.is_empty() {
+            1.0
+        } else {
+            self.distant.iter().map(|emitter| emitter.probability).sum()
+        };
     }
 
     /// Stage lights only, one group each, for a scene of `surfaces` surfaces.
@@ -144,6 +182,7 @@ impl Emitters {
             area_of: vec![None; surfaces],
             stage: Some(accel),
             distant: Vec::new(),
+            distant_share: 0.0,
             camera_visible: vec![false; stage.len()],
             scene_size,
         })
@@ -189,12 +228,12 @@ impl Emitters {
                     return Err(LightFault::EnvironmentRotation(*world_from_environment));
                 }
                 let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
-                self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map) });
+                self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map), probability: 0.0 });
             }
             Emission::Constant { radiance } => {
                 check_radiance(radiance)?;
                 let kind = DistantKind::Constant(Vec3::from_array(*radiance));
-                self.distant.push(DistantEmitter { light, kind });
+                self.distant.push(DistantEmitter { light, kind, probability: 0.0 });
             }
         }
         Ok(())
@@ -225,9 +264,9 @@ impl Emitters {
     /// Samples light for the point `from`, from three numbers in [0, 1). `None` if the sample brings no light.
     /// `opacity` returns the coverage of an emitting surface.
     pub fn sample(&self, from: Vec3, u: [f32; 3], opacity: impl Fn(&SurfaceHit) -> f32) -> Option<EmitterSample> {
-        let distant_share = self.distant_share();
+        let distant_share = self.distant_share;
         if u[0] < distant_share {
-            return self.sample_distant((u[0] / distant_share).min(1.0 - f32::EPSILON), [u[1], u[2]], distant_share);
+            return self.sample_distant(u[0], [u[1], u[2]]);
         }
         let choice = ((u[0] - distant_share) / (1.0 - distant_share)).clamp(0.0, 1.0 - f32::EPSILON);
         self.sample_area(from, choice, [u[1], u[2]], opacity)
@@ -246,7 +285,7 @@ impl Emitters {
         let towards = place.position - from;
         let direction = towards.try_normalize()?;
         let cos = place.geometric_normal.dot(direction).abs();
-        let probability = (1.0 - self.distant_share()) * probability;
+        let probability = (1.0 - self.distant_share) * probability;
         let density = probability * towards.length_squared() / (cos * area.area());
         if !area.emits(&place, -direction) || !density.is_finite() || density <= 0.0 {
             return None;
@@ -257,14 +296,19 @@ impl Emitters {
         Some(EmitterSample { light: area.light, direction, radiance, density, place: Some(place), on_stage })
     }
 
-    fn sample_distant(&self, choice: f32, u: [f32; 2], share: f32) -> Option<EmitterSample> {
-        let count = self.distant.len();
-        let emitter = self.distant.get(((choice * count as f32) as usize).min(count.checked_sub(1)?))?;
+    /// `choice` is below the probability of all emitters at infinity.
+    fn sample_distant(&self, choice: f32, u: [f32; 2]) -> Option<EmitterSample> {
+        let mut end = 0.0;
+        let chosen = self.distant.iter().find(|emitter| {
+            end += emitter.probability;
+            choice < end
+        });
+        let emitter = chosen.or(self.distant.last())?;
         let (direction, density) = match &emitter.kind {
             DistantKind::Map(map) => map.sample(u),
             DistantKind::Constant(_) => environment::sample_constant(u),
         };
-        let density = density * share / count as f32;
+        let density = density * emitter.probability;
         (density > 0.0 && density.is_finite()).then(|| EmitterSample {
             light: emitter.light,
             direction,
@@ -310,7 +354,7 @@ impl Emitters {
         if !area.emits(place, -towards) {
             return None;
         }
-        let probability = (1.0 - self.distant_share()) * self.area_probability(which, from);
+        let probability = (1.0 - self.distant_share) * self.area_probability(which, from);
         let distance2 = towards.length_squared();
         let cos = place.geometric_normal.dot(towards).abs() / distance2.sqrt();
         let density = probability * distance2 / (cos * area.area());
@@ -319,25 +363,15 @@ impl Emitters {
 
     /// The radiance from emitters at infinity along a ray to `direction` that hit nothing, one entry per emitter.
     pub fn from_outside(&self, direction: Vec3) -> impl Iterator<Item = Emitted> + '_ {
-        let share = self.distant_share() / self.distant.len().max(1) as f32;
         self.distant.iter().map(move |emitter| Emitted {
             light: emitter.light,
             radiance: emitter.radiance(direction),
-            density: share
+            density: emitter.probability
                 * match &emitter.kind {
                     DistantKind::Map(map) => map.density(direction),
                     DistantKind::Constant(_) => environment::CONSTANT_DENSITY,
                 },
         })
-    }
-
-    /// The probability of sampling an emitter at infinity.
-    fn distant_share(&self) -> f32 {
-        match (self.areas.is_empty(), self.distant.is_empty()) {
-            (_, true) => 0.0,
-            (true, false) => 1.0,
-            (false, false) => 0.5,
-        }
     }
 
     /// The area emitter for `choice` in [0, 1), the position of `choice` within its interval, and its probability among

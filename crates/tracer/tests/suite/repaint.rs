@@ -8,7 +8,7 @@ use mateval_scene::material::{ColorInput, MaterialModel, PrincipledFlavour, Scal
 use mateval_scene::reference::{Emission, ReferenceScene};
 use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::{Coat, LightGroups, LightSampling, Lighting, Render, RenderSettings, Repaint, StageLight, World};
-use mateval_tracer::{ViewsRender, render, render_repainted, render_views};
+use mateval_tracer::{Scattering, ViewsRender, render, render_repainted, render_views};
 
 use super::estimators::worst;
 use super::light_basis::{lit_room, view};
@@ -81,6 +81,63 @@ fn paint_is_the_material_itself_and_company_changes_nothing() {
         }
         assert_ne!(together[0].views, together[1].views, "the twin passes");
     }
+}
+
+/// Predictions of two roughnesses that share paths have the means that they have alone. The twin: with the roughness of
+/// the other they do not.
+#[test]
+fn two_roughnesses_share_paths_without_bias() {
+    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
+    let world = World::new(scene.clone()).unwrap();
+    let (smooth, rough) = ((0.25, 0.8), (0.7, 0.0));
+    let repaint = |(roughness, metallic): (f32, f32)| {
+        let coats = coats(&scene, &COLORS[..2], roughness, metallic);
+        Repaint::new(&world, &atlases(&scene), coats, PrincipledFlavour::Blender).unwrap()
+    };
+    let second = |(roughness, metallic): (f32, f32)| -> Vec<Option<Scattering>> {
+        let scattering = Scattering { roughness: flat([roughness; 3]), metallic: flat([metallic; 3]) };
+        scene.surfaces.iter().map(|surface| surface.mesh.uvs.as_ref().map(|_| scattering.clone())).collect()
+    };
+    let renders = |repaint: &Repaint, first_seed: u64| -> Vec<Renders> {
+        let groups = LightGroups::together(4);
+        let settings = RenderSettings { samples: 64, ..Default::default() };
+        let seeds: Vec<u64> = (first_seed..first_seed + 16).collect();
+        let lighting = Lighting::Apart(&groups);
+        let done =
+            render_repainted(&world, repaint, 0..2, &[view(32)], lighting, &settings, &seeds, &|_, _| ()).unwrap();
+        let pictures = |render: ViewsRender| {
+            let [view] = <[_; 1]>::try_from(render.views).unwrap();
+            Renders::from_pictures(view.halves.into_iter().map(|half| half.basis.sum()))
+        };
+        done.into_iter().map(pictures).collect()
+    };
+    let together = renders(&repaint(smooth).with_second(1, second(rough)).unwrap(), 100);
+    let [smooth_alone, rough_alone] = [renders(&repaint(smooth), 200), renders(&repaint(rough), 300)];
+    for (found, alone) in [(&together[0], &smooth_alone[0]), (&together[1], &rough_alone[1])] {
+        let z = worst(found, alone);
+        assert!(z < 4.5, "{z}");
+    }
+    let twin = worst(&together[1], &smooth_alone[1]);
+    assert!(twin > 10.0, "the twin passes: {twin}");
+    // Two equal pairs change nothing but the choice of directions.
+    let same = renders(&repaint(smooth).with_second(1, second(smooth)).unwrap(), 400);
+    assert!(worst(&same[1], &smooth_alone[1]) < 4.5);
+    assert!(repaint(smooth).with_second(1, vec![None; scene.surfaces.len()]).is_err());
+}
+
+/// A factor of the base colours is the same as other colours.
+#[test]
+fn scaled_colors_are_other_colors() {
+    let scene = Arc::new(lit_room([[1.0; 3]; 4]));
+    let world = World::new(scene.clone()).unwrap();
+    let repaint = |colors: &[[f32; 3]]| {
+        Repaint::new(&world, &atlases(&scene), coats(&scene, colors, 0.5, 0.0), PrincipledFlavour::Blender).unwrap()
+    };
+    let scaled = repaint(&[COLORS[0]; 2]).with_scales(vec![1.0, 0.5]).unwrap();
+    let expected = repaint(&[COLORS[0], COLORS[0].map(|v| 0.5 * v)]);
+    assert_eq!(repainted(&world, &scaled, 0..2), repainted(&world, &expected, 0..2));
+    assert_ne!(repainted(&world, &scaled, 0..2)[1], repainted(&world, &expected, 0..2)[0], "the twin passes");
+    assert!(repaint(&COLORS).with_scales(vec![1.0]).is_err() && repaint(&COLORS).with_scales(vec![2.0; 3]).is_err());
 }
 
 /// Mixes are weighted sums of the basis.
@@ -180,33 +237,52 @@ fn a_stage_lights_the_floor_and_hides_nothing() {
     assert!(seen(&world.on_stage(&turned).unwrap(), &camera)[0] < 1e-5 * expected);
 }
 
-/// Smooth facets do not reflect a stage: a black floor of smooth plastic shows nothing of the square above it, a rough
-/// one does. As a surface of the scene, the same square is mirrored.
-#[test]
-fn smooth_facets_do_not_show_a_stage() {
-    let shine = |roughness: f32, staged: bool| {
-        let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
-        let model = MaterialModel::Principled {
-            base_color: ColorInput::Constant([0.0; 3]),
-            roughness: ScalarInput::Constant(roughness),
-            metallic: ScalarInput::Constant(0.0),
-            specular: 0.5,
-            flavour: PrincipledFlavour::Blender,
-        };
-        let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
-        let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
-        let builder = Builder::default().surface(floor, material(model));
-        if staged {
-            let stage = [StageLight { mesh: lamp, radiance: [1.0; 3] }];
-            seen(&builder.world().on_stage(&stage).unwrap(), &camera)[0]
-        } else {
-            seen(&builder.surface(lamp, grey(0.0)).glowing([1.0; 3]).world(), &camera)[0]
-        }
+/// What the camera sees of a square lamp above a floor of the given base colour, roughness and metallic: as a light of a
+/// stage, or as a surface of the scene.
+fn shine(flavour: PrincipledFlavour, color: f32, roughness: f32, metallic: f32, staged: bool) -> f64 {
+    let floor = quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0);
+    let model = MaterialModel::Principled {
+        base_color: ColorInput::Constant([color; 3]),
+        roughness: ScalarInput::Constant(roughness),
+        metallic: ScalarInput::Constant(metallic),
+        specular: 0.5,
+        flavour,
     };
-    assert_eq!(shine(0.1, true), 0.0);
-    assert!((shine(0.1, false) - 0.04).abs() < 2e-3);
-    let (stage, scene) = (shine(0.4, true), shine(0.4, false));
-    assert!(scene > 0.01 && (stage / scene - 1.0).abs() < 0.02, "{stage} {scene}");
+    let lamp = quad(Vec3::new(-0.5, 3.0, -0.5), Vec3::X, Vec3::Z);
+    let camera = camera([0.0, 2.0, 0.0], [0.0, 0.0, 0.0], 9, 0.5);
+    let builder = Builder::default().surface(floor, material(model));
+    let world = if staged {
+        let stage = [StageLight { mesh: lamp, radiance: [1.0; 3] }];
+        builder.world().on_stage(&stage).unwrap()
+    } else {
+        builder.surface(lamp, grey(0.0)).glowing([1.0; 3]).world()
+    };
+    seen(&world, &camera)[0]
+}
+
+/// Facets of no roughness show a stage: a black floor of plastic shows nothing of the square above it. As a surface of the
+/// scene, the same square is mirrored.
+#[test]
+fn no_facets_show_a_stage() {
+    let black = |roughness: f32, staged: bool| shine(PrincipledFlavour::Blender, 0.0, roughness, 0.0, staged);
+    for roughness in [0.1, 0.4, 1.0] {
+        assert_eq!(black(roughness, true), 0.0);
+    }
+    assert!((black(0.1, false) - 0.04).abs() < 2e-3 && black(0.4, false) > 0.01);
+}
+
+/// Metal reflects a stage as a Lambertian surface of its base colour does, at every roughness, less what Blender's facets
+/// absorb between each other. As a surface of the scene, the square is far brighter in smooth metal.
+#[test]
+fn metal_is_matt_on_a_stage() {
+    for flavour in [PrincipledFlavour::Blender, PrincipledFlavour::Mitsuba] {
+        let matt = shine(flavour, 0.6, 1.0, 0.0, true);
+        for roughness in [0.05, 0.3, 0.7] {
+            let metal = shine(flavour, 0.6, roughness, 1.0, true);
+            assert!((metal / matt - 1.0).abs() < 0.15, "{flavour:?} {roughness}: {metal} {matt}");
+        }
+        assert!(shine(flavour, 0.6, 0.05, 1.0, false) > 5.0 * matt, "the twin passes");
+    }
 }
 
 /// A room of matt walls with a smooth floor, and a stage of two lights, one of them 2 mm in front of the back wall.

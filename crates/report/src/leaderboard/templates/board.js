@@ -23,7 +23,9 @@ function showColumns() {
     const hide = !groups.every((name) => words[name].includes(head.dataset[name]));
     if (head.hidden === hide) continue;
     head.hidden = hide;
-    for (const row of table.tBodies[0].rows) row.cells[head.cellIndex].hidden = hide;
+    for (const part of [table.tBodies[0], table.tFoot]) {
+      for (const row of part ? part.rows : []) row.cells[head.cellIndex].hidden = hide;
+    }
   }
   table.classList.toggle("plain-values", !form.elements.intervals.checked);
 }

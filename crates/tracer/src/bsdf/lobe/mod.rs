@@ -18,7 +18,7 @@ use crate::warp;
 use conductor::{Conductor, reflection_density};
 use dielectric::Dielectric;
 use plastic::{Coat, Plastic};
-pub(crate) use principled::{Principled, PrincipledView, Tint};
+pub(crate) use principled::{Principled, PrincipledView, Response, Tint};
 
 /// A material's parameters at one point. Opaque materials expect `wo.z > 0`, dielectrics accept either side.
 #[derive(Clone, Copy, Debug)]

@@ -235,9 +235,11 @@ impl PrincipledView {
         }
     }
 
-    /// Whether the facets are smoother than `roughness`.
-    pub(crate) fn is_smoother_than(&self, roughness: f32) -> bool {
-        self.alpha < roughness * roughness
+    /// `response` without highlights: the dielectric facets are left out, and metal reflects what its facets keep at normal
+    /// incidence as a Lambertian surface.
+    pub(crate) fn without_highlights(&self, response: Response) -> Response {
+        let kept = self.albedo.as_ref().map_or(1.0, |albedo| albedo.directional);
+        Response { bounce: kept * FRAC_1_PI * response.cos, schlick: 0.0, dielectric: 0.0, ..response }
     }
 
     /// Smith's masking and shadowing over twice the product of the cosines, expressed by [`slope`] instead of Lambda:
@@ -275,13 +277,6 @@ impl PrincipledView {
         }
         let response = self.response(wi);
         (response.density > 0.0).then_some((wi, response))
-    }
-}
-
-impl Response {
-    /// The response without the facets.
-    pub(crate) fn of_base_alone(self) -> Self {
-        Self { bounce: 0.0, ..self }
     }
 }
 

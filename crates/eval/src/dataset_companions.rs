@@ -1,0 +1,119 @@
+//! The companions' pictures that a dataset carries, so that its users need not render them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::layout::{DATASET, SceneFolder};
+use mateval_scene::manifest;
+use mateval_scene::open::Dataset;
+use mateval_scene::{Progress, SceneId, json};
+
+use crate::companion_pictures::COMPANIONS_JSON;
+use crate::companion_store::{MadeIn, UNFINISHED};
+use crate::error::EvalError;
+use crate::light_score::keep_companions;
+use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
+use crate::protocol::Protocol;
+use crate::scene_task::SceneTask;
+use crate::truth::ViewTruth;
+
+/// What [`make_companions`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompanionsReport {
+    /// The number of passes whose pictures were rendered.
+    pub made: usize,
+    /// The number of passes whose pictures were there already.
+    pub kept: usize,
+}
+
+/// Renders the companions' pictures of these scenes (of all, if none is named) into the dataset in `root`, for every pass of
+/// the protocol that has companions, then writes a new manifest.
+///
+/// Pictures of the same inputs and rules are kept, so that a killed run resumes where it ended; others are replaced. As the
+/// manifest changes, results made before belong to another dataset. Only one process at a time may work on a dataset.
+pub fn make_companions(
+    root: &Path,
+    scenes: &[SceneId],
+    protocol: &Protocol,
+    progress: Progress<'_>,
+) -> Result<CompanionsReport, EvalError> {
+    protocol.check()?;
+    let mut dataset = Dataset::open(root)?;
+    let mut report = CompanionsReport::default();
+    for scene in dataset.chosen_scenes(scenes)? {
+        let folder = dataset.folder(&scene.id);
+        remove_unfinished(&folder)?;
+        let before = lists(&folder)?;
+        for (pass, sha256) in of_scene(&dataset, scene, protocol, progress)? {
+            if before.get(&pass) == Some(&sha256) { report.kept += 1 } else { report.made += 1 }
+        }
+    }
+    progress("hashes", 0, 1);
+    dataset.file.manifest_sha256 = manifest::write(root)?;
+    json::write(&root.join(DATASET), &dataset.file)?;
+    Ok(report)
+}
+
+fn of_scene(
+    dataset: &Dataset,
+    scene: &SceneFile,
+    protocol: &Protocol,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<String, String>, EvalError> {
+    let renderer = dataset.file.scored_renderer.as_ref();
+    let renderer = renderer.ok_or_else(|| EvalError::NoScoredRenderer { dataset: dataset.root.clone() })?;
+    let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, Some(renderer))?;
+    let task = SceneTask {
+        scene,
+        folder: &folder,
+        world: &world,
+        atlases: &atlases,
+        views: scored_views(dataset, scene)?,
+        predictions: &[],
+        protocols: std::slice::from_ref(protocol),
+        lpips: None,
+        renderer: Some(renderer),
+        companions_made_in: MadeIn::Dataset,
+        inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
+        progress,
+    };
+    let truths = task.views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
+    keep_companions(&task, renderer, &truths, 0)
+}
+
+/// The hash of each pass's list of pictures.
+fn lists(folder: &SceneFolder) -> Result<BTreeMap<String, String>, EvalError> {
+    let mut lists = BTreeMap::new();
+    for (name, path) in folders(folder)? {
+        let list = path.join(COMPANIONS_JSON);
+        if list.is_file() {
+            lists.insert(name, manifest::sha256_of_file(&list)?);
+        }
+    }
+    Ok(lists)
+}
+
+/// Removes what killed runs left.
+fn remove_unfinished(folder: &SceneFolder) -> Result<(), EvalError> {
+    for (name, path) in folders(folder)? {
+        if name.starts_with(UNFINISHED) {
+            std::fs::remove_dir_all(&path).map_err(|source| EvalError::Io { action: "remove", path, source })?;
+        }
+    }
+    Ok(())
+}
+
+/// Name and path of every folder of companions.
+fn folders(folder: &SceneFolder) -> Result<Vec<(String, std::path::PathBuf)>, EvalError> {
+    let companions = folder.companions();
+    if !companions.exists() {
+        return Ok(Vec::new());
+    }
+    let io = |source| EvalError::Io { action: "read", path: companions.clone(), source };
+    let entry = |entry: std::io::Result<std::fs::DirEntry>| {
+        let entry = entry.map_err(io)?;
+        Ok((entry.file_name().to_string_lossy().into_owned(), entry.path()))
+    };
+    std::fs::read_dir(&companions).map_err(io)?.map(entry).collect()
+}

@@ -1,0 +1,163 @@
+//! Companions' pictures are made once, wherever they are kept; what is truncated, edited or of other inputs is named and
+//! never used, and no score depends on where they came from.
+
+use std::path::{Path, PathBuf};
+use std::sync::{LazyLock, Mutex};
+
+use mateval_eval::companion_pictures::COMPANIONS_JSON;
+use mateval_eval::dataset_companions::{CompanionsReport, make_companions};
+use mateval_eval::protocol::Protocol;
+use mateval_eval::result::PictureValue;
+use mateval_eval::score::{ScorePlan, score};
+use mateval_scene::SceneId;
+use mateval_scene::open::Dataset;
+use mateval_testkit::kept_folder::kept_folder;
+
+use super::sample::{dataset, hasty, plan, write_grey};
+
+const SCENE: &str = "room";
+
+/// A submission, and its scores where no pictures are kept.
+struct Scored {
+    submission: PathBuf,
+    pictures: Vec<PictureValue>,
+}
+
+static SCORED: LazyLock<Scored> = LazyLock::new(|| {
+    let submission = kept_folder("companions").join("grey");
+    write_grey(&submission);
+    let pictures = scores(dataset(), &submission, None).0;
+    assert!(pictures.iter().any(|value| value.noise.is_some()));
+    Scored { submission, pictures }
+});
+
+/// The scores of a submission, and what was said meanwhile about pictures that were not used or not kept.
+fn scores(dataset: &Dataset, submission: &Path, cache: Option<&Path>) -> (Vec<PictureValue>, Vec<String>) {
+    let said = Mutex::new(Vec::new());
+    let progress = |what: &str, _: usize, _: usize| {
+        if what.contains("companions not used") || what.contains("companions cannot") {
+            said.lock().unwrap().push(what.to_owned());
+        }
+    };
+    let protocol = hasty();
+    let plan = ScorePlan { dataset, companion_cache: cache, ..plan(&[submission], &protocol, &[SCENE]) };
+    let mut results = score(&plan, &progress).unwrap();
+    let pictures = results.remove(0).protocols.remove("mateval-2").unwrap().pictures;
+    (pictures, said.into_inner().unwrap())
+}
+
+fn same_scores(dataset: &Dataset, cache: Option<&Path>) -> Vec<String> {
+    let (pictures, said) = scores(dataset, &SCORED.submission, cache);
+    assert!(pictures == SCORED.pictures, "the scores depend on where the companions' pictures come from");
+    said
+}
+
+fn make(root: &Path, protocol: &Protocol) -> CompanionsReport {
+    make_companions(root, &[SceneId::new(SCENE).unwrap()], protocol, &|_, _, _| ()).unwrap()
+}
+
+/// A copy of the dataset.
+fn copied() -> tempfile::TempDir {
+    fn copy(from: &Path, to: &Path) {
+        std::fs::create_dir_all(to).unwrap();
+        for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+            let target = to.join(entry.file_name());
+            if entry.path().is_dir() {
+                copy(&entry.path(), &target);
+            } else {
+                std::fs::copy(entry.path(), &target).unwrap();
+            }
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    copy(&dataset().root, folder.path());
+    folder
+}
+
+fn only_folder(parent: &Path) -> PathBuf {
+    let mut folders = std::fs::read_dir(parent).unwrap().map(|entry| entry.unwrap().path());
+    let folder = folders.next().unwrap();
+    assert_eq!(folders.next(), None, "nothing else lies in {}", parent.display());
+    folder
+}
+
+fn truncate(path: &Path) {
+    let bytes = std::fs::read(path).unwrap();
+    std::fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+}
+
+#[test]
+fn a_dataset_carries_them() {
+    let copy = copied();
+    let companions = Dataset::open(copy.path()).unwrap().folder(&SceneId::new(SCENE).unwrap()).companions();
+    // What a killed run left is removed.
+    std::fs::create_dir_all(companions.join(".companions-1")).unwrap();
+    assert_eq!(make(copy.path(), &hasty()), CompanionsReport { made: 1, kept: 0 });
+    assert_eq!(make(copy.path(), &hasty()), CompanionsReport { made: 0, kept: 1 });
+    let pass = only_folder(&companions);
+    assert_eq!(std::fs::read_dir(&pass).unwrap().count(), 1 + 2 * 5, "the list, and two halves of five views");
+    let dataset = Dataset::open(copy.path()).unwrap();
+    assert!(mateval_scene::manifest::check_those(copy.path(), |_| true).unwrap().is_empty());
+    assert_eq!(same_scores(&dataset, None), Vec::<String>::new());
+
+    // Of other rules: replaced.
+    let mut other = hasty();
+    other.light.noise.companion_samples = 2;
+    assert_eq!(make(copy.path(), &other), CompanionsReport { made: 1, kept: 0 });
+    let said = same_scores(&Dataset::open(copy.path()).unwrap(), None);
+    assert!(said.len() == 1 && said[0].contains("was made from other inputs or rules"), "{said:?}");
+    assert_eq!(make(copy.path(), &hasty()), CompanionsReport { made: 1, kept: 0 });
+
+    // A swapped picture: named, and not used.
+    std::fs::copy(pass.join("input_a.exr"), pass.join("input_b.exr")).unwrap();
+    let said = same_scores(&dataset, None);
+    assert!(said.len() == 1 && said[0].contains("input_b.exr' is not the file that"), "{said:?}");
+}
+
+#[test]
+fn a_cache_is_filled_once_and_repaired() {
+    let cache = tempfile::tempdir().unwrap();
+    assert_eq!(same_scores(dataset(), Some(cache.path())), Vec::<String>::new());
+    let folder = only_folder(cache.path());
+    let list = std::fs::read(folder.join(COMPANIONS_JSON)).unwrap();
+    let faults: [(&str, &dyn Fn()); 4] = [
+        ("is not the file that", &|| truncate(&folder.join("input_a.exr"))),
+        ("input_b.exr", &|| std::fs::remove_file(folder.join("input_b.exr")).unwrap()),
+        (COMPANIONS_JSON, &|| truncate(&folder.join(COMPANIONS_JSON))),
+        ("other inputs", &|| {
+            let text = String::from_utf8(list.clone()).unwrap();
+            let at = text.find("\"key\": \"").unwrap() + 8;
+            std::fs::write(
+                folder.join(COMPANIONS_JSON),
+                format!("{}{}{}", &text[..at], "0".repeat(64), &text[at + 64..]),
+            )
+            .unwrap();
+        }),
+    ];
+    for (expected, damage) in faults {
+        damage();
+        let said = same_scores(dataset(), Some(cache.path()));
+        assert!(said.len() == 1 && said[0].contains(expected), "{expected}: {said:?}");
+        assert_eq!(std::fs::read(folder.join(COMPANIONS_JSON)).unwrap(), list, "{expected}: made anew");
+    }
+    assert_eq!(same_scores(dataset(), Some(cache.path())), Vec::<String>::new());
+}
+
+#[test]
+fn a_cache_that_cannot_be_written_does_not_end_a_score() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = folder.path().join("cache");
+    std::fs::write(&cache, "a file").unwrap();
+    let said = same_scores(dataset(), Some(&cache));
+    assert!(said.len() == 1 && said[0].contains("companions cannot be kept"), "{said:?}");
+}
+
+#[test]
+fn two_scorings_share_a_cache() {
+    let cache = tempfile::tempdir().unwrap();
+    std::thread::scope(|scope| {
+        let both = [(); 2].map(|()| scope.spawn(|| same_scores(dataset(), Some(cache.path()))));
+        both.into_iter().for_each(|one| assert_eq!(one.join().unwrap(), Vec::<String>::new()));
+    });
+    only_folder(cache.path());
+}
