@@ -134,7 +134,7 @@ fn score_light(
                 for mask in masks(&truth) {
                     for (what, lpips) in [("light without LPIPS", None), ("light with LPIPS", Some(lpips))] {
                         steps.of(&name(what), || {
-                            rgb_metrics(&protocol, lpips, &seen, &reference, &mask, blocks).unwrap();
+                            rgb_metrics(&protocol, lpips, &seen, None, &reference, &mask, blocks).unwrap();
                         });
                     }
                 }

@@ -11,7 +11,7 @@ use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture};
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::{ViewId, json};
-use mateval_tracer::ViewsRender;
+use mateval_tracer::{LightMix, ViewsRender};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -47,8 +47,8 @@ pub(crate) struct CompanionPictures {
     pub(crate) sha256: String,
 }
 
-/// One companion's picture under each lighting.
-type Lightings<T> = Vec<[T; COMPANIONS]>;
+/// The companions' pictures under each lighting.
+pub(crate) type Lightings<T> = Vec<[T; COMPANIONS]>;
 
 impl CompanionPictures {
     /// The pictures in `folder` if they have this key and are whole; otherwise the reason why they cannot be used. None if
@@ -135,6 +135,20 @@ impl CompanionPictures {
             .map(|lighting| Ok([companion(lighting, 0)?, companion(lighting, 1)?, companion(lighting, 2)?]))
             .collect()
     }
+}
+
+/// The companions' pictures under lights of these weights, from those under each light alone.
+pub(crate) fn weighted(lights: &Lightings<Picture<LinearRgb>>, mix: &LightMix) -> [Picture<LinearRgb>; COMPANIONS] {
+    std::array::from_fn(|j| {
+        let (width, height) = lights.first().map_or((0, 0), |light| (light[j].width(), light[j].height()));
+        let mut sums = vec![[0.0_f64; 3]; width * height];
+        for (light, weights) in lights.iter().zip(mix) {
+            for (sum, pixel) in sums.iter_mut().zip(light[j].pixels()) {
+                (0..3).for_each(|c| sum[c] += weights[c] * f64::from(pixel.0[c]));
+            }
+        }
+        Picture::from_fn(width, height, |x, y| LinearRgb(sums[y * width + x].map(|v| v as f32)))
+    })
 }
 
 /// Lighting, companion and channel of every plane of a file.

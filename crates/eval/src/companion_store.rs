@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::{Progress, json};
-use mateval_tracer::LightMix;
 use tempfile::TempDir;
 
 use crate::cache_bound;
@@ -16,7 +15,6 @@ use crate::light_pass::LightPass;
 use crate::light_rules::LightRules;
 use crate::lit_scene::LitScene;
 use crate::protocol::SCORER_VERSION;
-use crate::seeds::SEED_PREFIX;
 
 /// Where pictures that are not found are made.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +43,7 @@ impl<'a> CompanionStore<'a> {
         Self { of_dataset, made_in, inputs_sha256, temporary: OnceLock::new() }
     }
 
-    /// The converged pictures of `companions` under the mixes of a pass. Pictures that are truncated, changed, or of other
+    /// The converged pictures of `companions` under the lightings of a pass. Pictures that are truncated, changed, or of other
     /// inputs are reported through `progress` and not used.
     pub(crate) fn find(
         &self,
@@ -53,10 +51,9 @@ impl<'a> CompanionStore<'a> {
         rules: &LightRules,
         pass: &LightPass<'_>,
         companions: &Companions,
-        mixes: &[LightMix],
         progress: Progress<'_>,
     ) -> Result<CompanionPictures, EvalError> {
-        let key = self.key(lit, rules, pass, mixes);
+        let key = self.key(lit, rules, pass);
         let (of_dataset, cached) = (self.of_dataset.join(pass.name), self.cache_folder(&key));
         for folder in [Some(&of_dataset), cached.as_ref()].into_iter().flatten() {
             match CompanionPictures::open(folder, &key) {
@@ -70,7 +67,7 @@ impl<'a> CompanionStore<'a> {
                 None => {}
             }
         }
-        let make = |folder: &Path| make(lit, rules, pass, companions, mixes, &key, folder);
+        let make = |folder: &Path| make(lit, rules, pass, companions, &key, folder);
         match (self.made_in, cached) {
             (MadeIn::Dataset, _) => make(&of_dataset),
             (_, None) => make(&self.temporary_folder(&key)?),
@@ -118,12 +115,12 @@ impl<'a> CompanionStore<'a> {
     }
 
     /// The hash of everything that the pictures depend on.
-    fn key(&self, lit: &LitScene<'_>, rules: &LightRules, pass: &LightPass<'_>, mixes: &[LightMix]) -> String {
-        let settings = (rules.flavour, rules.max_bounces, rules.roulette_start, rules.roulette_survival);
-        let definition = (SCORER_VERSION, SEED_PREFIX, COMPANION_SCALES, rules.noise.companion_samples);
+    fn key(&self, lit: &LitScene<'_>, rules: &LightRules, pass: &LightPass<'_>) -> String {
+        let settings = (rules.flavour, rules.max_bounces, rules.roulette_start, rules.roulette_survival, &rules.stage);
+        let definition = (SCORER_VERSION, &rules.noise.seed, COMPANION_SCALES, rules.noise.companion_samples);
         let views: Vec<_> = lit.views.iter().map(|view| &view.id).collect();
         let of_scene = (&lit.scene.id, lit.scene.exposure, views, &self.inputs_sha256);
-        sha256_of_bytes(json::to_text(&(definition, settings, pass.name, of_scene, mixes)).as_bytes())
+        sha256_of_bytes(json::to_text(&(definition, settings, pass.name, of_scene, pass.companion_mixes())).as_bytes())
     }
 }
 
@@ -136,7 +133,6 @@ fn make(
     rules: &LightRules,
     pass: &LightPass<'_>,
     companions: &Companions,
-    mixes: &[LightMix],
     key: &str,
     folder: &Path,
 ) -> Result<CompanionPictures, EvalError> {
@@ -151,7 +147,7 @@ fn make(
     let mut files = std::collections::BTreeMap::new();
     for (half, name) in HALVES.iter().enumerate() {
         let stream = format!("companions_{name}");
-        let renders = pass.trace_companions(companions, mixes, rules.noise.companion_samples, &stream)?;
+        let renders = pass.trace_companions(companions, rules.noise.companion_samples, &stream)?;
         files.extend(CompanionPictures::write_half(work.path(), &views, half, &renders, lit.scene.exposure)?);
     }
     CompanionPictures::finish(work.path(), key, files)?;

@@ -12,6 +12,8 @@ use mateval_submission::{map_file, memory_budget, prediction, texel_map};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::companions::COMPANION_SCALES;
+use crate::control_variate;
 use crate::metric::LPIPS_NET;
 
 /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
@@ -78,8 +80,16 @@ pub struct FixedRules {
     pub fit_step_share: f64,
     /// Fitted radiances below this, relative to the target's mean, may become 0.
     pub fit_zero_below: f64,
-    /// First word of the texts whose hashes seed the paths.
-    pub seed_prefix: String,
+    /// The factors of the companions' base colours.
+    pub companion_scales: Vec<f32>,
+    /// The largest ratio of a prediction's base colour to the truth's by which companions are multiplied.
+    pub companion_most_ratio: f32,
+    /// The smallest base colour of the truth that a prediction's is divided by.
+    pub companion_least_base_color: f32,
+    /// Share of the trace that is added to the diagonal of the normal equations of the companions' coefficients.
+    pub companion_ridge: f64,
+    /// The range of exposed values whose slope of the sRGB curve weighs a pixel in these equations.
+    pub companion_weighed_range: [f64; 2],
 }
 
 impl FixedRules {
@@ -117,7 +127,11 @@ impl FixedRules {
             fit_most_steps: light_fit::MOST_STEPS,
             fit_step_share: light_fit::STEP_SHARE,
             fit_zero_below: light_fit::ZERO_BELOW,
-            seed_prefix: crate::seeds::SEED_PREFIX.to_owned(),
+            companion_scales: COMPANION_SCALES.to_vec(),
+            companion_most_ratio: control_variate::MOST_RATIO,
+            companion_least_base_color: control_variate::LEAST_BASE_COLOR,
+            companion_ridge: control_variate::RIDGE,
+            companion_weighed_range: control_variate::WEIGHED_RANGE,
         }
     }
 

@@ -18,6 +18,7 @@
 //! takes the means ([`means`]): pictures to scenes, scenes to the dataset.
 
 pub mod alignment;
+mod batch_mixes;
 mod cache_bound;
 pub mod companion_pictures;
 mod companion_store;
@@ -25,6 +26,7 @@ mod companions;
 pub mod control_variate;
 pub mod dataset_companions;
 pub mod error;
+mod fitted_mixes;
 pub mod fitted_radiances;
 pub mod fixed_rules;
 pub mod instance_errors;
@@ -60,6 +62,7 @@ mod stored_light;
 pub mod texture_space;
 pub mod truth;
 pub mod truth_material;
+mod truth_noise;
 pub mod verify;
 pub mod word_enum;
 

@@ -1,10 +1,14 @@
 //! A pass: the pictures of predictions that come from one set of paths.
 
+use std::borrow::Cow;
+
+use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, Progress};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
-use mateval_tracer::{Coat, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};
+use mateval_tracer::{Coat, LightGroups, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};
 
-use crate::companions::{COMPANION_SCALES, Companions};
+use crate::companion_pictures::{Lightings, weighted};
+use crate::companions::{COMPANION_SCALES, COMPANIONS, Companions};
 use crate::error::EvalError;
 use crate::light_rules::{LightRules, Track};
 use crate::lit_scene::LitScene;
@@ -29,7 +33,7 @@ pub(crate) struct LightPass<'a> {
 pub(crate) enum PassPictures {
     /// Tracks and lightings whose weights are the same for every prediction.
     Fixed(Vec<(Track, Option<LightingName>)>),
-    /// One picture, of track `fitted`.
+    /// Two pictures of track `fitted`, under the weights that each of two streams of samples was fitted to.
     Fitted,
 }
 
@@ -38,7 +42,7 @@ impl PassPictures {
     pub(crate) fn names(&self) -> Vec<(Track, Option<LightingName>)> {
         match self {
             Self::Fixed(names) => names.clone(),
-            Self::Fitted => vec![(Track::Fitted, None)],
+            Self::Fitted => vec![(Track::Fitted, None); 2],
         }
     }
 }
@@ -67,72 +71,82 @@ impl<'a> LightPass<'a> {
         Self { name: "stage", world, lights, on_stage: true, pictures: PassPictures::Fitted, lit, rules, progress }
     }
 
-    /// The companions that travel with this pass's predictions. Their pictures are known under fixed lights; fitted lights
-    /// differ between predictions.
-    pub(crate) fn companions(&self) -> Option<&'a Companions> {
-        match self.pictures {
-            PassPictures::Fixed(_) => self.lit.companions,
-            PassPictures::Fitted => None,
+    /// The weights of the lights under which converged pictures of the companions are kept: those of the pass's pictures, or
+    /// each light alone where the weights are fitted for each prediction.
+    pub(crate) fn companion_mixes(&self) -> Vec<LightMix> {
+        let lights = self.lights.len();
+        let mix = |(track, lighting): &(Track, Option<LightingName>)| match track {
+            Track::Relit => {
+                let relit = self.lit.lightings.iter().find(|relit| Some(relit.name) == *lighting);
+                relit.expect("the pass was made of these lightings").weights.clone()
+            }
+            Track::True | Track::Fitted => vec![[1.0; 3]; lights],
+        };
+        let alone = |light: usize| (0..lights).map(|other| [f64::from(u8::from(other == light)); 3]).collect();
+        match &self.pictures {
+            PassPictures::Fixed(names) => names.iter().map(mix).collect(),
+            PassPictures::Fitted => (0..lights).map(alone).collect(),
         }
     }
 
-    /// The weights of the lights in each picture of a pass whose weights are fixed.
-    pub(crate) fn fixed_mixes(&self) -> Vec<LightMix> {
-        let mix = |(track, lighting): (Track, Option<LightingName>)| match track {
-            Track::Relit => {
-                let relit = self.lit.lightings.iter().find(|relit| Some(relit.name) == lighting);
-                relit.expect("the pass was made of these lightings").weights.clone()
-            }
-            Track::True | Track::Fitted => vec![[1.0; 3]; self.lights.len()],
-        };
-        self.pictures.names().into_iter().map(mix).collect()
-    }
-
-    /// Renders one stream of `predictions`, each under its own `mixes`, and of the pass's companions under those of the
-    /// first. `predictions` agree in roughness and metallic.
+    /// Renders one stream of `predictions` and the scene's companions in every view, each under all `mixes`. `predictions`
+    /// agree in roughness and metallic.
     pub(crate) fn trace(
         &self,
         predictions: &[&PredictedScene],
-        mixes: &[Vec<LightMix>],
-        cameras: &[Camera],
+        mixes: &[LightMix],
         samples: u32,
         stream: &str,
         what: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
-        let mut mixes = mixes.to_vec();
-        let companions = self.companions();
-        if companions.is_some() {
-            mixes.extend(vec![mixes[0].clone(); COMPANION_SCALES.len()]);
-        }
-        let repaint = self.repaint(predictions, companions)?;
-        self.render(&repaint, Lighting::Mixed(&mixes), cameras, samples, stream, what)
+        let repaint = self.repaint(predictions, self.lit.companions)?;
+        let mixes = vec![mixes.to_vec(); repaint.predictions()];
+        self.render(&repaint, Lighting::Mixed(&mixes), &self.lit.cameras(), samples, stream, what)
     }
 
-    /// Renders one stream of `predictions` without companions.
-    pub(crate) fn trace_alone(
+    /// Renders one stream of `predictions` and the scene's companions in one view, each under every light alone.
+    pub(crate) fn trace_lights(
         &self,
         predictions: &[&PredictedScene],
-        lighting: Lighting<'_>,
-        cameras: &[Camera],
+        camera: &Camera,
         samples: u32,
         stream: &str,
         what: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
-        self.render(&self.repaint(predictions, None)?, lighting, cameras, samples, stream, what)
+        let repaint = self.repaint(predictions, self.lit.companions)?;
+        let groups = LightGroups::apart(self.lights.len());
+        self.render(&repaint, Lighting::Apart(&groups), std::slice::from_ref(camera), samples, stream, what)
     }
 
-    /// Renders one stream of the companions alone.
+    /// Renders one stream of the companions alone, under the mixes of [`Self::companion_mixes`].
     pub(crate) fn trace_companions(
         &self,
         companions: &Companions,
-        mixes: &[LightMix],
         samples: u32,
         stream: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let repaint = self.repaint(&[], Some(companions))?;
-        let mixes = vec![mixes.to_vec(); COMPANION_SCALES.len()];
+        let (mixes, groups) = (vec![self.companion_mixes(); COMPANION_SCALES.len()], LightGroups::apart(self.lights.len()));
+        let lighting = match self.pictures {
+            PassPictures::Fixed(_) => Lighting::Mixed(&mixes),
+            PassPictures::Fitted => Lighting::Apart(&groups),
+        };
         let what = format!("{} companions, {samples} samples, {stream}", self.name);
-        self.render(&repaint, Lighting::Mixed(&mixes), &self.lit.cameras(), samples, stream, &what)
+        self.render(&repaint, lighting, &self.lit.cameras(), samples, stream, &what)
+    }
+
+    /// The companions' converged pictures in picture number `picture` of the pass, whose lights have the weights `mix`, made
+    /// of those that are kept.
+    pub(crate) fn converged<'c>(
+        &self,
+        kept: &'c Lightings<Picture<LinearRgb>>,
+        picture: usize,
+        mix: &LightMix,
+    ) -> Cow<'c, [Picture<LinearRgb>; COMPANIONS]> {
+        match self.pictures {
+            PassPictures::Fixed(_) => Cow::Borrowed(&kept[picture]),
+            PassPictures::Fitted => Cow::Owned(weighted(kept, mix)),
+        }
     }
 
     fn render(
@@ -145,7 +159,7 @@ impl<'a> LightPass<'a> {
         what: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let what = format!("scene {}: {what}", self.lit.scene.id);
-        let seeds = [seed(&self.lit.scene.id, self.name, stream)];
+        let seeds = [seed(&self.rules.noise.seed, &self.lit.scene.id, self.name, stream)];
         let settings = self.rules.settings(samples);
         let shown = |done: usize, all: usize| (self.progress)(&what, done, all);
         let which = 0..repaint.predictions();

@@ -72,6 +72,10 @@ pub struct RelitRules {
     pub alone_at_most: usize,
     /// The smallest share of the light of a group that takes part.
     pub least_share: f64,
+    /// The largest variance of the truth's input view, mean over both halves' mean of encoded values, in a lighting that is
+    /// scored: a noisier picture stays brighter or darker than its light after encoding, so that its own material would not
+    /// score best.
+    pub most_truth_variance: f64,
 }
 
 /// The numbers of samples, which follow from a pilot render with samples of its own. All are per pixel of each half; the
@@ -79,6 +83,8 @@ pub struct RelitRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseRules {
+    /// First word of the texts whose hashes seed the paths.
+    pub seed: String,
     /// Samples of the pilot.
     pub pilot_samples: u32,
     /// The smallest number of samples; doubled until the noise is small enough or `most_samples` is reached.
@@ -109,8 +115,9 @@ impl LightRules {
             roulette_survival: settings.roulette_survival,
             stage: StageRules::default(),
             fit: FitRules::default(),
-            relit: RelitRules { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3, least_share: 0.05 },
+            relit: RelitRules { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3, least_share: 0.05, most_truth_variance: 2e-3 },
             noise: NoiseRules {
+                seed: "mateval".to_owned(),
                 pilot_samples: 2,
                 least_samples: 4,
                 most_samples: 64,

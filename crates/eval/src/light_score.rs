@@ -7,7 +7,6 @@ use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_metrics::{MetricError, NoiseFreeMse, psnr_mean_error};
 use mateval_scene::RendererId;
 use mateval_scene::layout::INPUT;
-use mateval_tracer::LightMix;
 use rayon::prelude::*;
 
 use crate::companion_store::CompanionStore;
@@ -22,13 +21,15 @@ use crate::material_pictures::material_pictures;
 use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
-use crate::relit::{LightingName, lightings};
+use crate::relit::{LightingName, RelitLighting, lightings};
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
+use crate::rendered_view::RenderedView;
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
 use crate::scene_score::{NoiseScore, ScoreSheet};
 use crate::scene_task::{MaskedRegion, SceneTask, regions};
 use crate::truth::{RgbTruth, TrueLight, ViewTruth};
+use crate::truth_noise::{NoisyLighting, encoded_variance};
 
 /// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures.
 pub(crate) fn score_light(
@@ -41,7 +42,10 @@ pub(crate) fn score_light(
     let companions = companions(task, truths)?;
     let scorer = LightScorer::new(task, renderer, truths, Some(&companions), &task.protocols[at])?;
     let used = scorer.predict(&mut |submission, light| scorer.measure(light, &mut sheets[submission][at]))?;
-    sheets.iter_mut().for_each(|sheets| sheets[at].score.companions = used.clone());
+    for sheets in sheets {
+        let score = &mut sheets[at].score;
+        (score.companions, score.noisy_lightings) = (used.clone(), scorer.noisy.clone());
+    }
     Ok(())
 }
 
@@ -107,6 +111,8 @@ struct LightScorer<'a> {
     /// The regions of each view.
     regions: Vec<Vec<MaskedRegion>>,
     lit: LitScene<'a>,
+    /// The lightings that are left out.
+    noisy: Vec<NoisyLighting>,
     store: CompanionStore<'a>,
 }
 
@@ -137,6 +143,14 @@ impl<'a> LightScorer<'a> {
                 lights.entry(Some(lighting.name)).or_default().push(truth);
             }
         }
+        // Leave out the lightings whose truth is too noisy.
+        let variance = |lighting: &RelitLighting| encoded_variance(&lights[&Some(lighting.name)][photo.place], photo.valid);
+        let noisy = lightings.iter().map(|relit| NoisyLighting { lighting: relit.name, variance: variance(relit) });
+        let too_noisy = |found: &NoisyLighting| found.variance > protocol.light.relit.most_truth_variance;
+        let noisy: Vec<NoisyLighting> = noisy.filter(too_noisy).collect();
+        let is_scored = |name: LightingName| noisy.iter().all(|noisy| noisy.lighting != name);
+        let lightings: Vec<RelitLighting> = lightings.into_iter().filter(|relit| is_scored(relit.name)).collect();
+        lights.retain(|name, _| name.is_none_or(is_scored));
         let lit = LitScene {
             scene: task.scene,
             world: task.world,
@@ -153,7 +167,7 @@ impl<'a> LightScorer<'a> {
         let lit = LitScene { blocks: noise_blocks(&protocol.light.noise, &lit.cameras()), ..lit };
         let of_dataset = task.folder.companions();
         let store = CompanionStore::new(of_dataset, task.companions_made_in, task.inputs_sha256.clone());
-        Ok(Self { task, protocol, regions: truths.iter().map(regions).collect(), lit, store })
+        Ok(Self { task, protocol, regions: truths.iter().map(regions).collect(), lit, noisy, store })
     }
 
     /// Renders every submission and passes it to `each` with its number. Returns the hashes of the companions' pictures that
@@ -164,8 +178,8 @@ impl<'a> LightScorer<'a> {
     ) -> Result<BTreeMap<String, String>, EvalError> {
         let (rules, progress) = (&self.protocol.light, self.task.progress);
         let used = RefCell::new(BTreeMap::new());
-        let find = |pass: &LightPass<'_>, companions: &Companions, mixes: &[LightMix]| {
-            let found = self.store.find(&self.lit, rules, pass, companions, mixes, progress)?;
+        let find = |pass: &LightPass<'_>, companions: &Companions| {
+            let found = self.store.find(&self.lit, rules, pass, companions, progress)?;
             used.borrow_mut().insert(pass.name.to_owned(), found.sha256.clone());
             Ok(found)
         };
@@ -202,17 +216,26 @@ impl<'a> LightScorer<'a> {
         let task = self.task;
         let kind = picture.track.picture();
         let truths = &self.lit.lights[&picture.lighting];
-        let pairs: Vec<Result<(EncodedLight, LightReference), MetricError>> = picture
+        let pairs: Vec<Result<ComparedLight, MetricError>> = picture
             .views
             .par_iter()
             .zip(truths)
-            .map(|(rendered, truth)| {
-                let reference = LightReference::new(self.protocol, task.lpips, truth)?;
-                Ok((EncodedLight::of_prediction(rendered)?, reference))
+            .enumerate()
+            .map(|(view, (rendered, truth))| {
+                let encoded = |views: &Vec<RenderedView>| EncodedLight::of_prediction(&views[view]);
+                let of_fits = picture.of_fits.as_ref().map(|fits| -> Result<[EncodedLight; 2], MetricError> {
+                    let [a, b] = fits;
+                    Ok([encoded(a)?, encoded(b)?])
+                });
+                Ok(ComparedLight {
+                    light: EncodedLight::of_prediction(rendered)?,
+                    of_fits: of_fits.transpose()?,
+                    reference: LightReference::new(self.protocol, task.lpips, truth)?,
+                })
             })
             .collect();
         let pairs = pairs.into_iter().zip(&task.views).map(|(pair, view)| task.locate_error(view, pair));
-        let pairs: Vec<(EncodedLight, LightReference)> = pairs.collect::<Result<_, _>>()?;
+        let pairs: Vec<ComparedLight> = pairs.collect::<Result<_, _>>()?;
         let jobs: Vec<(usize, &MaskedRegion)> = self
             .regions
             .iter()
@@ -222,8 +245,8 @@ impl<'a> LightScorer<'a> {
         let measured: Vec<Result<RgbMeasured, MetricError>> = jobs
             .par_iter()
             .map(|&(view, region)| {
-                let ((light, reference), blocks) = (&pairs[view], &self.lit.blocks[view]);
-                rgb_metrics(self.protocol, task.lpips, light, reference, &region.mask, blocks)
+                let (ComparedLight { light, of_fits, reference }, blocks) = (&pairs[view], &self.lit.blocks[view]);
+                rgb_metrics(self.protocol, task.lpips, light, of_fits.as_ref(), reference, &region.mask, blocks)
             })
             .collect();
         for (&(view, region), measured) in jobs.iter().zip(measured) {
@@ -239,8 +262,9 @@ impl<'a> LightScorer<'a> {
         Ok(())
     }
 
-    fn add_errors(&self, kind: PictureKind, pairs: &[(EncodedLight, LightReference)], errors: &mut InstanceErrors) {
-        for ((view, truth), (light, reference)) in self.task.views.iter().zip(self.lit.truths).zip(pairs) {
+    fn add_errors(&self, kind: PictureKind, pairs: &[ComparedLight], errors: &mut InstanceErrors) {
+        for ((view, truth), pair) in self.task.views.iter().zip(self.lit.truths).zip(pairs) {
+            let ComparedLight { light, reference, .. } = pair;
             let error = |k: usize| light.noise_free_square(reference, k);
             errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
@@ -248,6 +272,14 @@ impl<'a> LightScorer<'a> {
             }
         }
     }
+}
+
+/// A view of a prediction and of the truth, encoded.
+struct ComparedLight {
+    light: EncodedLight,
+    /// The prediction under the lights that each of two streams was fitted to.
+    of_fits: Option<[EncodedLight; 2]>,
+    reference: LightReference,
 }
 
 /// The base colour of every prediction over the truth's, by view.
@@ -269,7 +301,7 @@ fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) ->
     let view = task.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene() })?;
     let place = task.views.iter().position(|scored| scored.id == view.id);
     let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: scene() })?;
-    Ok(Photo { view, light: own[place].shown.clone(), valid: &truths[place].valid })
+    Ok(Photo { view, place, light: own[place].shown.clone(), valid: &truths[place].valid })
 }
 
 /// The noise in the mean PSNR of some pictures, and why it is as large as it is.
@@ -277,7 +309,7 @@ fn psnr_noise(rules: &NoiseRules, pictures: &[NoiseFreeMse], samples: u32) -> Ps
     let noise = psnr_mean_error(&pictures.iter().collect::<Vec<_>>());
     // Without any noise there is nothing to certify.
     let state = noise.as_ref().map_or(NoiseState::Certified, |noise| {
-        let fixed = noise.shared.hypot(noise.reference);
+        let fixed = noise.shared.hypot(noise.reference).hypot(noise.common);
         if noise.paths <= rules.target_db && fixed <= rules.target_db {
             NoiseState::Certified
         } else if noise.paths <= rules.target_db.max(rules.truth_share * fixed) {
@@ -295,6 +327,7 @@ fn psnr_noise(rules: &NoiseRules, pictures: &[NoiseFreeMse], samples: u32) -> Ps
         own_db: noise.map(|noise| noise.paths),
         companions_db: noise.map(|noise| noise.shared),
         truth_db: noise.map(|noise| noise.reference),
+        fit_db: noise.map(|noise| noise.common),
         samples,
         state,
     }

@@ -42,6 +42,8 @@ pub(crate) struct LitScene<'a> {
 pub(crate) struct Photo<'a> {
     /// The view.
     pub(crate) view: &'a View,
+    /// Its place among the scored views.
+    pub(crate) place: usize,
     /// Its picture, linear, before exposure.
     pub(crate) light: Picture<LinearRgb>,
     /// The pixels that count.

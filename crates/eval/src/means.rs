@@ -148,6 +148,7 @@ mod tests {
             own_db: error,
             companions_db: None,
             truth_db: None,
+            fit_db: None,
             samples: 16,
             state: NoiseState::Certified,
         };

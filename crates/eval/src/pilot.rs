@@ -1,17 +1,20 @@
 //! The pilot of a batch of predictions: a render of few samples that says how the companions correct each prediction, and
 //! how many samples it needs.
 
+use std::ops::Range;
+
 use mateval_image::{LinearRgb, Picture};
 use mateval_metrics::{Halves, NoiseFreeMse, NoisePsnr, NoisyRender, noise_free_mse, psnr_mean_error};
 use mateval_scene::layout::INPUT;
 use mateval_submission::prediction::PredictedScene;
-use mateval_tracer::{LightMix, ViewsRender};
+use mateval_tracer::ViewsRender;
 
-use crate::companion_pictures::CompanionPictures;
+use crate::batch_mixes::BatchMixes;
+use crate::companion_pictures::{CompanionPictures, Lightings};
 use crate::companions::COMPANIONS;
 use crate::control_variate::{Coefficients, Regression};
 use crate::error::EvalError;
-use crate::light_pass::LightPass;
+use crate::light_pass::{LightPass, PassPictures};
 use crate::light_rules::NoiseRules;
 use crate::lit_scene::LitScene;
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
@@ -27,23 +30,21 @@ pub(crate) struct Pilot<'a> {
     /// The numbers of the predictions in the scene's list.
     pub(crate) batch: &'a [usize],
     pub(crate) predictions: Vec<&'a PredictedScene>,
-    /// The weights of each prediction's pictures.
-    pub(crate) mixes: Vec<Vec<LightMix>>,
+    pub(crate) mixes: &'a BatchMixes,
 }
 
 /// Samples per pixel of a half, and the companions' coefficients of each picture.
 type Found = (u32, Vec<Coefficients>);
 
-/// One stream of a pilot: by variant, picture and view.
+/// One stream of a pilot: by variant, picture of the render and view.
 struct Stream(Vec<Vec<Vec<StoredLight>>>);
 
 /// Runs a pilot; one answer for each prediction.
 pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<Found>, EvalError> {
-    let (samples, pictures) = (pilot.rules.pilot_samples / 2, pilot.mixes[0].len());
+    let (samples, pictures) = (pilot.rules.pilot_samples / 2, pilot.mixes.pictures());
     let trace = |stream: &str| {
         let what = format!("{} pilot, stream {stream}", pilot.pass.name);
-        let cameras = pilot.lit.cameras();
-        pilot.pass.trace(&pilot.predictions, &pilot.mixes, &cameras, samples.max(1), &format!("pilot_{stream}"), &what)
+        pilot.pass.trace(&pilot.predictions, &pilot.mixes.all, samples.max(1), &format!("pilot_{stream}"), &what)
     };
     // The first half gives the coefficients; only the pictures that they leave are kept.
     let first = ["a1", "a2"].map(|stream| trace(stream).map(|renders| Stream::of(&renders, pilot.lit.scene.exposure)));
@@ -51,7 +52,7 @@ pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<Found>, EvalError> {
     let (a1, a2) = (a1?, a2?);
     let mut coefficients = Vec::new();
     for at in 0..pilot.predictions.len() {
-        coefficients.push((0..pictures).map(|picture| pilot.coefficients(at, picture, [&a1, &a2])).collect::<Vec<_>>());
+        coefficients.push(pilot.coefficients(at, [&a1, &a2]));
     }
     let mut views = pilot.blank(pictures);
     for stream in [a1, a2] {
@@ -89,17 +90,30 @@ impl Pilot<'_> {
         vec![vec![vec![RenderedView::empty(); self.lit.views.len()]; pictures]; self.predictions.len()]
     }
 
-    /// The companions' coefficients of one picture of a prediction, from two streams.
-    fn coefficients(&self, at: usize, picture: usize, [one, other]: [&Stream; 2]) -> Coefficients {
-        let mut regression = Regression::default();
-        if self.companions.is_none() {
-            return regression.solve();
+    /// The companions' coefficients of each picture of a prediction, from two streams. Both pictures of a fit have the same,
+    /// so that their difference shows the fit and not the paths.
+    fn coefficients(&self, at: usize, streams: [&Stream; 2]) -> Vec<Coefficients> {
+        let pictures = self.mixes.pictures();
+        let regressed = |range: Range<usize>| {
+            let mut regression = Regression::default();
+            if self.companions.is_some() {
+                range.for_each(|picture| self.add_rows(at, picture, streams, &mut regression));
+            }
+            regression.solve()
+        };
+        match self.pass.pictures {
+            PassPictures::Fixed(_) => (0..pictures).map(|picture| regressed(picture..picture + 1)).collect(),
+            PassPictures::Fitted => vec![regressed(0..pictures); pictures],
         }
-        let first = self.predictions.len();
+    }
+
+    /// Adds the valid pixels of a picture in all views.
+    fn add_rows(&self, at: usize, picture: usize, [one, other]: [&Stream; 2], regression: &mut Regression) {
+        let (first, place) = (self.predictions.len(), self.mixes.place(at, picture));
         for (view, truth) in self.lit.truths.iter().enumerate() {
             let ratio = &self.lit.ratios[self.batch[at]][view];
             for k in (0..truth.valid.pixels().len()).filter(|&k| truth.valid.pixels()[k]) {
-                let of = |variant: usize| [one, other].map(|stream| stream.0[variant][picture][view].at(k));
+                let of = |variant: usize| [one, other].map(|stream| stream.0[variant][place][view].at(k));
                 let [p, q] = of(at);
                 let companions: [[f64; 3]; COMPANIONS] = std::array::from_fn(|j| {
                     let [f, g] = of(first + j);
@@ -109,7 +123,6 @@ impl Pilot<'_> {
                 regression.add(difference, companions, mean);
             }
         }
-        regression.solve()
     }
 
     /// Adds a stream as the next quarter of every prediction's pictures.
@@ -118,7 +131,7 @@ impl Pilot<'_> {
         for (at, pictures) in views.iter_mut().enumerate() {
             for (picture, views) in pictures.iter_mut().enumerate() {
                 for (view, rendered) in views.iter_mut().enumerate() {
-                    let of = |variant: usize| &stream.0[variant][picture][view];
+                    let of = |variant: usize| &stream.0[variant][self.mixes.place(at, picture)][view];
                     if self.companions.is_none() {
                         rendered.add_quarter(of(at).clone());
                         continue;
@@ -146,13 +159,15 @@ impl Pilot<'_> {
     ) -> Result<(), EvalError> {
         let Some(companions) = self.companions else { return Ok(()) };
         for (view, shown) in self.lit.views.iter().enumerate() {
-            let [a, b] = [0, 1].map(|half| companions.read(&shown.id, half, self.mixes[0].len()));
+            let kept = self.pass.companion_mixes().len();
+            let [a, b] = [0, 1].map(|half| companions.read(&shown.id, half, kept));
             let (a, b) = (a?, b?);
             for (at, pictures) in views.iter_mut().enumerate() {
                 let ratio = &self.lit.ratios[self.batch[at]][view];
                 for (picture, rendered) in pictures.iter_mut().enumerate() {
-                    let half = |half: &Vec<[Picture<LinearRgb>; COMPANIONS]>| {
-                        of_companions(&half[picture], &coefficients[at][picture], ratio)
+                    let half = |half: &Lightings<Picture<LinearRgb>>| {
+                        let converged = self.pass.converged(half, picture, self.mixes.mix(at, picture));
+                        of_companions(&converged, &coefficients[at][picture], ratio)
                     };
                     rendered[view].set_companions([half(&a), half(&b)]);
                 }
@@ -224,7 +239,7 @@ mod tests {
         let noise = Protocol::named("mateval-2").unwrap().light.noise;
         let (least, most, target) = (noise.least_samples, noise.most_samples, noise.target_db);
         let samples = |paths: f64, reference: f64, variance: f64| {
-            let error = NoisePsnr { total: paths, paths, shared: 0.0, reference };
+            let error = NoisePsnr { total: paths, paths, shared: 0.0, reference, common: 0.0 };
             samples_under_bound(&noise, Some(error), variance * noise.most_variance)
         };
         let times = |factor: f64| f64::sqrt(factor / f64::from(noise.pilot_samples)) * target;

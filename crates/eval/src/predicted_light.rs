@@ -5,27 +5,28 @@
 //!
 //! Predictions that agree in roughness and metallic share paths, and the scene's companions travel along. A pilot render,
 //! with samples of its own, determines how the companions correct each prediction and how many samples it needs. Radiances
-//! are fitted on a further stream of samples, so that the fit does not make the quarters depend on each other. A
-//! prediction's pictures are the same, bit for bit, whichever others are rendered with it.
+//! are fitted on further streams of samples (`fitted_mixes`), so that the fit does not make the quarters depend on each
+//! other. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
 
 use std::collections::BTreeMap;
 
-use mateval_image::{LinearRgb, Picture};
-use mateval_light::light_fit::{FitTarget, LightFit, fit_lights};
+use mateval_image::LinearRgb;
 use mateval_light::light_stage;
 use mateval_scene::dataset::View;
 use mateval_scene::{Progress, SceneLights};
 use mateval_submission::prediction::PredictedScene;
-use mateval_tracer::{LightGroups, LightMix, Lighting, StageLight, ViewsRender};
+use mateval_tracer::{StageLight, ViewsRender};
 
-use crate::companion_pictures::CompanionPictures;
+use crate::batch_mixes::BatchMixes;
+use crate::companion_pictures::{CompanionPictures, HALVES};
 use crate::companions::{COMPANIONS, Companions};
 use crate::control_variate::Coefficients;
 use crate::error::EvalError;
-use crate::fitted_radiances::{FittedRadiance, FittedRadiances};
+use crate::fitted_mixes::{FittedMixes, MixFit};
+use crate::fitted_radiances::FittedRadiances;
 use crate::light_pass::{LightPass, PassPictures};
 use crate::light_rules::{LightRules, Track};
-use crate::lit_scene::{LitScene, Photo};
+use crate::lit_scene::LitScene;
 use crate::pilot::{Pilot, run_pilot};
 use crate::relit::LightingName;
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
@@ -51,14 +52,17 @@ pub struct LitPicture {
     pub lighting: Option<LightingName>,
     /// One for each view.
     pub views: Vec<RenderedView>,
+    /// For track `fitted`, the views under the radiances that each of two streams of samples was fitted to; [`Self::views`]
+    /// are their means.
+    pub of_fits: Option<[Vec<RenderedView>; 2]>,
 }
 
-/// The largest amount of memory that the pictures of one batch of predictions take.
-const BATCH_BYTES: u64 = 900 << 20;
+/// The largest amount of memory that the pictures of one batch of predictions take, in bytes.
+const BATCH_BYTES: u64 = 850 << 20;
 
 /// Finds the converged pictures of the companions for a pass, or makes them.
 pub(crate) type FindCompanions<'a> =
-    dyn Fn(&LightPass<'_>, &Companions, &[LightMix]) -> Result<CompanionPictures, EvalError> + 'a;
+    dyn Fn(&LightPass<'_>, &Companions) -> Result<CompanionPictures, EvalError> + 'a;
 
 /// Renders all predictions under the lights of `rules` and passes each to `each`, pass by pass, with its index in
 /// `predictions`.
@@ -106,13 +110,6 @@ struct Renderer<'a> {
     find_companions: &'a FindCompanions<'a>,
 }
 
-/// The weights of a prediction's lights in each picture of a pass, and the fit that they come from.
-#[derive(Clone)]
-struct Mixing {
-    mixes: Vec<LightMix>,
-    fit: Option<FittedRadiances>,
-}
-
 /// How one prediction is rendered: by the pilot.
 struct Planned {
     samples: u32,
@@ -131,34 +128,54 @@ struct Quarters {
 impl Renderer<'_> {
     fn render(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
         let all: Vec<usize> = (0..self.predictions.len()).collect();
-        let mixings = self.mixings(&all)?;
-        let find = |companions| (self.find_companions)(&self.pass, companions, &self.pass.fixed_mixes());
-        let companions = self.pass.companions().map(find).transpose()?;
-        let planned = self.plan(&all, &mixings, companions.as_ref())?;
-        for batch in self.batches(&all, |index| planned[index].samples) {
-            let quarters = self.quarters(&batch, &mixings, &planned)?;
-            self.finish(&batch, &mixings, &planned, companions.as_ref(), quarters, each)?;
+        let find = |companions| (self.find_companions)(&self.pass, companions);
+        let companions = self.lit.companions.map(find).transpose()?;
+        let fits = self.fits(&all, companions.as_ref())?;
+        let planned = self.plan(&all, &fits, companions.as_ref())?;
+        for batch in self.batches(&all, |index| planned[index].samples, |count| self.quarters_bytes(count)) {
+            let quarters = self.quarters(&batch, &fits, &planned)?;
+            self.finish(&batch, &fits, &planned, companions.as_ref(), quarters, each)?;
         }
         Ok(())
+    }
+
+    /// The fit of each prediction's lights; none in a pass whose weights are fixed.
+    fn fits(&self, all: &[usize], companions: Option<&CompanionPictures>) -> Result<Vec<FittedMixes>, EvalError> {
+        let mut fits = BTreeMap::new();
+        if let PassPictures::Fixed(_) = self.pass.pictures {
+            return Ok(Vec::new());
+        }
+        for batch in self.batches(all, |_| self.rules.fit.samples, |count| self.basis_bytes(count)) {
+            let fit = MixFit {
+                lit: self.lit,
+                rules: self.rules,
+                pass: &self.pass,
+                companions,
+                batch: &batch,
+                predictions: self.predictions_of(&batch),
+            };
+            fits.extend(batch.iter().copied().zip(fit.run()?));
+        }
+        Ok(fits.into_values().collect())
     }
 
     /// What the pilot finds about each prediction.
     fn plan(
         &self,
         all: &[usize],
-        mixings: &[Mixing],
+        fits: &[FittedMixes],
         companions: Option<&CompanionPictures>,
     ) -> Result<Vec<Planned>, EvalError> {
         let mut planned = BTreeMap::new();
-        for batch in self.batches(all, |_| self.rules.noise.pilot_samples) {
+        for batch in self.batches(all, |_| self.rules.noise.pilot_samples, |count| self.quarters_bytes(count)) {
             let pilot = Pilot {
                 lit: self.lit,
                 rules: &self.rules.noise,
                 pass: &self.pass,
                 companions,
                 batch: &batch,
-                predictions: batch.iter().map(|&index| &self.predictions[index]).collect(),
-                mixes: batch.iter().map(|&index| mixings[index].mixes.clone()).collect(),
+                predictions: self.predictions_of(&batch),
+                mixes: &self.mixes(&batch, fits),
             };
             for (&index, (samples, coefficients)) in batch.iter().zip(run_pilot(&pilot)?) {
                 planned.insert(index, Planned { samples, coefficients });
@@ -168,46 +185,45 @@ impl Renderer<'_> {
     }
 
     /// The quarters of every prediction of a batch.
-    fn quarters(&self, batch: &[usize], mixings: &[Mixing], planned: &[Planned]) -> Result<Quarters, EvalError> {
-        let samples = planned[batch[0]].samples;
-        let mixes: Vec<Vec<LightMix>> = batch.iter().map(|&index| mixings[index].mixes.clone()).collect();
-        let predictions: Vec<&PredictedScene> = batch.iter().map(|&index| &self.predictions[index]).collect();
-        let blank = vec![vec![RenderedView::empty(); self.lit.views.len()]; mixes[0].len()];
+    fn quarters(&self, batch: &[usize], fits: &[FittedMixes], planned: &[Planned]) -> Result<Quarters, EvalError> {
+        let (samples, mixes) = (planned[batch[0]].samples, self.mixes(batch, fits));
+        let predictions = self.predictions_of(batch);
+        let blank = vec![vec![RenderedView::empty(); self.lit.views.len()]; mixes.pictures()];
         let (mut views, mut not_finite) = (vec![blank; batch.len()], vec![0; batch.len()]);
         for quarter in ["a1", "a2", "b1", "b2"] {
             let what = format!("{} light, {samples} samples, quarter {quarter}", self.pass.name);
-            let cameras = self.lit.cameras();
-            let renders = self.pass.trace(&predictions, &mixes, &cameras, (samples / 2).max(1), quarter, &what)?;
+            let renders = self.pass.trace(&predictions, &mixes.all, (samples / 2).max(1), quarter, &what)?;
             for (at, &index) in batch.iter().enumerate() {
                 not_finite[at] += renders[at].stats.not_finite;
-                let coefficients = &planned[index].coefficients;
-                self.add_quarter(&renders, at, index, batch.len(), coefficients, &mut views[at]);
+                for (picture, views) in views[at].iter_mut().enumerate() {
+                    let coefficients = &planned[index].coefficients[picture];
+                    self.add_quarter(&renders, (at, index), mixes.place(at, picture), coefficients, views);
+                }
             }
         }
         Ok(Quarters { views, not_finite })
     }
 
+    /// Adds one picture of a render, of prediction `at` of its batch, as the next quarter of each view.
     fn add_quarter(
         &self,
         renders: &[ViewsRender],
-        at: usize,
-        index: usize,
-        predictions: usize,
-        coefficients: &[Coefficients],
-        pictures: &mut [Vec<RenderedView>],
+        (at, index): (usize, usize),
+        picture: usize,
+        coefficients: &Coefficients,
+        views: &mut [RenderedView],
     ) {
         let exposure = self.lit.scene.exposure;
-        for (picture, views) in pictures.iter_mut().enumerate() {
-            for (view, rendered) in views.iter_mut().enumerate() {
-                let of = |variant: usize| picture_of(&renders[variant], view, picture);
-                rendered.add_quarter(if renders.len() == predictions {
-                    StoredLight::exposed(of(at), exposure)
-                } else {
-                    let companions = std::array::from_fn(|j| of(predictions + j));
-                    let ratio = &self.lit.ratios[index][view];
-                    without_companions(of(at), companions, &coefficients[picture], ratio, exposure)
-                });
-            }
+        for (view, rendered) in views.iter_mut().enumerate() {
+            let of = |variant: usize| picture_of(&renders[variant], view, picture);
+            rendered.add_quarter(if self.lit.companions.is_none() {
+                StoredLight::exposed(of(at), exposure)
+            } else {
+                // The companions come after the predictions.
+                let companions = std::array::from_fn(|j| of(renders.len() - COMPANIONS + j));
+                let ratio = &self.lit.ratios[index][view];
+                without_companions(of(at), companions, coefficients, ratio, exposure)
+            });
         }
     }
 
@@ -215,99 +231,120 @@ impl Renderer<'_> {
     fn finish(
         &self,
         batch: &[usize],
-        mixings: &[Mixing],
+        fits: &[FittedMixes],
         planned: &[Planned],
         companions: Option<&CompanionPictures>,
         Quarters { mut views, not_finite }: Quarters,
         each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>,
     ) -> Result<(), EvalError> {
         if let Some(companions) = companions {
-            for (at, view) in self.lit.views.iter().enumerate() {
-                let [a, b] = [0, 1].map(|half| companions.read(&view.id, half, views[0].len()));
-                let (a, b) = (a?, b?);
-                for (&index, pictures) in batch.iter().zip(&mut views) {
-                    let ratio = &self.lit.ratios[index][at];
-                    for (picture, rendered) in pictures.iter_mut().enumerate() {
-                        let coefficients = &planned[index].coefficients[picture];
-                        let half = |half: &Vec<[Picture<LinearRgb>; COMPANIONS]>| {
-                            of_companions(&half[picture], coefficients, ratio)
+            let (mixes, kept) = (self.mixes(batch, fits), self.pass.companion_mixes().len());
+            for (view, shown) in self.lit.views.iter().enumerate() {
+                let mut halves: Vec<Vec<Vec<StoredLight>>> = Vec::new();
+                for half in 0..HALVES.len() {
+                    let converged = companions.read(&shown.id, half, kept)?;
+                    let of = |(at, &index): (usize, &usize)| {
+                        let picture = |picture: usize| {
+                            let companions = self.pass.converged(&converged, picture, mixes.mix(at, picture));
+                            let coefficients = &planned[index].coefficients[picture];
+                            of_companions(&companions, coefficients, &self.lit.ratios[index][view])
                         };
-                        rendered[at].set_companions([half(&a), half(&b)]);
+                        (0..mixes.pictures()).map(picture).collect()
+                    };
+                    halves.push(batch.iter().enumerate().map(of).collect());
+                }
+                let second = halves.pop().expect("there are two halves");
+                let first = halves.pop().expect("there are two halves");
+                for (pictures, halves) in views.iter_mut().zip(first.into_iter().zip(second)) {
+                    for (picture, (a, b)) in pictures.iter_mut().zip(halves.0.into_iter().zip(halves.1)) {
+                        picture[view].set_companions([a, b]);
                     }
                 }
             }
         }
         for ((&index, pictures), not_finite) in batch.iter().zip(views).zip(not_finite) {
-            let names = self.pass.pictures.names();
-            let named = names.into_iter().zip(pictures);
-            let pictures = named.map(|((track, lighting), views)| LitPicture { track, lighting, views }).collect();
-            let fit = mixings[index].fit.clone();
+            let fit = fits.get(index).map(|fit| fit.radiances.clone());
+            let pictures = self.named(pictures);
             each(index, PredictedLight { pictures, fit, samples: planned[index].samples, not_finite })?;
         }
         Ok(())
     }
 
-    /// The weights of each prediction's lights; fits radiances where a picture needs them.
-    fn mixings(&self, all: &[usize]) -> Result<Vec<Mixing>, EvalError> {
-        if let PassPictures::Fixed(_) = self.pass.pictures {
-            let mixing = Mixing { mixes: self.pass.fixed_mixes(), fit: None };
-            return Ok(vec![mixing; all.len()]);
-        }
-        let mixing = |fit: FittedRadiances| Mixing {
-            mixes: vec![fit.lights.iter().map(|light| light.radiance).collect()],
-            fit: Some(fit),
-        };
-        Ok(self.fits(all)?.into_iter().map(mixing).collect())
-    }
-
-    /// The fitted radiances of each prediction, from stream `fit` of the input view.
-    fn fits(&self, all: &[usize]) -> Result<Vec<FittedRadiances>, EvalError> {
-        let Photo { view, light, valid } = &self.lit.photo;
-        let target = FitTarget { photo: light, mask: Some(valid), exposure: self.lit.scene.exposure };
-        let groups = LightGroups::apart(self.pass.lights.len());
-        let mut fits = BTreeMap::new();
-        let samples = self.rules.fit.samples;
-        for batch in self.batches(all, |_| samples) {
-            let predictions: Vec<&PredictedScene> = batch.iter().map(|&index| &self.predictions[index]).collect();
-            let lighting = Lighting::Apart(&groups);
-            let renders =
-                self.pass.trace_alone(&predictions, lighting, &[view.camera], samples, "fit", "light basis")?;
-            for (&index, render) in batch.iter().zip(renders) {
-                let basis = &render.views[0].halves[0].basis;
-                let fit = fit_lights(&self.rules.fit, basis, &target)?;
-                fits.insert(index, self.radiances(fit));
+    /// The pictures of a prediction by track and lighting.
+    fn named(&self, pictures: Vec<Vec<RenderedView>>) -> Vec<LitPicture> {
+        match &self.pass.pictures {
+            PassPictures::Fixed(names) => {
+                let named = names.iter().zip(pictures);
+                let named = named.map(|(&(track, lighting), views)| LitPicture { track, lighting, views, of_fits: None });
+                named.collect()
+            }
+            PassPictures::Fitted => {
+                let mut streams = pictures.into_iter();
+                let of_fits: [Vec<RenderedView>; 2] =
+                    std::array::from_fn(|_| streams.next().expect("there is a picture for each stream"));
+                let pairs = of_fits[0].iter().zip(&of_fits[1]);
+                let views = pairs.map(|(a, b)| RenderedView::mean(a, b)).collect();
+                vec![LitPicture { track: Track::Fitted, lighting: None, views, of_fits: Some(of_fits) }]
             }
         }
-        Ok(fits.into_values().collect())
     }
 
-    fn radiances(&self, fit: LightFit) -> FittedRadiances {
-        let lights = self.pass.lights.iter().zip(&fit.weights);
-        let squares = fit.squares.max(1) as f64;
-        FittedRadiances {
-            stage: self.pass.on_stage,
-            lights: lights
-                .map(|(light, radiance)| FittedRadiance { light: light.clone(), radiance: *radiance })
-                .collect(),
-            mean_absolute_error: [0, 1, 2].map(|c| fit.channels[c].misfit / squares),
-            ridge: [0, 1, 2].map(|c| fit.channels[c].ridge / squares),
-            lower_bound: [0, 1, 2].map(|c| fit.channels[c].bound / squares),
+    fn predictions_of(&self, batch: &[usize]) -> Vec<&PredictedScene> {
+        batch.iter().map(|&index| &self.predictions[index]).collect()
+    }
+
+    /// The weights of the lights in a batch's pictures.
+    fn mixes(&self, batch: &[usize], fits: &[FittedMixes]) -> BatchMixes {
+        match self.pass.pictures {
+            PassPictures::Fixed(_) => BatchMixes::shared(self.pass.companion_mixes()),
+            PassPictures::Fitted => BatchMixes::own(batch.iter().map(|&index| fits[index].streams.to_vec()).collect()),
         }
     }
 
     /// Predictions that share paths: they agree in roughness, metallic and number of samples. A batch holds as many as the
-    /// tracer takes at once and as fit in memory.
-    fn batches(&self, all: &[usize], samples: impl Fn(usize) -> u32) -> Vec<Vec<usize>> {
+    /// tracer takes at once and as fit in memory, by the bytes that a number of predictions needs.
+    fn batches(
+        &self,
+        all: &[usize],
+        samples: impl Fn(usize) -> u32,
+        bytes: impl Fn(usize) -> u64,
+    ) -> Vec<Vec<usize>> {
         let mut alike: BTreeMap<(&str, u32), Vec<usize>> = BTreeMap::new();
         for &index in all {
             alike.entry((&self.predictions[index].scattering_key, samples(index))).or_default().push(index);
         }
-        let pixels = |view: &&View| u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height);
-        let pixels: u64 = self.lit.views.iter().map(pixels).sum();
-        let one = size_of::<LinearRgb>() as u64 * self.pass.pictures.names().len() as u64 * pixels;
-        let extra = if self.pass.companions().is_some() { COMPANIONS } else { 0 };
-        let in_memory = (BATCH_BYTES / (2 * one).max(1)) as usize;
-        let most = in_memory.min(mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE).saturating_sub(extra).max(1);
+        let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - self.companion_count();
+        let most = (1..=at_once).rev().find(|&count| bytes(count) <= BATCH_BYTES).unwrap_or(1);
         alike.into_values().flat_map(|alike| alike.chunks(most).map(<[usize]>::to_vec).collect::<Vec<_>>()).collect()
     }
+
+    fn companion_count(&self) -> usize {
+        if self.lit.companions.is_some() { COMPANIONS } else { 0 }
+    }
+
+    /// Memory of the quarters of this many predictions: a render, and all quarters as they are stored. (The companions'
+    /// halves take the render's place when it is gone.)
+    fn quarters_bytes(&self, count: usize) -> u64 {
+        let each = self.pass.pictures.names().len();
+        let in_render = if matches!(self.pass.pictures, PassPictures::Fixed(_)) { each } else { each * count };
+        let rendered = ((count + self.companion_count()) * in_render) as u64 * RENDERED_BYTES;
+        let pixels: u64 = self.lit.views.iter().map(|view| pixels(view)).sum();
+        pixels * (rendered + (4 * count * each) as u64 * STORED_BYTES)
+    }
+
+    /// Memory of the light bases of this many predictions: a render, and both streams' bases.
+    fn basis_bytes(&self, count: usize) -> u64 {
+        let pictures = (count + self.companion_count() + 2 * count) * self.pass.lights.len();
+        pixels(self.lit.photo.view) * pictures as u64 * RENDERED_BYTES
+    }
+}
+
+/// Bytes of a pixel of a render.
+const RENDERED_BYTES: u64 = size_of::<LinearRgb>() as u64;
+
+/// Bytes of a pixel of [`StoredLight`].
+const STORED_BYTES: u64 = 6;
+
+fn pixels(view: &View) -> u64 {
+    u64::from(view.camera.intrinsics.width) * u64::from(view.camera.intrinsics.height)
 }

@@ -41,7 +41,7 @@ pub struct Protocol {
 }
 
 /// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
-pub const SCORER_VERSION: u32 = 6;
+pub const SCORER_VERSION: u32 = 7;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.

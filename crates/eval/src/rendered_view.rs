@@ -28,6 +28,14 @@ impl RenderedView {
         Self { quarters: Vec::new(), companions: None }
     }
 
+    /// The mean of two pictures of the same view, quarter by quarter.
+    pub(crate) fn mean(a: &Self, b: &Self) -> Self {
+        let quarters = a.quarters.iter().zip(&b.quarters).map(|(a, b)| StoredLight::mean(a, b)).collect();
+        let companions = a.companions.as_ref().zip(b.companions.as_ref());
+        let companions = companions.map(|(a, b)| [0, 1].map(|half| StoredLight::mean(&a[half], &b[half])));
+        Self { quarters, companions }
+    }
+
     /// Adds the next quarter.
     pub(crate) fn add_quarter(&mut self, quarter: StoredLight) {
         self.quarters.push(quarter);

@@ -110,6 +110,8 @@ pub struct PsnrNoise {
     pub companions_db: Option<f64>,
     /// The part due to the noise of the truth.
     pub truth_db: Option<f64>,
+    /// The part due to the noise of fitted radiances; 0 where none were fitted.
+    pub fit_db: Option<f64>,
     /// Samples per pixel of each of our halves.
     pub samples: u32,
     /// Whether the samples were enough.

@@ -112,18 +112,24 @@ impl LightReference {
     }
 }
 
-/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of a picture of light over the mask. `blocks` come from
+/// MSE, PSNR, SSIM and (where its weights are loaded) LPIPS of a picture of light over the mask. `of_fits` are the same
+/// picture under the lights that each of two streams was fitted to, if there was a fit; `blocks` come from
 /// [`crate::noise_blocks`]. Fails if sizes differ or a value that counts is not finite.
 pub fn rgb_metrics(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
     prediction: &EncodedLight,
+    of_fits: Option<&[EncodedLight; 2]>,
     reference: &LightReference,
     mask: &Mask,
     blocks: &Picture<u32>,
 ) -> Result<RgbMeasured, MetricError> {
     let halves = Halves { a: &reference.halves[0], b: &reference.halves[1] };
-    let mse = noise_free_mse(&prediction.render, halves, mask, blocks)?;
+    let mut mse = noise_free_mse(&prediction.render, halves, mask, blocks)?;
+    if let (Some(mse), Some(of_fits)) = (&mut mse, of_fits) {
+        let [a, b] = of_fits.each_ref().map(|light| noise_free_mse(&light.render, halves, mask, blocks));
+        mse.common = a?.zip(b?).map_or(0.0, |(a, b)| (a.mse - b.mse) / 2.0);
+    }
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let mut values = noise_free_values(mse.as_ref(), pixels)?;
     values.push(ssim_metric(protocol.mask_rule.ssim_halves(prediction.render.halves(), &reference.shown, mask)?));

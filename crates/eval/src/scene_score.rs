@@ -12,6 +12,7 @@ use crate::relit::LightingName;
 use crate::result::{InstancePixelErrors, InstanceTexelErrors, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
 use crate::scene_task::MaskedRegion;
+use crate::truth_noise::NoisyLighting;
 
 /// What one submission scored in one scene under one protocol.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -24,6 +25,7 @@ pub(crate) struct SceneScore {
     pub(crate) noise: Vec<NoiseScore>,
     /// SHA-256, hex, of the `companions.json` of each pass.
     pub(crate) companions: BTreeMap<String, String>,
+    pub(crate) noisy_lightings: Vec<NoisyLighting>,
     pub(crate) fit: Option<FittedRadiances>,
     /// Number of contributions of light that were not finite and count as none.
     pub(crate) not_finite: u64,

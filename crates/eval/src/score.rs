@@ -24,6 +24,7 @@ use crate::result_writer::protocol_result;
 use crate::scene_score::SceneScore;
 use crate::scene_scorer::score_scene;
 use crate::scene_task::SceneTask;
+use crate::truth_noise::NoisyLighting;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::submission_json::SubmissionJson;
@@ -274,6 +275,8 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
     let lost = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| lost_light(protocol, scores));
     entry.findings.extend(lost);
+    let noisy = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| noisy_truth(protocol, scores));
+    entry.findings.extend(noisy);
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
         let renderer = plan.dataset.file.scored_renderer.as_ref();
         let fingerprint = protocol.fingerprint(manifest, &ids, renderer, weights);
@@ -313,6 +316,26 @@ fn lost_light(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Find
         action: "they count as no light; please report this submission".to_owned(),
     })
     .collect()
+}
+
+/// A finding for each lighting that is not scored because its truth is too noisy.
+fn noisy_truth(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Finding> {
+    let noisy = scores.iter().flat_map(|(scene, score)| score.noisy_lightings.iter().map(move |noisy| (scene, noisy)));
+    let most = protocol.light.relit.most_truth_variance;
+    noisy
+        .map(|(scene, NoisyLighting { lighting, variance })| Finding {
+            severity: Severity::Note,
+            code: "noisy_lighting".to_owned(),
+            file: format!("scenes/{scene}"),
+            place: lighting.to_string(),
+            message: format!(
+                "protocol '{}': the truth's input view has a variance of {variance:.1e} in this lighting, expected at \
+                 most {most:.1e}",
+                protocol.name
+            ),
+            action: "this lighting is not scored; render the truth with more samples".to_owned(),
+        })
+        .collect()
 }
 
 /// The metrics that lack weights or renders.

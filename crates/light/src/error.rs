@@ -27,9 +27,9 @@ pub enum LightError {
         /// Its value.
         value: [f32; 3],
     },
-    /// A light's picture holds values that light cannot have.
+    /// A light's picture holds an infinity or NaN.
     #[error(
-        "cannot fit lights: pixel ({}, {}) of light group {group} is {value:?}, expected finite numbers of at least 0",
+        "cannot fit lights: pixel ({}, {}) of light group {group} is {value:?}, expected finite numbers",
         at[0], at[1]
     )]
     BasisPicture {

@@ -64,7 +64,7 @@ impl Default for StageRules {
 pub struct FitRules {
     /// Side of the squares of pixels whose averages are compared, at least 1.
     pub pool: u32,
-    /// Samples per pixel of the light basis that the fit is made on; they come from a random stream of their own.
+    /// Samples per pixel of the light bases that the fit is made on, half of them for each of two independent streams.
     pub samples: u32,
     /// The factor of the ridge towards the start, above 0: the share of the photo's light that all lights at twice their
     /// start add to the objective.
@@ -74,6 +74,6 @@ pub struct FitRules {
 impl Default for FitRules {
     /// The values of every protocol today.
     fn default() -> Self {
-        Self { pool: 8, samples: 64, ridge: 1e-2 }
+        Self { pool: 8, samples: 8, ridge: 1e-2 }
     }
 }

@@ -3,7 +3,7 @@
 //! Noise of few samples adds its variance to a squared error. Two independent halves of each picture avoid that: with
 //! X = A - Ia and Y = B - Ib, the expectation of the mean of X*Y is the squared true difference d², whatever the noise.
 //!
-//! The noise of this estimate follows from the same pictures, for three sources that are independent of each other:
+//! The noise of this estimate follows from the same pictures, for sources that are independent of each other:
 //!
 //! - The prediction's paths. Each half comes in quarters ([`NoisyRender`]), whose difference u (of A) or v (of B) has the
 //!   half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y. The expectation of
@@ -14,6 +14,8 @@
 //!   of Σ (u + v) / 2 (Ia - Ib), which the paths' noise in m adds. It assumes Gaussian noise, which a reference of many
 //!   samples has.
 //! - Noise that both quarters of a half share ([`NoisyRender::shared`]), like the reference's.
+//! - An error that all pixels have in common ([`NoiseFreeMse::common`]), as that of lights which were fitted to noisy
+//!   pictures. Only the caller can know it.
 //!
 //! Pixels whose noise is correlated form a block: all sums are taken within blocks, and variances are added over them.
 
@@ -34,6 +36,9 @@ pub struct NoiseFreeMse {
     pub pixels: usize,
     /// The estimate's noise by block id, ascending, for the blocks with pixels that count.
     pub blocks: Vec<(u32, BlockNoise)>,
+    /// One sample of an error that all pixels of all views have in common: its square is an estimate of its variance.
+    /// [`noise_free_mse`] sets 0.
+    pub common: f64,
 }
 
 /// Sums over one block from which the noise that it adds to a [`NoiseFreeMse`] follows, each divided by the number of all
@@ -65,6 +70,8 @@ pub struct Variances {
     pub shared: f64,
     /// From the reference.
     pub reference: f64,
+    /// From the error that all pixels have in common.
+    pub common: f64,
 }
 
 impl BlockNoise {
@@ -80,20 +87,20 @@ impl BlockNoise {
 }
 
 impl Variances {
-    fn of<'a>(blocks: impl Iterator<Item = &'a BlockNoise>) -> Self {
-        let mut sum = Self::default();
+    fn of<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> Self {
+        let mut sum = Self { common: common.powi(2), ..Self::default() };
         for block in blocks {
             sum.paths += block.first_half.powi(2) + block.second_half.powi(2) - block.both_halves.powi(2);
             sum.shared += block.shared.powi(2) - block.paths_in_shared.powi(2);
             sum.reference += block.reference.powi(2) - block.paths_in_reference.powi(2);
         }
-        let Self { paths, shared, reference } = sum;
-        Self { paths: paths.max(0.0), shared: shared.max(0.0), reference: reference.max(0.0) }
+        let Self { paths, shared, reference, common } = sum;
+        Self { paths: paths.max(0.0), shared: shared.max(0.0), reference: reference.max(0.0), common }
     }
 
     /// From all sources.
     pub fn total(&self) -> f64 {
-        self.paths + self.shared + self.reference
+        self.paths + self.shared + self.reference + self.common
     }
 }
 
@@ -142,7 +149,7 @@ pub fn noise_free_mse<P: Pixel>(
         (block, divided)
     };
     let blocks = by_block.into_iter().map(shared).collect();
-    Ok((pixels > 0).then_some(NoiseFreeMse { mse: sum * share, pixels, blocks }))
+    Ok((pixels > 0).then_some(NoiseFreeMse { mse: sum * share, pixels, blocks, common: 0.0 }))
 }
 
 /// Checks all sizes first, then the values inside the mask.
@@ -174,7 +181,7 @@ fn check<P: Pixel>(
 impl NoiseFreeMse {
     /// The variances of `mse`.
     pub fn variances(&self) -> Variances {
-        Variances::of(self.blocks.iter().map(|(_, noise)| noise))
+        Variances::of(self.blocks.iter().map(|(_, noise)| noise), self.common)
     }
 
     /// The standard deviation of `mse`.
@@ -224,6 +231,8 @@ pub struct NoisePsnr {
     pub shared: f64,
     /// From the references' noise.
     pub reference: f64,
+    /// From the errors that all pixels have in common.
+    pub common: f64,
 }
 
 /// The standard error of the mean PSNR of several views, decibels.
@@ -235,19 +244,21 @@ pub fn psnr_mean_error(views: &[&NoiseFreeMse]) -> Option<NoisePsnr> {
     if views.is_empty() || !views.iter().all(|view| view.bounded() > 0.0) {
         return None;
     }
-    let mut by_block: BTreeMap<u32, BlockNoise> = BTreeMap::new();
+    let (mut by_block, mut common): (BTreeMap<u32, BlockNoise>, f64) = Default::default();
     for view in views {
         let slope = -10.0 / LN_10 / view.bounded() / views.len() as f64;
+        common += slope * view.common;
         for (block, noise) in &view.blocks {
             by_block.entry(*block).or_default().add_scaled(slope, noise);
         }
     }
-    let variances = Variances::of(by_block.values());
+    let variances = Variances::of(by_block.values(), common);
     Some(NoisePsnr {
         total: variances.total().sqrt(),
         paths: variances.paths.sqrt(),
         shared: variances.shared.sqrt(),
         reference: variances.reference.sqrt(),
+        common: variances.common.sqrt(),
     })
 }
 

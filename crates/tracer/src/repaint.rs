@@ -201,21 +201,24 @@ pub fn render_repainted(
 ) -> Result<Vec<ViewsRender>, TracerError> {
     // Check everything before the first path.
     check_predictions(world, repaint, &which)?;
-    let subject = |first| Subject { world, materials: Painted { world, repaint, first }, first, lighting };
-    let job = |first| ViewsJob { subject: subject(first), cameras, settings, seeds };
-    let planes = job(0).planes(repaint.predictions)?;
+    let job = |Range { start: first, end }: Range<usize>| {
+        let subject = Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
+        ViewsJob { subject, cameras, settings, seeds }
+    };
+    let planes = job(0..0).planes(repaint.predictions)?;
     // Render the predictions in rounds that share their paths.
     let rounds = rounds(which);
-    let progress = Progress::new(job(0).tiles(&planes) * rounds.len(), progress);
+    let progress = Progress::new(job(0..0).tiles(&planes) * rounds.len(), progress);
     let mut renders = Vec::new();
     for round in rounds {
-        let job = job(round.start);
-        match round.len() {
-            1 => renders.extend(job.render::<1>(&planes, &progress)),
-            2 => renders.extend(job.render::<2>(&planes, &progress)),
-            3 | 4 => renders.extend(job.render::<4>(&planes, &progress).into_iter().take(round.len())),
-            _ => renders.extend(job.render::<8>(&planes, &progress).into_iter().take(round.len())),
-        }
+        let variants = round.len();
+        let job = job(round);
+        renders.extend(match variants {
+            1 => job.render::<1>(&planes, &progress),
+            2 => job.render::<2>(&planes, &progress),
+            3 | 4 => job.render::<4>(&planes, &progress),
+            _ => job.render::<8>(&planes, &progress),
+        });
     }
     Ok(renders)
 }

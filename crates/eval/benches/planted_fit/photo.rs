@@ -50,22 +50,23 @@ pub fn measure(room: &Room, submission: &Path) {
             };
             let rules = FitRules { ridge, ..room.rules.fit };
             let fit = fit_two_streams(&rules, [&streams[0], &streams[1]], &target).unwrap();
-            let zeros = fit.joint.weights.iter().flatten().filter(|weight| **weight == 0.0).count();
-            let [input, novel] = psnrs(&scored, &fit.joint.weights, exposure);
-            let displaced = fit.displaced().map(|weights| psnrs(&scored, &weights, exposure));
+            let weights = fit.weights();
+            let zeros = weights.iter().flatten().filter(|weight| **weight == 0.0).count();
+            let [input, novel] = psnrs(&scored, &weights, exposure);
+            let displaced = fit.streams.each_ref().map(|stream| psnrs(&scored, &stream.weights, exposure));
             let noise = [0, 1].map(|at| (displaced[0][at] - displaced[1][at]).abs() / 2.0);
             println!(
                 "  clipped {how}, ridge {ridge:e}: {zeros} zeros, input {input:.3} dB (fit's noise {:.3}), novel {novel:.3} dB \
                  ({:.3}), gap {:.1e}",
-                noise[0], noise[1], fit.joint.relative_gap
+                noise[0], noise[1], fit.streams[0].relative_gap
             );
             if ridge == room.rules.fit.ridge && how == CLIPPED[0] {
-                let pairs = room.names.iter().zip(fit.joint.weights.iter().zip(fit.spread()));
+                let pairs = room.names.iter().zip(weights.iter().zip(fit.spread()));
                 pairs.for_each(|(name, (weight, spread))| println!("    {name}: {weight:.3?}, spread {spread:.3?}"));
                 println!(
                     "    start {:.3?}, steps {:?}",
-                    fit.joint.start,
-                    fit.joint.channels.each_ref().map(|c| c.steps)
+                    fit.streams[0].start,
+                    fit.streams[0].channels.each_ref().map(|c| c.steps)
                 );
             }
         }

@@ -150,7 +150,7 @@ fn blocks(protocol: &Protocol) -> Value {
 fn samples(protocol: &Protocol) -> Value {
     let noises = [0.01, 0.02, 0.04, 0.08, 0.16, 9.0].map(|own| [0.0, 0.04].map(|reference| (own, reference)));
     let asked = noises.as_flattened().iter().map(|&(paths, reference)| {
-        let pilot = NoisePsnr { total: paths, paths, shared: 0.0, reference };
+        let pilot = NoisePsnr { total: paths, paths, shared: 0.0, reference, common: 0.0 };
         [0.0, 5e-4].map(|variance| samples_under_bound(&protocol.light.noise, Some(pilot), variance))
     });
     json!(asked.collect::<Vec<_>>())

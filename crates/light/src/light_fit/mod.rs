@@ -41,7 +41,7 @@ pub struct LightFit {
 /// Fits the basis to the photo.
 ///
 /// Fails if sizes differ, if ridge or exposure are not above 0, if no weights are found, or if a picture holds values that
-/// light cannot have: values that are not finite, or negative ones in the basis.
+/// light cannot have: values that are not finite. The basis may be negative where noise was taken off it.
 pub fn fit_lights(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result<LightFit, LightError> {
     check(rules, basis, target)?;
     let lights = basis.pictures().len();
@@ -104,7 +104,7 @@ fn check(rules: &FitRules, basis: &LightBasis, target: &FitTarget<'_>) -> Result
         if !picture.same_size(target) {
             return Err(LightError::BasisSize { basis: [picture.width(), picture.height()], photo });
         }
-        if let Some((at, value)) = first_pixel(picture, |v| !v.is_finite() || v < 0.0) {
+        if let Some((at, value)) = first_pixel(picture, |v| !v.is_finite()) {
             return Err(LightError::BasisPicture { group, at, value });
         }
     }

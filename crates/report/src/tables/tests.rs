@@ -24,6 +24,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
         own_db: None,
         companions_db: None,
         truth_db: None,
+        fit_db: None,
         samples: 16,
         state: NoiseState::Certified,
     };

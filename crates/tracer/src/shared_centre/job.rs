@@ -53,14 +53,14 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         self.seeds.len() * planes.iter().map(|plane| plane.tiles().len()).sum::<usize>()
     }
 
-    /// Renders the views for `K` material variants that share their paths.
-    pub(crate) fn render<const K: usize>(&self, planes: &[Plane], progress: &Progress<'_>) -> [ViewsRender; K]
+    /// Renders the views for the subject's material variants, which share their paths and are at most `K`.
+    pub(crate) fn render<const K: usize>(&self, planes: &[Plane], progress: &Progress<'_>) -> Vec<ViewsRender>
     where
         M: MaterialSource<'a, K> + Sync,
     {
         let done = || progress.advance();
         let blank = ViewLight { halves: Vec::with_capacity(self.seeds.len()) };
-        let mut views: [Vec<ViewLight>; K] = std::array::from_fn(|_| vec![blank.clone(); self.cameras.len()]);
+        let mut views: Vec<Vec<ViewLight>> = vec![vec![blank; self.cameras.len()]; self.subject.variants];
         let mut counts = Vec::new();
         // Expose every plane once per seed.
         for &seed in self.seeds {
@@ -75,11 +75,12 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
             }
         }
         // Attach the counts of each variant.
-        let mut views = views.into_iter().enumerate();
-        std::array::from_fn(|_| {
-            let (variant, views) = views.next().expect("there are as many as variants");
-            ViewsRender { views, passes: planes.len(), stats: stats(&counts, variant) }
-        })
+        let of_variant = |(variant, views): (usize, Vec<ViewLight>)| ViewsRender {
+            views,
+            passes: planes.len(),
+            stats: stats(&counts, variant),
+        };
+        views.into_iter().enumerate().map(of_variant).collect()
     }
 }
 

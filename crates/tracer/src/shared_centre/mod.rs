@@ -44,11 +44,11 @@ pub fn render_views(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ViewsRender, TracerError> {
     let lighting = Lighting::Apart(groups);
-    let subject = Subject { world, materials: OwnMaterials(world), first: 0, lighting };
+    let subject = Subject { world, materials: OwnMaterials(world), first: 0, variants: 1, lighting };
     let job = ViewsJob { subject, cameras, settings, seeds };
     let planes = job.planes(1)?;
-    let [render] = job.render(&planes, &Progress::new(job.tiles(&planes), progress));
-    Ok(render)
+    let mut renders = job.render::<1>(&planes, &Progress::new(job.tiles(&planes), progress));
+    Ok(renders.pop().expect("there is one variant"))
 }
 
 /// Whether views from these cameras can come from one set of paths: the cameras stand at one point, up to the rounding

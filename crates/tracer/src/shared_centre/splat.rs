@@ -37,6 +37,8 @@ pub(crate) struct Subject<'a, M> {
     pub(crate) materials: M,
     /// The first of the material variants to trace.
     pub(crate) first: usize,
+    /// The number of variants whose pictures are kept, at most `K`: the others only fill up the tracer's lanes.
+    pub(crate) variants: usize,
     pub(crate) lighting: Lighting<'a>,
 }
 
@@ -47,7 +49,7 @@ pub(super) fn expose<'w, M: MaterialSource<'w, K> + Sync, const K: usize>(
     settings: &RenderSettings,
     counts: &mut Vec<TileCounts>,
     done: &(impl Fn() + Sync),
-) -> Vec<[HalfLight; K]> {
+) -> Vec<Vec<HalfLight>> {
     let exposure = Exposure { subject, plane, settings, numbering: Numbering::new(plane.most_paths()) };
     let mut films = exposure.blank_films();
     // Tiles are merged in their own order, whichever finishes first; batches limit how many wait in memory.
@@ -119,11 +121,14 @@ struct TileTracer<'w, 'a, M, const K: usize> {
     found: PathLight<K>,
 }
 
-/// The light found by one path, per picture and variant.
+/// The light found by one path, per variant.
 struct PathLight<const K: usize> {
+    /// By picture.
     sums: Vec<[[f64; 3]; K]>,
     /// The pictures that have received light, in order of their first contribution.
     touched: Vec<usize>,
+    /// By light, of which there are few on one path: what is mixed to pictures when all of it is known.
+    lights: Vec<(LightIndex, [[f64; 3]; K])>,
 }
 
 impl<'w, M: Copy> Exposure<'w, '_, M> {
@@ -131,13 +136,13 @@ impl<'w, M: Copy> Exposure<'w, '_, M> {
         self.subject.lighting.pictures()
     }
 
-    fn blank_films<const K: usize>(&self) -> Vec<[HalfLight; K]> {
+    fn blank_films(&self) -> Vec<Vec<HalfLight>> {
         let blank = |(width, height): (usize, usize)| HalfLight {
             basis: LightBasis::black(width, height, self.pictures()),
             counts: Picture::filled(width, height, 0),
         };
         let size = |view: &super::plane::PlaneView| (view.intrinsics.width as usize, view.intrinsics.height as usize);
-        self.plane.views().iter().map(size).map(|size| from_fn(|_| blank(size))).collect()
+        self.plane.views().iter().map(size).map(|size| vec![blank(size); self.subject.variants]).collect()
     }
 
     fn tile<const K: usize>(&self, tile: &Window) -> ExposedTile<K>
@@ -191,7 +196,11 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
             tracer: PathTracer::new(world, materials, *exposure.settings),
             paths: Vec::new(),
             contributions: Vec::new(),
-            found: PathLight { sums: vec![[[0.0; 3]; K]; exposure.pictures()], touched: Vec::new() },
+            found: PathLight {
+                sums: vec![[[0.0; 3]; K]; exposure.pictures()],
+                touched: Vec::new(),
+                lights: Vec::new(),
+            },
         }
     }
 
@@ -208,7 +217,8 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
         for (which, path) in paths.iter().enumerate() {
             let (own, others) = rest.split_at(rest.partition_point(|contribution| contribution.path == which));
             rest = others;
-            own.iter().for_each(|contribution| found.add(lighting, first, contribution));
+            own.iter().for_each(|contribution| found.add(lighting, contribution));
+            found.mix(lighting, first);
             exposure.splat(path, found, &mut exposed.parts);
             found.clear();
         }
@@ -219,25 +229,45 @@ impl<'w, 'a, M: MaterialSource<'w, K>, const K: usize> TileTracer<'w, 'a, M, K> 
 }
 
 impl<const K: usize> PathLight<K> {
-    fn add(&mut self, lighting: &Lighting<'_>, first: usize, contribution: &Contribution<K>) {
+    fn add(&mut self, lighting: &Lighting<'_>, contribution: &Contribution<K>) {
         let values = contribution.values.map(|value| value.to_array().map(f64::from));
-        match lighting {
+        let sums = match lighting {
             Lighting::Apart(groups) => {
                 let group = groups.of(contribution.light);
                 self.touch(group);
-                self.sums[group].iter_mut().zip(values).for_each(|(sum, value)| add(sum, value, 1.0));
+                &mut self.sums[group]
             }
-            Lighting::Mixed(mixes) => {
-                for picture in 0..self.sums.len() {
-                    self.touch(picture);
-                    for (k, (sum, value)) in self.sums[picture].iter_mut().zip(values).enumerate() {
-                        // Variants beyond the last repeat it.
-                        let weight = mixes[(first + k).min(mixes.len() - 1)][picture][contribution.light.0];
-                        add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
-                    }
+            Lighting::Mixed(_) => self.of_light(contribution.light),
+        };
+        sums.iter_mut().zip(values).for_each(|(sum, value)| add(sum, value, 1.0));
+    }
+
+    fn of_light(&mut self, light: LightIndex) -> &mut [[f64; 3]; K] {
+        let known = self.lights.iter().position(|(known, _)| *known == light);
+        let at = known.unwrap_or_else(|| {
+            self.lights.push((light, [[0.0; 3]; K]));
+            self.lights.len() - 1
+        });
+        &mut self.lights[at].1
+    }
+
+    /// Mixes what each light brought to pictures.
+    fn mix(&mut self, lighting: &Lighting<'_>, first: usize) {
+        let Lighting::Mixed(mixes) = lighting else { return };
+        if self.lights.is_empty() {
+            return;
+        }
+        for (picture, sums) in self.sums.iter_mut().enumerate() {
+            self.touched.push(picture);
+            for (light, values) in &self.lights {
+                for (k, (sum, value)) in sums.iter_mut().zip(values).enumerate() {
+                    // Variants beyond the last repeat it.
+                    let weight = mixes[(first + k).min(mixes.len() - 1)][picture][light.0];
+                    add(sum, from_fn(|channel| value[channel] * weight[channel]), 1.0);
                 }
             }
         }
+        self.lights.clear();
     }
 
     fn touch(&mut self, picture: usize) {
@@ -278,7 +308,7 @@ impl<const K: usize> Part<K> {
     }
 
     /// Adds the rectangle to its view. A pixel receives few rectangles, always in the order of the tiles.
-    fn merge_into(&self, films: &mut [HalfLight; K]) {
+    fn merge_into(&self, films: &mut [HalfLight]) {
         for (k, film) in films.iter_mut().enumerate() {
             let groups = film.basis.pictures().len();
             for (place, [x, y]) in self.window.cells().enumerate() {
