@@ -24,6 +24,7 @@ use mateval_metrics::{Lpips, Net};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::{Camera, SceneId};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 fn main() {
@@ -40,7 +41,8 @@ fn main() {
         OpenScene::read(&dataset, scene, dataset.file.scored_renderer.as_ref()).unwrap()
     });
     let predictions: Vec<PredictedScene> = steps.of("reading and hashing the submissions", || {
-        submissions.iter().map(|path| read_scene(Path::new(path), scene)).collect()
+        let atlases = AtlasMeshes::in_memory(&opened.atlases);
+        submissions.iter().map(|path| read_scene(Path::new(path), scene, &atlases).unwrap()).collect()
     });
     score_materials(&mut steps, &dataset, scene, &opened, &predictions, &lpips);
     score_light(&mut steps, &dataset, scene, &opened, predictions.len(), &lpips);

@@ -16,6 +16,7 @@ use mateval_image::Texture;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::{Camera, SceneId, glb, open::Dataset, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::read_scene;
 use mateval_tracer::{Coat, LightGroups, Lighting, RenderSettings, Repaint, World, render_repainted};
 
@@ -35,7 +36,7 @@ fn main() {
     let folder: SceneFolder = dataset.folder(&id);
     let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
     let atlases: Vec<_> = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
-    let predicted = read_scene(Path::new(submission), scene);
+    let predicted = read_scene(Path::new(submission), scene, &AtlasMeshes::in_memory(&atlases)).unwrap();
     let coats = |count: usize| {
         let coat = |material: &mateval_submission::prediction::PredictedMaterial| Coat {
             base_colors: (0..count).map(|_| copied(&material.base_color)).collect(),

@@ -14,6 +14,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::Map;
 use mateval_scene::{TriangleMesh, glb, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::read_scene;
 use mateval_submission::texel_map::TexelMap;
 use mateval_tracer::World;
@@ -35,7 +36,8 @@ fn bench_scene(folder: &SceneFolder, scene: &SceneFile, submissions: &[PathBuf])
     let atlases: Vec<TriangleMesh> =
         glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
     let start = Instant::now();
-    let predictions: Vec<_> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let meshes = AtlasMeshes::in_memory(&atlases);
+    let predictions: Vec<_> = submissions.iter().map(|path| read_scene(path, scene, &meshes).unwrap()).collect();
     let read_s = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let compared = texture_space(folder, scene, &world, &atlases, &predictions, &|_, _, _| {}).unwrap();

@@ -8,7 +8,7 @@
 use mateval_light::light_fit;
 use mateval_metrics::{Psnr, lpips, noise_free, ssim};
 use mateval_scene::submission::MAP_SIZES;
-use mateval_submission::{map_file, memory_budget, prediction, texel_map};
+use mateval_submission::{bad_texels, default_map, map_file, memory_budget, reach, texel_map};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,10 +34,14 @@ pub struct FixedRules {
     pub missing_roughness: f32,
     /// Value that replaces a missing or unsound metallic, as the format promises.
     pub missing_metallic: f32,
-    /// A base colour with values outside this range is unsound, by the format.
+    /// A texel of a base colour with a value outside this range is bad, by the format.
     pub base_color_range: [f32; 2],
-    /// A roughness or metallic with values outside this range is unsound, by the format.
+    /// A texel of a roughness or metallic with a value outside this range is bad, by the format.
     pub scalar_range: [f32; 2],
+    /// A map of whose reached texels a larger share than this is bad is unsound, by the format.
+    pub most_bad_share: f64,
+    /// How much further than one texel from the surface a reached texel may lie, in texels, for uv of up to 1.
+    pub reach_margin: f64,
     /// The smallest and the largest side of a map, in texels, by the format.
     pub map_sides: [usize; 2],
     /// A map whose file is larger than this, in bytes, is unsound, by the format.
@@ -102,10 +106,12 @@ impl FixedRules {
             flat_range: mateval_tracer::aov::FLAT_RANGE,
             cut_out_below_opacity: mateval_scene::material::CUT_OUT_BELOW_OPACITY,
             missing_base_color: mateval_scene::submission::GREY,
-            missing_roughness: prediction::MISSING_ROUGHNESS,
-            missing_metallic: prediction::MISSING_METALLIC,
-            base_color_range: range(map_file::BASE_COLOR_RANGE),
-            scalar_range: range(map_file::SCALAR_RANGE),
+            missing_roughness: default_map::MISSING_ROUGHNESS,
+            missing_metallic: default_map::MISSING_METALLIC,
+            base_color_range: range(bad_texels::BASE_COLOR_RANGE),
+            scalar_range: range(bad_texels::SCALAR_RANGE),
+            most_bad_share: bad_texels::MOST_BAD_SHARE,
+            reach_margin: reach::REACH_MARGIN,
             map_sides: [*MAP_SIZES.start(), *MAP_SIZES.end()],
             most_map_bytes: map_file::MAX_MAP_BYTES,
             most_exr_numbers: map_file::MAX_EXR_NUMBERS,

@@ -25,6 +25,7 @@ use crate::scene_score::SceneScore;
 use crate::scene_scorer::score_scene;
 use crate::scene_task::SceneTask;
 use crate::truth_noise::NoisyLighting;
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_submission::submission_json::SubmissionJson;
@@ -168,7 +169,9 @@ fn score_scenes(
 }
 
 fn score_one(plan: &ScorePlan<'_>, scene: &SceneFile, progress: Progress<'_>) -> Result<Vec<Outcome>, EvalError> {
-    let predictions: Vec<PredictedScene> = plan.submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
+    let read = |path: &&Path| read_scene(path, scene, &atlases);
+    let predictions: Vec<PredictedScene> = plan.submissions.iter().map(read).collect::<Result<_, _>>()?;
     let mut scores: Vec<Option<Vec<SceneScore>>> =
         predictions.iter().map(|prediction| plan.read_cached(scene, prediction)).collect();
     let uncached: Vec<usize> = (0..scores.len()).filter(|&at| scores[at].is_none()).collect();

@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
-use mateval_scene::{Progress, RendererId};
+use mateval_scene::{Progress, RendererId, TriangleMesh};
 
 use crate::companion_store::MadeIn;
 use crate::error::EvalError;
@@ -15,6 +15,7 @@ use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
 /// The truth and every submission's albedo of one view, linear.
@@ -32,13 +33,22 @@ pub fn scene_albedo(
     submissions: &[&Path],
 ) -> Result<Vec<SceneAlbedo>, EvalError> {
     let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, None)?;
-    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let predictions = predictions_of(submissions, scene, &atlases)?;
     let view = |view: &View| {
         let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
         let predicted = pictures.into_iter().map(|pictures| pictures.base_color).collect();
         Ok(SceneAlbedo { truth: ViewTruth::read(&folder, view)?, predicted })
     };
     scored_views(dataset, scene)?.into_iter().map(view).collect()
+}
+
+fn predictions_of(
+    submissions: &[&Path],
+    scene: &SceneFile,
+    atlases: &[TriangleMesh],
+) -> Result<Vec<PredictedScene>, EvalError> {
+    let atlases = AtlasMeshes::in_memory(atlases);
+    Ok(submissions.iter().map(|path| read_scene(path, scene, &atlases)).collect::<Result<_, _>>()?)
 }
 
 /// The truth's light and every submission's of one view, for display.
@@ -59,7 +69,7 @@ pub fn scene_light(
     progress: Progress<'_>,
 ) -> Result<Vec<SceneLight>, EvalError> {
     let OpenScene { folder, world, atlases } = OpenScene::read(dataset, scene, Some(renderer))?;
-    let predictions: Vec<PredictedScene> = submissions.iter().map(|path| read_scene(path, scene)).collect();
+    let predictions = predictions_of(submissions, scene, &atlases)?;
     let views = scored_views(dataset, scene)?;
     let truths = views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
     let task = SceneTask {

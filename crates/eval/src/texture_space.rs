@@ -177,6 +177,7 @@ mod tests {
     use serde_json::json;
 
     use super::*;
+    use mateval_submission::atlas_meshes::AtlasMeshes;
     use mateval_submission::prediction::read_scene;
 
     /// Two triangles in one plane, all seen, of `areas` square metres. In the atlas they are alike, one in its left half and
@@ -351,8 +352,11 @@ mod tests {
         submission: &std::path::Path,
     ) -> Result<Vec<Vec<InstanceTexels>>, EvalError> {
         let mesh = mesh([1.0, 1.0]);
-        let submissions = [read_scene(submission, scene), read_scene(std::path::Path::new("nowhere"), scene)];
-        texture_space(folder, scene, &world(&mesh), &[mesh], &submissions, &|_, _, _| {})
+        let meshes = [mesh];
+        let atlases = AtlasMeshes::in_memory(&meshes);
+        let submissions = [submission, std::path::Path::new("nowhere")];
+        let submissions = submissions.map(|path| read_scene(path, scene, &atlases).unwrap());
+        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, &|_, _, _| {})
     }
 
     #[test]

@@ -94,6 +94,11 @@ impl Texture {
         &self.texels
     }
 
+    /// The stored texels, to change them; copied if a clone of this texture still holds them.
+    pub fn into_texels(self) -> Texels {
+        Arc::unwrap_or_clone(self.texels)
+    }
+
     /// How lookups continue outside 0..1.
     pub fn wrap(&self) -> Wrap {
         self.wrap

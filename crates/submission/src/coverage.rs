@@ -6,6 +6,8 @@
 use glam::{DVec2, DVec3};
 use mateval_scene::TriangleMesh;
 
+use crate::polygon::Polygon;
+
 /// The part of a triangle inside a texel's square.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Part {
@@ -105,61 +107,6 @@ fn reached(along: impl IntoIterator<Item = f64>, size: usize) -> std::ops::Range
         along.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(at), high.max(at)));
     let first = low.floor().clamp(0.0, size as f64) as usize;
     first..(high.ceil().clamp(0.0, size as f64) as usize).max(first)
-}
-
-/// A triangle clipped by at most four lines.
-#[derive(Clone, Copy)]
-struct Polygon {
-    corners: [DVec2; 8],
-    count: usize,
-}
-
-impl Polygon {
-    fn new([a, b, c]: [DVec2; 3]) -> Self {
-        let mut polygon = Self { corners: [DVec2::ZERO; 8], count: 0 };
-        [a, b, c].into_iter().for_each(|corner| polygon.push(corner));
-        polygon
-    }
-
-    fn corners(&self) -> &[DVec2] {
-        &self.corners[..self.count]
-    }
-
-    fn push(&mut self, corner: DVec2) {
-        self.corners[self.count] = corner;
-        self.count += 1;
-    }
-
-    /// The part whose dot product with `axis` (along x or y, of either sign) is at least `least` (Sutherland and
-    /// Hodgman, 1974). New corners lie exactly on the line.
-    fn clipped(&self, axis: DVec2, least: f64) -> Self {
-        let mut clipped = Self { corners: [DVec2::ZERO; 8], count: 0 };
-        for (at, corner) in self.corners().iter().enumerate() {
-            let next = self.corners[(at + 1) % self.count];
-            let (height, next_height) = (corner.dot(axis) - least, next.dot(axis) - least);
-            if height >= 0.0 {
-                clipped.push(*corner);
-            }
-            if (height > 0.0 && next_height < 0.0) || (height < 0.0 && next_height > 0.0) {
-                let cut = *corner + (next - *corner) * (height / (height - next_height));
-                let on_line = axis * least;
-                clipped.push(if axis.x == 0.0 { DVec2::new(cut.x, on_line.y) } else { DVec2::new(on_line.x, cut.y) });
-            }
-        }
-        clipped
-    }
-
-    /// Area and centroid; no area for less than three corners.
-    fn measured(&self) -> (f64, DVec2) {
-        let Some((first, others)) = self.corners().split_first() else { return (0.0, DVec2::ZERO) };
-        let (mut twice, mut moment) = (0.0, DVec2::ZERO);
-        for pair in others.windows(2) {
-            let (b, c) = (pair[0] - *first, pair[1] - *first);
-            twice += b.perp_dot(c);
-            moment += (b + c) * b.perp_dot(c);
-        }
-        if twice == 0.0 { (0.0, *first) } else { (twice.abs() / 2.0, *first + moment / (3.0 * twice)) }
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
-//! Why one file of a submission cannot be used.
+//! What is wrong with one file of a submission.
 
-/// The fault of one file. `eval lint` reports it as a finding; scoring replaces the map by its default.
+use mateval_scene::{Finding, Severity};
+
+/// The fault of one file. `eval lint` reports it as a finding. Scoring replaces the map by its default, or, if only a few
+/// texels are bad, those.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileFault {
     /// A stable word, as in `not_square`.
@@ -16,6 +19,12 @@ pub struct FileFault {
 impl FileFault {
     pub(crate) fn new(code: &'static str, message: impl Into<String>, action: &'static str) -> Self {
         Self { code, place: String::new(), message: message.into(), action }
+    }
+
+    /// The finding about `file`, a path in the submission.
+    pub(crate) fn into_finding(self, severity: Severity, file: String) -> Finding {
+        let Self { code, place, message, action } = self;
+        Finding { severity, code: code.to_owned(), file, place, message, action: action.to_owned() }
     }
 
     /// A file that the system does not let us read.

@@ -7,10 +7,12 @@ use std::path::Path;
 
 use mateval_image::exr_header::{EXR_SIGNATURE, ExrHeader};
 use mateval_image::png_header::{PNG_SIGNATURE, PngHeader};
-use mateval_image::{ImageError, Texels, Texture, map_io};
+use mateval_image::{ImageError, Texture, map_io};
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{MAP_SIZES, Map};
+use mateval_scene::{SceneError, TriangleMesh};
 
+use crate::bad_texels;
 use crate::file_fault::FileFault;
 use crate::submitted_file::SubmittedFile;
 
@@ -20,12 +22,6 @@ pub const MAX_MAP_BYTES: u64 = 512 << 20;
 /// Most numbers that an OpenEXR file may hold in all its parts and channels together: eight channels of the largest
 /// map.
 pub const MAX_EXR_NUMBERS: usize = 8 * 4096 * 4096;
-
-/// The range of a linear base colour. One stray value must not dominate the mean over all pixels.
-pub const BASE_COLOR_RANGE: std::ops::RangeInclusive<f32> = -1.0..=16.0;
-
-/// The range of a roughness and of a metallic.
-pub const SCALAR_RANGE: std::ops::RangeInclusive<f32> = 0.0..=1.0;
 
 /// The header of a map's file.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,19 +37,43 @@ pub enum MapHeader {
 pub struct MapFile {
     /// The file's header.
     pub header: MapHeader,
-    /// Colours of a base colour; scalars of the others.
+    /// Colours of a base colour; scalars of the others. All numbers are finite and in range.
     pub texture: Texture,
+    /// The finding about texels that were not, and that lookups reach.
+    pub bad_texels: Option<FileFault>,
     /// Of the file's bytes, hex.
     pub sha256: String,
 }
 
 /// Decodes the file of a map; its ending says whether it should be a PNG or an EXR.
-pub fn decode(file: SubmittedFile, map: Map) -> Result<MapFile, FileFault> {
+///
+/// `atlas` reads the mesh of the map's instance and is called only if the map has bad texels. The outer error is its
+/// error: without the mesh nothing is known about the map.
+pub fn decode<'a>(
+    file: SubmittedFile,
+    map: Map,
+    atlas: impl FnOnce() -> Result<&'a TriangleMesh, SceneError>,
+) -> Result<Result<MapFile, FileFault>, SceneError> {
+    let DecodedFile { header, texture, sha256 } = match decode_any(file, map) {
+        Ok(decoded) => decoded,
+        Err(fault) => return Ok(Err(fault)),
+    };
+    let repaired = bad_texels::repaired(texture, map, atlas)?;
+    Ok(repaired.map(|(texture, bad_texels)| MapFile { header, texture, bad_texels, sha256 }))
+}
+
+/// A file whose numbers may be anything.
+struct DecodedFile {
+    header: MapHeader,
+    texture: Texture,
+    sha256: String,
+}
+
+fn decode_any(file: SubmittedFile, map: Map) -> Result<DecodedFile, FileFault> {
     let header = check_header(file.path(), file.bytes(), map)?;
     let (path, sha256) = (file.path().to_owned(), file.hashed().sha256.clone());
     let texture = texels(&path, file.into_bytes(), map, &header)?;
-    check_values(&texture, map)?;
-    Ok(MapFile { header, texture, sha256 })
+    Ok(DecodedFile { header, texture, sha256 })
 }
 
 /// Reads the header. Fails if the file's kind, size or channels rule it out, before any texel is decoded.
@@ -188,40 +208,5 @@ fn texels(path: &Path, bytes: Vec<u8>, map: Map, header: &MapHeader) -> Result<T
             other => other.to_string(),
         };
         FileFault::new("unreadable_picture", what, "write the map again")
-    })
-}
-
-/// Fails unless every number is finite and within its range.
-fn check_values(texture: &Texture, map: Map) -> Result<(), FileFault> {
-    let (name, range) = match map {
-        Map::BaseColor => ("base colour", BASE_COLOR_RANGE),
-        Map::Roughness => ("roughness", SCALAR_RANGE),
-        Map::Metallic => ("metallic", SCALAR_RANGE),
-    };
-    let (values, a_texel): (&[f32], usize) = match texture.texels() {
-        Texels::Linear(values) => (values.as_flattened(), 3),
-        Texels::Grey(values) => (values, 1),
-        // Integers decode to 0 to 1.
-        _ => return Ok(()),
-    };
-    let Some(at) = values.iter().position(|value| !range.contains(value)) else { return Ok(()) };
-    // A value that is not finite is reported rather than one that is only too large.
-    let at = values.iter().position(|value| !value.is_finite()).unwrap_or(at);
-    let (value, texel) = (values[at], at / a_texel);
-    let (low, high) = (range.start(), range.end());
-    let code = if value.is_nan() {
-        "nan"
-    } else if value.is_infinite() {
-        "infinity"
-    } else {
-        "out_of_range"
-    };
-    Err(FileFault {
-        place: format!("texel ({}, {})", texel % texture.width(), texel / texture.width()),
-        ..FileFault::new(
-            code,
-            format!("a {name} of {value}; expected {low} to {high}"),
-            "write finite numbers in range",
-        )
     })
 }

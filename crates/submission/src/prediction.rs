@@ -8,21 +8,17 @@ use std::path::Path;
 use mateval_image::{Texels, Texture, Wrap};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::submission::{GREY, Map};
-use mateval_scene::{Finding, Severity};
+use mateval_scene::submission::Map;
+use mateval_scene::{Finding, SceneError, Severity};
 
+use crate::atlas_meshes::AtlasMeshes;
+use crate::default_map::default_value;
 use crate::file_fault::FileFault;
 use crate::hashed_file::HashedFile;
 use crate::map_file::{self, MAX_MAP_BYTES, MapFile};
 use crate::map_folder::MapFolder;
 use crate::memory_budget::MemoryBudget;
 use crate::submitted_file::{SubmittedFile, relative};
-
-/// The perceptual roughness that replaces a missing map.
-pub const MISSING_ROUGHNESS: f32 = 0.5;
-
-/// The metallic that replaces a missing map.
-pub const MISSING_METALLIC: f32 = 0.0;
 
 /// One instance's maps. A map with the same value everywhere has one texel.
 #[derive(Clone, Debug)]
@@ -61,39 +57,56 @@ pub struct PredictedScene {
     pub files: Vec<HashedFile>,
 }
 
-/// Reads, hashes and decodes the maps of one scene, each file once.
-pub fn read_scene(submission: &Path, scene: &SceneFile) -> PredictedScene {
-    let mut reader = Reader { submission, memory: MemoryBudget::of_scene(), findings: Vec::new(), files: Vec::new() };
-    let material = |instance: &mateval_scene::dataset::Instance| {
-        instance.atlas.as_ref()?;
-        let folder = MapFolder { submission, scene: &scene.id, instance: &instance.id };
-        let [base_color, roughness, metallic] = Map::ALL.map(|map| reader.texture(folder, map));
-        Some(PredictedMaterial { base_color, roughness, metallic })
-    };
-    let materials: Vec<Option<PredictedMaterial>> = scene.instances.iter().map(material).collect();
+/// Reads, hashes and decodes the maps of one scene, each file once. `atlases` are the scene's; a submission without bad
+/// texels does not need them. Whatever is wrong with the submission is a finding; this fails only where they cannot be
+/// read.
+pub fn read_scene(
+    submission: &Path,
+    scene: &SceneFile,
+    atlases: &AtlasMeshes<'_>,
+) -> Result<PredictedScene, SceneError> {
+    let (memory, findings, files) = (MemoryBudget::of_scene(), Vec::new(), Vec::new());
+    let mut reader = Reader { submission, scene, atlases, memory, findings, files };
+    let instances = 0..scene.instances.len();
+    let materials = instances.map(|at| reader.material(at)).collect::<Result<Vec<_>, SceneError>>()?;
     let Reader { findings, files, .. } = reader;
-    PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files }
+    Ok(PredictedScene { scattering_key: scattering_key(&materials), materials, findings, files })
 }
 
 /// Reads maps one by one and gathers what is known about their files.
 struct Reader<'a> {
     submission: &'a Path,
+    scene: &'a SceneFile,
+    atlases: &'a AtlasMeshes<'a>,
     memory: MemoryBudget,
     findings: Vec<Finding>,
     files: Vec<HashedFile>,
 }
 
 impl Reader<'_> {
+    /// The maps of the instance at a place of the scene; none without an atlas.
+    fn material(&mut self, at: usize) -> Result<Option<PredictedMaterial>, SceneError> {
+        if self.scene.instances[at].atlas.is_none() {
+            return Ok(None);
+        }
+        let mut texture = |map| self.texture(at, map);
+        let base_color = texture(Map::BaseColor)?;
+        let (roughness, metallic) = (texture(Map::Roughness)?, texture(Map::Metallic)?);
+        Ok(Some(PredictedMaterial { base_color, roughness, metallic }))
+    }
+
     /// A map, or its default.
-    fn texture(&mut self, folder: MapFolder<'_>, map: Map) -> Texture {
+    fn texture(&mut self, at: usize, map: Map) -> Result<Texture, SceneError> {
+        let (scene, instance) = (&self.scene.id, &self.scene.instances[at].id);
+        let folder = MapFolder { submission: self.submission, scene, instance };
         let present = folder.present(map);
         let fault = match present.as_slice() {
-            [path] => match self.decoded(path, map) {
-                Ok(texture) => return texture,
+            [path] => match self.decoded(path, at, map)? {
+                Ok(texture) => return Ok(texture),
                 Err(finding) => *finding,
             },
             // Roughness and metallic are optional.
-            [] if map != Map::BaseColor => return default_of(map),
+            [] if map != Map::BaseColor => return Ok(default_of(map)),
             [] => self.replaced("missing_map", &folder.candidates(map)[0], map, "expected a PNG or an EXR, found none"),
             several => {
                 // Neither is scored, but both belong to the submission's hash. An unreadable one has no hash.
@@ -103,17 +116,30 @@ impl Reader<'_> {
             }
         };
         self.findings.push(fault);
-        default_of(map)
+        Ok(default_of(map))
     }
 
-    fn decoded(&mut self, path: &Path, map: Map) -> Result<Texture, Box<Finding>> {
-        let decoded = self.read(path).and_then(|file| map_file::decode(file, map));
-        let file = decoded.map_err(|fault| {
-            let finding = self.replaced("unsound_map", path, map, &fault.message);
-            Box::new(Finding { place: fault.place, ..finding })
-        })?;
-        let held = self.memory.holding(compact_texture(file, map));
-        held.ok_or_else(|| Box::new(self.replaced("unsound_map", path, map, &MemoryBudget::exceeded())))
+    /// The map of a file, or the finding that it is replaced. Fails only where the atlas cannot be read.
+    fn decoded(&mut self, path: &Path, at: usize, map: Map) -> Result<Result<Texture, Box<Finding>>, SceneError> {
+        let atlases = self.atlases;
+        let decoded = match self.read(path) {
+            Ok(file) => map_file::decode(file, map, || atlases.mesh(at))?,
+            Err(fault) => Err(fault),
+        };
+        let mut file = match decoded {
+            Ok(file) => file,
+            Err(fault) => {
+                let finding = self.replaced("unsound_map", path, map, &fault.message);
+                return Ok(Err(Box::new(Finding { place: fault.place, ..finding })));
+            }
+        };
+        let bad_texels = file.bad_texels.take();
+        let Some(texture) = self.memory.holding(compact_texture(file, map)) else {
+            return Ok(Err(Box::new(self.replaced("unsound_map", path, map, &MemoryBudget::exceeded()))));
+        };
+        let name = relative(self.submission, path);
+        self.findings.extend(bad_texels.map(|fault| fault.into_finding(Severity::Warning, name)));
+        Ok(Ok(texture))
     }
 
     /// Reads a file and records its hash.
@@ -125,10 +151,11 @@ impl Reader<'_> {
 
     /// The finding that a map's default is scored.
     fn replaced(&self, code: &str, path: &Path, map: Map, message: &str) -> Finding {
+        let value = default_value(map);
         let scored = match map {
-            Map::BaseColor => format!("base colour {GREY} (linear)"),
-            Map::Roughness => format!("roughness {MISSING_ROUGHNESS}"),
-            Map::Metallic => format!("metallic {MISSING_METALLIC}"),
+            Map::BaseColor => format!("base colour {value} (linear)"),
+            Map::Roughness => format!("roughness {value}"),
+            Map::Metallic => format!("metallic {value}"),
         };
         Finding {
             severity: Severity::Warning,
@@ -143,11 +170,7 @@ impl Reader<'_> {
 
 /// The texture that replaces a missing or unusable map.
 fn default_of(map: Map) -> Texture {
-    one_texel(match map {
-        Map::BaseColor => GREY,
-        Map::Roughness => MISSING_ROUGHNESS,
-        Map::Metallic => MISSING_METALLIC,
-    })
+    one_texel(default_value(map))
 }
 
 /// A texture of one value everywhere.
@@ -180,8 +203,10 @@ mod tests {
     use std::path::PathBuf;
     use std::sync::atomic::{AtomicBool, Ordering};
 
+    use glam::{Vec2, Vec3};
     use mateval_image::exr_io::{self, Precision};
     use mateval_image::{LinearRgb, Picture, png_io};
+    use mateval_scene::TriangleMesh;
     use serde_json::json;
 
     use super::*;
@@ -223,8 +248,19 @@ mod tests {
         folder.path().join("scenes/s").join(instance).join(name)
     }
 
+    /// Three atlases of two triangles that cover all texels.
+    fn atlases() -> Vec<TriangleMesh> {
+        let mesh = TriangleMesh {
+            positions: vec![Vec3::ZERO; 4],
+            normals: None,
+            uvs: Some(vec![Vec2::ZERO, Vec2::X, Vec2::ONE, Vec2::Y]),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        vec![mesh; 3]
+    }
+
     fn read(folder: &tempfile::TempDir) -> PredictedScene {
-        read_scene(folder.path(), &scene())
+        read_scene(folder.path(), &scene(), &AtlasMeshes::in_memory(&atlases())).unwrap()
     }
 
     fn constant(texture: &Texture) -> Option<f32> {
@@ -259,12 +295,12 @@ mod tests {
         for name in ["roughness.png", "metallic.png"] {
             std::fs::remove_file(file(&folder, "a", name)).unwrap();
         }
-        let read = read(&folder);
-        let a = read.materials[0].as_ref().unwrap();
+        let found = read(&folder);
+        let a = found.materials[0].as_ref().unwrap();
         assert_eq!((constant(&a.roughness), constant(&a.metallic)), (Some(0.5), Some(0.0)));
-        assert_eq!(read.findings, Vec::new());
+        assert_eq!(found.findings, Vec::new());
         // Three of b, one of a; the twin: with all of them there are six.
-        assert_eq!((read.files.len(), super::read_scene(sound().path(), &scene()).files.len()), (4, 6));
+        assert_eq!((found.files.len(), read(&sound()).files.len()), (4, 6));
     }
 
     /// The file is sparse and takes hardly any disk space.
@@ -326,6 +362,46 @@ mod tests {
             }
             assert!(constant(&read.materials[2].as_ref().unwrap().roughness).is_none());
         }
+    }
+
+    /// Replaces roughness or metallic of `a` by an EXR whose texels are 0.25, except some that are `value`.
+    fn plant(folder: &tempfile::TempDir, map: Map, value: f32, is_bad: impl Fn(usize, usize) -> bool) {
+        let png = file(folder, "a", &format!("{}.png", map.stem()));
+        std::fs::remove_file(&png).unwrap();
+        let picture = Picture::from_fn(64, 64, |x, y| if is_bad(x, y) { value } else { 0.25 });
+        exr_io::write_scalar(&png.with_extension("exr"), &picture, Precision::Float).unwrap();
+    }
+
+    /// One bad texel is a finding of its own, and its map is scored.
+    #[test]
+    fn one_bad_texel_does_not_replace_its_map() {
+        for (map, value) in [(Map::Roughness, f32::NAN), (Map::Metallic, f32::NEG_INFINITY), (Map::Metallic, 1.01)] {
+            let folder = sound();
+            plant(&folder, map, value, |x, y| (x, y) == (20, 31));
+            let read = read(&folder);
+            let [finding] = read.findings.as_slice() else { panic!("{:?}", read.findings) };
+            assert_eq!((finding.code.as_str(), finding.severity), ("bad_texels", Severity::Warning));
+            assert_eq!(
+                (finding.file.as_str(), finding.place.as_str()),
+                (format!("scenes/s/a/{}.exr", map.stem()).as_str(), "texel (20, 31)")
+            );
+            assert!(finding.message.starts_with("1 of the 4096 texels"), "{finding}");
+            assert!(finding.message.ends_with(&value.to_string()), "{finding}");
+            // Its neighbours are all 0.25, so the map became constant.
+            assert_eq!(constant(read.materials[0].as_ref().unwrap().texture(map)), Some(0.25));
+        }
+    }
+
+    /// Two percent are too many; the finding of the default names the first.
+    #[test]
+    fn many_bad_texels_replace_their_map() {
+        let folder = sound();
+        plant(&folder, Map::Metallic, f32::NAN, |x, y| x == 5 || (y == 9 && x < 20));
+        let read = read(&folder);
+        let [finding] = read.findings.as_slice() else { panic!("{:?}", read.findings) };
+        assert_eq!((finding.code.as_str(), finding.place.as_str()), ("unsound_map", "texel (5, 0)"));
+        assert!(finding.message.starts_with("83 of the 4096 texels that lookups reach, more than 1 %,"), "{finding}");
+        assert_eq!(constant(&read.materials[0].as_ref().unwrap().metallic), Some(0.0));
     }
 
     /// The key is of values: how they are stored does not enter, base colours do not, every scalar does.

@@ -7,6 +7,7 @@
 
 mod suite {
     mod archives;
+    mod bad_texels;
     mod hostile_pictures;
     mod lint;
 }

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use libfuzzer_sys::fuzz_target;
+use mateval_scene::TriangleMesh;
 use mateval_scene::submission::Map;
 use mateval_submission::map_file::decode;
 use mateval_submission::submitted_file::SubmittedFile;
@@ -12,7 +13,8 @@ fuzz_target!(|bytes: &[u8]| {
     let Some((which, bytes)) = bytes.split_first() else { return };
     let map = Map::ALL[usize::from(*which) % Map::ALL.len()];
     let file = SubmittedFile::from_bytes(Path::new(""), Path::new("a.png"), bytes.to_vec());
-    if let Ok(file) = decode(file, map) {
+    let atlas = TriangleMesh::default();
+    if let Ok(file) = decode(file, map, || Ok(&atlas)).unwrap() {
         let side = file.texture.width();
         assert!((64..=4096).contains(&side) && side == file.texture.height());
         assert!(file.texture.texel(side - 1, side - 1).iter().all(|value| value.is_finite()));

@@ -9,6 +9,7 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::PrincipledFlavour;
 use mateval_scene::{SceneId, SceneLights, TriangleMesh, glb, open::Dataset, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::read_scene;
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
@@ -50,7 +51,7 @@ impl Room {
 
     /// Views of a submission under each light alone: for each view, one basis for each seed.
     pub fn bases(&self, submission: &Path, views: &[View], samples: u32, seeds: &[u64]) -> Vec<Vec<LightBasis>> {
-        let predicted = read_scene(submission, &self.scene);
+        let predicted = read_scene(submission, &self.scene, &AtlasMeshes::in_memory(&self.atlases)).unwrap();
         let coats = predicted.materials.iter().map(|material| {
             material.as_ref().map(|material| Coat {
                 base_colors: vec![material.base_color.clone()],

@@ -12,6 +12,7 @@ use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::Emission;
 use mateval_scene::{Camera, RendererId, SceneId, SceneLights, TriangleMesh, glb, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::World;
 
@@ -44,12 +45,14 @@ impl Room {
         let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
         let truth = |view: &View| ViewTruth::read(&folder, view).unwrap();
         let light = |view: &View| RgbTruth::read(&folder, &renderer, view).unwrap();
+        let nodes = glb::read(&folder.instances()).unwrap();
+        let atlases: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
         Self {
             dataset: dataset.to_owned(),
             submission: submission.to_owned(),
             weights,
-            atlases: glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect(),
-            predicted: read_scene(submission, &scene),
+            predicted: read_scene(submission, &scene, &AtlasMeshes::in_memory(&atlases)).unwrap(),
+            atlases,
             protocol: protocol(),
             truths: scene.views.iter().map(truth).collect(),
             light: scene.views.iter().map(light).collect(),

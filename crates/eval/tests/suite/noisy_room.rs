@@ -13,6 +13,7 @@ use mateval_eval::truth::ViewTruth;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, Texels, Texture};
 use mateval_metrics::{Halves, NoisyHalf, NoisyRender};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedMaterial, read_scene};
 use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
 
@@ -84,8 +85,8 @@ impl Room {
         let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
         let nodes = glb::read(&folder.instances()).unwrap();
         let atlases: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
-        let coats =
-            read_scene(&submission, scene).materials.iter().map(|material| material.as_ref().map(coat)).collect();
+        let predicted = read_scene(&submission, scene, &AtlasMeshes::in_memory(&atlases)).unwrap();
+        let coats = predicted.materials.iter().map(|material| material.as_ref().map(coat)).collect();
         let repaint = Repaint::new(&world, &atlases, coats, hasty().light.flavour).unwrap();
         let views = &scene.views[..VIEWS];
         let cameras: Vec<Camera> = views.iter().map(|view| smaller(&view.camera)).collect();

@@ -12,6 +12,7 @@ use mateval_light::light_stage::{self, NamedLight};
 use mateval_light::rules::FitRules;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::{Camera, TriangleMesh, glb, reference_io};
+use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 use mateval_tracer::{
     Coat, LightBasis, LightGroups, LightMix, Lighting, RenderSettings, Repaint, StageLight, World, render_repainted,
@@ -43,8 +44,10 @@ fn read(name: &str, scene: &SceneFile) -> (World, Vec<TriangleMesh>, PredictedSc
     let submission = kept_folder("planted").join(name);
     write_truth(&submission);
     let world = World::new(Arc::new(reference_io::read(&folder).unwrap())).unwrap();
-    let atlases = glb::read(&folder.instances()).unwrap().into_iter().map(|node| node.mesh).collect();
-    (world, atlases, read_scene(&submission, scene), ViewTruth::read(&folder, &scene.views[0]).unwrap())
+    let nodes = glb::read(&folder.instances()).unwrap();
+    let atlases: Vec<TriangleMesh> = nodes.into_iter().map(|node| node.mesh).collect();
+    let predicted = read_scene(&submission, scene, &AtlasMeshes::in_memory(&atlases)).unwrap();
+    (world, atlases, predicted, ViewTruth::read(&folder, &scene.views[0]).unwrap())
 }
 
 /// The input view of a prediction under each light of a world alone.

@@ -1,9 +1,9 @@
 //! One scene checked: each map is read once, a few instances at a time, then judged together.
 
 use mateval_image::Texture;
-use mateval_scene::Finding;
-use mateval_scene::dataset::{Instance, SceneFile};
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::submission::Map;
+use mateval_scene::{Finding, SceneError, Severity};
 use rayon::prelude::*;
 
 use super::colours::{self, Decoding};
@@ -15,6 +15,7 @@ use super::plan::LintPlan;
 use super::sight::{InstanceSight, Sight};
 use super::unobserved::fill;
 use super::{map_remarks, orientation, scalars, shading, unobserved};
+use crate::atlas_meshes::AtlasMeshes;
 use crate::error::SubmissionError;
 use crate::map_file::{self, MAX_MAP_BYTES, MapFile, MapHeader};
 use crate::map_folder::MapFolder;
@@ -42,9 +43,11 @@ pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<SceneFindi
     }
     let sight = Sight::read(plan.dataset, scene)?;
     let order: Vec<usize> = (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
+    let atlases = AtlasMeshes::on_demand(plan.dataset, scene);
     let mut all: Vec<InstanceFacts> = Vec::new();
     for some in order.chunks(AT_ONCE) {
-        all.par_extend(some.par_iter().map(|&at| instance(plan, scene, at, &sight.instances[at])));
+        let facts = some.par_iter().map(|&at| instance(plan, scene, at, &sight.instances[at], &atlases));
+        all.extend(facts.collect::<Result<Vec<_>, _>>()?);
     }
     let maps = all.iter().map(|facts| facts.maps).sum();
     let mut findings: Vec<Finding> = all.iter_mut().flat_map(|facts| std::mem::take(&mut facts.findings)).collect();
@@ -78,11 +81,19 @@ fn together(scene: &SceneFile, sight: &Sight, all: &[InstanceFacts]) -> (Vec<Fin
     (findings, decoding)
 }
 
-fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceSight) -> InstanceFacts {
+fn instance(
+    plan: &LintPlan<'_>,
+    scene: &SceneFile,
+    at: usize,
+    sight: &InstanceSight,
+    atlases: &AtlasMeshes<'_>,
+) -> Result<InstanceFacts, SceneError> {
     let instance = &scene.instances[at];
     let mut facts =
         InstanceFacts { folder: format!("scenes/{}/{}", scene.id, instance.id), ..InstanceFacts::default() };
-    let [base_color, roughness, metallic] = Map::ALL.map(|map| read(plan, scene, instance, map, &mut facts));
+    let reader = InstanceReader { plan, scene, at, atlases };
+    let mut read = |map| reader.read(map, &mut facts);
+    let [base_color, roughness, metallic] = [read(Map::BaseColor)?, read(Map::Roughness)?, read(Map::Metallic)?];
     if let Some(file) = &base_color {
         facts.looks = looks(at, &sight.pixels, &file.texture);
         facts.fill = Some(fill(&sight.texels, &file.texture));
@@ -92,33 +103,45 @@ fn instance(plan: &LintPlan<'_>, scene: &SceneFile, at: usize, sight: &InstanceS
     facts.scalars = scalar_looks(&sight.pixels, of(&roughness), of(&metallic));
     let files = [base_color, roughness, metallic];
     facts.copies = CopyCount::of(&plan.dataset.folder(&scene.id), &instance.id, &files);
-    facts
+    Ok(facts)
 }
 
-fn read(
-    plan: &LintPlan<'_>,
-    scene: &SceneFile,
-    instance: &Instance,
-    map: Map,
-    facts: &mut InstanceFacts,
-) -> Option<MapFile> {
-    let folder = MapFolder { submission: plan.submission, scene: &scene.id, instance: &instance.id };
-    // A missing map, and two files for one map, are findings of `layout`.
-    let [path] = folder.present(map).try_into().ok()?;
-    let name = relative(plan.submission, &path);
-    let file = SubmittedFile::read(plan.submission, &path, MAX_MAP_BYTES);
-    match file.and_then(|file| map_file::decode(file, map)) {
-        Ok(file) => {
-            facts.maps += 1;
-            // A clone shares its texels.
-            facts.bytes += compact_texture(file.clone(), map).bytes().len();
-            facts.findings.extend(map_remarks::remarks(&name, map, &file));
-            Some(file)
-        }
-        Err(fault) => {
-            let finding = error(fault.code, &name, fault.message, fault.action);
-            facts.findings.push(Finding { place: fault.place, ..finding });
-            None
+/// Reads the maps of one instance.
+struct InstanceReader<'a> {
+    plan: &'a LintPlan<'a>,
+    scene: &'a SceneFile,
+    /// The instance, by its place in the scene.
+    at: usize,
+    atlases: &'a AtlasMeshes<'a>,
+}
+
+impl InstanceReader<'_> {
+    /// A map, none if it is missing or cannot be used. Fails only where the dataset does.
+    fn read(&self, map: Map, facts: &mut InstanceFacts) -> Result<Option<MapFile>, SceneError> {
+        let Self { plan, scene, at, atlases } = self;
+        let submission = plan.submission;
+        let folder = MapFolder { submission, scene: &scene.id, instance: &scene.instances[*at].id };
+        // A missing map, and two files for one map, are findings of `layout`.
+        let Ok([path]) = <[_; 1]>::try_from(folder.present(map)) else { return Ok(None) };
+        let name = relative(submission, &path);
+        let decoded = match SubmittedFile::read(submission, &path, MAX_MAP_BYTES) {
+            Ok(file) => map_file::decode(file, map, || atlases.mesh(*at))?,
+            Err(fault) => Err(fault),
+        };
+        match decoded {
+            Ok(file) => {
+                facts.maps += 1;
+                // A clone shares its texels.
+                facts.bytes += compact_texture(file.clone(), map).bytes().len();
+                let bad_texels = file.bad_texels.clone();
+                facts.findings.extend(bad_texels.map(|fault| fault.into_finding(Severity::Warning, name.clone())));
+                facts.findings.extend(map_remarks::remarks(&name, map, &file));
+                Ok(Some(file))
+            }
+            Err(fault) => {
+                facts.findings.push(fault.into_finding(Severity::Error, name));
+                Ok(None)
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::{LinearRgb, Picture, png_io};
+use mateval_scene::TriangleMesh;
 use mateval_scene::submission::Map;
 use mateval_submission::file_fault::FileFault;
 use mateval_submission::map_file::{MapFile, decode};
@@ -12,12 +13,18 @@ use proptest::prelude::*;
 
 use super::lint::written::{chunk, exr_header, png, rows};
 
+/// Decodes a map of an instance whose atlas has no uv, so that every texel counts.
+fn decoded(file: SubmittedFile, map: Map) -> Result<MapFile, FileFault> {
+    let atlas = TriangleMesh::default();
+    decode(file, map, || Ok(&atlas)).unwrap()
+}
+
 fn read_png(bytes: &[u8]) -> Result<MapFile, FileFault> {
-    decode(SubmittedFile::from_bytes(Path::new(""), Path::new("a.png"), bytes.to_vec()), Map::Roughness)
+    decoded(SubmittedFile::from_bytes(Path::new(""), Path::new("a.png"), bytes.to_vec()), Map::Roughness)
 }
 
 fn read_exr(bytes: &[u8]) -> Result<MapFile, FileFault> {
-    decode(SubmittedFile::from_bytes(Path::new(""), Path::new("a.exr"), bytes.to_vec()), Map::BaseColor)
+    decoded(SubmittedFile::from_bytes(Path::new(""), Path::new("a.exr"), bytes.to_vec()), Map::BaseColor)
 }
 
 #[track_caller]
@@ -138,10 +145,16 @@ fn numbers_that_are_not_finite_or_out_of_range() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.exr");
     for (value, expected) in [(f32::NAN, "nan"), (f32::NEG_INFINITY, "infinity"), (-1e-3, "out_of_range")] {
-        let picture = Picture::from_fn(64, 64, |x, y| if (x, y) == (7, 9) { value } else { 0.5 });
-        write_scalar(&path, &picture, Precision::Float).unwrap();
-        let fault = decode(SubmittedFile::read(folder.path(), &path, 1 << 20).unwrap(), Map::Metallic).unwrap_err();
+        let read = |is_bad: fn(usize, usize) -> bool| {
+            let picture = Picture::from_fn(64, 64, |x, y| if is_bad(x, y) { value } else { 0.5 });
+            write_scalar(&path, &picture, Precision::Float).unwrap();
+            decoded(SubmittedFile::read(folder.path(), &path, 1 << 20).unwrap(), Map::Metallic)
+        };
+        let fault = read(|x, y| x == 7 && y >= 9).unwrap_err();
         assert_eq!((fault.code, fault.place.as_str()), (expected, "texel (7, 9)"));
+        let file = read(|x, y| (x, y) == (7, 9)).unwrap();
+        assert_eq!(file.bad_texels.map(|fault| fault.place).as_deref(), Some("texel (7, 9)"));
+        assert_eq!(file.texture.texel(7, 9), [0.5; 3]);
     }
 }
 
@@ -159,7 +172,8 @@ proptest! {
         }
         let read = if which == 2 { read_exr(&bytes) } else { read_png(&bytes) };
         if let Ok(file) = read {
-            prop_assert!(file.texture.texel(0, 0)[0].is_finite());
+            let finite = |at: usize| file.texture.texel(at % 64, at / 64).iter().all(|value| value.is_finite());
+            prop_assert!((0..64 * 64).all(finite));
         }
     }
 }

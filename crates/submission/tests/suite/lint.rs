@@ -139,7 +139,7 @@ fn a_public_dataset_is_enough() {
     assert_eq!(codes(&look(&submission), WARNING), BTreeSet::from(["flipped_vertically".to_owned()]));
 }
 
-fn copy_public(from: &Path, to: &Path) {
+pub fn copy_public(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap().map(|entry| entry.unwrap()) {
         let place = to.join(entry.file_name());

@@ -67,6 +67,15 @@ pub const FAULTS: &[Fault] = &[
         let others = ["A", "B", "C", "D", "E", "F", "H", "I", "V"].map(|name| (name, 1));
         header(&rough(root), 4096, false, &others);
     }),
+    ("bad_texels", WARNING, |root| {
+        let samples = || {
+            let mut values = vec![0.5; 64 * 64];
+            values[32 * 64 + 32] = f32::NAN;
+            ex::FlatSamples::F32(values)
+        };
+        let image = ex::Image::from_layer(layer_of(&["V"], samples));
+        replace(&rough(root), |path| image.write().to_file(path));
+    }),
     ("nan", ERROR, |root| exr(&rough(root), &["V"], f32::NAN)),
     ("infinity", ERROR, |root| exr(&base(root), &["R", "G", "B"], f32::INFINITY)),
     ("out_of_range", ERROR, |root| exr(&rough(root), &["V"], 1.5)),
