@@ -17,6 +17,7 @@ use mateval_eval::open_scene::{OpenScene, scored_views};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::rendered_view::RenderedView;
 use mateval_eval::rgb::{EncodedLight, LightReference, rgb_metrics};
+use mateval_eval::shown_render::ViewGuide;
 use mateval_eval::texture_space::texture_space;
 use mateval_eval::truth::{RgbTruth, TrueLight, ViewTruth};
 use mateval_image::{LinearRgb, Mask};
@@ -131,8 +132,17 @@ fn score_light(
             let darker = [b, a].map(|half| half.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| 0.9 * v))));
             let [a, b] = &darker;
             let rendered = RenderedView::plain([a, a, b, b], scene.exposure);
+            let (shown, ratio) = (light.shown.clone(), truth.albedo.map(|_| LinearRgb([0.9; 3])));
+            let guide = ViewGuide {
+                truth: &shown,
+                ratio: &ratio,
+                base_color: &truth.albedo,
+                instances: &truth.instances,
+                normals: &truth.normals,
+                valid: &truth.valid,
+            };
             for _ in 0..submissions {
-                let seen = steps.of(&name("a light's encoding"), || EncodedLight::of_prediction(&rendered).unwrap());
+                let seen = steps.of(&name("a light's encoding"), || EncodedLight::of_prediction(&rendered, &guide).unwrap());
                 for mask in masks(&truth) {
                     for (what, lpips) in [("light without LPIPS", None), ("light with LPIPS", Some(lpips))] {
                         steps.of(&name(what), || {

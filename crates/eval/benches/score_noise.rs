@@ -1,8 +1,9 @@
 //! How far scores of light move with the seed, against what they state and against converged renders:
-//! `cargo bench --workspace --bench score_noise -- DATASET SCENE WEIGHTS SEEDS SUBMISSION...`, where WEIGHTS is the file with
-//! Alex' weights.
+//! `cargo bench --workspace --bench score_noise -- DATASET SCENE WEIGHTS SEEDS SAMPLES SUBMISSION...`, where WEIGHTS is the
+//! file with Alex' weights and SAMPLES the number per half, or 0 for the number that the pilot finds.
 //!
-//! Every submission is scored with SEEDS different seeds of paths and companions, and once with 1,024 samples per half. A
+//! Every submission is scored with SEEDS different seeds of paths and companions, and once with 256 samples per half and companions of 512 per
+//! half, which are as certain as thousands without companions. A
 //! row is the mean of a metric over the views of one lighting. For PSNR it shows the ratio of the stated standard error
 //! (without the truth's, which all seeds share) to the spread over seeds; for every metric the distance of the seeds' mean
 //! from the converged value, and their spread.
@@ -21,18 +22,18 @@ use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
 
 /// Samples per half of the renders that count as converged.
-const CONVERGED: u32 = 1024;
+const CONVERGED: u32 = 256;
 
 /// Samples per half of the companions' pictures with each seed: each seed makes its own.
-const COMPANION_SAMPLES: u32 = 16;
+const COMPANION_SAMPLES: u32 = 64;
 
 /// A picture's key, and its lighting.
 type Row = (ResultKey, String);
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let [dataset, scene, weights, seeds, submissions @ ..] = words.as_slice() else {
-        println!("give DATASET SCENE WEIGHTS SEEDS SUBMISSION...: nothing measured");
+    let [dataset, scene, weights, seeds, samples, submissions @ ..] = words.as_slice() else {
+        println!("give DATASET SCENE WEIGHTS SEEDS SAMPLES SUBMISSION...: nothing measured");
         return;
     };
     let dataset = Dataset::open(Path::new(dataset)).unwrap();
@@ -52,20 +53,21 @@ fn main() {
         let results = score(&plan, &|_, _, _| ()).unwrap().into_iter();
         results.map(|mut result| result.protocols.pop_first().unwrap().1).collect::<Vec<ProtocolResult>>()
     };
+    let (seeds, samples): (usize, u32) = (seeds.parse().unwrap(), samples.parse().unwrap());
     for name in Protocol::NAMES {
-        let with = |seed: &str, samples: Option<u32>| {
+        let with = |seed: &str, companion_samples: u32, samples: u32| {
             let mut protocol = Protocol::named(name).unwrap();
             let noise = &mut protocol.light.noise;
-            (noise.seed, noise.companion_samples) = (seed.to_owned(), samples.unwrap_or(COMPANION_SAMPLES));
-            if let Some(samples) = samples {
+            (noise.seed, noise.companion_samples) = (seed.to_owned(), companion_samples);
+            if samples > 0 {
                 (noise.least_samples, noise.most_samples) = (samples, samples);
-                protocol.light.fit.samples = samples;
             }
+            protocol.light.fit.samples = protocol.light.fit.samples.max(samples);
             scored(protocol)
         };
-        let converged = with("converged", Some(CONVERGED));
-        let seeds: usize = seeds.parse().unwrap();
-        let all: Vec<Vec<ProtocolResult>> = (0..seeds).map(|seed| with(&format!("seed {seed}"), None)).collect();
+        let converged = with("converged", 2 * CONVERGED, CONVERGED);
+        let all: Vec<Vec<ProtocolResult>> =
+            (0..seeds).map(|seed| with(&format!("seed {seed}"), COMPANION_SAMPLES, samples)).collect();
         for (at, submission) in submissions.iter().enumerate() {
             println!("\n{name}, {submission}");
             print_rows(&converged[at], &all.iter().map(|results| &results[at]).collect::<Vec<_>>());

@@ -69,9 +69,30 @@ impl Companions {
         Ok(Self { truth, base_colors })
     }
 
+    /// Whether a prediction has the truth's roughness and metallic, as far as its files can state them: a constant of the
+    /// truth counts as met by the byte that is nearest to it (0.5 by 128 of 255). Such predictions are rendered with the
+    /// truth's own.
+    pub(crate) fn scatter_like(&self, prediction: &PredictedScene) -> bool {
+        let pairs = prediction.materials.iter().zip(&self.truth.materials);
+        prediction.scattering_key == self.truth.scattering_key
+            || pairs.into_iter().all(|pair| match pair {
+                (Some(p), Some(t)) => is_stored(&p.roughness, &t.roughness) && is_stored(&p.metallic, &t.metallic),
+                (p, t) => p.is_none() && t.is_none(),
+            })
+    }
+
     /// The base colours of the companions on an instance with an atlas.
     pub(crate) fn base_colors(&self, instance: usize) -> Option<&[Texture; COMPANIONS]> {
         self.base_colors[instance].as_ref()
+    }
+}
+
+/// Whether a map is what a file of bytes can state of the truth's.
+fn is_stored(prediction: &Texture, truth: &Texture) -> bool {
+    let sizes = [prediction, truth].map(|map| (map.width(), map.height()));
+    match sizes {
+        [(1, 1), (1, 1)] => (prediction.texel(0, 0)[0] - truth.texel(0, 0)[0]).abs() <= 0.501 / 255.0,
+        [p, t] => p == t && prediction.bytes() == truth.bytes(),
     }
 }
 

@@ -89,19 +89,20 @@ impl<'a> LightPass<'a> {
         }
     }
 
-    /// Renders one stream of `predictions` and the scene's companions in every view, each under all `mixes`. `predictions`
-    /// agree in roughness and metallic.
+    /// Renders one stream of `predictions` and the scene's companions, each under all `mixes`. `predictions` agree in
+    /// roughness and metallic.
     pub(crate) fn trace(
         &self,
         predictions: &[&PredictedScene],
         mixes: &[LightMix],
+        cameras: &[Camera],
         samples: u32,
         stream: &str,
         what: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let repaint = self.repaint(predictions, self.lit.companions)?;
         let mixes = vec![mixes.to_vec(); repaint.predictions()];
-        self.render(&repaint, Lighting::Mixed(&mixes), &self.lit.cameras(), samples, stream, what)
+        self.render(&repaint, Lighting::Mixed(&mixes), cameras, samples, stream, what)
     }
 
     /// Renders one stream of `predictions` and the scene's companions in one view, each under every light alone.
@@ -169,7 +170,9 @@ impl<'a> LightPass<'a> {
     /// The predictions, then the companions.
     fn repaint(&self, predictions: &[&PredictedScene], companions: Option<&Companions>) -> Result<Repaint, EvalError> {
         let truth = companions.map(|companions| &companions.truth);
-        let scattering = predictions.first().copied().or(truth).expect("there is a prediction or a companion");
+        let own = predictions.first().copied();
+        let scatters_alike = own.is_none_or(|own| companions.is_some_and(|companions| companions.scatter_like(own)));
+        let scattering = own.filter(|_| !scatters_alike).or(truth).expect("there is a prediction or a companion");
         let coat = |surface: usize| {
             let material = |prediction: &PredictedScene| prediction.materials[surface].clone();
             let PredictedMaterial { roughness, metallic, .. } = material(scattering)?;
@@ -185,7 +188,7 @@ impl<'a> LightPass<'a> {
         if let Some(truth) = truth {
             let own = vec![1.0; predictions.len()];
             repaint = repaint.with_scales(own.into_iter().chain(COMPANION_SCALES).collect())?;
-            if truth.scattering_key != scattering.scattering_key {
+            if !scatters_alike {
                 let of_surface = truth.materials.iter().map(|material| {
                     let PredictedMaterial { roughness, metallic, .. } = material.clone()?;
                     Some(Scattering { roughness, metallic })

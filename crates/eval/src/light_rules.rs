@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use mateval_light::rules::{FitRules, StageRules};
+use mateval_metrics::NoiseFreeMse;
 use mateval_scene::material::PrincipledFlavour;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -85,8 +86,10 @@ pub struct RelitRules {
 pub struct NoiseRules {
     /// First word of the texts whose hashes seed the paths.
     pub seed: String,
-    /// Samples of the pilot.
+    /// Samples of the pilot, per pixel of its own.
     pub pilot_samples: u32,
+    /// Side of the pilot's pixels, in pixels of a view.
+    pub pilot_pixels: u32,
     /// The smallest number of samples; doubled until the noise is small enough or `most_samples` is reached.
     pub least_samples: u32,
     /// The largest number of samples.
@@ -95,12 +98,23 @@ pub struct NoiseRules {
     pub companion_samples: u32,
     /// The largest standard error of a scene's mean PSNR that the noise of our own paths may cause, in dB.
     pub target_db: f64,
-    /// Where the noise of truth and companions is larger than `target_db`, ours may be this share of it.
+    /// Where the noise of truth, companions and fit is larger than that, ours may be this share of it.
     pub truth_share: f64,
-    /// The largest mean variance of the encoded values of a half, which bounds what noise does to SSIM and LPIPS.
-    pub most_variance: f64,
+    /// A standard error of a picture's MSE that is small enough, whatever the MSE: predictions that are nearly the truth need
+    /// not be distinguished to `target_db`.
+    pub target_mse: f64,
     /// Side of the blocks of pixels within which noise counts as correlated, in pixels of the input view.
     pub block_pixels: u32,
+}
+
+impl NoiseRules {
+    /// The largest standard error of the mean PSNR of some pictures that is small enough, in dB: to first order that of
+    /// `target_mse`, and at least `target_db`.
+    pub fn allowed_db(&self, pictures: &[NoiseFreeMse]) -> f64 {
+        let of_mse = |picture: &NoiseFreeMse| self.target_mse / picture.bounded().max(f64::MIN_POSITIVE);
+        let mean = pictures.iter().map(of_mse).sum::<f64>() / pictures.len().max(1) as f64;
+        self.target_db.max(10.0 / std::f64::consts::LN_10 * mean)
+    }
 }
 
 impl LightRules {
@@ -119,12 +133,13 @@ impl LightRules {
             noise: NoiseRules {
                 seed: "mateval".to_owned(),
                 pilot_samples: 2,
+                pilot_pixels: 2,
                 least_samples: 4,
                 most_samples: 64,
                 companion_samples: 128,
                 target_db: 0.02,
                 truth_share: 1.0,
-                most_variance: 4e-4,
+                target_mse: 2e-5,
                 block_pixels: 16,
             },
         }

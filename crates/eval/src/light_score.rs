@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
-use mateval_metrics::{MetricError, NoiseFreeMse, psnr_mean_error};
+use mateval_metrics::{MetricError, NoiseFreeMse, NoisyRender, psnr_mean_error};
 use mateval_scene::RendererId;
 use mateval_scene::layout::INPUT;
 use rayon::prelude::*;
@@ -17,7 +17,6 @@ use crate::instance_errors::InstanceErrors;
 use crate::light_pass::LightPass;
 use crate::light_rules::{NoiseRules, Track};
 use crate::lit_scene::{LitScene, Photo};
-use crate::material_pictures::material_pictures;
 use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
@@ -25,23 +24,26 @@ use crate::relit::{LightingName, RelitLighting, lightings};
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
 use crate::rendered_view::RenderedView;
-use crate::rgb::{EncodedLight, LightReference, RgbMeasured, rgb_metrics};
+use crate::rgb::{EncodedLight, LightReference, RgbMeasured, encoded_render, rgb_metrics};
 use crate::scene_score::{NoiseScore, ScoreSheet};
 use crate::scene_task::{MaskedRegion, SceneTask, regions};
+use crate::shown_render::ViewGuide;
 use crate::truth::{RgbTruth, TrueLight, ViewTruth};
 use crate::truth_noise::{NoisyLighting, encoded_variance};
 
-/// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures.
+/// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures. `base_colors` are
+/// the submissions' in every view.
 pub(crate) fn score_light(
     task: &SceneTask<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
+    base_colors: &[Vec<Picture<LinearRgb>>],
     at: usize,
     sheets: &mut [Vec<ScoreSheet>],
 ) -> Result<(), EvalError> {
     let companions = companions(task, truths)?;
-    let scorer = LightScorer::new(task, renderer, truths, Some(&companions), &task.protocols[at])?;
-    let used = scorer.predict(&mut |submission, light| scorer.measure(light, &mut sheets[submission][at]))?;
+    let scorer = LightScorer::new(task, renderer, truths, base_colors, Some(&companions), &task.protocols[at])?;
+    let used = scorer.predict(&mut |submission, light| scorer.measure(submission, light, &mut sheets[submission][at]))?;
     for sheets in sheets {
         let score = &mut sheets[at].score;
         (score.companions, score.noisy_lightings) = (used.clone(), scorer.noisy.clone());
@@ -57,7 +59,7 @@ pub(crate) fn keep_companions(
     at: usize,
 ) -> Result<BTreeMap<String, String>, EvalError> {
     let companions = companions(task, truths)?;
-    let scorer = LightScorer::new(task, renderer, truths, Some(&companions), &task.protocols[at])?;
+    let scorer = LightScorer::new(task, renderer, truths, &[], Some(&companions), &task.protocols[at])?;
     scorer.predict(&mut |_, _| Ok(()))
 }
 
@@ -74,16 +76,18 @@ pub(crate) fn shown_light(
     task: &SceneTask<'_>,
     renderer: &RendererId,
     truths: &[ViewTruth],
+    base_colors: &[Vec<Picture<LinearRgb>>],
 ) -> Result<Vec<ShownLight>, EvalError> {
     // A display does not need what companions bring.
-    let scorer = LightScorer::new(task, renderer, truths, None, &task.protocols[0])?;
+    let scorer = LightScorer::new(task, renderer, truths, base_colors, None, &task.protocols[0])?;
     // Predictions arrive in any order.
     let mut predicted = BTreeMap::new();
     scorer.predict(&mut |submission, light| {
         let first = light.pictures.first().into_iter().flat_map(|picture| &picture.views);
-        let shown = first
-            .zip(&task.views)
-            .map(|(rendered, view)| Ok(task.locate_error(view, EncodedLight::of_prediction(rendered))?.shown()));
+        let truths = &scorer.lit.lights[&None];
+        let shown = first.zip(truths).zip(task.views.iter().enumerate()).map(|((rendered, truth), (at, view))| {
+            Ok(task.locate_error(view, scorer.encoded(submission, at, rendered, truth))?.shown())
+        });
         predicted.insert(submission, shown.collect::<Result<Vec<_>, EvalError>>()?);
         Ok(())
     })?;
@@ -121,6 +125,7 @@ impl<'a> LightScorer<'a> {
         task: &'a SceneTask<'a>,
         renderer: &RendererId,
         truths: &'a [ViewTruth],
+        base_colors: &'a [Vec<Picture<LinearRgb>>],
         companions: Option<&'a Companions>,
         protocol: &'a Protocol,
     ) -> Result<Self, EvalError> {
@@ -162,7 +167,8 @@ impl<'a> LightScorer<'a> {
             photo,
             lightings,
             companions,
-            ratios: companions.map_or_else(Vec::new, |companions| ratios(task, companions)),
+            ratios: ratios(base_colors, truths),
+            base_colors,
         };
         let lit = LitScene { blocks: noise_blocks(&protocol.light.noise, &lit.cameras()), ..lit };
         let of_dataset = task.folder.companions();
@@ -187,11 +193,25 @@ impl<'a> LightScorer<'a> {
         Ok(used.into_inner())
     }
 
-    fn measure(&self, light: PredictedLight, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
+    /// A view of a prediction, encoded.
+    fn encoded(
+        &self,
+        submission: usize,
+        view: usize,
+        rendered: &RenderedView,
+        truth: &TrueLight,
+    ) -> Result<EncodedLight, MetricError> {
+        let ViewTruth { instances, normals, valid, .. } = &self.lit.truths[view];
+        let (ratio, base_color) = (&self.lit.ratios[submission][view], &self.lit.base_colors[submission][view]);
+        let truth = &truth.shown.picture();
+        EncodedLight::of_prediction(rendered, &ViewGuide { truth, ratio, base_color, instances, normals, valid })
+    }
+
+    fn measure(&self, submission: usize, light: PredictedLight, sheet: &mut ScoreSheet) -> Result<(), EvalError> {
         let PredictedLight { pictures, fit, samples, not_finite } = light;
         let mut errors: BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>> = BTreeMap::new();
         for picture in &pictures {
-            self.measure_picture(picture, &mut errors, sheet)?;
+            self.measure_picture(submission, picture, &mut errors, sheet)?;
         }
         let rules = &self.protocol.light.noise;
         let measured = errors.into_iter().filter(|(_, mses)| !mses.is_empty());
@@ -209,6 +229,7 @@ impl<'a> LightScorer<'a> {
 
     fn measure_picture(
         &self,
+        submission: usize,
         picture: &LitPicture,
         errors: &mut BTreeMap<(PictureName, Views), Vec<NoiseFreeMse>>,
         sheet: &mut ScoreSheet,
@@ -222,13 +243,11 @@ impl<'a> LightScorer<'a> {
             .zip(truths)
             .enumerate()
             .map(|(view, (rendered, truth))| {
-                let encoded = |views: &Vec<RenderedView>| EncodedLight::of_prediction(&views[view]);
-                let of_fits = picture.of_fits.as_ref().map(|fits| -> Result<[EncodedLight; 2], MetricError> {
-                    let [a, b] = fits;
-                    Ok([encoded(a)?, encoded(b)?])
+                let of_fits = picture.of_fits.as_ref().map(|[a, b]| -> Result<_, MetricError> {
+                    Ok([encoded_render(&a[view])?, encoded_render(&b[view])?])
                 });
                 Ok(ComparedLight {
-                    light: EncodedLight::of_prediction(rendered)?,
+                    light: self.encoded(submission, view, rendered, truth)?,
                     of_fits: of_fits.transpose()?,
                     reference: LightReference::new(self.protocol, task.lpips, truth)?,
                 })
@@ -278,22 +297,16 @@ impl<'a> LightScorer<'a> {
 struct ComparedLight {
     light: EncodedLight,
     /// The prediction under the lights that each of two streams was fitted to.
-    of_fits: Option<[EncodedLight; 2]>,
+    of_fits: Option<[NoisyRender<SrgbRgb>; 2]>,
     reference: LightReference,
 }
 
 /// The base colour of every prediction over the truth's, by view.
-fn ratios(task: &SceneTask<'_>, companions: &Companions) -> Vec<Vec<Picture<LinearRgb>>> {
-    let mut ratios = vec![Vec::with_capacity(task.views.len()); task.predictions.len()];
-    let all: Vec<_> = task.predictions.iter().chain([&companions.truth]).cloned().collect();
-    for view in &task.views {
-        let mut pictures = material_pictures(task.world, task.atlases, &view.camera, &all);
-        let truth = pictures.pop().expect("the truth is the last").base_color;
-        for (ratios, predicted) in ratios.iter_mut().zip(pictures) {
-            ratios.push(base_color_ratio(&predicted.base_color, &truth));
-        }
-    }
-    ratios
+fn ratios(base_colors: &[Vec<Picture<LinearRgb>>], truths: &[ViewTruth]) -> Vec<Vec<Picture<LinearRgb>>> {
+    let of_prediction = |views: &Vec<Picture<LinearRgb>>| {
+        views.iter().zip(truths).map(|(view, truth)| base_color_ratio(view, &truth.albedo)).collect()
+    };
+    base_colors.iter().map(of_prediction).collect()
 }
 
 fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
@@ -310,9 +323,10 @@ fn psnr_noise(rules: &NoiseRules, pictures: &[NoiseFreeMse], samples: u32) -> Ps
     // Without any noise there is nothing to certify.
     let state = noise.as_ref().map_or(NoiseState::Certified, |noise| {
         let fixed = noise.shared.hypot(noise.reference).hypot(noise.common);
-        if noise.paths <= rules.target_db && fixed <= rules.target_db {
+        let allowed = rules.allowed_db(pictures);
+        if noise.paths <= allowed && fixed <= allowed {
             NoiseState::Certified
-        } else if noise.paths <= rules.target_db.max(rules.truth_share * fixed) {
+        } else if noise.paths <= allowed.max(rules.truth_share * fixed) {
             NoiseState::LimitedByTruth
         } else if samples >= rules.most_samples {
             NoiseState::SampleCap

@@ -33,7 +33,9 @@ pub(crate) struct LitScene<'a> {
     pub(crate) lightings: Vec<RelitLighting>,
     /// The companions of every prediction; without them, light takes more samples.
     pub(crate) companions: Option<&'a Companions>,
-    /// The base colour of every prediction over that of the truth, by view.
+    /// The base colour of every prediction, by view.
+    pub(crate) base_colors: &'a [Vec<Picture<LinearRgb>>],
+    /// The same over that of the truth.
     pub(crate) ratios: Vec<Vec<Picture<LinearRgb>>>,
 }
 

@@ -3,11 +3,9 @@
 use std::sync::Arc;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
-use mateval_metrics::lpips::MeanAndHalves;
 use mateval_metrics::mask::pixel_count;
 use mateval_metrics::{
-    Features, Halves, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_halves_black_fill,
-    ssim_halves_valid_windows, ssim_valid_windows,
+    Features, Lpips, MaskedSsim, MetricError, Pixel, ssim_black_fill, ssim_valid_windows,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,19 +39,6 @@ impl MaskRule {
         })
     }
 
-    /// [`Self::ssim`] of a noisy prediction.
-    pub(crate) fn ssim_halves(
-        self,
-        prediction: Halves<'_, SrgbRgb>,
-        reference: &Picture<SrgbRgb>,
-        mask: &Mask,
-    ) -> Result<Counted, MetricError> {
-        Ok(match self {
-            Self::BlackFill => (ssim_halves_black_fill(prediction, reference, mask)?, pixel_count(mask)),
-            Self::Inside => windows(ssim_halves_valid_windows(prediction, reference, mask)?),
-        })
-    }
-
     /// None where nothing counts or the picture is too small for the network. `features` are those of the reference.
     pub(crate) fn lpips(
         self,
@@ -68,23 +53,6 @@ impl MaskRule {
             (Some(features), Self::BlackFill) => lpips.black_fill_from(prediction, &features, mask),
             (Some(features), Self::Inside) => lpips.masked_from(prediction, &features, mask),
         }
-    }
-
-    /// [`Self::lpips`] of a noisy prediction.
-    pub(crate) fn lpips_halves(
-        self,
-        lpips: &Lpips,
-        prediction: MeanAndHalves<'_>,
-        reference: &Picture<SrgbRgb>,
-        features: &ReferenceFeatures,
-        mask: &Mask,
-    ) -> Result<Option<f64>, MetricError> {
-        let distance = match (self.features(lpips, reference, features, mask)?, self) {
-            (None, _) => None,
-            (Some(features), Self::BlackFill) => lpips.extrapolated_black_fill(prediction, &features, mask)?,
-            (Some(features), Self::Inside) => lpips.extrapolated_masked(prediction, &features, mask)?,
-        };
-        Ok(distance.map(|distance| distance.lpips))
     }
 
     /// The features of the reference that predictions are compared with; none where nothing counts or it is too small.

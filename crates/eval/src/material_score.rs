@@ -1,5 +1,6 @@
 //! Submissions compared with a scene's truth without light: pictures of maps, and texels.
 
+use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::submission::Map;
 use rayon::prelude::*;
@@ -42,12 +43,13 @@ struct Truth<'a> {
 }
 
 impl SceneTask<'_> {
-    /// Pictures of base colour, roughness and metallic.
+    /// Pictures of base colour, roughness and metallic. Returns the base colours of each submission, by view.
     pub(crate) fn score_materials(
         &self,
         truths: &[ViewTruth],
         sheets: &mut [Vec<ScoreSheet>],
-    ) -> Result<(), EvalError> {
+    ) -> Result<Vec<Vec<Picture<LinearRgb>>>, EvalError> {
+        let mut base_colors: Vec<Vec<Picture<LinearRgb>>> = vec![Vec::new(); self.predictions.len()];
         for (at, (view, truth)) in self.views.iter().zip(truths).enumerate() {
             (self.progress)(&format!("scene {}: materials", self.scene.id), at, self.views.len());
             let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
@@ -66,8 +68,11 @@ impl SceneTask<'_> {
                 sheet.score.add(&view.id, values?);
                 self.material_errors(&self.protocols[p], view, &predicted[s], &truth, &mut sheet.errors);
             }
+            for (base_colors, predicted) in base_colors.iter_mut().zip(predicted) {
+                base_colors.push(predicted.pictures.base_color);
+            }
         }
-        Ok(())
+        Ok(base_colors)
     }
 
     /// All metrics of a view's raw albedo, aligned albedo, roughness and metallic. The scale of the aligned albedo is fitted

@@ -1,10 +1,13 @@
 //! The pilot of a batch of predictions: a render of few samples that says how the companions correct each prediction, and
-//! how many samples it needs.
+//! how many samples it needs. Its pixels are larger than those of the views (`pilot_view`), so that it costs a part of one
+//! sample per pixel.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use mateval_image::{LinearRgb, Picture};
-use mateval_metrics::{Halves, NoiseFreeMse, NoisePsnr, NoisyRender, noise_free_mse, psnr_mean_error};
+use mateval_metrics::{Halves, NoiseFreeMse, NoisePsnr, encoded_reference, noise_free_mse, psnr_mean_error};
+use mateval_scene::Camera;
 use mateval_scene::layout::INPUT;
 use mateval_submission::prediction::PredictedScene;
 use mateval_tracer::ViewsRender;
@@ -15,10 +18,11 @@ use crate::companions::COMPANIONS;
 use crate::control_variate::{Coefficients, Regression};
 use crate::error::EvalError;
 use crate::light_pass::{LightPass, PassPictures};
-use crate::light_rules::NoiseRules;
+use crate::light_rules::{NoiseRules, Track};
 use crate::lit_scene::LitScene;
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
-use crate::rgb::{EncodedLight, LightReference};
+use crate::pilot_view::{PilotView, enlarged_pixels};
+use crate::rgb::{encode_noisy, encoded_render};
 use crate::stored_light::StoredLight;
 
 /// The input of a pilot.
@@ -27,10 +31,10 @@ pub(crate) struct Pilot<'a> {
     pub(crate) rules: &'a NoiseRules,
     pub(crate) pass: &'a LightPass<'a>,
     pub(crate) companions: Option<&'a CompanionPictures>,
-    /// The numbers of the predictions in the scene's list.
-    pub(crate) batch: &'a [usize],
     pub(crate) predictions: Vec<&'a PredictedScene>,
     pub(crate) mixes: &'a BatchMixes,
+    /// The views with large pixels, and the ratios of the predictions' base colours.
+    pub(crate) views: Vec<PilotView>,
 }
 
 /// Samples per pixel of a half, and the companions' coefficients of each picture.
@@ -44,7 +48,8 @@ pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<Found>, EvalError> {
     let (samples, pictures) = (pilot.rules.pilot_samples / 2, pilot.mixes.pictures());
     let trace = |stream: &str| {
         let what = format!("{} pilot, stream {stream}", pilot.pass.name);
-        pilot.pass.trace(&pilot.predictions, &pilot.mixes.all, samples.max(1), &format!("pilot_{stream}"), &what)
+        let stream = format!("pilot_{stream}");
+        pilot.pass.trace(&pilot.predictions, &pilot.mixes.all, &pilot.cameras(), samples.max(1), &stream, &what)
     };
     // The first half gives the coefficients; only the pictures that they leave are kept.
     let first = ["a1", "a2"].map(|stream| trace(stream).map(|renders| Stream::of(&renders, pilot.lit.scene.exposure)));
@@ -65,11 +70,7 @@ pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<Found>, EvalError> {
     pilot.add_companions(&coefficients, &mut views)?;
     let mut found = Vec::new();
     for (coefficients, views) in coefficients.into_iter().zip(views) {
-        let mut samples = pilot.rules.least_samples;
-        for (picture, views) in views.iter().enumerate() {
-            samples = samples.max(pilot.enough_samples(picture, views)?);
-        }
-        found.push((samples, coefficients));
+        found.push((pilot.enough_samples(&views)?, coefficients));
     }
     Ok(found)
 }
@@ -86,6 +87,10 @@ impl Stream {
 }
 
 impl Pilot<'_> {
+    fn cameras(&self) -> Vec<Camera> {
+        self.views.iter().map(|view| view.camera).collect()
+    }
+
     fn blank(&self, pictures: usize) -> Vec<Vec<Vec<RenderedView>>> {
         vec![vec![vec![RenderedView::empty(); self.lit.views.len()]; pictures]; self.predictions.len()]
     }
@@ -110,14 +115,13 @@ impl Pilot<'_> {
     /// Adds the valid pixels of a picture in all views.
     fn add_rows(&self, at: usize, picture: usize, [one, other]: [&Stream; 2], regression: &mut Regression) {
         let (first, place) = (self.predictions.len(), self.mixes.place(at, picture));
-        for (view, truth) in self.lit.truths.iter().enumerate() {
-            let ratio = &self.lit.ratios[self.batch[at]][view];
-            for k in (0..truth.valid.pixels().len()).filter(|&k| truth.valid.pixels()[k]) {
+        for (view, PilotView { valid, ratios, .. }) in self.views.iter().enumerate() {
+            for k in (0..valid.pixels().len()).filter(|&k| valid.pixels()[k]) {
                 let of = |variant: usize| [one, other].map(|stream| stream.0[variant][place][view].at(k));
                 let [p, q] = of(at);
                 let companions: [[f64; 3]; COMPANIONS] = std::array::from_fn(|j| {
                     let [f, g] = of(first + j);
-                    [0, 1, 2].map(|c| f64::from(ratio.pixels()[k].0[c]) * (f[c] - g[c]))
+                    [0, 1, 2].map(|c| f64::from(ratios[at].pixels()[k].0[c]) * (f[c] - g[c]))
                 });
                 let (difference, mean) = ([0, 1, 2].map(|c| p[c] - q[c]), [0, 1, 2].map(|c| 0.5 * (p[c] + q[c])));
                 regression.add(difference, companions, mean);
@@ -137,7 +141,7 @@ impl Pilot<'_> {
                         continue;
                     }
                     let companions: [Picture<LinearRgb>; COMPANIONS] = std::array::from_fn(|j| of(first + j).picture());
-                    let ratio = &self.lit.ratios[self.batch[at]][view];
+                    let ratio = &self.views[view].ratios[at];
                     // Streams are exposed already.
                     let rest = without_companions(
                         &of(at).picture(),
@@ -160,10 +164,14 @@ impl Pilot<'_> {
         let Some(companions) = self.companions else { return Ok(()) };
         for (view, shown) in self.lit.views.iter().enumerate() {
             let kept = self.pass.companion_mixes().len();
-            let [a, b] = [0, 1].map(|half| companions.read(&shown.id, half, kept));
-            let (a, b) = (a?, b?);
+            let side = self.rules.pilot_pixels as usize;
+            let read = |half: usize| -> Result<Lightings<Picture<LinearRgb>>, EvalError> {
+                let lightings = companions.read(&shown.id, half, kept)?.into_iter();
+                Ok(lightings.map(|lighting| lighting.map(|picture| enlarged_pixels(&picture, side))).collect())
+            };
+            let (a, b) = (read(0)?, read(1)?);
             for (at, pictures) in views.iter_mut().enumerate() {
-                let ratio = &self.lit.ratios[self.batch[at]][view];
+                let ratio = &self.views[view].ratios[at];
                 for (picture, rendered) in pictures.iter_mut().enumerate() {
                     let half = |half: &Lightings<Picture<LinearRgb>>| {
                         let converged = self.pass.converged(half, picture, self.mixes.mix(at, picture));
@@ -176,54 +184,45 @@ impl Pilot<'_> {
         Ok(())
     }
 
-    /// Samples that bring the noise of a picture under its bounds, in the input view and in the novel views.
-    fn enough_samples(&self, picture: usize, views: &[RenderedView]) -> Result<u32, EvalError> {
-        let (_, lighting) = self.pass.pictures.names()[picture];
-        let truths = &self.lit.lights[&lighting];
-        let mut kinds: [Vec<NoiseFreeMse>; 2] = Default::default();
-        let mut variance = 0.0_f64;
-        for (at, view) in self.lit.views.iter().enumerate() {
-            let locate = |source| {
-                let (scene, view) = (self.lit.scene.id.clone(), view.id.clone());
-                EvalError::Metric { scene, view, source }
-            };
-            let light = EncodedLight::of_prediction(&views[at]).map_err(locate)?;
-            let [a, b] = LightReference::encoded_halves(&truths[at]).map_err(locate)?;
-            let (valid, blocks) = (&self.lit.truths[at].valid, &self.lit.blocks[at]);
-            let mse = noise_free_mse(light.render(), Halves { a: &a, b: &b }, valid, blocks).map_err(locate)?;
-            variance = variance.max(mean_variance(light.render(), valid));
-            kinds[usize::from(view.id.as_str() != INPUT)].extend(mse);
+    /// Samples that bring the noise of every mean PSNR of a result under its bound: of the input view and of the novel views,
+    /// in each track.
+    fn enough_samples(&self, pictures: &[Vec<RenderedView>]) -> Result<u32, EvalError> {
+        let mut means: BTreeMap<(Track, bool), Vec<NoiseFreeMse>> = BTreeMap::new();
+        for ((track, lighting), views) in self.pass.pictures.names().into_iter().zip(pictures) {
+            for (at, view) in self.lit.views.iter().enumerate() {
+                let locate = |source| {
+                    let (scene, view) = (self.lit.scene.id.clone(), view.id.clone());
+                    EvalError::Metric { scene, view, source }
+                };
+                let light = encoded_render(&views[at]).map_err(locate)?;
+                let PilotView { valid, blocks, truths, .. } = &self.views[at];
+                let [a, b] = &truths[&lighting];
+                let [a, b] = encoded_reference(Halves { a, b }, encode_noisy).map_err(locate)?;
+                let mse = noise_free_mse(&light, Halves { a: &a, b: &b }, valid, blocks).map_err(locate)?;
+                means.entry((track, view.id.as_str() == INPUT)).or_default().extend(mse);
+            }
         }
-        let kinds = kinds.iter().filter(|mses| !mses.is_empty());
-        let errors = kinds.map(|mses| psnr_mean_error(&mses.iter().collect::<Vec<_>>()));
-        let needed = errors.map(|error| samples_under_bound(self.rules, error, variance));
+        let needed = means.values().filter(|mses| !mses.is_empty()).map(|mses| {
+            let error = psnr_mean_error(&mses.iter().collect::<Vec<_>>());
+            samples_under_bound(self.rules, error, self.rules.allowed_db(mses))
+        });
         Ok(needed.max().unwrap_or(self.rules.least_samples))
     }
 }
 
-/// The mean variance of the values of a half over the pixels of the mask; 0 without such pixels.
-fn mean_variance(render: &NoisyRender<mateval_image::SrgbRgb>, mask: &mateval_image::Mask) -> f64 {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for half in [&render.a.noise, &render.b.noise] {
-        for (pixel, _) in half.pixels().iter().zip(mask.pixels()).filter(|(_, counts)| **counts) {
-            sum += pixel.0.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-            count += 3;
-        }
-    }
-    sum / count.max(1) as f64
-}
-
-/// Samples that bring the noise under its bounds, since variance is inversely proportional to their number. `pilot` is the
-/// standard error of the pilot's mean PSNR (none: its pictures equal the truth's without noise), `variance` the mean
-/// variance of its halves.
-pub fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>, variance: f64) -> u32 {
-    let of_error = pilot.map_or(0.0, |NoisePsnr { paths, shared, reference, .. }| {
-        let bound = rules.target_db.max(rules.truth_share * shared.hypot(reference));
-        (paths / bound).powi(2)
-    });
-    let needed = f64::from(rules.pilot_samples) * of_error.max(variance / rules.most_variance);
+/// Samples that bring the noise under its bound. Variance is inversely proportional to the number of paths, and that of
+/// products of both halves' noise also to the number of samples per pixel. `pilot` is the standard error of the pilot's mean PSNR (none: its pictures equal the
+/// truth's without noise), `allowed` the error that is small enough ([`NoiseRules::allowed_db`]).
+pub fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>, allowed: f64) -> u32 {
+    let Some(NoisePsnr { paths, products, shared, reference, .. }) = pilot else { return rules.least_samples };
+    let bound = allowed.max(rules.truth_share * shared.hypot(reference));
+    let is_enough = |samples: u32| {
+        let (samples, pixels) = (f64::from(rules.pilot_samples) / f64::from(samples), f64::from(rules.pilot_pixels.pow(2)));
+        let (product, rest) = (products.powi(2), (paths.powi(2) - products.powi(2)).max(0.0));
+        (rest + product * samples) * samples / pixels <= bound.powi(2)
+    };
     let mut samples = rules.least_samples;
-    while f64::from(samples) < needed && samples < rules.most_samples {
+    while samples < rules.most_samples && !is_enough(samples) {
         samples *= 2;
     }
     samples.min(rules.most_samples)
@@ -238,19 +237,18 @@ mod tests {
     fn samples_follow_the_pilot() {
         let noise = Protocol::named("mateval-2").unwrap().light.noise;
         let (least, most, target) = (noise.least_samples, noise.most_samples, noise.target_db);
-        let samples = |paths: f64, reference: f64, variance: f64| {
-            let error = NoisePsnr { total: paths, paths, shared: 0.0, reference, common: 0.0 };
-            samples_under_bound(&noise, Some(error), variance * noise.most_variance)
+        let samples = |paths: f64, reference: f64| {
+            let error = NoisePsnr { total: paths, paths, products: 0.0, shared: 0.0, reference, common: 0.0 };
+            samples_under_bound(&noise, Some(error), target)
         };
-        let times = |factor: f64| f64::sqrt(factor / f64::from(noise.pilot_samples)) * target;
-        assert_eq!(samples(0.001 * target, 0.0, 0.0), least);
+        let pixels = f64::from(noise.pilot_pixels.pow(2));
+        let times = |factor: f64| f64::sqrt(factor * pixels / f64::from(noise.pilot_samples)) * target;
+        assert_eq!(samples(0.001 * target, 0.0), least);
         // As much as `3 * least` samples would bring to the bound: the next doubling.
-        assert_eq!(samples(times(3.0 * f64::from(least)), 0.0, 0.0), 4 * least);
-        assert_eq!(samples(1e3 * target, 0.0, 0.0), most);
+        assert_eq!(samples(times(3.0 * f64::from(least)), 0.0), 4 * least);
+        assert_eq!(samples(1e3 * target, 0.0), most);
         // A truth with as much noise of its own: as much will do.
-        assert_eq!(samples(1e3 * target, 1e3 * target, 0.0), least);
-        // Noise of pixels counts by itself.
-        assert_eq!(samples(0.0, 0.0, 3.0 * f64::from(least) / f64::from(noise.pilot_samples)), 4 * least);
-        assert_eq!(samples_under_bound(&noise, None, 0.0), least);
+        assert_eq!(samples(1e3 * target, 1e3 * target), least);
+        assert_eq!(samples_under_bound(&noise, None, target), least);
     }
 }

@@ -28,6 +28,7 @@ use crate::light_pass::{LightPass, PassPictures};
 use crate::light_rules::{LightRules, Track};
 use crate::lit_scene::LitScene;
 use crate::pilot::{Pilot, run_pilot};
+use crate::pilot_view::pilot_views;
 use crate::relit::LightingName;
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
 use crate::stored_light::StoredLight;
@@ -173,9 +174,9 @@ impl Renderer<'_> {
                 rules: &self.rules.noise,
                 pass: &self.pass,
                 companions,
-                batch: &batch,
                 predictions: self.predictions_of(&batch),
                 mixes: &self.mixes(&batch, fits),
+                views: pilot_views(&self.rules.noise, self.lit, &batch),
             };
             for (&index, (samples, coefficients)) in batch.iter().zip(run_pilot(&pilot)?) {
                 planned.insert(index, Planned { samples, coefficients });
@@ -192,7 +193,8 @@ impl Renderer<'_> {
         let (mut views, mut not_finite) = (vec![blank; batch.len()], vec![0; batch.len()]);
         for quarter in ["a1", "a2", "b1", "b2"] {
             let what = format!("{} light, {samples} samples, quarter {quarter}", self.pass.name);
-            let renders = self.pass.trace(&predictions, &mixes.all, (samples / 2).max(1), quarter, &what)?;
+            let cameras = self.lit.cameras();
+            let renders = self.pass.trace(&predictions, &mixes.all, &cameras, (samples / 2).max(1), quarter, &what)?;
             for (at, &index) in batch.iter().enumerate() {
                 not_finite[at] += renders[at].stats.not_finite;
                 for (picture, views) in views[at].iter_mut().enumerate() {
@@ -311,7 +313,10 @@ impl Renderer<'_> {
     ) -> Vec<Vec<usize>> {
         let mut alike: BTreeMap<(&str, u32), Vec<usize>> = BTreeMap::new();
         for &index in all {
-            alike.entry((&self.predictions[index].scattering_key, samples(index))).or_default().push(index);
+            let prediction = &self.predictions[index];
+            let companions = self.lit.companions.filter(|companions| companions.scatter_like(prediction));
+            let scattering = companions.map_or(prediction, |companions| &companions.truth);
+            alike.entry((&scattering.scattering_key, samples(index))).or_default().push(index);
         }
         let at_once = mateval_tracer::repaint::MOST_PREDICTIONS_AT_ONCE - self.companion_count();
         let most = (1..=at_once).rev().find(|&count| bytes(count) <= BATCH_BYTES).unwrap_or(1);

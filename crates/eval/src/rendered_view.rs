@@ -55,13 +55,14 @@ impl RenderedView {
         }
     }
 
-    /// The first half with the companions of the second in place of its own; none without companions.
-    pub(crate) fn with_other_companions(&self, first: &Picture<LinearRgb>) -> Option<Picture<LinearRgb>> {
-        let [own, other] = self.companions.as_ref()?;
+    /// A half with the companions of the other half in place of its own; none without companions. `mean` is the half.
+    pub(crate) fn with_other_companions(&self, half: usize, mean: &Picture<LinearRgb>) -> Option<Picture<LinearRgb>> {
+        let companions = self.companions.as_ref()?;
+        let (own, other) = (&companions[half], &companions[1 - half]);
         let (width, height) = own.size();
         Some(Picture::from_fn(width, height, |x, y| {
             let (own, other) = (own.at(y * width + x), other.at(y * width + x));
-            let LinearRgb(value) = first.get(x, y);
+            let LinearRgb(value) = mean.get(x, y);
             LinearRgb([0, 1, 2].map(|c| (f64::from(value[c]) + other[c] - own[c]) as f32))
         }))
     }

@@ -1,12 +1,11 @@
 //! Metrics of rendered light, without the effect of render noise.
 //!
 //! Prediction and truth are multiplied by the scene's exposure, clipped to 0..1 and sRGB-encoded. MSE and PSNR use the
-//! quarters of the prediction and the halves of the truth; SSIM and LPIPS compare the prediction's halves with the truth's
-//! denoised picture.
+//! quarters of the prediction and the halves of the truth; SSIM and LPIPS compare the prediction with little noise
+//! (`shown_render`) with the truth's denoised picture.
 
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
-use mateval_metrics::lpips::MeanAndHalves;
 use mateval_metrics::{
     Halves, Lpips, MetricError, NoiseFreeMse, NoisyHalf, NoisyRender, Psnr, encoded_reference, noise_free_mse,
 };
@@ -16,14 +15,14 @@ use crate::metric::Metric;
 use crate::protocol::{MaskRule, Protocol};
 use crate::reference_features::ReferenceFeatures;
 use crate::rendered_view::RenderedView;
+use crate::shown_render::{ViewGuide, shown_render};
 use crate::truth::TrueLight;
 
 /// A prediction's picture under one light, encoded.
 pub struct EncodedLight {
-    /// For MSE, PSNR and SSIM.
+    /// For MSE and PSNR.
     render: NoisyRender<SrgbRgb>,
-    /// Both halves and their mean within 0..1, for LPIPS and display.
-    shown_halves: [Picture<SrgbRgb>; 2],
+    /// Within 0..1, with little noise: for SSIM, LPIPS and display.
     shown: Picture<SrgbRgb>,
 }
 
@@ -55,32 +54,50 @@ fn mean_of(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb>
     })
 }
 
-impl EncodedLight {
-    /// Fails if sizes differ, which those of one render never do.
-    pub fn of_prediction(view: &RenderedView) -> Result<Self, MetricError> {
-        let quarters = [0, 1].map(|half| [0, 1].map(|quarter| view.quarter(half, quarter)));
-        let half = |half: usize| NoisyHalf::encoded([&quarters[half][0], &quarters[half][1]], encode_noisy);
-        let (a, b) = (half(0)?, half(1)?);
-        let halves = [0, 1].map(|half| mean_of(&quarters[half][0], &quarters[half][1]));
-        // The first half with the converged companions of the second shows what the companions' own noise does.
-        let shared = view.with_other_companions(&halves[0]).map(|other| {
-            Picture::from_fn(other.width(), other.height(), |x, y| {
-                let [own, other] = [&halves[0], &other].map(|picture| encode_noisy(picture.get(x, y)).0);
+/// A prediction's quarters, encoded for MSE. Fails if sizes differ, which those of one render never do.
+pub(crate) fn encoded_render(view: &RenderedView) -> Result<NoisyRender<SrgbRgb>, MetricError> {
+    let quarters = [0, 1].map(|half| [0, 1].map(|quarter| view.quarter(half, quarter)));
+    let half = |half: usize| NoisyHalf::encoded([&quarters[half][0], &quarters[half][1]], encode_noisy);
+    let (mut a, mut b) = (half(0)?, half(1)?);
+    // Each half with the converged companions of the other shows what the companions' own noise does.
+    let means = [0, 1].map(|half| mean_of(&quarters[half][0], &quarters[half][1]));
+    let other = |half: usize| view.with_other_companions(half, &means[half]);
+    let shared = match (other(0), other(1)) {
+        (Some(of_a), Some(of_b)) => {
+            remove_bias(&mut a.estimate, &means[0], &of_a);
+            remove_bias(&mut b.estimate, &means[1], &of_b);
+            Some(Picture::from_fn(of_a.width(), of_a.height(), |x, y| {
+                let [own, other] = [&means[0], &of_a].map(|picture| encode_noisy(picture.get(x, y)).0);
                 SrgbRgb([0, 1, 2].map(|c| own[c] - other[c]))
-            })
-        });
-        let shown = mean_of(&halves[0], &halves[1]).to_srgb();
-        Ok(Self { render: NoisyRender { a, b, shared }, shown_halves: halves.map(|half| half.to_srgb()), shown })
+            }))
+        }
+        _ => None,
+    };
+    Ok(NoisyRender { a, b, shared })
+}
+
+/// Takes off an encoded half the bias that the noise of its companions' converged pictures causes in encoding: the same as
+/// for the truth's halves, from the half with its own companions and with those of the other half.
+fn remove_bias(estimate: &mut Picture<SrgbRgb>, own: &Picture<LinearRgb>, other: &Picture<LinearRgb>) {
+    let mean = mean_of(own, other);
+    *estimate = Picture::from_fn(own.width(), own.height(), |x, y| {
+        let [own, other, mean] = [own, other, &mean].map(|picture| encode_noisy(picture.get(x, y)).0);
+        let encoded = estimate.get(x, y).0;
+        SrgbRgb([0, 1, 2].map(|c| encoded[c] - (own[c] + other[c] - 2.0 * mean[c])))
+    });
+}
+
+impl EncodedLight {
+    /// Encodes a prediction's view. Fails if sizes differ, which those of one render never do.
+    pub fn of_prediction(view: &RenderedView, guide: &ViewGuide<'_>) -> Result<Self, MetricError> {
+        let [a, b] = [0, 1].map(|half| mean_of(&view.quarter(half, 0), &view.quarter(half, 1)));
+        let shown = shown_render([&a, &b], guide).to_srgb();
+        Ok(Self { render: encoded_render(view)?, shown })
     }
 
     /// The picture for display.
     pub(crate) fn shown(self) -> Picture<SrgbRgb> {
         self.shown
-    }
-
-    /// The quarters, encoded for MSE.
-    pub(crate) fn render(&self) -> &NoisyRender<SrgbRgb> {
-        &self.render
     }
 
     /// The squared error of pixel `k`, mean over channels, free of noise: the product of both halves' differences.
@@ -119,7 +136,7 @@ pub fn rgb_metrics(
     protocol: &Protocol,
     lpips: Option<&Lpips>,
     prediction: &EncodedLight,
-    of_fits: Option<&[EncodedLight; 2]>,
+    of_fits: Option<&[NoisyRender<SrgbRgb>; 2]>,
     reference: &LightReference,
     mask: &Mask,
     blocks: &Picture<u32>,
@@ -127,17 +144,15 @@ pub fn rgb_metrics(
     let halves = Halves { a: &reference.halves[0], b: &reference.halves[1] };
     let mut mse = noise_free_mse(&prediction.render, halves, mask, blocks)?;
     if let (Some(mse), Some(of_fits)) = (&mut mse, of_fits) {
-        let [a, b] = of_fits.each_ref().map(|light| noise_free_mse(&light.render, halves, mask, blocks));
+        let [a, b] = of_fits.each_ref().map(|render| noise_free_mse(render, halves, mask, blocks));
         mse.common = a?.zip(b?).map_or(0.0, |(a, b)| (a.mse - b.mse) / 2.0);
     }
     let pixels = mateval_metrics::mask::pixel_count(mask);
     let mut values = noise_free_values(mse.as_ref(), pixels)?;
-    values.push(ssim_metric(protocol.mask_rule.ssim_halves(prediction.render.halves(), &reference.shown, mask)?));
+    values.push(ssim_metric(protocol.mask_rule.ssim(&prediction.shown, &reference.shown, mask)?));
     if let Some(lpips) = lpips {
-        let [a, b] = &prediction.shown_halves;
-        let seen = MeanAndHalves { mean: &prediction.shown, a, b };
-        let features = &reference.features;
-        let distance = protocol.mask_rule.lpips_halves(lpips, seen, &reference.shown, features, mask)?;
+        let (shown, features) = (&prediction.shown, &reference.features);
+        let distance = protocol.mask_rule.lpips(lpips, shown, &reference.shown, features, mask)?;
         values.push(rounded_lpips(protocol, distance, pixels));
     }
     Ok(RgbMeasured { values, mse })

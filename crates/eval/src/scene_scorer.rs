@@ -11,11 +11,11 @@ pub(crate) fn score_scene(task: &SceneTask<'_>) -> Result<Vec<Vec<SceneScore>>, 
     let truths = task.views.iter().map(|view| ViewTruth::read(task.folder, view)).collect::<Result<Vec<_>, _>>()?;
     let blank = || task.protocols.iter().map(|_| ScoreSheet::default()).collect();
     let mut sheets: Vec<Vec<ScoreSheet>> = task.predictions.iter().map(|_| blank()).collect();
-    task.score_materials(&truths, &mut sheets)?;
+    let base_colors = task.score_materials(&truths, &mut sheets)?;
     task.score_texels(&mut sheets)?;
     if let Some(renderer) = task.renderer {
         for at in 0..task.protocols.len() {
-            score_light(task, renderer, &truths, at, &mut sheets)?;
+            score_light(task, renderer, &truths, &base_colors, at, &mut sheets)?;
         }
     }
     let finish = |sheet: ScoreSheet| SceneScore { instances: sheet.errors.finish(task.scene), ..sheet.score };

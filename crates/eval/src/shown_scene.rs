@@ -86,7 +86,12 @@ pub fn scene_light(
         inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
         progress,
     };
-    let shown = shown_light(&task, renderer, &truths)?;
+    let mut base_colors = vec![Vec::new(); predictions.len()];
+    for view in &task.views {
+        let pictures = material_pictures(&world, &atlases, &view.camera, &predictions);
+        base_colors.iter_mut().zip(pictures).for_each(|(views, pictures)| views.push(pictures.base_color));
+    }
+    let shown = shown_light(&task, renderer, &truths, &base_colors)?;
     let rows = truths.into_iter().zip(shown);
     Ok(rows.map(|(truth, shown)| SceneLight { truth, shown }).collect())
 }

@@ -1,6 +1,6 @@
 //! The ground truth of views: maps, masks and light.
 
-use mateval_image::{LinearRgb, Mask, Picture, exr_io, png_io};
+use mateval_image::{LinearRgb, Mask, Normal, Picture, exr_io, png_io};
 use mateval_scene::RendererId;
 use mateval_scene::dataset::View;
 use mateval_scene::layout::{INPUT, SceneFolder};
@@ -26,6 +26,8 @@ pub struct ViewTruth {
     pub specular: Option<Mask>,
     /// Instance index of each pixel's centre, 0 for nothing.
     pub instances: Picture<u16>,
+    /// Normal at each pixel's centre, in world space.
+    pub normals: Picture<Normal>,
 }
 
 impl ViewTruth {
@@ -41,6 +43,7 @@ impl ViewTruth {
             metallic: exr_io::read_scalar(&hidden.join("metallic.exr"))?,
             specular: None,
             instances: png_io::read_ids(&shown.join("instance.png"))?,
+            normals: exr_io::read_normal(&shown.join("normal.exr"))?,
             unobserved,
             valid,
         };
@@ -52,6 +55,7 @@ impl ViewTruth {
             size(&truth.valid),
             truth.unobserved.as_ref().map_or(size(&truth.valid), size),
             size(&truth.instances),
+            size(&truth.normals),
             size(&specular),
         ];
         check_sizes(view, &sizes)?;

@@ -9,8 +9,7 @@
 //! since their windows reach across its edge; [`mask`] holds the two ways to fill those pixels.
 //!
 //! Renders are noisy, and a metric counts noise as error. For a prediction in four independent quarters ([`noisy_render`]),
-//! these modules estimate the metric without noise: [`mod@noise_free`], [`mod@ssim_halves`], and the extrapolated
-//! distances of [`Lpips`].
+//! [`mod@noise_free`] estimates the mean squared error without noise.
 //!
 //! Means are summed in `f64` in a fixed order, so the number of threads changes no bit. A NaN or infinite value inside
 //! the mask is an error; values outside the mask are not read.
@@ -25,15 +24,13 @@ pub mod noisy_render;
 pub mod pixel;
 pub mod psnr;
 pub mod ssim;
-pub mod ssim_halves;
 
 pub use error::MetricError;
 pub use halves::Halves;
-pub use lpips::{ExtrapolatedLpips, Features, Lpips, MeanAndHalves, Net};
+pub use lpips::{Features, Lpips, Net};
 pub use mse::mse;
 pub use noise_free::{BlockNoise, NoiseFreeMse, NoiseFreePsnr, NoisePsnr, Variances, noise_free_mse, psnr_mean_error};
 pub use noisy_render::{NoisyHalf, NoisyRender, encoded_reference};
 pub use pixel::Pixel;
 pub use psnr::Psnr;
 pub use ssim::{MaskedSsim, ssim, ssim_black_fill, ssim_map, ssim_valid_windows};
-pub use ssim_halves::{ssim_halves, ssim_halves_black_fill, ssim_halves_valid_windows};

@@ -66,6 +66,9 @@ pub struct BlockNoise {
 pub struct Variances {
     /// From the prediction's paths, which more samples lower.
     pub paths: f64,
+    /// The part of [`Self::paths`] that comes from products of both halves' noise: it falls with the square of the number of
+    /// samples, the rest in proportion.
+    pub products: f64,
     /// From the noise that the quarters of a half share.
     pub shared: f64,
     /// From the reference.
@@ -91,11 +94,13 @@ impl Variances {
         let mut sum = Self { common: common.powi(2), ..Self::default() };
         for block in blocks {
             sum.paths += block.first_half.powi(2) + block.second_half.powi(2) - block.both_halves.powi(2);
+            sum.products += block.both_halves.powi(2);
             sum.shared += block.shared.powi(2) - block.paths_in_shared.powi(2);
             sum.reference += block.reference.powi(2) - block.paths_in_reference.powi(2);
         }
-        let Self { paths, shared, reference, common } = sum;
-        Self { paths: paths.max(0.0), shared: shared.max(0.0), reference: reference.max(0.0), common }
+        let Self { paths, products, shared, reference, common } = sum;
+        let paths = paths.max(0.0);
+        Self { paths, products: products.min(paths), shared: shared.max(0.0), reference: reference.max(0.0), common }
     }
 
     /// From all sources.
@@ -227,6 +232,8 @@ pub struct NoisePsnr {
     pub total: f64,
     /// From the predictions' paths.
     pub paths: f64,
+    /// The part of it that comes from products of both halves' noise ([`Variances::products`]).
+    pub products: f64,
     /// From the noise that the quarters of a half share.
     pub shared: f64,
     /// From the references' noise.
@@ -256,6 +263,7 @@ pub fn psnr_mean_error(views: &[&NoiseFreeMse]) -> Option<NoisePsnr> {
     Some(NoisePsnr {
         total: variances.total().sqrt(),
         paths: variances.paths.sqrt(),
+        products: variances.products.sqrt(),
         shared: variances.shared.sqrt(),
         reference: variances.reference.sqrt(),
         common: variances.common.sqrt(),

@@ -7,10 +7,12 @@
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
+use mateval_eval::material_pictures::material_pictures;
 use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::rgb::encode_noisy;
+use mateval_eval::shown_render::{ViewGuide, shown_render};
 use mateval_eval::truth::ViewTruth;
-use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb, Texels, Texture};
+use mateval_image::{LinearRgb, Mask, Normal, Picture, SrgbRgb, Texels, Texture};
 use mateval_metrics::{Halves, NoisyHalf, NoisyRender};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
 use mateval_submission::atlas_meshes::AtlasMeshes;
@@ -53,6 +55,10 @@ pub struct Room {
     pub blocks: Vec<Picture<u32>>,
     world: World,
     repaint: Repaint,
+    /// The true base colours of the input view.
+    base_color: Picture<LinearRgb>,
+    instances: Picture<u16>,
+    normals: Picture<Normal>,
 }
 
 /// Renders of one number of samples.
@@ -98,7 +104,24 @@ impl Room {
         });
         let valid = valid.collect();
         let blocks = noise_blocks(&hasty().light.noise, &cameras);
-        Self { cameras, valid, blocks, world, repaint }
+        let base_color = material_pictures(&world, &atlases, &cameras[0], std::slice::from_ref(&predicted)).remove(0).base_color;
+        let (truth, k) = (ViewTruth::read(&folder, &views[0]).unwrap(), cameras[0].intrinsics);
+        let place = |at: usize| ((at as f64 + 0.5) / SCALE) as usize;
+        let (width, height) = (k.width as usize, k.height as usize);
+        let instances = Picture::from_fn(width, height, |x, y| truth.instances.get(place(x), place(y)));
+        let normals = Picture::from_fn(width, height, |x, y| truth.normals.get(place(x), place(y)));
+        Self { cameras, valid, blocks, world, repaint, base_color, instances, normals }
+    }
+
+    /// The input view of a prediction as it is shown, from its halves and the truth without noise.
+    pub fn shown(&self, other: usize, halves: &Pair, truth: &Picture<LinearRgb>) -> Picture<LinearRgb> {
+        let factor = FACTORS[other];
+        let scaled = |LinearRgb(rgb): LinearRgb| LinearRgb([0, 1, 2].map(|c| rgb[c] * factor[c]));
+        let base_color = self.base_color.map(scaled);
+        let ratio = self.base_color.map(|_| LinearRgb(factor));
+        let (instances, normals, valid) = (&self.instances, &self.normals, &self.valid[0]);
+        let guide = ViewGuide { truth, ratio: &ratio, base_color: &base_color, instances, normals, valid };
+        shown_render([&halves[0], &halves[1]], &guide)
     }
 
     /// The pictures of every seed, by prediction and view; one bounce gives enough noise.

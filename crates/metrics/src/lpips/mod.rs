@@ -11,7 +11,6 @@
 
 mod convolution;
 mod distance;
-mod extrapolated;
 mod features;
 mod multiply;
 mod net;
@@ -24,7 +23,6 @@ use std::path::Path;
 
 use mateval_image::{Mask, Picture, SrgbRgb};
 
-pub use extrapolated::{ExtrapolatedLpips, MeanAndHalves};
 pub use features::{EPSILON, Features, SCALE, SHIFT};
 pub use net::{ALEX_FILE_NAME, ALEX_SHA256, Net, VGG_FILE_NAME, VGG_SHA256};
 

@@ -209,45 +209,6 @@ fn black_fill_by_its_definition() {
     assert!((found - lpips.whole(&p, &r).unwrap()).abs() > 0.1 * whole);
 }
 
-/// The extrapolation equals its definition under both mask rules.
-#[test]
-fn the_extrapolation_by_its_definition() {
-    let (lpips, r) = (tiny(), noise(24, 18, 20));
-    let mask = Picture::from_fn(24, 18, |x, y| x > 6 && y < 12);
-    let [mean, mut a, b] = [21, 22, 23].map(|seed| noise(24, 18, seed));
-    a.set(3, 3, SrgbRgb([f32::NAN; 3]));
-    let noisy = MeanAndHalves { mean: &mean, a: &a, b: &b };
-    let expected =
-        |distance: &dyn Fn(&Picture<SrgbRgb>) -> f64| 2.0 * distance(&mean) - (distance(&a) + distance(&b)) / 2.0;
-    let (whole, black) = (lpips.features(&r).unwrap(), lpips.black_filled_features(&r, &mask).unwrap());
-    let found = lpips.extrapolated_masked(noisy, &whole, &mask).unwrap().unwrap();
-    assert_eq!(found.lpips, expected(&|p| lpips.masked(p, &r, &mask).unwrap().unwrap()));
-    assert_eq!(found.lpips, 2.0 * found.of_mean - found.of_halves);
-    let found = lpips.extrapolated_black_fill(noisy, &black, &mask).unwrap().unwrap();
-    assert_eq!(found.lpips, expected(&|p| lpips.black_fill(p, &r, &mask).unwrap().unwrap()));
-    // The twin: features of the other mask rule give another value.
-    assert_ne!(lpips.extrapolated_black_fill(noisy, &whole, &mask).unwrap(), Some(found));
-    let none = Picture::filled(24, 18, false);
-    assert_eq!(lpips.extrapolated_masked(noisy, &whole, &none).unwrap(), None);
-    assert_eq!(lpips.extrapolated_black_fill(noisy, &black, &none).unwrap(), None);
-    a.set(10, 3, SrgbRgb([f32::NAN; 3]));
-    let error = lpips.extrapolated_black_fill(MeanAndHalves { mean: &mean, a: &a, b: &b }, &black, &mask).unwrap_err();
-    assert!(matches!(error, MetricError::NotFinite { picture: "prediction's first half", x: 10, y: 3, .. }));
-    let small = noise(18, 18, 24);
-    let error =
-        lpips.extrapolated_black_fill(MeanAndHalves { mean: &mean, a: &b, b: &small }, &black, &mask).unwrap_err();
-    assert!(matches!(error, MetricError::SizesDiffer { what: "prediction's second half", .. }));
-}
-
-/// Without noise the extrapolation changes nothing.
-#[test]
-fn equal_halves_are_plain_lpips() {
-    let (lpips, p, r, mask) = (tiny(), noise(20, 20, 25), noise(20, 20, 26), Picture::from_fn(20, 20, |x, _| x > 4));
-    let same = MeanAndHalves { mean: &p, a: &p, b: &p };
-    let found = lpips.extrapolated_masked(same, &lpips.features(&r).unwrap(), &mask).unwrap().unwrap();
-    assert_eq!(Some(found.lpips), lpips.masked(&p, &r, &mask).unwrap());
-}
-
 /// The least sides follow from the real layers: with one pixel less, a stage has no pixel.
 #[test]
 fn least_sides_of_the_real_networks() {
