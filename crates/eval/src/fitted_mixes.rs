@@ -83,7 +83,7 @@ impl MixFit<'_> {
 
     fn regressed(&self, streams: &[Vec<ViewsRender>; 2], at: usize) -> Coefficients {
         let (photo, lights) = (&self.lit.photo, self.pass.lights.len());
-        let ratio = &self.lit.ratios[self.batch[at]][photo.place];
+        let ratio = &self.lit.ratio(self.batch[at], photo.place);
         // The scale at which the lights together are about as bright as the photo.
         let sum = |picture: &Picture<LinearRgb>| -> f64 {
             picture.pixels().iter().flat_map(|rgb| rgb.0).map(f64::from).sum()
@@ -132,10 +132,10 @@ impl MixFit<'_> {
         coefficients: &Coefficients,
     ) -> LightBasis {
         let photo = &self.lit.photo;
+        let ratio = &self.lit.ratio(self.batch[at], photo.place);
         let light = |light: usize| {
             let own = picture_of(&renders[at], 0, light);
             let Some(converged) = converged else { return own.clone() };
-            let ratio = &self.lit.ratios[self.batch[at]][photo.place];
             Picture::from_fn(own.width(), own.height(), |x, y| {
                 let difference: [[f64; 3]; COMPANIONS] = std::array::from_fn(|j| {
                     // Converged pictures are exposed.

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::companions::COMPANION_SCALES;
 use crate::control_variate;
 use crate::metric::LPIPS_NET;
+use crate::shown_render;
 
 /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -84,6 +85,14 @@ pub struct FixedRules {
     pub fit_step_share: f64,
     /// Fitted radiances below this, relative to the target's mean, may become 0.
     pub fit_zero_below: f64,
+    /// The number of passes of the filter that removes noise from what SSIM and LPIPS compare.
+    pub shown_passes: u32,
+    /// The difference between pixels at which that filter counts them a quarter, in standard deviations of the noise.
+    pub shown_deviations: f32,
+    /// The least cosine between the normals of pixels that it averages.
+    pub shown_least_cosine: f32,
+    /// The least base colour that it divides light by.
+    pub shown_least_base_color: f32,
     /// The factors of the companions' base colours.
     pub companion_scales: Vec<f32>,
     /// The largest ratio of a prediction's base colour to the truth's by which companions are multiplied.
@@ -133,6 +142,10 @@ impl FixedRules {
             fit_most_steps: light_fit::MOST_STEPS,
             fit_step_share: light_fit::STEP_SHARE,
             fit_zero_below: light_fit::ZERO_BELOW,
+            shown_passes: shown_render::PASSES,
+            shown_deviations: shown_render::DEVIATIONS,
+            shown_least_cosine: shown_render::LEAST_COSINE,
+            shown_least_base_color: shown_render::LEAST_BASE_COLOR,
             companion_scales: COMPANION_SCALES.to_vec(),
             companion_most_ratio: control_variate::MOST_RATIO,
             companion_least_base_color: control_variate::LEAST_BASE_COLOR,

@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use crate::companion_store::CompanionStore;
 use crate::companions::Companions;
-use crate::control_variate::base_color_ratio;
 use crate::error::EvalError;
 use crate::instance_errors::InstanceErrors;
 use crate::light_pass::LightPass;
@@ -167,7 +166,6 @@ impl<'a> LightScorer<'a> {
             photo,
             lightings,
             companions,
-            ratios: ratios(base_colors, truths),
             base_colors,
         };
         let lit = LitScene { blocks: noise_blocks(&protocol.light.noise, &lit.cameras()), ..lit };
@@ -202,7 +200,7 @@ impl<'a> LightScorer<'a> {
         truth: &TrueLight,
     ) -> Result<EncodedLight, MetricError> {
         let ViewTruth { instances, normals, valid, .. } = &self.lit.truths[view];
-        let (ratio, base_color) = (&self.lit.ratios[submission][view], &self.lit.base_colors[submission][view]);
+        let (ratio, base_color) = (&self.lit.ratio(submission, view), &self.lit.base_colors[submission][view]);
         let truth = &truth.shown.picture();
         EncodedLight::of_prediction(rendered, &ViewGuide { truth, ratio, base_color, instances, normals, valid })
     }
@@ -299,14 +297,6 @@ struct ComparedLight {
     /// The prediction under the lights that each of two streams was fitted to.
     of_fits: Option<[NoisyRender<SrgbRgb>; 2]>,
     reference: LightReference,
-}
-
-/// The base colour of every prediction over the truth's, by view.
-fn ratios(base_colors: &[Vec<Picture<LinearRgb>>], truths: &[ViewTruth]) -> Vec<Vec<Picture<LinearRgb>>> {
-    let of_prediction = |views: &Vec<Picture<LinearRgb>>| {
-        views.iter().zip(truths).map(|(view, truth)| base_color_ratio(view, &truth.albedo)).collect()
-    };
-    base_colors.iter().map(of_prediction).collect()
 }
 
 fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {

@@ -8,6 +8,7 @@ use mateval_scene::{Camera, TriangleMesh};
 use mateval_tracer::World;
 
 use crate::companions::Companions;
+use crate::control_variate::base_color_ratio;
 use crate::relit::{LightingName, RelitLighting};
 use crate::truth::{TrueLight, ViewTruth};
 
@@ -35,8 +36,6 @@ pub(crate) struct LitScene<'a> {
     pub(crate) companions: Option<&'a Companions>,
     /// The base colour of every prediction, by view.
     pub(crate) base_colors: &'a [Vec<Picture<LinearRgb>>],
-    /// The same over that of the truth.
-    pub(crate) ratios: Vec<Vec<Picture<LinearRgb>>>,
 }
 
 /// The input view as the truth shows it.
@@ -53,6 +52,11 @@ pub(crate) struct Photo<'a> {
 }
 
 impl LitScene<'_> {
+    /// The base colour of a prediction over that of the truth, in view number `view`.
+    pub(crate) fn ratio(&self, prediction: usize, view: usize) -> Picture<LinearRgb> {
+        base_color_ratio(&self.base_colors[prediction][view], &self.truths[view].albedo)
+    }
+
     /// The cameras of the views.
     pub(crate) fn cameras(&self) -> Vec<Camera> {
         self.views.iter().map(|view| view.camera).collect()

@@ -37,7 +37,7 @@ pub(crate) fn pilot_views(rules: &NoiseRules, lit: &LitScene<'_>, batch: &[usize
             camera,
             valid: Mask::from_fn(width, height, |x, y| parts(x, y).all(|(x, y)| valid.get(x, y))),
             blocks,
-            ratios: batch.iter().map(|&index| enlarged_pixels(&lit.ratios[index][at], side)).collect(),
+            ratios: batch.iter().map(|&index| enlarged_pixels(&lit.ratio(index, at), side)).collect(),
             truths: lit.lights.iter().map(|(name, views)| (*name, halves(&views[at]))).collect(),
         }
     };

@@ -223,7 +223,7 @@ impl Renderer<'_> {
             } else {
                 // The companions come after the predictions.
                 let companions = std::array::from_fn(|j| of(renders.len() - COMPANIONS + j));
-                let ratio = &self.lit.ratios[index][view];
+                let ratio = &self.lit.ratio(index, view);
                 without_companions(of(at), companions, coefficients, ratio, exposure)
             });
         }
@@ -246,10 +246,11 @@ impl Renderer<'_> {
                 for half in 0..HALVES.len() {
                     let converged = companions.read(&shown.id, half, kept)?;
                     let of = |(at, &index): (usize, &usize)| {
+                        let ratio = self.lit.ratio(index, view);
                         let picture = |picture: usize| {
                             let companions = self.pass.converged(&converged, picture, mixes.mix(at, picture));
                             let coefficients = &planned[index].coefficients[picture];
-                            of_companions(&companions, coefficients, &self.lit.ratios[index][view])
+                            of_companions(&companions, coefficients, &ratio)
                         };
                         (0..mixes.pictures()).map(picture).collect()
                     };

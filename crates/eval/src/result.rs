@@ -18,13 +18,13 @@ use crate::result_key::{PictureKind, PictureName, Region, ResultKey, Views};
 use crate::word_enum::UnknownWord;
 
 /// The word for this version of a result.
-pub const RESULT_FORMAT: &str = "mateval-result/4";
+pub const RESULT_FORMAT: &str = "mateval-result/5";
 
 /// A submission's scores on a dataset.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResultFile {
-    /// Always `mateval-result/4`.
+    /// Always `mateval-result/5`.
     pub format: String,
     /// Program and version, as in `mateval 0.1.0`.
     pub tool: String,

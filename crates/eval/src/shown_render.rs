@@ -15,7 +15,7 @@ use rayon::prelude::*;
 pub const PASSES: u32 = 5;
 
 /// The difference between pixels at which they count a quarter, in standard deviations of the noise.
-pub const DEVIATIONS: f32 = 2.5;
+pub const DEVIATIONS: f32 = 4.0;
 
 /// The least cosine between the normals of pixels that are averaged.
 pub const LEAST_COSINE: f32 = 0.9;

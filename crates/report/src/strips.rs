@@ -216,7 +216,7 @@ pub(crate) fn grid(rows: &[Vec<Picture<[u8; 3]>>]) -> Picture<[u8; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use mateval_image::Mask;
+    use mateval_image::{Mask, Normal};
 
     use super::*;
 
@@ -232,6 +232,7 @@ mod tests {
             unobserved,
             specular: None,
             instances: Picture::filled(4, 3, 1),
+            normals: Picture::filled(4, 3, Normal::default()),
         };
         albedo_row(SceneAlbedo { truth, predicted })
     }

@@ -13,7 +13,7 @@ use mateval_eval::relit::lightings;
 use mateval_eval::score::score;
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_stage;
-use mateval_metrics::NoisePsnr;
+use mateval_metrics::{NoiseFreeMse, NoisePsnr};
 use mateval_scene::Camera;
 use mateval_testkit::box_room::{self, box_room, quad};
 use mateval_tracer::World;
@@ -26,7 +26,7 @@ use mateval_testkit::kept_folder::kept_folder;
 type Reading = (&'static str, fn(&Protocol) -> Value);
 
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
-const READINGS: [Reading; 17] = [
+const READINGS: [Reading; 19] = [
     ("/name", scores),
     ("/mask_rule", scores),
     ("/albedo_space", scores),
@@ -37,7 +37,9 @@ const READINGS: [Reading; 17] = [
     ("/light/roulette_", light),
     ("/light/stage/", stage),
     ("/light/fit/", light),
+    ("/light/relit/most_truth_variance", light),
     ("/light/relit/", relit),
+    ("/light/noise/seed", light),
     ("/light/noise/block_pixels", blocks),
     ("/light/noise/least_samples", light),
     ("/light/noise/companion_samples", light),
@@ -146,12 +148,16 @@ fn blocks(protocol: &Protocol) -> Value {
     json!(noise_blocks(&protocol.light.noise, &cameras)[0].pixels())
 }
 
-/// Samples that pilots of several noises ask for, below and above the truth's own noise.
+/// Samples that pilots of several noises ask for, below and above the truth's own noise, of predictions near the truth and
+/// far from it.
 fn samples(protocol: &Protocol) -> Value {
+    let rules = &protocol.light.noise;
+    let picture = |mse: f64| NoiseFreeMse { mse, pixels: 1, blocks: Vec::new(), common: 0.0 };
+    let allowed = [1e-5, 1e-1].map(|mse| rules.allowed_db(&[picture(mse)]));
     let noises = [0.01, 0.02, 0.04, 0.08, 0.16, 9.0].map(|own| [0.0, 0.04].map(|reference| (own, reference)));
     let asked = noises.as_flattened().iter().map(|&(paths, reference)| {
-        let pilot = NoisePsnr { total: paths, paths, shared: 0.0, reference, common: 0.0 };
-        [0.0, 5e-4].map(|variance| samples_under_bound(&protocol.light.noise, Some(pilot), variance))
+        let pilot = NoisePsnr { total: paths, paths, products: 0.5 * paths, shared: 0.0, reference, common: 0.0 };
+        allowed.map(|allowed| (samples_under_bound(rules, Some(pilot), allowed), allowed))
     });
     json!(asked.collect::<Vec<_>>())
 }

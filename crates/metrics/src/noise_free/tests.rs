@@ -84,8 +84,14 @@ fn a_small_number_by_hand() {
     let second = BlockNoise { first_half: 0.015625, second_half: 0.0625, both_halves: 0.015625, ..Default::default() };
     assert_eq!(found.blocks, [(3, first), (7, second)]);
     let paths = 0.015625_f64.powi(2) + 0.0625_f64.powi(2);
-    assert_eq!(found.variances(), Variances { paths, shared: 0.0, reference: 0.0 });
+    let products = 0.015625_f64.powi(2);
+    assert_eq!(found.variances(), Variances { paths, products, shared: 0.0, reference: 0.0, common: 0.0 });
     assert_eq!(found.standard_error(), paths.sqrt());
+    // An error that all pixels have in common adds its square, and over views it adds before it is squared.
+    let fitted = NoiseFreeMse { common: 0.25, ..found.clone() };
+    assert_eq!(fitted.variances().total(), paths + 0.0625);
+    let [one, two] = [&[&fitted][..], &[&fitted, &fitted][..]].map(|views| psnr_mean_error(views).unwrap().common);
+    assert!((one - 10.0 / LN_10 * 0.25 / fitted.bounded()).abs() < 1e-12 && (one - two).abs() < 1e-12);
     assert_eq!(error([false, true]).unwrap().mse, 0.0625);
     assert_eq!(error([false, false]), None);
 }

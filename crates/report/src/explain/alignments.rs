@@ -120,6 +120,8 @@ fn aligned(by: AlignedBy, scales: &Scales, number: usize, view: &SceneAlbedo) ->
 
 #[cfg(test)]
 mod tests {
+    use mateval_image::Normal;
+
     use super::*;
     use mateval_eval::truth::ViewTruth;
 
@@ -138,6 +140,7 @@ mod tests {
                 unobserved: (number > 0).then(|| Picture::from_fn(6, 4, |x, _| x == 5)),
                 specular: None,
                 instances: Picture::from_fn(6, 4, |x, _| if x < 3 { 1 } else { 2 }),
+                normals: Picture::filled(6, 4, Normal::default()),
             };
             SceneAlbedo { truth, predicted: vec![predicted] }
         };
