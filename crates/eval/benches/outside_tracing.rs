@@ -142,7 +142,8 @@ fn score_light(
                 valid: &truth.valid,
             };
             for _ in 0..submissions {
-                let seen = steps.of(&name("a light's encoding"), || EncodedLight::of_prediction(&rendered, &guide).unwrap());
+                let seen =
+                    steps.of(&name("a light's encoding"), || EncodedLight::of_prediction(&rendered, &guide).unwrap());
                 for mask in masks(&truth) {
                     for (what, lpips) in [("light without LPIPS", None), ("light with LPIPS", Some(lpips))] {
                         steps.of(&name(what), || {

@@ -87,7 +87,8 @@ fn print_rows(converged: &ProtocolResult, seeds: &[&ProtocolResult]) {
         }
         let (bias, spread) = (mean(&values) - exact, spread(&values));
         // The noise of a result belongs to all lightings of a key together.
-        let stated: Vec<&PsnrNoise> = seeds.iter().filter_map(|result| result.noise.values().next()?.get(&row.0)).collect();
+        let stated: Vec<&PsnrNoise> =
+            seeds.iter().filter_map(|result| result.noise.values().next()?.get(&row.0)).collect();
         let error = |noise: &PsnrNoise| {
             [noise.own_db, noise.companions_db, noise.fit_db].iter().flatten().map(|db| db * db).sum::<f64>()
         };

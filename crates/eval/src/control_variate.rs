@@ -30,9 +30,11 @@ pub const RIDGE: f64 = 1e-6;
 /// The range of exposed values whose slope of the sRGB curve weighs a pixel.
 pub const WEIGHED_RANGE: [f64; 2] = [0.003, 1.0];
 
-/// The ratio of base colours as a view shows them; 1 where the truth's is 0.
+/// The ratio of base colours as a view shows them, the prediction's clipped to 0..1 as when it is rendered; 1 where the
+/// truth's is 0.
 pub(crate) fn base_color_ratio(prediction: &Picture<LinearRgb>, truth: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    let ratio = |p: f32, t: f32| if t == 0.0 { 1.0 } else { (p / t.max(LEAST_BASE_COLOR)).clamp(0.0, MOST_RATIO) };
+    let ratio =
+        |p: f32, t: f32| if t == 0.0 { 1.0 } else { (p.clamp(0.0, 1.0) / t.max(LEAST_BASE_COLOR)).min(MOST_RATIO) };
     Picture::from_fn(truth.width(), truth.height(), |x, y| {
         let (LinearRgb(p), LinearRgb(t)) = (prediction.get(x, y), truth.get(x, y));
         LinearRgb([0, 1, 2].map(|c| ratio(p[c], t[c])))
@@ -125,5 +127,7 @@ mod tests {
         let picture = |rgb| Picture::filled(1, 1, LinearRgb(rgb));
         let ratio = base_color_ratio(&picture([0.5, 0.9, 0.3]), &picture([0.25, 1e-4, 0.0])).get(0, 0);
         assert_eq!(ratio.0, [2.0, 8.0, 1.0]);
+        let outside = base_color_ratio(&picture([16.0, -1.0, 0.5]), &picture([0.5; 3])).get(0, 0);
+        assert_eq!(outside.0, [2.0, 0.0, 1.0]);
     }
 }

@@ -117,9 +117,8 @@ impl MixFit<'_> {
 
     /// The converged pictures of half `half` in the input view, one light after the other.
     fn converged(&self, half: usize) -> Result<Option<Lightings<Picture<LinearRgb>>>, EvalError> {
-        let read = |companions: &CompanionPictures| {
-            companions.read(&self.lit.photo.view.id, half, self.pass.lights.len())
-        };
+        let read =
+            |companions: &CompanionPictures| companions.read(&self.lit.photo.view.id, half, self.pass.lights.len());
         self.companions.map(read).transpose()
     }
 
@@ -154,7 +153,8 @@ impl MixFit<'_> {
 
     fn radiances(&self, streams: &[LightFit; 2], weights: &[[f64; 3]], spread: &[[f64; 3]]) -> FittedRadiances {
         let lights = self.pass.lights.iter().zip(weights.iter().zip(spread));
-        let mean = |of: &dyn Fn(&LightFit) -> f64| streams.iter().map(|fit| of(fit) / fit.squares.max(1) as f64 / 2.0).sum();
+        let mean =
+            |of: &dyn Fn(&LightFit) -> f64| streams.iter().map(|fit| of(fit) / fit.squares.max(1) as f64 / 2.0).sum();
         FittedRadiances {
             stage: self.pass.on_stage,
             lights: lights

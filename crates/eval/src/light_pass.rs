@@ -5,7 +5,9 @@ use std::borrow::Cow;
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, Progress};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
-use mateval_tracer::{Coat, LightGroups, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted};
+use mateval_tracer::{
+    Coat, LightGroups, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted,
+};
 
 use crate::companion_pictures::{Lightings, weighted};
 use crate::companions::{COMPANION_SCALES, COMPANIONS, Companions};
@@ -127,7 +129,8 @@ impl<'a> LightPass<'a> {
         stream: &str,
     ) -> Result<Vec<ViewsRender>, EvalError> {
         let repaint = self.repaint(&[], Some(companions))?;
-        let (mixes, groups) = (vec![self.companion_mixes(); COMPANION_SCALES.len()], LightGroups::apart(self.lights.len()));
+        let (mixes, groups) =
+            (vec![self.companion_mixes(); COMPANION_SCALES.len()], LightGroups::apart(self.lights.len()));
         let lighting = match self.pictures {
             PassPictures::Fixed(_) => Lighting::Mixed(&mixes),
             PassPictures::Fitted => Lighting::Apart(&groups),

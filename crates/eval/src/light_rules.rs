@@ -73,9 +73,9 @@ pub struct RelitRules {
     pub alone_at_most: usize,
     /// The smallest share of the light of a group that takes part.
     pub least_share: f64,
-    /// The largest variance of the truth's input view, mean over both halves' mean of encoded values, in a lighting that is
-    /// scored: a noisier picture stays brighter or darker than its light after encoding, so that its own material would not
-    /// score best.
+    /// The largest variance that noise causes in the truth's encoded input view (the mean of both halves; averaged over valid
+    /// pixels and channels) in a lighting that is scored. In a noisier picture the bias that encoding leaves would keep the
+    /// true material from scoring best.
     pub most_truth_variance: f64,
 }
 
@@ -98,7 +98,8 @@ pub struct NoiseRules {
     pub companion_samples: u32,
     /// The largest standard error of a scene's mean PSNR that the noise of our own paths may cause, in dB.
     pub target_db: f64,
-    /// Where the noise of truth, companions and fit is larger than that, ours may be this share of it.
+    /// Where the noise of truth and companions is larger than that, ours may be this share of it; the state in a result counts
+    /// the noise of the fit too.
     pub truth_share: f64,
     /// A standard error of a picture's MSE that is small enough, whatever the MSE: predictions that are nearly the truth need
     /// not be distinguished to `target_db`.
@@ -129,7 +130,13 @@ impl LightRules {
             roulette_survival: settings.roulette_survival,
             stage: StageRules::default(),
             fit: FitRules::default(),
-            relit: RelitRules { warm: [1.3, 1.0, 0.6], cool: [0.6, 0.9, 1.3], alone_at_most: 3, least_share: 0.05, most_truth_variance: 2e-3 },
+            relit: RelitRules {
+                warm: [1.3, 1.0, 0.6],
+                cool: [0.6, 0.9, 1.3],
+                alone_at_most: 3,
+                least_share: 0.05,
+                most_truth_variance: 2e-3,
+            },
             noise: NoiseRules {
                 seed: "mateval".to_owned(),
                 pilot_samples: 2,

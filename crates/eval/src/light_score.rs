@@ -20,9 +20,9 @@ use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
 use crate::relit::{LightingName, RelitLighting, lightings};
+use crate::rendered_view::RenderedView;
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
-use crate::rendered_view::RenderedView;
 use crate::rgb::{EncodedLight, LightReference, RgbMeasured, encoded_render, rgb_metrics};
 use crate::scene_score::{NoiseScore, ScoreSheet};
 use crate::scene_task::{MaskedRegion, SceneTask, regions};
@@ -42,7 +42,8 @@ pub(crate) fn score_light(
 ) -> Result<(), EvalError> {
     let companions = companions(task, truths)?;
     let scorer = LightScorer::new(task, renderer, truths, base_colors, Some(&companions), &task.protocols[at])?;
-    let used = scorer.predict(&mut |submission, light| scorer.measure(submission, light, &mut sheets[submission][at]))?;
+    let used =
+        scorer.predict(&mut |submission, light| scorer.measure(submission, light, &mut sheets[submission][at]))?;
     for sheets in sheets {
         let score = &mut sheets[at].score;
         (score.companions, score.noisy_lightings) = (used.clone(), scorer.noisy.clone());
@@ -148,7 +149,8 @@ impl<'a> LightScorer<'a> {
             }
         }
         // Leave out the lightings whose truth is too noisy.
-        let variance = |lighting: &RelitLighting| encoded_variance(&lights[&Some(lighting.name)][photo.place], photo.valid);
+        let variance =
+            |lighting: &RelitLighting| encoded_variance(&lights[&Some(lighting.name)][photo.place], photo.valid);
         let noisy = lightings.iter().map(|relit| NoisyLighting { lighting: relit.name, variance: variance(relit) });
         let too_noisy = |found: &NoisyLighting| found.variance > protocol.light.relit.most_truth_variance;
         let noisy: Vec<NoisyLighting> = noisy.filter(too_noisy).collect();

@@ -1,6 +1,6 @@
 //! The pilot of a batch of predictions: a render of few samples that says how the companions correct each prediction, and
-//! how many samples it needs. Its pixels are larger than those of the views (`pilot_view`), so that it costs a part of one
-//! sample per pixel.
+//! how many samples it needs. Its pixels are larger than those of the views (`pilot_view`): its four streams together cost
+//! one sample per pixel of a view.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,8 +20,8 @@ use crate::error::EvalError;
 use crate::light_pass::{LightPass, PassPictures};
 use crate::light_rules::{NoiseRules, Track};
 use crate::lit_scene::LitScene;
-use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
 use crate::pilot_view::{PilotView, enlarged_pixels};
+use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
 use crate::rgb::{encode_noisy, encoded_render};
 use crate::stored_light::StoredLight;
 
@@ -38,20 +38,20 @@ pub(crate) struct Pilot<'a> {
 }
 
 /// Samples per pixel of a half, and the companions' coefficients of each picture.
-type Found = (u32, Vec<Coefficients>);
+type PilotFinding = (u32, Vec<Coefficients>);
 
 /// One stream of a pilot: by variant, picture of the render and view.
 struct Stream(Vec<Vec<Vec<StoredLight>>>);
 
 /// Runs a pilot; one answer for each prediction.
-pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<Found>, EvalError> {
+pub(crate) fn run_pilot(pilot: &Pilot<'_>) -> Result<Vec<PilotFinding>, EvalError> {
     let (samples, pictures) = (pilot.rules.pilot_samples / 2, pilot.mixes.pictures());
     let trace = |stream: &str| {
         let what = format!("{} pilot, stream {stream}", pilot.pass.name);
         let stream = format!("pilot_{stream}");
         pilot.pass.trace(&pilot.predictions, &pilot.mixes.all, &pilot.cameras(), samples.max(1), &stream, &what)
     };
-    // The first half gives the coefficients; only the pictures that they leave are kept.
+    // The first half determines the coefficients. Each stream is then reduced to its corrected pictures.
     let first = ["a1", "a2"].map(|stream| trace(stream).map(|renders| Stream::of(&renders, pilot.lit.scene.exposure)));
     let [a1, a2] = first;
     let (a1, a2) = (a1?, a2?);
@@ -217,7 +217,8 @@ pub fn samples_under_bound(rules: &NoiseRules, pilot: Option<NoisePsnr>, allowed
     let Some(NoisePsnr { paths, products, shared, reference, .. }) = pilot else { return rules.least_samples };
     let bound = allowed.max(rules.truth_share * shared.hypot(reference));
     let is_enough = |samples: u32| {
-        let (samples, pixels) = (f64::from(rules.pilot_samples) / f64::from(samples), f64::from(rules.pilot_pixels.pow(2)));
+        let (samples, pixels) =
+            (f64::from(rules.pilot_samples) / f64::from(samples), f64::from(rules.pilot_pixels.pow(2)));
         let (product, rest) = (products.powi(2), (paths.powi(2) - products.powi(2)).max(0.0));
         (rest + product * samples) * samples / pixels <= bound.powi(2)
     };
@@ -249,6 +250,10 @@ mod tests {
         assert_eq!(samples(1e3 * target, 0.0), most);
         // A truth with as much noise of its own: as much will do.
         assert_eq!(samples(1e3 * target, 1e3 * target), least);
+        // Products alone: variance falls with the square of the samples. As much as `3 * least` would bring to the bound.
+        let paths = 1.5 * f64::from(least) * target * f64::from(noise.pilot_pixels);
+        let products = NoisePsnr { total: paths, paths, products: paths, shared: 0.0, reference: 0.0, common: 0.0 };
+        assert_eq!(samples_under_bound(&noise, Some(products), target), 4 * least);
         assert_eq!(samples_under_bound(&noise, None, target), least);
     }
 }

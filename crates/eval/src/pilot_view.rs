@@ -25,17 +25,22 @@ pub(crate) struct PilotView {
 /// All views of a scene, with the ratios of the predictions of a batch.
 pub(crate) fn pilot_views(rules: &NoiseRules, lit: &LitScene<'_>, batch: &[usize]) -> Vec<PilotView> {
     let side = rules.pilot_pixels as usize;
-    let cameras: Vec<Camera> = lit.cameras().iter().map(|camera| with_large_pixels(camera, rules.pilot_pixels)).collect();
+    let cameras: Vec<Camera> =
+        lit.cameras().iter().map(|camera| with_large_pixels(camera, rules.pilot_pixels)).collect();
     let of_blocks = NoiseRules { block_pixels: (rules.block_pixels / rules.pilot_pixels).max(1), ..rules.clone() };
     let blocks = noise_blocks(&of_blocks, &cameras);
     let view = |(at, (camera, blocks)): (usize, (Camera, Picture<u32>))| {
         let (width, height) = (blocks.width(), blocks.height());
         let valid = &lit.truths[at].valid;
+        // A view of one column or row has no whole square.
+        let last = |size: usize, at: usize| at.min(size - 1);
         let parts = |x: usize, y: usize| (0..side * side).map(move |k| (x * side + k % side, y * side + k / side));
         let halves = |light: &crate::truth::TrueLight| light.halves().map(|half| enlarged_pixels(&half, side));
         PilotView {
             camera,
-            valid: Mask::from_fn(width, height, |x, y| parts(x, y).all(|(x, y)| valid.get(x, y))),
+            valid: Mask::from_fn(width, height, |x, y| {
+                parts(x, y).all(|(x, y)| valid.get(last(valid.width(), x), last(valid.height(), y)))
+            }),
             blocks,
             ratios: batch.iter().map(|&index| enlarged_pixels(&lit.ratio(index, at), side)).collect(),
             truths: lit.lights.iter().map(|(name, views)| (*name, halves(&views[at]))).collect(),
@@ -44,7 +49,8 @@ pub(crate) fn pilot_views(rules: &NoiseRules, lit: &LitScene<'_>, batch: &[usize
     cameras.into_iter().zip(blocks).enumerate().map(view).collect()
 }
 
-/// The picture with each square of `side` pixels averaged to one. Pixels that fill no square are left out.
+/// The picture with each square of `side` pixels averaged to one. Pixels that fill no square are
+/// left out, unless the picture is smaller than a square.
 pub(crate) fn enlarged_pixels(picture: &Picture<LinearRgb>, side: usize) -> Picture<LinearRgb> {
     let share = 1.0 / (side * side) as f32;
     Picture::from_fn((picture.width() / side).max(1), (picture.height() / side).max(1), |x, y| {

@@ -5,8 +5,8 @@
 //!
 //! Predictions that agree in roughness and metallic share paths, and the scene's companions travel along. A pilot render,
 //! with samples of its own, determines how the companions correct each prediction and how many samples it needs. Radiances
-//! are fitted on further streams of samples (`fitted_mixes`), so that the fit does not make the quarters depend on each
-//! other. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
+//! are fitted on two further streams of samples (`fitted_mixes`), one for each half, so that the noise of the fit adds no
+//! bias to the squared error. A prediction's pictures are the same, bit for bit, whichever others are rendered with it.
 
 use std::collections::BTreeMap;
 
@@ -53,8 +53,8 @@ pub struct LitPicture {
     pub lighting: Option<LightingName>,
     /// One for each view.
     pub views: Vec<RenderedView>,
-    /// For track `fitted`, the views under the radiances that each of two streams of samples was fitted to; [`Self::views`]
-    /// are their means.
+    /// For track `fitted`, the views under the radiances that each of two streams of samples was fitted to: [`Self::views`]
+    /// have half A of the first and half B of the second.
     pub of_fits: Option<[Vec<RenderedView>; 2]>,
 }
 
@@ -62,8 +62,7 @@ pub struct LitPicture {
 const BATCH_BYTES: u64 = 850 << 20;
 
 /// Finds the converged pictures of the companions for a pass, or makes them.
-pub(crate) type FindCompanions<'a> =
-    dyn Fn(&LightPass<'_>, &Companions) -> Result<CompanionPictures, EvalError> + 'a;
+pub(crate) type FindCompanions<'a> = dyn Fn(&LightPass<'_>, &Companions) -> Result<CompanionPictures, EvalError> + 'a;
 
 /// Renders all predictions under the lights of `rules` and passes each to `each`, pass by pass, with its index in
 /// `predictions`.
@@ -129,8 +128,9 @@ struct Quarters {
 impl Renderer<'_> {
     fn render(&self, each: &mut dyn FnMut(usize, PredictedLight) -> Result<(), EvalError>) -> Result<(), EvalError> {
         let all: Vec<usize> = (0..self.predictions.len()).collect();
-        let find = |companions| (self.find_companions)(&self.pass, companions);
-        let companions = self.lit.companions.map(find).transpose()?;
+        // Without lights nothing is to be corrected.
+        let known = self.lit.companions.filter(|_| !self.pass.lights.is_empty());
+        let companions = known.map(|companions| (self.find_companions)(&self.pass, companions)).transpose()?;
         let fits = self.fits(&all, companions.as_ref())?;
         let planned = self.plan(&all, &fits, companions.as_ref())?;
         for batch in self.batches(&all, |index| planned[index].samples, |count| self.quarters_bytes(count)) {
@@ -218,7 +218,7 @@ impl Renderer<'_> {
         let exposure = self.lit.scene.exposure;
         for (view, rendered) in views.iter_mut().enumerate() {
             let of = |variant: usize| picture_of(&renders[variant], view, picture);
-            rendered.add_quarter(if self.lit.companions.is_none() {
+            rendered.add_quarter(if self.lit.companions.is_none() || self.pass.lights.is_empty() {
                 StoredLight::exposed(of(at), exposure)
             } else {
                 // The companions come after the predictions.
@@ -278,7 +278,8 @@ impl Renderer<'_> {
         match &self.pass.pictures {
             PassPictures::Fixed(names) => {
                 let named = names.iter().zip(pictures);
-                let named = named.map(|(&(track, lighting), views)| LitPicture { track, lighting, views, of_fits: None });
+                let named =
+                    named.map(|(&(track, lighting), views)| LitPicture { track, lighting, views, of_fits: None });
                 named.collect()
             }
             PassPictures::Fitted => {
@@ -286,7 +287,7 @@ impl Renderer<'_> {
                 let of_fits: [Vec<RenderedView>; 2] =
                     std::array::from_fn(|_| streams.next().expect("there is a picture for each stream"));
                 let pairs = of_fits[0].iter().zip(&of_fits[1]);
-                let views = pairs.map(|(a, b)| RenderedView::mean(a, b)).collect();
+                let views = pairs.map(|(a, b)| RenderedView::of_halves(a, b)).collect();
                 vec![LitPicture { track: Track::Fitted, lighting: None, views, of_fits: Some(of_fits) }]
             }
         }
@@ -306,12 +307,7 @@ impl Renderer<'_> {
 
     /// Predictions that share paths: they agree in roughness, metallic and number of samples. A batch holds as many as the
     /// tracer takes at once and as fit in memory, by the bytes that a number of predictions needs.
-    fn batches(
-        &self,
-        all: &[usize],
-        samples: impl Fn(usize) -> u32,
-        bytes: impl Fn(usize) -> u64,
-    ) -> Vec<Vec<usize>> {
+    fn batches(&self, all: &[usize], samples: impl Fn(usize) -> u32, bytes: impl Fn(usize) -> u64) -> Vec<Vec<usize>> {
         let mut alike: BTreeMap<(&str, u32), Vec<usize>> = BTreeMap::new();
         for &index in all {
             let prediction = &self.predictions[index];
@@ -338,9 +334,11 @@ impl Renderer<'_> {
         pixels * (rendered + (4 * count * each) as u64 * STORED_BYTES)
     }
 
-    /// Memory of the light bases of this many predictions: a render, and both streams' bases.
+    /// Memory of the light bases of this many predictions: both renders of the pilot, or a render with its converged companions
+    /// and both streams' bases.
     fn basis_bytes(&self, count: usize) -> u64 {
-        let pictures = (count + self.companion_count() + 2 * count) * self.pass.lights.len();
+        let (with, companions) = (count + self.companion_count(), self.companion_count());
+        let pictures = (2 * with).max(with + companions + 2 * count) * self.pass.lights.len();
         pixels(self.lit.photo.view) * pictures as u64 * RENDERED_BYTES
     }
 }

@@ -14,26 +14,29 @@ pub struct RenderedView {
     quarters: Vec<StoredLight>,
     /// For each half what its converged companions add.
     companions: Option<[StoredLight; 2]>,
+    /// For each half what the converged companions of the other half would add under its own lights, where the halves have
+    /// lights of their own; otherwise it is what they add to the other half.
+    others: Option<[StoredLight; 2]>,
 }
 
 impl RenderedView {
     /// Quarters that nothing corrects, linear, before exposure.
     pub fn plain(quarters: [&Picture<LinearRgb>; 4], exposure: f64) -> Self {
         let quarters = quarters.into_iter().map(|quarter| StoredLight::exposed(quarter, exposure)).collect();
-        Self { quarters, companions: None }
+        Self { quarters, companions: None, others: None }
     }
 
     /// A view without quarters yet.
     pub(crate) fn empty() -> Self {
-        Self { quarters: Vec::new(), companions: None }
+        Self { quarters: Vec::new(), companions: None, others: None }
     }
 
-    /// The mean of two pictures of the same view, quarter by quarter.
-    pub(crate) fn mean(a: &Self, b: &Self) -> Self {
-        let quarters = a.quarters.iter().zip(&b.quarters).map(|(a, b)| StoredLight::mean(a, b)).collect();
-        let companions = a.companions.as_ref().zip(b.companions.as_ref());
-        let companions = companions.map(|(a, b)| [0, 1].map(|half| StoredLight::mean(&a[half], &b[half])));
-        Self { quarters, companions }
+    /// Half A of one picture and half B of another, of the same view under lights that differ a little.
+    pub(crate) fn of_halves(first: &Self, second: &Self) -> Self {
+        let quarters = first.quarters[..2].iter().chain(&second.quarters[2..]).cloned().collect();
+        let pair = first.companions.as_ref().zip(second.companions.as_ref());
+        let half = |at: usize| pair.map(|(first, second)| [first[at].clone(), second[1 - at].clone()]);
+        Self { quarters, companions: half(0), others: half(1) }
     }
 
     /// Adds the next quarter.
@@ -41,7 +44,7 @@ impl RenderedView {
         self.quarters.push(quarter);
     }
 
-    /// Adds what the converged companions of the next half bring.
+    /// Sets what the converged companions add to each half.
     pub(crate) fn set_companions(&mut self, halves: [StoredLight; 2]) {
         self.companions = Some(halves);
     }
@@ -58,7 +61,8 @@ impl RenderedView {
     /// A half with the companions of the other half in place of its own; none without companions. `mean` is the half.
     pub(crate) fn with_other_companions(&self, half: usize, mean: &Picture<LinearRgb>) -> Option<Picture<LinearRgb>> {
         let companions = self.companions.as_ref()?;
-        let (own, other) = (&companions[half], &companions[1 - half]);
+        let other = self.others.as_ref().map_or(&companions[1 - half], |others| &others[half]);
+        let own = &companions[half];
         let (width, height) = own.size();
         Some(Picture::from_fn(width, height, |x, y| {
             let (own, other) = (own.at(y * width + x), other.at(y * width + x));

@@ -122,13 +122,14 @@ pub struct PsnrNoise {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoiseState {
-    /// The noise of our paths is under the protocol's bound, and that of truth and companions too.
+    /// The noise of our paths is under the protocol's bound, and that of truth, companions and fit together too.
     Certified,
-    /// The noise of truth and companions is above the bound, and that of our paths under the protocol's share of it.
+    /// The noise of truth, companions and fit is above the bound, and that of our paths under the protocol's share of it.
     LimitedByTruth,
     /// The most samples were taken, and our noise is above the bound.
     SampleCap,
-    /// The number of samples that the pilot estimated was too small.
+    /// The number of samples that the pilot estimated was too small, or the pixels are unobserved or specular ones, which the
+    /// pilot does not weigh separately.
     AboveTarget,
 }
 

@@ -1,7 +1,7 @@
 //! A noisy prediction of light as SSIM, LPIPS and people see it: with little noise, and without blurring its textures.
 //!
-//! Most of a predicted picture is known without noise: it is close to the truth's denoised picture T times the ratio r of
-//! the predicted base colour to the true one. What remains, P - r T, is light that the prediction's own colours bounce, and
+//! Most of a predicted picture is known without noise of its own: it is close to the truth's picture T (denoised, or with
+//! little noise) times the ratio r of the predicted base colour to the true one. What remains, P - r T, is light that the prediction's own colours bounce, and
 //! reflections; divided by the predicted base colour it is smooth over surfaces. It alone is filtered, with the
 //! edge-avoiding a-trous wavelets of Dammertz et al., "Edge-Avoiding A-Trous Wavelet Transform for fast Global Illumination
 //! Filtering" (2010), whose weights follow the noise as in Schied et al., "Spatiotemporal Variance-Guided Filtering" (2017):
@@ -26,7 +26,7 @@ pub const LEAST_BASE_COLOR: f32 = 0.05;
 /// What the filter knows about a view without noise.
 #[derive(Clone, Copy)]
 pub struct ViewGuide<'a> {
-    /// The truth's denoised picture, exposed.
+    /// The truth's picture (denoised, or the mean of its halves), exposed.
     pub truth: &'a Picture<LinearRgb>,
     /// The predicted base colour over the true one.
     pub ratio: &'a Picture<LinearRgb>,
@@ -51,7 +51,7 @@ struct Remainder {
 /// those of the mean.
 pub fn shown_render(halves: [&Picture<LinearRgb>; 2], guide: &ViewGuide<'_>) -> Picture<LinearRgb> {
     let (width, height) = (guide.valid.width(), guide.valid.height());
-    let divisor = |k: usize| guide.base_color.pixels()[k].0.map(|v| v.max(LEAST_BASE_COLOR));
+    let divisor = |k: usize| guide.base_color.pixels()[k].0.map(|v| v.clamp(LEAST_BASE_COLOR, 1.0));
     let known = |k: usize| {
         let (truth, ratio) = (guide.truth.pixels()[k].0, guide.ratio.pixels()[k].0);
         [0, 1, 2].map(|c| truth[c] * ratio[c])
@@ -210,7 +210,12 @@ mod tests {
             LinearRgb([0, 1, 2].map(|c| 0.5 * (a.get(x, y).0[c] + b.get(x, y).0[c])))
         });
         let shown = shown_render([&a, &b], &planted.guide());
-        assert!(error(&shown, &exact) < 0.2 * error(&mean, &exact), "{} {}", error(&shown, &exact), error(&mean, &exact));
+        assert!(
+            error(&shown, &exact) < 0.2 * error(&mean, &exact),
+            "{} {}",
+            error(&shown, &exact),
+            error(&mean, &exact)
+        );
     }
 
     /// Without noise the filter changes nothing, whatever the remainder holds.

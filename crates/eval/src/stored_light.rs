@@ -22,15 +22,6 @@ impl StoredLight {
         Self(Picture::from_fn(width, height, |x, y| value(y * width + x).map(stored)))
     }
 
-    /// The mean of two pictures of one size.
-    pub(crate) fn mean(a: &Self, b: &Self) -> Self {
-        let (width, height) = a.size();
-        Self::from_pixels(width, height, |k| {
-            let (a, b) = (a.at(k), b.at(k));
-            [0, 1, 2].map(|c| 0.5 * (a[c] + b[c]))
-        })
-    }
-
     /// Width and height.
     pub(crate) fn size(&self) -> (usize, usize) {
         (self.0.width(), self.0.height())

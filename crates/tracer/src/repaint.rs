@@ -202,7 +202,8 @@ pub fn render_repainted(
     // Check everything before the first path.
     check_predictions(world, repaint, &which)?;
     let job = |Range { start: first, end }: Range<usize>| {
-        let subject = Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
+        let subject =
+            Subject { world, materials: Painted { world, repaint, first }, first, variants: end - first, lighting };
         ViewsJob { subject, cameras, settings, seeds }
     };
     let planes = job(0..0).planes(repaint.predictions)?;

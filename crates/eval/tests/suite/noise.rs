@@ -4,9 +4,7 @@
 
 use mateval_eval::rgb::encode_noisy;
 use mateval_image::{LinearRgb, Picture};
-use mateval_metrics::{
-    NoiseFreeMse, encoded_reference, mse, noise_free_mse, psnr_mean_error, ssim_valid_windows,
-};
+use mateval_metrics::{NoiseFreeMse, encoded_reference, mse, noise_free_mse, psnr_mean_error, ssim_valid_windows};
 
 use super::noisy_room::{EXACT, LEVELS, OTHERS, Pair, Quarters, ROOM, SEEDS, encoded, halves, linear, mean_of, pair};
 use super::sample::lpips;
@@ -204,7 +202,7 @@ fn ssim_and_lpips_of_64_samples_are_those_of_thousands() {
         let [found, twin] = [&shown, &plain].map(|pictures| off(&|p| Some(ssim(p)), pictures).unwrap());
         println!("{other}: SSIM off by {found}, plain {twin}");
         assert!(found < 0.005 && twin > 0.01, "{other}: {found} {twin}");
-        // So many samples leave LPIPS little noise; its twin has four.
+        // 64 samples leave LPIPS little noise; the twin has 4.
         let noisy: Vec<_> = LEVELS[0].renders[other][0][..8].iter().map(|quarters| mean_of(&pair(quarters))).collect();
         let [found, twin] = [&shown, &noisy].map(|pictures| off(&lpips, pictures));
         println!("{other}: LPIPS off by {found:?}, plain {twin:?}");

@@ -104,7 +104,8 @@ impl Room {
         });
         let valid = valid.collect();
         let blocks = noise_blocks(&hasty().light.noise, &cameras);
-        let base_color = material_pictures(&world, &atlases, &cameras[0], std::slice::from_ref(&predicted)).remove(0).base_color;
+        let base_color =
+            material_pictures(&world, &atlases, &cameras[0], std::slice::from_ref(&predicted)).remove(0).base_color;
         let (truth, k) = (ViewTruth::read(&folder, &views[0]).unwrap(), cameras[0].intrinsics);
         let place = |at: usize| ((at as f64 + 0.5) / SCALE) as usize;
         let (width, height) = (k.width as usize, k.height as usize);

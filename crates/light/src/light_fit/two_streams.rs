@@ -19,8 +19,8 @@ impl TwoStreamFit {
         self.combined(|a, b| 0.5 * (a + b))
     }
 
-    /// Half the difference of the streams' weights: a draw from the mean's noise, of one degree of freedom. Its square is
-    /// an estimate of the covariance of the weights, light by light and between lights.
+    /// Half the difference of the streams' weights: a draw from the mean's noise, of one degree of freedom. Its
+    /// outer product with itself is an estimate of the covariance of the weights.
     pub fn spread(&self) -> Vec<[f64; 3]> {
         self.combined(|a, b| 0.5 * (a - b))
     }

@@ -282,7 +282,12 @@ fn difference(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearR
 
 /// An estimate with this standard error, all from the reference.
 fn error_of(mse: f64, noise: f64) -> NoiseFreeMse {
-    NoiseFreeMse { mse, pixels: 1, blocks: vec![(0, BlockNoise { reference: noise, ..Default::default() })], common: 0.0 }
+    NoiseFreeMse {
+        mse,
+        pixels: 1,
+        blocks: vec![(0, BlockNoise { reference: noise, ..Default::default() })],
+        common: 0.0,
+    }
 }
 
 #[test]
