@@ -135,7 +135,7 @@ impl LightRules {
                 cool: [0.6, 0.9, 1.3],
                 alone_at_most: 3,
                 least_share: 0.05,
-                most_truth_variance: 2e-3,
+                most_truth_variance: 5e-4,
             },
             noise: NoiseRules {
                 seed: "mateval".to_owned(),

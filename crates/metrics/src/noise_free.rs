@@ -8,8 +8,9 @@
 //! - The prediction's paths. Each half comes in quarters ([`NoisyRender`]), whose difference u (of A) or v (of B) has the
 //!   half's noise and nothing else. With X = d + x and Y = d + y, X*Y - d² = d (x + y) + x y. The expectation of
 //!   (Σ Y u)² + (Σ X v)² - (Σ u v)² is the variance of Σ X*Y as far as it comes from those paths, without any assumption about the
-//!   distribution of the noise beyond the independence of quarters. Two halves alone could not separate a fourth
-//!   cumulant from a variance.
+//!   distribution of the noise beyond the independence of quarters. Where few large contributions make it small or negative,
+//!   half of the first two terms counts, whose expectation is at least half of the variance. Two halves alone could not
+//!   separate a fourth cumulant from a variance.
 //! - The reference, of which there are two halves only: with m = (X + Y) / 2, the square of Σ m (Ia - Ib) less the square
 //!   of Σ (u + v) / 2 (Ia - Ib), which the paths' noise in m adds. It assumes Gaussian noise, which a reference of many
 //!   samples has.
@@ -61,7 +62,8 @@ pub struct BlockNoise {
     pub paths_in_shared: f64,
 }
 
-/// Variances of an estimate by the source of the noise. A source whose estimated variance is negative has 0.
+/// Variances of an estimate by the source of the noise. That of the paths is at least half of its positive terms; another
+/// source whose estimated variance is negative has 0.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Variances {
     /// From the prediction's paths, which more samples lower.
@@ -91,15 +93,15 @@ impl BlockNoise {
 
 impl Variances {
     fn of<'a>(blocks: impl Iterator<Item = &'a BlockNoise>, common: f64) -> Self {
-        let mut sum = Self { common: common.powi(2), ..Self::default() };
+        let (mut sum, mut squares) = (Self { common: common.powi(2), ..Self::default() }, 0.0);
         for block in blocks {
-            sum.paths += block.first_half.powi(2) + block.second_half.powi(2) - block.both_halves.powi(2);
+            squares += block.first_half.powi(2) + block.second_half.powi(2);
             sum.products += block.both_halves.powi(2);
             sum.shared += block.shared.powi(2) - block.paths_in_shared.powi(2);
             sum.reference += block.reference.powi(2) - block.paths_in_reference.powi(2);
         }
-        let Self { paths, products, shared, reference, common } = sum;
-        let paths = paths.max(0.0);
+        let Self { products, shared, reference, common, .. } = sum;
+        let paths = (squares - products).max(squares / 2.0);
         Self { paths, products: products.min(paths), shared: shared.max(0.0), reference: reference.max(0.0), common }
     }
 

@@ -307,6 +307,17 @@ fn psnr_of_an_estimate() {
     assert!(matches!(error_of(f64::NAN, 0.0).psnr(), Err(MetricError::InvalidMse { .. })));
 }
 
+/// Where products of both halves' noise exceed what they are subtracted from, the error is not 0: an MSE below 0 has no
+/// PSNR of 100 dB.
+#[test]
+fn large_products_leave_an_error() {
+    let noise = BlockNoise { first_half: 1e-4, second_half: 1e-4, both_halves: 5e-4, ..Default::default() };
+    let error = NoiseFreeMse { mse: -1e-4, pixels: 1, blocks: vec![(0, noise)], common: 0.0 };
+    assert!((error.standard_error() - 1e-4).abs() < 1e-12);
+    let psnr = error.psnr().unwrap();
+    assert!(psnr.lower_bound && psnr.db < 40.0, "{psnr:?}");
+}
+
 /// No PSNR rises with its MSE, nor with its standard error; the twin, which takes an upper bound below 1.645 standard
 /// errors, does.
 #[test]
