@@ -49,10 +49,8 @@ impl MixFit<'_> {
         for (half, name) in HALVES.iter().enumerate() {
             let renders = self.trace(samples, &format!("fit_{name}"))?;
             let converged = self.converged(half)?;
-            for at in 0..self.predictions.len() {
-                let basis = self.basis(&renders, at, converged.as_ref(), &coefficients[at]);
-                bases[half].push(basis);
-            }
+            let corrected = coefficients.iter().enumerate();
+            bases[half] = corrected.map(|(at, found)| self.basis(&renders, at, converged.as_ref(), found)).collect();
         }
         let photo = &self.lit.photo;
         let target = FitTarget { photo: &photo.light, mask: Some(photo.valid), exposure: self.lit.scene.exposure };
