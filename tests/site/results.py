@@ -34,10 +34,9 @@ CATEGORIES = [("Sofa", "Seat"), ("Dining Table", "Table"), ("WallInner", "Archit
 
 
 def pretty(value: object) -> str:
-    """JSON as MatEval writes it: an exponent has no leading zero, as in 1e-6."""
+    """JSON as MatEval writes it: 0.000025 without an exponent, smaller numbers with one without a leading zero, as in 1e-6."""
     text = json.dumps(value, indent=2, ensure_ascii=False) + "\n"
-    # Numbers from 1e-5 on have no exponent.
-    text = text.replace("2e-05", "0.00002")
+    text = re.sub(r"(?<=[ -])(\d)(?:\.(\d+))?e-05\b", r"0.0000\1\2", text)
     return re.sub(r"(?<=\de)([+-])0+(?=\d)", r"\1", text)
 
 
