@@ -135,8 +135,8 @@ fn write_twin(dataset: &Path, scene: ReferenceScene, cameras: &[View], samples: 
             seeds: [71, 72].map(|seed| format!("{seed:016x}")),
             max_bounces: settings.max_bounces,
             capped_throughput: None,
-            denoiser: None,
-            noise: RenderNoise::of([&a.sum(), &b.sum()], None),
+            denoiser: "none".to_owned(),
+            noise: RenderNoise::of([&a.sum(), &b.sum()], &a.sum()),
             approximations: Vec::new(),
         };
         mateval_scene::json::write(&folder.join("render.json"), &render).unwrap();

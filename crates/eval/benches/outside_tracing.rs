@@ -27,6 +27,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::{Camera, SceneId};
 use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
+use mateval_tracer::noise_filter::Surfaces;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
@@ -133,14 +134,13 @@ fn score_light(
             let [a, b] = &darker;
             let rendered = RenderedView::plain([a, a, b, b], scene.exposure);
             let (shown, ratio) = (light.shown.clone(), truth.albedo.map(|_| LinearRgb([0.9; 3])));
-            let guide = ViewGuide {
-                truth: &shown,
-                ratio: &ratio,
+            let surfaces = Surfaces {
                 base_color: &truth.albedo,
                 instances: &truth.instances,
                 normals: &truth.normals,
                 valid: &truth.valid,
             };
+            let guide = ViewGuide { truth: &shown, ratio: &ratio, surfaces };
             for _ in 0..submissions {
                 let seen =
                     steps.of(&name("a light's encoding"), || EncodedLight::of_prediction(&rendered, &guide).unwrap());

@@ -9,13 +9,13 @@ use mateval_light::light_fit;
 use mateval_metrics::{Psnr, lpips, noise_free, ssim};
 use mateval_scene::submission::MAP_SIZES;
 use mateval_submission::{bad_texels, default_map, map_file, memory_budget, reach, texel_map};
+use mateval_tracer::noise_filter;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::companions::COMPANION_SCALES;
 use crate::control_variate;
 use crate::metric::LPIPS_NET;
-use crate::shown_render;
 
 /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -142,10 +142,10 @@ impl FixedRules {
             fit_most_steps: light_fit::MOST_STEPS,
             fit_step_share: light_fit::STEP_SHARE,
             fit_zero_below: light_fit::ZERO_BELOW,
-            shown_passes: shown_render::PASSES,
-            shown_deviations: shown_render::DEVIATIONS,
-            shown_least_cosine: shown_render::LEAST_COSINE,
-            shown_least_base_color: shown_render::LEAST_BASE_COLOR,
+            shown_passes: noise_filter::PASSES,
+            shown_deviations: noise_filter::DEVIATIONS,
+            shown_least_cosine: noise_filter::LEAST_COSINE,
+            shown_least_base_color: noise_filter::LEAST_BASE_COLOR,
             companion_scales: COMPANION_SCALES.to_vec(),
             companion_most_ratio: control_variate::MOST_RATIO,
             companion_least_base_color: control_variate::LEAST_BASE_COLOR,

@@ -29,6 +29,7 @@ use crate::scene_task::{MaskedRegion, SceneTask, regions};
 use crate::shown_render::ViewGuide;
 use crate::truth::{RgbTruth, TrueLight, ViewTruth};
 use crate::truth_noise::{NoisyLighting, encoded_variance};
+use mateval_tracer::noise_filter::Surfaces;
 
 /// Scores every submission under the lights of protocol number `at`; `renderer` made the truth's pictures. `base_colors` are
 /// the submissions' in every view.
@@ -204,7 +205,8 @@ impl<'a> LightScorer<'a> {
         let ViewTruth { instances, normals, valid, .. } = &self.lit.truths[view];
         let (ratio, base_color) = (&self.lit.ratio(submission, view), &self.lit.base_colors[submission][view]);
         let truth = &truth.shown.picture();
-        EncodedLight::of_prediction(rendered, &ViewGuide { truth, ratio, base_color, instances, normals, valid })
+        let surfaces = Surfaces { base_color, instances, normals, valid };
+        EncodedLight::of_prediction(rendered, &ViewGuide { truth, ratio, surfaces })
     }
 
     fn measure(&self, submission: usize, light: PredictedLight, sheet: &mut ScoreSheet) -> Result<(), EvalError> {

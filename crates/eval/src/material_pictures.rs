@@ -1,12 +1,12 @@
 //! Pictures of submissions' maps, looked up at the truth's own first hits.
 
-use std::cell::OnceCell;
+use std::cell::LazyCell;
 
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::{Camera, TriangleMesh};
-use mateval_tracer::World;
-use mateval_tracer::aov::{PixelMean, SUBPIXELS, place_through, subpixel};
+use mateval_tracer::aov::{COARSE_SUBPIXELS, PixelMean, SUBPIXELS, coarse_subpixels, places_through, subpixel};
+use mateval_tracer::{Hit, World};
 use rayon::prelude::*;
 
 use mateval_submission::prediction::PredictedScene;
@@ -61,19 +61,14 @@ fn picture_row(
     width: usize,
     y: usize,
 ) -> Vec<Vec<Values>> {
+    let lookups = |places: &mut dyn Iterator<Item = DVec2>| -> Vec<Option<Lookup>> {
+        places_through(world, camera, places).into_iter().map(|hit| Lookup::of(&hit?, atlases)).collect()
+    };
+    let coarse = lookups(&mut (0..width).flat_map(|x| coarse_subpixels(x, y)));
     let mut rows = vec![Vec::with_capacity(width); submissions.len()];
-    for x in 0..width {
-        let looked_up: [OnceCell<Option<Lookup>>; SUBPIXELS] = [const { OnceCell::new() }; SUBPIXELS];
-        let lookup = |at: usize| {
-            *looked_up[at].get_or_init(|| {
-                let hit = place_through(world, camera, subpixel(x, y, at))?;
-                let mesh = &atlases[hit.surface.0];
-                let uvs = mesh.uvs.as_deref()?;
-                let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
-                let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
-                Some(Lookup { instance: hit.surface.0, uv })
-            })
-        };
+    for (x, coarse) in coarse.chunks_exact(COARSE_SUBPIXELS).enumerate() {
+        let others = LazyCell::new(|| lookups(&mut (COARSE_SUBPIXELS..SUBPIXELS).map(|at| subpixel(x, y, at))));
+        let lookup = |at: usize| at.checked_sub(COARSE_SUBPIXELS).map_or_else(|| coarse[at], |rest| others[rest]);
         for (row, submission) in rows.iter_mut().zip(submissions) {
             row.push(PixelMean::of(|at| values(submission, lookup(at)?)).mean);
         }
@@ -87,6 +82,17 @@ struct Lookup {
     instance: usize,
     /// In the instance's atlas.
     uv: Vec2,
+}
+
+impl Lookup {
+    /// None where the instance has no atlas.
+    fn of(hit: &Hit, atlases: &[TriangleMesh]) -> Option<Self> {
+        let mesh = &atlases[hit.surface.0];
+        let uvs = mesh.uvs.as_deref()?;
+        let [a, b, c] = mesh.triangles[hit.triangle.0].map(|vertex| uvs[vertex as usize]);
+        let uv = a * hit.barycentrics.x + b * hit.barycentrics.y + c * hit.barycentrics.z;
+        Some(Self { instance: hit.surface.0, uv })
+    }
 }
 
 fn values(submission: &PredictedScene, Lookup { instance, uv }: Lookup) -> Option<Values> {

@@ -2,7 +2,7 @@
 //!
 //! Prediction and truth are multiplied by the scene's exposure, clipped to 0..1 and sRGB-encoded. MSE and PSNR use the
 //! quarters of the prediction and the halves of the truth; SSIM and LPIPS compare the prediction with little noise
-//! (`shown_render`) with the truth's denoised picture.
+//! (`shown_render`) with the truth's picture `rgb.exr`.
 
 use mateval_image::transfer::srgb_from_linear;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};

@@ -69,7 +69,7 @@ impl ViewTruth {
 pub struct RgbTruth {
     /// The halves.
     pub halves: [Picture<LinearRgb>; 2],
-    /// Denoised, or their mean.
+    /// Their mean, with its noise taken out.
     pub shown: Picture<LinearRgb>,
 }
 
@@ -106,7 +106,7 @@ impl RgbTruth {
 pub struct TrueLight {
     /// The halves.
     pub(crate) halves: [StoredLight; 2],
-    /// Denoised, or their mean.
+    /// Their mean, with its noise taken out.
     pub(crate) shown: StoredLight,
 }
 

@@ -100,6 +100,19 @@ pub enum PrepError {
         /// Width and height of the rendered picture, in pixels.
         found: [usize; 2],
     },
+    /// A map of a view has another size than the camera's picture.
+    #[error(
+        "'{}' has {}x{} pixels, expected the {}x{} of the view's camera; run `prep build` again",
+        path.display(), found[0], found[1], expected[0], expected[1]
+    )]
+    MapSize {
+        /// The file.
+        path: PathBuf,
+        /// Width and height of the camera's picture, in pixels.
+        expected: [usize; 2],
+        /// Width and height of the map, in pixels.
+        found: [usize; 2],
+    },
     /// The output folder holds an unfinished build with another key.
     #[error("'{}' holds an unfinished build of another recipe, source or version; add --force to replace it", path.display())]
     OtherBuild {

@@ -5,7 +5,7 @@ use mateval_scene::camera::Projection;
 use mateval_scene::material::CUT_OUT_BELOW_OPACITY;
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::{Camera, TriangleMesh};
-use mateval_tracer::{Ray, World};
+use mateval_tracer::{Hit, Ray, World};
 use rayon::prelude::*;
 
 use crate::coverage::{Coverage, Part};
@@ -135,6 +135,21 @@ impl Eye {
     }
 }
 
+/// A place of a triangle, and the ray from the camera towards it.
+struct Sight {
+    triangle: usize,
+    place: DVec3,
+    ray: Ray,
+}
+
+impl Sight {
+    fn new(eye: &Eye, triangle: usize, place: DVec3) -> Self {
+        let offset = place - eye.origin;
+        let direction = offset / offset.length();
+        Self { triangle, place, ray: Ray::endless(eye.origin.as_vec3(), direction.as_vec3()) }
+    }
+}
+
 /// The surface whose texels are classified, and the camera that sees them.
 struct Observer<'a> {
     world: &'a World,
@@ -155,11 +170,22 @@ impl Observer<'_> {
             cells[part.column].add(&part, part.area * self.texel_m2[part.triangle], holds_centre, centre);
         });
         let covered = cells.iter().enumerate().filter(|(_, cell)| cell.area_m2 > 0.0);
-        covered.filter_map(|(x, cell)| self.texel(size, x, cell)).collect()
+        let (mut texels, sights): (Vec<Texel>, Vec<Option<Sight>>) =
+            covered.filter_map(|(x, cell)| self.texel(size, x, cell)).unzip();
+        let rays: Vec<Ray> = sights.iter().flatten().map(|sight| sight.ray).collect();
+        let mut hits = Vec::with_capacity(rays.len());
+        self.world.first_hits(&rays, &mut hits);
+        let in_frame = texels.iter_mut().zip(&sights).filter_map(|(texel, sight)| Some((texel, sight.as_ref()?)));
+        for ((texel, sight), hit) in in_frame.zip(hits) {
+            // A ray may miss the edge that it is aimed at; then nothing hides the place.
+            texel.observed = hit.is_none_or(|hit| self.is_place(sight, &hit));
+        }
+        texels
     }
 
-    /// None for a texel that is cut out.
-    fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<Texel> {
+    /// A texel that is not observed yet, and how the camera could see it, if its picture holds the place. None for a texel
+    /// that is cut out.
+    fn texel(&self, size: usize, x: usize, cell: &Cell) -> Option<(Texel, Option<Sight>)> {
         // Rounding may put a place on an edge slightly outside.
         let weights = self.coverage.barycentrics(cell.triangle, cell.place).max(DVec3::ZERO);
         let weights = weights / weights.element_sum();
@@ -169,13 +195,14 @@ impl Observer<'_> {
         let [a, b, c] = self.mesh.corners(cell.triangle).map(|corner| corner.as_dvec3());
         let place = a * weights.x + b * weights.y + c * weights.z;
         let [u, v] = (cell.place / size as f64).to_array();
-        Some(Texel {
+        let texel = Texel {
             area_m2: cell.area_m2 as f32,
             uv: [u as f32, (1.0 - v) as f32],
             column: x as u16,
             at_centre: cell.at_centre,
-            observed: self.eye.frame_holds(place) && self.is_first(cell.triangle, place),
-        })
+            observed: false,
+        };
+        Some((texel, self.eye.frame_holds(place).then(|| Sight::new(&self.eye, cell.triangle, place))))
     }
 
     fn opacity(&self, triangle: usize, weights: DVec3) -> f32 {
@@ -188,18 +215,15 @@ impl Observer<'_> {
         opacity.at(self.world.textures(), uv)
     }
 
-    /// Whether nothing lies between the camera and a place of a triangle.
-    fn is_first(&self, triangle: usize, place: DVec3) -> bool {
-        let offset = place - self.eye.origin;
-        let distance = offset.length();
-        let ray = Ray::endless(self.eye.origin.as_vec3(), (offset / distance).as_vec3());
-        // A ray may miss the edge that it is aimed at; then nothing hides the place.
-        let Some(hit) = self.world.first_hit(&ray) else { return true };
-        if hit.surface == self.surface && hit.triangle.0 == triangle {
+    /// Whether the first hit towards a place is that place, or nothing nearer by more than rounding.
+    fn is_place(&self, sight: &Sight, hit: &Hit) -> bool {
+        if hit.surface == self.surface && hit.triangle.0 == sight.triangle {
             return true;
         }
-        let slope = self.mesh.geometric_normal(triangle).dot(offset / distance).abs().max(LEAST_COSINE);
-        let coordinate = place.abs().max(self.eye.origin.abs()).max_element();
+        let offset = sight.place - self.eye.origin;
+        let distance = offset.length();
+        let slope = self.mesh.geometric_normal(sight.triangle).dot(offset / distance).abs().max(LEAST_COSINE);
+        let coordinate = sight.place.abs().max(self.eye.origin.abs()).max_element();
         f64::from(hit.distance) >= distance - SAME_PLACE_ROUNDINGS * ROUNDING * coordinate / slope
     }
 }

@@ -98,9 +98,13 @@ impl PixelHit {
     }
 }
 
-/// The first hit behind `pixel`, or `None`, as [`hit_through`] finds it, without depth and normal.
-pub fn place_through(world: &World, camera: &Camera, pixel: DVec2) -> Option<Hit> {
-    world.first_hit(&Ray::endless(camera.position().as_vec3(), camera.direction(pixel).as_vec3()))
+/// The first hit behind each of `pixels`, or `None`, as [`hit_through`] finds it, without depth and normal.
+pub fn places_through(world: &World, camera: &Camera, pixels: impl Iterator<Item = DVec2>) -> Vec<Option<Hit>> {
+    let origin = camera.position().as_vec3();
+    let rays: Vec<Ray> = pixels.map(|pixel| Ray::endless(origin, camera.direction(pixel).as_vec3())).collect();
+    let mut hits = Vec::with_capacity(rays.len());
+    world.first_hits(&rays, &mut hits);
+    hits
 }
 
 /// The first hit behind `pixel`, or `None`. Masked-out texels (opacity below one half) do not count as hits, glass

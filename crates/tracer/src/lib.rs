@@ -14,6 +14,7 @@
 //! 3. A camera [`Ray`] finds a [`Hit`], which becomes a [`SurfaceHit`].
 //! 4. The material at that place becomes a [`Bsdf`]; [`emitter`] samples a light; the BSDF samples the next ray.
 //! 5. [`film`] averages the samples of each tile in a fixed order.
+//! 6. [`noise_filter`] takes the noise out of a picture that people, SSIM or LPIPS see.
 //!
 //! Every machine computes the same bits: trigonometric functions come from the `libm` crate, or are sums and products
 //! in `warp`.
@@ -27,6 +28,7 @@ pub mod film;
 mod frame;
 pub mod light_basis;
 mod material_source;
+pub mod noise_filter;
 mod path;
 pub mod ray;
 pub mod render;

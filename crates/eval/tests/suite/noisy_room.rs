@@ -17,6 +17,7 @@ use mateval_metrics::{Halves, NoisyHalf, NoisyRender};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, glb, reference_io};
 use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedMaterial, read_scene};
+use mateval_tracer::noise_filter::Surfaces;
 use mateval_tracer::{Coat, LightGroups, Lighting, Repaint, ViewLight, World, render_repainted};
 
 use super::sample::{dataset, hasty, write_truth};
@@ -121,8 +122,8 @@ impl Room {
         let base_color = self.base_color.map(scaled);
         let ratio = self.base_color.map(|_| LinearRgb(factor));
         let (instances, normals, valid) = (&self.instances, &self.normals, &self.valid[0]);
-        let guide = ViewGuide { truth, ratio: &ratio, base_color: &base_color, instances, normals, valid };
-        shown_render([&halves[0], &halves[1]], &guide)
+        let surfaces = Surfaces { base_color: &base_color, instances, normals, valid };
+        shown_render([&halves[0], &halves[1]], &ViewGuide { truth, ratio: &ratio, surfaces })
     }
 
     /// The pictures of every seed, by prediction and view; one bounce gives enough noise.

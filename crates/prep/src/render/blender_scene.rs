@@ -235,8 +235,8 @@ impl BlenderScene<'_> {
             seeds: seed_texts(view.seeds.map(u64::from)),
             max_bounces: MAX_BOUNCES,
             capped_throughput: None,
-            denoiser: Some("OpenImageDenoise".to_owned()),
-            noise: RenderNoise::of([&a.rgb, &b.rgb], Some(&pictures.denoised.rgb)),
+            denoiser: "OpenImageDenoise".to_owned(),
+            noise: RenderNoise::of([&a.rgb, &b.rgb], &pictures.denoised.rgb),
             approximations: result.approximations.clone(),
         };
         let render = ViewRender { halves: [a, b], shown: &pictures.denoised, passes: Some(pictures) };

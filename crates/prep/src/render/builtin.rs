@@ -1,11 +1,13 @@
 //! Renders with MatEval's own path tracer.
 
+use std::path::Path;
 use std::sync::Arc;
 
-use mateval_image::{LinearRgb, Picture};
-use mateval_scene::dataset::SceneFile;
+use mateval_image::{ImageError, Picture, exr_io, png_io};
+use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::{Progress, SceneId, json, reference_io};
+use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
 use super::noise::RenderNoise;
@@ -55,6 +57,7 @@ fn render_scene(
         let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
         let [a, b]: [LightPictures; 2] =
             std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
+        let shown = without_noise(&folder, view, [&a, &b])?;
         report.remarks.extend(remark(&step, &render.stats));
         let file = RenderFile {
             renderer: run.renderer.clone(),
@@ -63,13 +66,9 @@ fn render_scene(
             seeds: seed_texts(seeds),
             max_bounces: MAX_BOUNCES,
             capped_throughput: Some(render.stats.capped_throughput),
-            denoiser: None,
-            noise: RenderNoise::of([&a.rgb, &b.rgb], None),
+            denoiser: noise_filter::NAME.to_owned(),
+            noise: RenderNoise::of([&a.rgb, &b.rgb], &shown.rgb),
             approximations: Vec::new(),
-        };
-        let shown = LightPictures {
-            rgb: mean(&a.rgb, &b.rgb),
-            groups: a.groups.iter().zip(&b.groups).map(|(a, b)| mean(a, b)).collect(),
         };
         let render = ViewRender { halves: [&a, &b], shown: &shown, passes: None };
         store::write(&folder.render(&run.renderer, &view.id), &render, scene.exposure, &file)?;
@@ -87,9 +86,28 @@ fn light_pictures(basis: LightBasis) -> LightPictures {
     LightPictures { rgb: basis.sum(), groups: basis.pictures().to_vec() }
 }
 
-/// The mean of two pictures of one size.
-fn mean(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    let pixels = a.pixels().iter().zip(b.pixels());
-    let pixels = pixels.map(|(a, b)| LinearRgb(std::array::from_fn(|c| (a.0[c] + b.0[c]) / 2.0))).collect();
-    Picture::new(a.width(), a.height(), pixels).expect("both halves are of one size")
+/// The means of both halves, filtered on the surfaces that the view's maps show.
+fn without_noise(folder: &SceneFolder, view: &View, [a, b]: [&LightPictures; 2]) -> Result<LightPictures, PrepError> {
+    let (shown, hidden) = (folder.view(&view.id), folder.truth_view(&view.id));
+    let base_color = map_of(view, &hidden.join("albedo.exr"), exr_io::read_linear)?;
+    let instances = map_of(view, &shown.join("instance.png"), png_io::read_ids)?;
+    let normals = map_of(view, &shown.join("normal.exr"), exr_io::read_normal)?;
+    let valid = instances.map(|instance| instance != 0);
+    let surfaces = Surfaces { base_color: &base_color, instances: &instances, normals: &normals, valid: &valid };
+    Ok(LightPictures {
+        rgb: filtered_mean([&a.rgb, &b.rgb], &surfaces),
+        groups: a.groups.iter().zip(&b.groups).map(|(a, b)| filtered_mean([a, b], &surfaces)).collect(),
+    })
+}
+
+/// Reads a map of a view. Fails if it has not the size of the camera's picture.
+fn map_of<T: Copy>(
+    view: &View,
+    path: &Path,
+    read: fn(&Path) -> Result<Picture<T>, ImageError>,
+) -> Result<Picture<T>, PrepError> {
+    let map = read(path)?;
+    let k = view.camera.intrinsics;
+    let (expected, found) = ([k.width as usize, k.height as usize], [map.width(), map.height()]);
+    if found == expected { Ok(map) } else { Err(PrepError::MapSize { path: path.to_owned(), expected, found }) }
 }

@@ -11,19 +11,18 @@ pub struct RenderNoise {
     /// Mean of ((a - b) / 2)²: the expected squared error of the plain mean of both halves.
     pub mean_of_halves_mse: f64,
     /// Mean of (rgb - a) (rgb - b): the squared error of the denoised picture, without the noise of the halves, so that it
-    /// may be slightly below 0. Null where `rgb` is the plain mean.
-    pub denoised_mse: Option<f64>,
+    /// may be slightly below 0.
+    pub denoised_mse: f64,
 }
 
 impl RenderNoise {
-    /// Measures the noise of two halves and, where there is one, of the picture denoised from their mean.
-    pub fn of([a, b]: [&Picture<LinearRgb>; 2], denoised: Option<&Picture<LinearRgb>>) -> Self {
+    /// Measures the noise of two halves and of the picture denoised from their mean.
+    pub fn of([a, b]: [&Picture<LinearRgb>; 2], denoised: &Picture<LinearRgb>) -> Self {
         let halves = || values(a).zip(values(b));
         let squares = halves().map(|(a, b)| (a - b) * (a - b) / 4.0);
         let count = 3.0 * a.pixels().len() as f64;
-        let denoised_mse = denoised
-            .map(|rgb| values(rgb).zip(halves()).map(|(rgb, (a, b))| (rgb - a) * (rgb - b)).sum::<f64>() / count);
-        Self { mean_of_halves_mse: squares.sum::<f64>() / count, denoised_mse }
+        let products = values(denoised).zip(halves()).map(|(rgb, (a, b))| (rgb - a) * (rgb - b));
+        Self { mean_of_halves_mse: squares.sum::<f64>() / count, denoised_mse: products.sum::<f64>() / count }
     }
 }
 
@@ -38,8 +37,8 @@ mod tests {
     #[test]
     fn known_values() {
         let flat = |value: f32| Picture::filled(4, 3, LinearRgb([value; 3]));
-        let noise = RenderNoise::of([&flat(1.0), &flat(3.0)], Some(&flat(2.0)));
-        assert_eq!(noise, RenderNoise { mean_of_halves_mse: 1.0, denoised_mse: Some(-1.0) });
-        assert_eq!(RenderNoise::of([&flat(1.0), &flat(1.0)], Some(&flat(1.5))).denoised_mse, Some(0.25));
+        let noise = RenderNoise::of([&flat(1.0), &flat(3.0)], &flat(2.0));
+        assert_eq!(noise, RenderNoise { mean_of_halves_mse: 1.0, denoised_mse: -1.0 });
+        assert_eq!(RenderNoise::of([&flat(1.0), &flat(1.0)], &flat(1.5)).denoised_mse, 0.25);
     }
 }

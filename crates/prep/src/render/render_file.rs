@@ -26,8 +26,8 @@ pub struct RenderFile {
     /// The throughput that cut paths still carried, averaged over all paths. Multiplied by the radiance around, it is the
     /// light that is missing. Null where the renderer does not report it.
     pub capped_throughput: Option<f64>,
-    /// The denoiser that made `rgb`; null where `rgb` is the plain mean of the halves.
-    pub denoiser: Option<String>,
+    /// The denoiser that made `rgb` from the mean of the halves.
+    pub denoiser: String,
     /// How noisy the pictures are.
     pub noise: RenderNoise,
     /// What the renderer only approximates of the source's meaning, one line per material.

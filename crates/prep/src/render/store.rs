@@ -14,7 +14,7 @@ use crate::error::PrepError;
 /// The pictures of a view that are written.
 pub(super) struct ViewRender<'a> {
     pub(super) halves: [&'a LightPictures; 2],
-    /// What people see: denoised, or the mean of the halves.
+    /// What people see: their mean, denoised.
     pub(super) shown: &'a LightPictures,
     /// Pictures that only Blender makes: base colour, ids, depth, normals.
     pub(super) passes: Option<&'a BlenderView>,
