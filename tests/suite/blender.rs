@@ -11,7 +11,7 @@ use mateval_testkit::data::say_skipped;
 
 use super::command::{Run, build, mateval, render, run, verify};
 use super::sample::{copied_dataset, files_below, json, manifest, write_source};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 /// One view of the sample's room: each render takes seconds.
 const TINY: &str = "resolution = [64, 48]\natlas_size = 64\nviews = [{ id = \"left\", x_deg = 0, y_deg = 5 }]";
@@ -26,7 +26,7 @@ static UNRENDERED: LazyLock<PathBuf> = LazyLock::new(|| {
 /// A copy of the dataset without renders.
 fn unrendered() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    super::sample::copy_folder(&UNRENDERED, folder.path());
+    copy_folder(&UNRENDERED, folder.path());
     folder
 }
 

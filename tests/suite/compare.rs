@@ -20,8 +20,8 @@ use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
 use super::command::{mateval, run};
 use super::planted::{rehash, roll};
-use super::sample::{copy_folder, dataset, files_below, own_materials};
-use mateval_testkit::kept_folder::kept_folder;
+use super::sample::{dataset, files_below, own_materials};
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 /// Samples a pixel of each half, theirs and ours. At 96x72 pixels, three standard errors of a tile are then two to four
 /// times the bound of 1 %, and those of a picture's mean are 0.5 to 0.8 % (under the lamp alone 1.5 to 2.2 %). The

@@ -17,7 +17,8 @@ use serde_json::Value;
 use super::blender::blender;
 use super::command::{baseline, build, mateval, render, run, score};
 use super::planted::{Room, rehash};
-use super::sample::{copied_dataset, copy_folder, dataset, json, unrendered, write_source};
+use super::sample::{copied_dataset, dataset, json, unrendered, write_source};
+use mateval_testkit::kept_folder::copy_folder;
 
 fn room(dataset: &Path) -> SceneFolder {
     SceneFolder::of(dataset, &SceneId::new("room").unwrap())

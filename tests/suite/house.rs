@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::command::{Run, baseline, build, mateval, run, run_words, score, stats, verify};
 use super::sample::json;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 /// The sample's source and the survey of its house.
 struct Surveyed {
@@ -123,7 +123,7 @@ fn accepted_rooms_become_a_dataset_that_can_be_scored() {
 fn a_recipe_refuses_files_that_are_not_those_it_pins() {
     let folder = tempfile::tempdir().unwrap();
     let (source, dataset) = (folder.path().join("source"), folder.path().join("dataset"));
-    super::sample::copy_folder(&SURVEYED.source, &source);
+    copy_folder(&SURVEYED.source, &source);
     let recipe = recipe(folder.path());
     let model = "house/3D-FUTURE-model/cc0f0000-5a3b-4e00-8000-000000000001/raw_model.obj";
     let mut text = std::fs::read_to_string(source.join(model)).unwrap();
@@ -144,7 +144,7 @@ fn a_recipe_refuses_files_that_are_not_those_it_pins() {
 fn cameras_in_a_wall_are_rejected() {
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("source");
-    super::sample::copy_folder(&SURVEYED.source, &source);
+    copy_folder(&SURVEYED.source, &source);
     let camera = r#"{ "pos": [0.002, 1.2, 0.5], "target": [0.002, 1.2, 4.0], "fov": 60.0 }"#;
     let entry = format!(r#"{{ "cc000000-5a3b-4e00-8000-000000000001_7.jpg": {{ "camera": {camera} }} }}"#);
     std::fs::write(source.join("cameras.json"), entry).unwrap();

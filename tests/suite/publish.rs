@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::command::{Run, run, run_words, verify};
-use super::sample::{copied_dataset, copy_folder, dataset, files_below, manifest};
+use super::sample::{copied_dataset, dataset, files_below, manifest};
+use mateval_testkit::kept_folder::copy_folder;
 
 fn publish(dataset: &Path, out: &Path) -> Run {
     let (public, private) = (out.join("public"), out.join("private"));

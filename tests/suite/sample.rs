@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use super::command::{build, render, run, run_words};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 /// 96x72 pixels and atlases of 128 texels: all five views are built and rendered within seconds.
 pub const SMALL: &str = "resolution = [96, 72]\natlas_size = 128";
@@ -66,20 +66,6 @@ pub fn write_source(source: &Path, head: &str, ids: &[&str]) -> PathBuf {
 pub fn recipe_text(head: &str, ids: &[&str]) -> String {
     let scene = |id: &&str| format!("\n[[scene]]\nid = \"{id}\"\nbitterli = \"room/scene.xml\"\nhouse = \"sample\"\n");
     format!("name = \"sample\"\n{head}\n{}", ids.iter().map(scene).collect::<String>())
-}
-
-/// Copies all files below `from`.
-pub fn copy_folder(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let place = to.join(entry.file_name());
-        if entry.file_type().unwrap().is_dir() {
-            copy_folder(&entry.path(), &place);
-        } else {
-            std::fs::copy(entry.path(), place).unwrap();
-        }
-    }
 }
 
 /// Every file below `root`, relative, sorted.

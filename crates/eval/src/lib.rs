@@ -65,6 +65,8 @@ pub mod texture_space;
 pub mod truth;
 pub mod truth_material;
 mod truth_noise;
+#[cfg(test)]
+mod unbiased_tests;
 pub mod verify;
 pub mod word_enum;
 

@@ -1,6 +1,6 @@
 //! Folders for what several tests of one run share.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Makes a new folder that outlives the tests of this run, since nothing drops a static. It lies in the build's folder
 /// for temporary files, from which folders older than an hour are removed.
@@ -16,6 +16,20 @@ pub fn kept_folder(name: &str) -> PathBuf {
         }
     }
     tempfile::Builder::new().prefix(&format!("{name}-")).tempdir_in(root).unwrap().keep()
+}
+
+/// Copies all files below `from`.
+pub fn copy_folder(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let place = to.join(entry.file_name());
+        if entry.file_type().unwrap().is_dir() {
+            copy_folder(&entry.path(), &place);
+        } else {
+            std::fs::copy(entry.path(), place).unwrap();
+        }
+    }
 }
 
 /// `target`, of which the running test is `target/<profile>/deps/<name>`.

@@ -11,7 +11,7 @@ use mateval_eval::result::PictureValue;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 use super::sample::{dataset, hasty, plan, write_grey};
 
@@ -58,19 +58,8 @@ fn make(root: &Path, protocol: &Protocol) -> CompanionsReport {
 
 /// A copy of the dataset.
 fn copied() -> tempfile::TempDir {
-    fn copy(from: &Path, to: &Path) {
-        std::fs::create_dir_all(to).unwrap();
-        for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
-            let target = to.join(entry.file_name());
-            if entry.path().is_dir() {
-                copy(&entry.path(), &target);
-            } else {
-                std::fs::copy(entry.path(), &target).unwrap();
-            }
-        }
-    }
     let folder = tempfile::tempdir().unwrap();
-    copy(&dataset().root, folder.path());
+    copy_folder(&dataset().root, folder.path());
     folder
 }
 
