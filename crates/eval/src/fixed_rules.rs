@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::companions::COMPANION_SCALES;
 use crate::control_variate;
 use crate::metric::LPIPS_NET;
+use crate::shown_render;
 
 /// Constants that all protocols share and none can change, because code, format or a published definition fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -93,6 +94,8 @@ pub struct FixedRules {
     pub shown_least_cosine: f32,
     /// The least base colour that it divides light by.
     pub shown_least_base_color: f32,
+    /// The largest ratio of base colours by which the truth's picture is multiplied before the rest is filtered.
+    pub shown_most_ratio: f32,
     /// The factors of the companions' base colours.
     pub companion_scales: Vec<f32>,
     /// The largest ratio of a prediction's base colour to the truth's by which companions are multiplied.
@@ -146,6 +149,7 @@ impl FixedRules {
             shown_deviations: noise_filter::DEVIATIONS,
             shown_least_cosine: noise_filter::LEAST_COSINE,
             shown_least_base_color: noise_filter::LEAST_BASE_COLOR,
+            shown_most_ratio: shown_render::MOST_RATIO,
             companion_scales: COMPANION_SCALES.to_vec(),
             companion_most_ratio: control_variate::MOST_RATIO,
             companion_least_base_color: control_variate::LEAST_BASE_COLOR,

@@ -57,10 +57,11 @@ pub fn filtered_mean(halves: [&Picture<LinearRgb>; 2], surfaces: &Surfaces<'_>) 
         Light { value, variance: noise * noise }
     };
     let mut pixels: Vec<Light> = (0..width * height).into_par_iter().map(divided).collect();
-    // One pixel's difference says little of its noise: take the mean over its neighbours.
+    // One pixel's difference says little of its noise: take the mean over its neighbours. What stands out of all of them in
+    // one half alone is noise too.
     pixels = filter(surfaces, |x, y| {
         let mut found = pixels[y * width + x];
-        found.variance = mean_variance(surfaces, &pixels, x, y);
+        found.variance = found.variance.max(mean_variance(surfaces, &pixels, x, y));
         found
     });
     for pass in 0..PASSES {
