@@ -1,7 +1,8 @@
-//! Progress on stderr: a bar on a terminal, otherwise one line per step and per tenth of a step.
+//! Progress on stderr: a bar on a terminal, otherwise a line now and then.
 
 use std::io::IsTerminal as _;
 use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use mateval_scene::Progress;
@@ -16,16 +17,18 @@ pub fn with_progress<T>(work: impl FnOnce(Progress<'_>) -> T) -> T {
     result
 }
 
+/// The least time between two lines of progress.
+const PAUSE: Duration = Duration::from_secs(10);
+
 struct Bars {
     bar: ProgressBar,
     shown: Mutex<Shown>,
 }
 
 /// The last line that was printed where stderr is no terminal.
-#[derive(Default)]
 struct Shown {
-    step: String,
-    tenths: usize,
+    at: Instant,
+    message: String,
 }
 
 impl Bars {
@@ -34,7 +37,7 @@ impl Bars {
         if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg:24} {wide_bar} {pos}/{len}") {
             bar.set_style(style);
         }
-        Self { bar, shown: Mutex::new(Shown::default()) }
+        Self { bar, shown: Mutex::new(Shown { at: Instant::now(), message: String::new() }) }
     }
 
     fn step(&self, step: &str, done: usize, total: usize) {
@@ -49,9 +52,10 @@ impl Bars {
     fn print_step(&self, step: &str, done: usize, total: usize) {
         // The lock guards plain assignments, so a thread that panicked while it held the lock left them whole.
         let mut shown = self.shown.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let tenths = 10 * done / total.max(1);
-        if shown.step != step || tenths > shown.tenths {
-            *shown = Shown { step: step.to_owned(), tenths };
+        // What has one part and has not begun it may be a message, which must not be lost.
+        let is_message = (done, total) == (0, 1) && shown.message != step;
+        if is_message || shown.at.elapsed() >= PAUSE {
+            *shown = Shown { at: Instant::now(), message: step.to_owned() };
             say(&format!("{step}: {done}/{total}"));
         }
     }

@@ -8,16 +8,19 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 
 use mateval_eval::result::ResultFile;
-use mateval_report::tables::{Grouping, TableFormat, tables};
+use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use mateval_scene::open::Dataset;
 
+use crate::baseline;
 use crate::eval::leaderboard::{self, LeaderboardArgs};
 use crate::eval::score::{self, ScoreArgs};
 use crate::outcome::{Outcome, print, say};
 use crate::parsing::{parse_args, parse_subcommand, path_option};
 use crate::prep::build::{self, BuildArgs};
 use crate::prep::render::{self, RenderArgs, RendererArgs};
-use crate::{baseline, sample};
+
+/// The protocol whose numbers are printed.
+const PROTOCOL: &str = "mateval-2";
 
 /// A baseline of the demo; its name is that of the subcommand of `baseline`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -50,21 +53,37 @@ pub struct Args {
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
     /// Samples per pixel of each half of a rendered picture.
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 64)]
     samples: u32,
     #[command(flatten)]
     by: RendererArgs,
-    /// Baselines to make and score.
-    #[arg(long, value_enum, value_delimiter = ',', default_values = ["gt", "nn", "median", "grey"])]
+    /// Baselines to make and score [default: gt, nn, grey; with --full also median].
+    #[arg(long, value_enum, value_delimiter = ',')]
     baselines: Vec<DemoBaseline>,
+    /// Views of 320x240 pixels in place of 160x120, one more baseline, and every table.
+    #[arg(long)]
+    full: bool,
     /// Replace what an earlier demo wrote.
     #[arg(long)]
     force: bool,
 }
 
+/// Width and height of a view, unless everything is asked for: large enough to look at, and rendered in seconds.
+const SMALL: [u32; 2] = [160, 120];
+
+impl Args {
+    fn baselines(&self) -> Vec<DemoBaseline> {
+        use DemoBaseline::{Grey, Gt, Median, Nn};
+        match (self.baselines.is_empty(), self.full) {
+            (false, _) => self.baselines.clone(),
+            (true, false) => vec![Gt, Nn, Grey],
+            (true, true) => vec![Gt, Nn, Median, Grey],
+        }
+    }
+}
+
 /// The arguments of all steps.
 struct Plan {
-    sample: sample::Args,
     build: BuildArgs,
     render: RenderArgs,
     baselines: Vec<baseline::Command>,
@@ -88,7 +107,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     args.by.checked()?;
     let plan = plan(args)?;
     say("1/6 sample: the source scenes, a house and a room that the program generates");
-    sample::run(&plan.sample)?;
+    let source = out.join("source");
+    let written = if args.full { mateval_sample::write(&source) } else { mateval_sample::write_at(&source, SMALL) };
+    written.context("cannot write the sample")?;
     say("2/6 prep build: geometry, atlases and the pictures of five views");
     build::run(&plan.build)?;
     say("3/6 prep render: RGB truth");
@@ -103,14 +124,15 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     score::run(&plan.score)?;
     say("6/6 eval leaderboard");
     leaderboard::run(&plan.leaderboard)?;
-    print_closing(out, &plan.board)?;
+    print_closing(out, &plan.board, args.full)?;
     Ok(Outcome::Good)
 }
 
 fn plan(args: &Args) -> anyhow::Result<Plan> {
     let [source, dataset, results] = ["source", "dataset", "results"].map(|name| args.out.join(name));
     let submission = |baseline: &DemoBaseline| args.out.join("submissions").join(baseline.name());
-    let submissions: Vec<PathBuf> = args.baselines.iter().map(submission).collect();
+    let baselines = args.baselines();
+    let submissions: Vec<PathBuf> = baselines.iter().map(submission).collect();
     // The demo's own folder is checked once; a file of an earlier demo is replaced.
     let words = |options: Vec<OsString>, paths: &[PathBuf]| -> Vec<OsString> {
         let force = args.force.then(|| OsString::from("--force"));
@@ -124,19 +146,18 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     };
     let score_words = words(vec![path_option("dataset", &dataset), path_option("out", &results)], &submissions);
     let score: ScoreArgs = parse_args(&score_words)?;
-    let board = board(&args.baselines, score.result_paths());
+    let board = board(&baselines, score.result_paths());
     let mut shown = vec![path_option("dataset", &dataset), path_option("out", &args.out.join("leaderboard"))];
     shown.extend(board.ceiling.iter().map(|ceiling| path_option("ceiling", ceiling)));
-    let ranked = args.baselines.iter().filter(|baseline| board.ceiling.is_none() || **baseline != DemoBaseline::Gt);
+    let ranked = baselines.iter().filter(|baseline| board.ceiling.is_none() || **baseline != DemoBaseline::Gt);
     shown.extend(ranked.map(|baseline| path_option("submission", &submission(baseline))));
     let render_words = words(vec![format!("--samples={}", args.samples).into()], std::slice::from_ref(&dataset));
     let mut render: RenderArgs = parse_args(&render_words)?;
     render.by = args.by.clone();
     Ok(Plan {
-        sample: parse_args(&words(Vec::new(), std::slice::from_ref(&source)))?,
         build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
         render,
-        baselines: args.baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,
+        baselines: baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,
         leaderboard: parse_args(&words(shown, &board.results))?,
         score,
         board,
@@ -150,12 +171,17 @@ fn board(baselines: &[DemoBaseline], mut results: Vec<PathBuf>) -> Board {
     Board { results, ceiling }
 }
 
-/// Prints the tables, and where to find what was made.
-fn print_closing(out: &Path, board: &Board) -> anyhow::Result<()> {
+/// Prints one table and where the site is; in full all tables, and where to find everything that was made.
+fn print_closing(out: &Path, board: &Board, full: bool) -> anyhow::Result<()> {
     let ceiling = board.ceiling.as_deref().map(ResultFile::read).transpose()?;
     let results = board.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     print("\n")?;
-    print(&tables(&results, ceiling.as_ref(), "mateval-2", Grouping::Dataset, TableFormat::Markdown)?)?;
+    let site = format!("leaderboard:    {}\n", out.join("leaderboard/index.html").display());
+    if !full {
+        print(&headline(&results, ceiling.as_ref(), PROTOCOL)?)?;
+        return print(&site);
+    }
+    print(&tables(&results, ceiling.as_ref(), PROTOCOL, Grouping::Dataset, TableFormat::Markdown)?)?;
     let dataset = Dataset::open(&out.join("dataset"))?;
     for id in &dataset.file.scenes {
         let scene = dataset.folder(id);
@@ -164,6 +190,5 @@ fn print_closing(out: &Path, board: &Board) -> anyhow::Result<()> {
         print(&format!("truth:          {}\n", scene.truth().display()))?;
     }
     print(&format!("results:        {}\n", out.join("results").display()))?;
-    print(&format!("leaderboard:    {}\n", out.join("leaderboard/index.html").display()))?;
-    Ok(())
+    print(&site)
 }

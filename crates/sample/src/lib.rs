@@ -32,10 +32,11 @@ attribution.\n\n\
 For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
-/// A recipe with one scene from each source.
-const RECIPE: &str = r#"name = "sample"
-resolution = [320, 240]
+/// Width and height of the recipe's views, in pixels.
+const RESOLUTION: [u32; 2] = [320, 240];
 
+/// A recipe with one scene from each source, after its head.
+const SCENES: &str = r#"
 [[scene]]
 id = "living"
 camera = { designer = 0 }
@@ -53,10 +54,16 @@ bitterli = "room/scene.xml"
 
 /// Writes the sample into the folder `out`, which is created if it is missing. Files of the same name are replaced.
 pub fn write(out: &Path) -> Result<(), SampleError> {
+    write_at(out, RESOLUTION)
+}
+
+/// [`write`] with a recipe whose views have `width` times `height` pixels.
+pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError> {
     write_room(out)?;
     house::write(out)?;
     // The recipe is written last, so that a folder with a recipe holds a complete sample.
-    write_text(&out.join("recipe.toml"), RECIPE)
+    let recipe = format!("name = \"sample\"\nresolution = [{width}, {height}]\n{SCENES}");
+    write_text(&out.join("recipe.toml"), &recipe)
 }
 
 fn write_room(out: &Path) -> Result<(), SampleError> {

@@ -86,6 +86,22 @@ pub(super) fn all() -> Vec<Layout> {
     plain.chain(specular).collect()
 }
 
+const HEADLINE: [BlockWords; 6] = [
+    ("Albedo, input view", PictureKind::Albedo, Views::Input),
+    ("Albedo, novel views", PictureKind::Albedo, Views::Novel),
+    ("True light, input view", PictureKind::RgbTrue, Views::Input),
+    ("True light, novel views", PictureKind::RgbTrue, Views::Novel),
+    ("Relit, input view", PictureKind::RgbRelit, Views::Input),
+    ("Relit, novel views", PictureKind::RgbRelit, Views::Novel),
+];
+
+/// One table of what matters most.
+pub(super) fn headline() -> Layout {
+    let mut layout = layout("PSNR in dB".to_owned(), &HEADLINE, Surfaces::All);
+    layout.blocks.iter_mut().for_each(|block| block.quantities = vec![Quantity::Score(Metric::Psnr)]);
+    layout
+}
+
 fn layout(title: String, blocks: &[BlockWords], surfaces: Surfaces) -> Layout {
     let block = |&(title, kind, views): &BlockWords| Block {
         title,

@@ -43,11 +43,28 @@ pub fn tables(
     grouping: Grouping,
     format: TableFormat,
 ) -> Result<String, ReportError> {
-    check_comparable(results, ceiling, protocol)?;
     let layouts = match grouping {
         Grouping::Dataset | Grouping::Scene => layouts::all(),
         Grouping::Category | Grouping::SuperCategory => layouts::pooled(),
     };
+    filled(&layouts, results, ceiling, protocol, grouping, format)
+}
+
+/// The one table that says most: PSNR of albedo, under true light and relit, of the input view and novel ones, as Markdown.
+/// Otherwise like [`tables()`].
+pub fn headline(results: &[ResultFile], ceiling: Option<&ResultFile>, protocol: &str) -> Result<String, ReportError> {
+    filled(&[layouts::headline()], results, ceiling, protocol, Grouping::Dataset, TableFormat::Markdown)
+}
+
+fn filled(
+    layouts: &[layouts::Layout],
+    results: &[ResultFile],
+    ceiling: Option<&ResultFile>,
+    protocol: &str,
+    grouping: Grouping,
+    format: TableFormat,
+) -> Result<String, ReportError> {
+    check_comparable(results, ceiling, protocol)?;
     let groups = rows::groups(results, ceiling, protocol, grouping);
     let tables = layouts.iter().filter_map(|layout| table::Table::fill(layout, grouping, &groups));
     let text: String = tables
