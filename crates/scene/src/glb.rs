@@ -1,4 +1,4 @@
-//! Reads and writes geometry as binary glTF: one node with one mesh a name, in world space, without materials.
+//! Reads and writes geometry as binary glTF: one node with one mesh a name, in world space, all of one plain material.
 //!
 //! glTF counts v from the top of a picture and [`TriangleMesh`] from the bottom; this module converts.
 
@@ -36,11 +36,26 @@ pub fn write(path: &Path, nodes: &[GlbNode]) -> Result<(), SceneError> {
         return Err(SceneError::Unsupported { path: path.to_owned(), what });
     }
     let mut file = Writer::default();
+    file.root.push(plain_material());
     for node in nodes {
         file.add_node(node);
     }
     write_whole(path, &file.finish())?;
     Ok(())
+}
+
+/// Grey paint, seen from both sides. It says nothing about the surface; but trimesh drops the uv of what has no material.
+fn plain_material() -> json::Material {
+    json::Material {
+        name: Some("plain".to_owned()),
+        double_sided: true,
+        pbr_metallic_roughness: json::material::PbrMetallicRoughness {
+            base_color_factor: json::material::PbrBaseColorFactor([0.5, 0.5, 0.5, 1.0]),
+            metallic_factor: json::material::StrengthFactor(0.0),
+            ..Default::default()
+        },
+        ..Default::default()
+    }
 }
 
 #[derive(Default)]
@@ -72,7 +87,7 @@ impl Writer {
             extensions: None,
             extras: None,
             indices: Some(indices),
-            material: None,
+            material: Some(json::Index::new(0)),
             mode: Checked::Valid(json::mesh::Mode::Triangles),
             targets: None,
         };
@@ -252,6 +267,21 @@ mod tests {
         write(&b, &nodes()).unwrap();
         assert_eq!(read(&a).unwrap(), nodes());
         assert_eq!(std::fs::read(a).unwrap(), std::fs::read(b).unwrap());
+    }
+
+    /// Readers that look for a material first find one, of no texture.
+    #[test]
+    fn every_primitive_has_the_plain_material() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.glb");
+        write(&path, &nodes()).unwrap();
+        let file = gltf::Gltf::open(&path).unwrap();
+        let primitives: Vec<_> = file.meshes().flat_map(|mesh| mesh.primitives()).collect();
+        assert_eq!((primitives.len(), file.materials().len()), (2, 1));
+        for primitive in primitives {
+            assert_eq!(primitive.material().name(), Some("plain"));
+            assert!(primitive.material().pbr_metallic_roughness().base_color_texture().is_none());
+        }
     }
 
     #[test]
