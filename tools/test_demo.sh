@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the demo of the tests' build, with a quarter of its samples, and compares the
+# Runs the demo of the tests' build, with few samples, and compares the
 # README's table with its results. Albedo scores do not depend on samples.
 set -eu
 cd "$(dirname "$0")/.."
