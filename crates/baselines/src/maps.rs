@@ -17,11 +17,14 @@ pub(crate) fn srgb_bytes(linear: [f32; 3]) -> [u8; 3] {
     linear.map(|v| byte_from_unit(srgb_from_linear(v.clamp(0.0, 1.0))))
 }
 
-/// Base colour as sRGB bytes, roughness and metallic as linear bytes; `None` for maps that are not given.
+/// The maps of an instance; `None` for maps that are not given.
 pub struct Maps {
-    base_color: Option<Picture<[u8; 3]>>,
-    roughness: Option<Picture<u8>>,
-    metallic: Option<Picture<u8>>,
+    /// sRGB.
+    pub base_color: Option<Picture<[u8; 3]>>,
+    /// Linear.
+    pub roughness: Option<Picture<u8>>,
+    /// Linear.
+    pub metallic: Option<Picture<u8>>,
 }
 
 impl Maps {

@@ -56,8 +56,7 @@ pub fn write_scenes(
     method: &Method,
     write_scene: impl Fn(&SceneFile, &Path) -> Result<usize, BaselineError>,
 ) -> Result<usize, BaselineError> {
-    check_outside(dataset, out)?;
-    check_place(out, force)?;
+    check_out(dataset, out, force)?;
     let work = WorkFolder::start(out)?;
     let mut instances = 0;
     for scene in &dataset.scenes {
@@ -79,6 +78,13 @@ pub fn write_scenes(
     json::write(&work.path().join(SUBMISSION), &file)?;
     work.finish()?;
     Ok(instances)
+}
+
+/// Fails where a submission may not be written to `out`: in the dataset's folder, or where something exists that `force`
+/// does not allow replacing, or that is no submission.
+pub fn check_out(dataset: &Dataset, out: &Path, force: bool) -> Result<(), BaselineError> {
+    check_outside(dataset, out)?;
+    check_place(out, force)
 }
 
 /// Fails where files for another project would replace something or lie in the dataset.

@@ -19,13 +19,19 @@ pub fn cache_folder() -> PathBuf {
         .unwrap_or_default()
 }
 
-/// The network, or why it could not be loaded, which is printed as a warning too.
-pub fn load(net: Net) -> LpipsWeights {
+/// The network, or why it could not be loaded.
+pub fn find_weights(net: Net) -> LpipsWeights {
     match Lpips::load(net, &cache_folder().join(net.file_name())) {
         Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
-        Err(error) => {
-            say(&format!("warning: {} is missing: {error}; run: {FIX}", net.key()));
-            LpipsWeights::Missing { reason: error.to_string(), fix: FIX.to_owned() }
-        }
+        Err(error) => LpipsWeights::Missing { reason: error.to_string(), fix: FIX.to_owned() },
     }
+}
+
+/// Like [`find_weights`]; that the network is missing is printed as a warning too.
+pub fn load(net: Net) -> LpipsWeights {
+    let found = find_weights(net);
+    if let LpipsWeights::Missing { reason, fix } = &found {
+        say(&format!("warning: {} is missing: {reason}; run: {fix}", net.key()));
+    }
+    found
 }

@@ -1,4 +1,7 @@
-//! The `mateval` command. Only this crate prints, reads the environment and ends the process.
+//! The `mateval` command. Only this crate prints and reads the environment.
+//!
+//! In: the words of a command line. Out: what the command prints and writes, and its exit code ([`main`]). The Python
+//! package runs the same function, and takes the tool's name, its weights and the text of errors from here.
 //!
 //! Each subcommand has a file. It parses its arguments, checks them and everything else that can fail early, and then
 //! calls a library, which returns values. Results go to stdout; progress and warnings go to stderr. Exit codes: 0 the
@@ -18,9 +21,14 @@ mod schema;
 mod tool;
 mod weights;
 
+use std::ffi::OsString;
+
 use clap::{Parser, Subcommand};
 
 use outcome::Outcome;
+pub use outcome::error_text;
+pub use tool::TOOL;
+pub use weights::{cache_folder, find_weights};
 
 /// Makes and scores a benchmark for recovering the materials of an indoor room from one photo.
 #[derive(Parser)]
@@ -50,13 +58,23 @@ enum Command {
     Schema(schema::Args),
 }
 
-fn main() -> std::process::ExitCode {
+/// Runs the command with these words, of which the first is the program's name, and returns its exit code.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().collect();
     // A panic is a bug and has printed its own message.
-    std::panic::catch_unwind(run).unwrap_or(std::process::ExitCode::from(2))
+    std::panic::catch_unwind(|| run(&words)).unwrap_or(2)
 }
 
-fn run() -> std::process::ExitCode {
-    let result = match Cli::parse().command {
+fn run(words: &[OsString]) -> u8 {
+    let command = match Cli::try_parse_from(words) {
+        Ok(cli) => cli.command,
+        Err(refusal) => {
+            // As `Cli::parse` does: nothing can be done where the terminal is gone.
+            let _ = refusal.print();
+            return u8::try_from(refusal.exit_code()).unwrap_or(2);
+        }
+    };
+    let result = match command {
         Command::Demo(args) => demo::run(&args),
         Command::Sample(args) => sample::run(&args),
         Command::Prep(command) => prep::run(&command),
@@ -65,11 +83,11 @@ fn run() -> std::process::ExitCode {
         Command::Schema(args) => schema::run(&args),
     };
     match result {
-        Ok(Outcome::Good) => std::process::ExitCode::from(0),
-        Ok(Outcome::No) => std::process::ExitCode::from(1),
+        Ok(Outcome::Good) => 0,
+        Ok(Outcome::No) => 1,
         Err(error) => {
             outcome::say(&format!("error: {}", outcome::error_text(&error)));
-            std::process::ExitCode::from(2)
+            2
         }
     }
 }

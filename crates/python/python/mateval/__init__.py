@@ -1,0 +1,46 @@
+"""MatEval: a benchmark for recovering the materials of an indoor room from one photo.
+
+>>> import mateval
+>>> dataset = mateval.open("DATASET")
+>>> scene = dataset["living"]
+>>> maps = mateval.lift(scene, base_color=my_estimate(scene.input.rgb))
+>>> with mateval.Submission("OUT", dataset, method="mine") as submission:
+...     for instance, found in maps.items():
+...         submission.write(scene.id, instance, base_color=found.base_color)
+>>> print(mateval.lint("OUT", dataset))
+>>> mateval.score("OUT", dataset)["albedo.novel.psnr"]
+
+Arrays are NumPy's, in rows from the top left. Colours are linear Rec. 709 where they are floats and sRGB where they are
+integers. Lengths are metres, +Y is up.
+"""
+
+from . import metrics
+from ._core import Camera, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, lift
+from .by_id import ById
+from .dataset import Dataset, open
+from .errors import Error, UnknownId, Withheld
+from .reports import LintReport, Result, lint, score
+
+__all__ = [
+    "ById",
+    "Camera",
+    "Dataset",
+    "Error",
+    "Instance",
+    "LintReport",
+    "Maps",
+    "Mesh",
+    "Part",
+    "Result",
+    "Scene",
+    "Submission",
+    "Truth",
+    "UnknownId",
+    "View",
+    "Withheld",
+    "lift",
+    "lint",
+    "metrics",
+    "open",
+    "score",
+]

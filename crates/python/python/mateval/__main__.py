@@ -1,0 +1,17 @@
+"""The command ``mateval``."""
+
+import signal
+import sys
+
+from . import _core
+
+
+def main() -> int:
+    """Runs the command with the words of ``sys.argv`` and returns its exit code."""
+    # Python would only note the signal, and act on it when the command has ended.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return _core.main(["mateval", *sys.argv[1:]])
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,17 @@
+"""The exceptions of this package. Wrong arguments are Python's own ``TypeError`` and ``ValueError``."""
+
+
+class Error(Exception):
+    """Something could not be read, written or scored. The text is that of the command, with the codes of findings."""
+
+
+class UnknownId(Error, KeyError):
+    """A scene, view, instance or part that does not exist."""
+
+    def __str__(self) -> str:
+        # KeyError would show the text in quotation marks.
+        return Exception.__str__(self)
+
+
+class Withheld(Error):
+    """Ground truth that this copy of the dataset does not hold."""

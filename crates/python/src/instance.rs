@@ -1,0 +1,188 @@
+//! An instance, its parts and its mesh.
+
+use std::sync::Arc;
+
+use mateval_scene::{Role, TriangleMesh, dataset};
+use numpy::PyArray2;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::rows;
+use crate::failure::failed;
+use crate::scene_source::SceneSource;
+
+/// One object that methods provide textures for.
+#[pyclass(frozen, module = "mateval")]
+pub struct Instance {
+    source: Arc<SceneSource>,
+    at: usize,
+}
+
+impl Instance {
+    /// The instance at this place of the scene, which must exist.
+    pub fn new(source: &Arc<SceneSource>, at: usize) -> Self {
+        Self { source: Arc::clone(source), at }
+    }
+
+    fn file(&self) -> &dataset::Instance {
+        &self.source.file().instances[self.at]
+    }
+}
+
+#[pymethods]
+impl Instance {
+    /// Its id: its folder in a submission.
+    #[getter]
+    fn id(&self) -> &str {
+        self.file().id.as_str()
+    }
+
+    /// Its value in `View.instance`, from 1.
+    #[getter]
+    fn index(&self) -> u16 {
+        self.file().index.0.get()
+    }
+
+    /// Its name in the source.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.file().name
+    }
+
+    /// Its role in the scene: `architecture`, `furniture`, `light_fixture` or `other`.
+    #[getter]
+    fn role(&self) -> &'static str {
+        match self.file().role {
+            Role::Architecture { .. } => "architecture",
+            Role::Furniture {} => "furniture",
+            Role::LightFixture {} => "light_fixture",
+            Role::Other {} => "other",
+        }
+    }
+
+    /// Its category; None where the source does not state it.
+    #[getter]
+    fn category(&self) -> Option<&str> {
+        self.file().category.as_deref()
+    }
+
+    /// Its broader category; None where the source does not state it.
+    #[getter]
+    fn super_category(&self) -> Option<&str> {
+        self.file().super_category.as_deref()
+    }
+
+    /// The number of its triangles.
+    #[getter]
+    fn triangles(&self) -> usize {
+        self.file().triangles
+    }
+
+    /// Texels along a side of the baked truth; a submission's maps may have another size. None for glass and for shapes
+    /// without area, which need no maps.
+    #[getter]
+    fn atlas_size(&self) -> Option<u32> {
+        self.file().atlas.as_ref().map(|atlas| atlas.size)
+    }
+
+    /// Its mesh. The first mesh of a scene that is read reads all others too.
+    #[getter]
+    fn mesh(&self, py: Python<'_>) -> PyResult<Mesh> {
+        py.detach(|| self.source.mesh(self.at)).map(Mesh).map_err(failed)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<mateval.Instance '{}', {} triangles>", self.file().id, self.file().triangles)
+    }
+}
+
+/// A piece of an instance.
+#[pyclass(frozen, module = "mateval")]
+pub struct Part(pub dataset::Part);
+
+#[pymethods]
+impl Part {
+    /// Its id.
+    #[getter]
+    fn id(&self) -> &str {
+        self.0.id.as_str()
+    }
+
+    /// Its value in `View.part`, from 1.
+    #[getter]
+    fn index(&self) -> u16 {
+        self.0.index.0.get()
+    }
+
+    /// The id of its instance.
+    #[getter]
+    fn instance(&self) -> &str {
+        self.0.instance.as_str()
+    }
+
+    /// The number of its triangles.
+    #[getter]
+    fn triangles(&self) -> usize {
+        self.0.triangles
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<mateval.Part '{}', {} triangles>", self.0.id, self.0.triangles)
+    }
+}
+
+/// Triangles in world space: metres, +Y up.
+#[pyclass(frozen, module = "mateval")]
+pub struct Mesh(Arc<TriangleMesh>);
+
+#[pymethods]
+impl Mesh {
+    /// Positions in metres: (vertices, 3), float32.
+    #[getter]
+    fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        rows(py, self.0.positions.iter().map(|position| position.to_array()))
+    }
+
+    /// Vertex indices, counter-clockwise seen from the front: (triangles, 3), uint32.
+    #[getter]
+    fn faces<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u32>>> {
+        rows(py, self.0.triangles.iter().copied())
+    }
+
+    /// Shading normals of unit length: (vertices, 3), float32; None where the faces are flat.
+    #[getter]
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let normals = self.0.normals.as_ref();
+        normals.map(|all| rows(py, all.iter().map(|normal| normal.to_array()))).transpose()
+    }
+
+    /// The atlas: (vertices, 2), float32. u runs to the right, v up from the bottom, as in trimesh and OBJ: the row of a
+    /// map is (1 - v) * side. None for instances without an atlas.
+    #[getter]
+    fn uv<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f32>>>> {
+        let uvs = self.0.uvs.as_ref();
+        uvs.map(|all| rows(py, all.iter().map(|uv| uv.to_array()))).transpose()
+    }
+
+    /// The mesh as a `trimesh.Trimesh` with the atlas as its uv. trimesh must be installed.
+    fn to_trimesh<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let trimesh = py.import("trimesh")?;
+        let arguments = PyDict::new(py);
+        arguments.set_item("vertices", self.vertices(py)?)?;
+        arguments.set_item("faces", self.faces(py)?)?;
+        arguments.set_item("vertex_normals", self.normals(py)?)?;
+        // Its own clean-up would merge and reorder vertices.
+        arguments.set_item("process", false)?;
+        if let Some(uv) = self.uv(py)? {
+            let texture = PyDict::new(py);
+            texture.set_item("uv", uv)?;
+            let visual = py.import("trimesh.visual")?.getattr("TextureVisuals")?.call((), Some(&texture))?;
+            arguments.set_item("visual", visual)?;
+        }
+        trimesh.getattr("Trimesh")?.call((), Some(&arguments))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<mateval.Mesh {} vertices, {} triangles>", self.0.positions.len(), self.0.triangles.len())
+    }
+}

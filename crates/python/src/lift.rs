@@ -1,0 +1,158 @@
+//! `mateval.lift`: the baseline `nn` on arrays.
+
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use mateval_baselines::BaselineError;
+use mateval_baselines::estimate::Estimate;
+use mateval_baselines::geometry::SceneGeometry;
+use mateval_baselines::maps;
+use mateval_baselines::nn::{NnOptions, lift_scene, seen_pixels};
+use mateval_baselines::seen_cloud::FillRule;
+use mateval_image::{Mask, Picture};
+use mateval_scene::Progress;
+use mateval_scene::submission::MAP_SIZES;
+use numpy::{PyArray2, PyArray3};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{plane, triples};
+use crate::failure::failed;
+use crate::long_work::run_long;
+use crate::map_input::MapInput;
+use crate::scene::Scene;
+use crate::scene_source::SceneSource;
+
+/// The maps of an instance, encoded as a submission stores them.
+#[pyclass(frozen, get_all, module = "mateval")]
+pub struct Maps {
+    /// sRGB: (side, side, 3), uint8; None where the estimate has none.
+    base_color: Option<Py<PyArray3<u8>>>,
+    /// Perceptual roughness times 255: (side, side), uint8; None where the estimate has none.
+    roughness: Option<Py<PyArray2<u8>>>,
+    /// Metallic times 255: (side, side), uint8; None where the estimate has none.
+    metallic: Option<Py<PyArray2<u8>>>,
+    /// Whether the input view shows each texel: (side, side), bool.
+    seen: Py<PyArray2<bool>>,
+}
+
+/// The maps of an instance before Python gets them.
+struct Lifted {
+    maps: maps::Maps,
+    seen: Mask,
+}
+
+/// Lifts an estimate of the input view to the atlases of all instances that have one: seen texels get the estimate, the
+/// others that of the seen points nearest to them. The maps are those of `mateval baseline nn`.
+///
+/// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
+/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. At least one of them must be given.
+///
+/// neighbours is the number of seen points that an unseen texel is computed from, normal_weight the distance in metres
+/// (0 to 100) that opposite normals count as. any_instance searches the points of all instances. atlas_size is the side of
+/// all maps in texels; None is the dataset's own size of each.
+///
+/// Returns the maps by the id of the instance, in the scene's order.
+#[pyfunction]
+#[pyo3(signature = (scene, *, base_color=None, roughness=None, metallic=None, neighbours=1, normal_weight=0.0, any_instance=false, atlas_size=None))]
+#[expect(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+pub fn lift<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    base_color: Option<Bound<'py, PyAny>>,
+    roughness: Option<Bound<'py, PyAny>>,
+    metallic: Option<Bound<'py, PyAny>>,
+    neighbours: u8,
+    normal_weight: f64,
+    any_instance: bool,
+    atlas_size: Option<u32>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
+    let options = options(neighbours, normal_weight, any_instance, atlas_size)?;
+    let source = Arc::clone(&scene.source);
+    let all = run_long(py, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
+    let by_id = PyDict::new(py);
+    for (instance, lifted) in all {
+        by_id.set_item(scene.source.file().instances[instance].id.as_str(), lifted.into_python(py)?)?;
+    }
+    Ok(by_id)
+}
+
+/// An estimate of pictures of one size.
+fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Estimate> {
+    let read = |(name, array): &(&'static str, Option<Bound<'_, PyAny>>)| {
+        array.as_ref().map(|array| MapInput::new(name, array)).transpose()
+    };
+    let inputs = [read(&given[0])?, read(&given[1])?, read(&given[2])?];
+    inputs.iter().flatten().try_for_each(MapInput::check_finite)?;
+    let mut present = inputs.iter().flatten();
+    let Some(first) = present.next() else {
+        return Err(PyValueError::new_err("expected base_color, roughness or metallic, found none of them"));
+    };
+    present.try_for_each(|other| other.check_same_size(first))?;
+    let [base_color, roughness, metallic] = &inputs;
+    Ok(Estimate {
+        base_color: base_color.as_ref().map(MapInput::linear).transpose()?,
+        roughness: roughness.as_ref().map(MapInput::plane).transpose()?,
+        metallic: metallic.as_ref().map(MapInput::plane).transpose()?,
+    })
+}
+
+fn options(neighbours: u8, normal_weight_m: f64, any_instance: bool, atlas_size: Option<u32>) -> PyResult<NnOptions> {
+    let Some(neighbours) = NonZero::new(usize::from(neighbours)) else {
+        return Err(PyValueError::new_err("neighbours: expected 1 to 255, found 0"));
+    };
+    if !(0.0..=100.0).contains(&normal_weight_m) {
+        return Err(PyValueError::new_err(format!("normal_weight: expected 0 to 100 m, found {normal_weight_m}")));
+    }
+    if let Some(size) = atlas_size.filter(|size| !MAP_SIZES.contains(&(*size as usize))) {
+        let (least, most) = (MAP_SIZES.start(), MAP_SIZES.end());
+        return Err(PyValueError::new_err(format!("atlas_size: expected {least} to {most} texels, found {size}")));
+    }
+    Ok(NnOptions { rule: FillRule { neighbours, normal_weight_m }, any_instance, atlas_size })
+}
+
+/// The maps by the instance's place in the scene.
+fn lifted(
+    source: &SceneSource,
+    estimate: &Estimate,
+    options: &NnOptions,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<usize, Lifted>, BaselineError> {
+    let geometry = SceneGeometry::read(source.folder(), source.file())?;
+    let seen = seen_pixels(&geometry, estimate)?;
+    let all = Mutex::new(BTreeMap::new());
+    lift_scene(&geometry, estimate, &seen, options, progress, |instance, lifted, medians| {
+        let given = estimate.given_maps();
+        let lifted = match lifted {
+            Some(lifted) => {
+                let side = lifted.whole.texels.width();
+                let seen = Picture::new(side, side, lifted.seen)?;
+                Lifted { maps: maps::Maps::of_atlas(&lifted.whole, given), seen }
+            }
+            None => {
+                let side = *MAP_SIZES.start();
+                let maps = maps::Maps::constant(medians.of(&geometry, instance), given);
+                Lifted { maps, seen: Picture::filled(side, side, false) }
+            }
+        };
+        all.lock().unwrap_or_else(PoisonError::into_inner).insert(instance, lifted);
+        Ok(())
+    })?;
+    Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+impl Lifted {
+    fn into_python(self, py: Python<'_>) -> PyResult<Maps> {
+        let colours = |picture: &Picture<[u8; 3]>| PyResult::Ok(triples(py, picture, |rgb| rgb)?.unbind());
+        let numbers = |picture: &Picture<u8>| PyResult::Ok(plane(py, picture)?.unbind());
+        Ok(Maps {
+            base_color: self.maps.base_color.as_ref().map(colours).transpose()?,
+            roughness: self.maps.roughness.as_ref().map(numbers).transpose()?,
+            metallic: self.maps.metallic.as_ref().map(numbers).transpose()?,
+            seen: plane(py, &self.seen)?.unbind(),
+        })
+    }
+}

@@ -1,0 +1,63 @@
+//! Runs long work so that Ctrl-C ends the call.
+//!
+//! Python's signal handlers run in its main thread, and only when that thread asks for them. The work therefore runs in
+//! the pool, which owns its inputs, while the calling thread waits and asks several times a second. After an interrupt
+//! the call returns at once. The work itself ends at its next report of progress, by unwinding; until then it takes
+//! processor time, but nobody sees its result.
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+use mateval_scene::Progress;
+use pyo3::prelude::*;
+
+use crate::pool::pool;
+
+/// How long signals may wait.
+const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
+
+/// The payload with which unwanted work unwinds.
+struct Unwanted;
+
+/// Runs `work` in this process's pool, detached from Python, and returns its result. Fails with the exception of a
+/// signal's handler, as `KeyboardInterrupt`. Panics where the work does.
+pub fn run_long<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(Progress<'_>) -> T + Send + 'static,
+) -> PyResult<T> {
+    let unwanted = Arc::new(AtomicBool::new(false));
+    let is_unwanted = Arc::clone(&unwanted);
+    let (sender, mut receiver) = channel();
+    pool(py)?.spawn(move || {
+        let progress = |_: &str, _: usize, _: usize| {
+            if is_unwanted.load(Ordering::Relaxed) {
+                resume_unwind(Box::new(Unwanted));
+            }
+        };
+        // After a panic nothing of the work is used again: it owns its inputs.
+        let result = catch_unwind(AssertUnwindSafe(|| work(&progress)));
+        // After an interrupt nobody receives it.
+        let _ = sender.send(result);
+    });
+    loop {
+        let received;
+        (receiver, received) = py.detach(move || {
+            let received = receiver.recv_timeout(BETWEEN_SIGNALS);
+            (receiver, received)
+        });
+        match received {
+            Ok(Ok(result)) => return Ok(result),
+            Ok(Err(panic)) => resume_unwind(panic),
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(interrupt) = py.check_signals() {
+                    unwanted.store(true, Ordering::Relaxed);
+                    return Err(interrupt);
+                }
+            }
+            Err(RecvTimeoutError::Disconnected) => unreachable!("the work always sends a result"),
+        }
+    }
+}

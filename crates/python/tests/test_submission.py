@@ -1,0 +1,265 @@
+"""Lifting, writing, checking and scoring: the same bytes as the command's."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+import mateval
+
+
+def files_of(folder):
+    """The bytes of all files by their paths."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()
+    }
+
+
+def written(out, dataset, scene, maps):
+    with mateval.Submission(out, dataset, method="mine") as submission:
+        for instance, found in maps.items():
+            given = {map: getattr(found, map) for map in ("base_color", "roughness", "metallic")}
+            submission.write(scene.id, instance, **{map: array for map, array in given.items() if array is not None})
+    return out
+
+
+def compare_maps(ours, commands):
+    ours, commands = files_of(ours), files_of(commands)
+    ours.pop("submission.json"), commands.pop("submission.json")
+    assert list(ours) == list(commands) and len(ours) > 10
+    assert [path for path in ours if ours[path] != commands[path]] == []
+
+
+def test_lift_equals_the_baseline_byte_for_byte(dataset, scene, nn, tmp_path):
+    truth = scene.input.truth
+    maps = mateval.lift(scene, base_color=truth.albedo, roughness=truth.roughness, metallic=truth.metallic)
+    compare_maps(written(tmp_path / "out", dataset, scene, maps), nn)
+    assert any(found.seen.any() for found in maps.values())
+    for found in maps.values():
+        assert found.seen.shape == found.roughness.shape and found.seen.dtype == np.bool_
+
+
+def test_lift_equals_the_baseline_with_other_options(root, dataset, scene, command, tmp_path):
+    out = tmp_path / "command"
+    command("baseline", "nn", "--dataset", root, "--out", out, "--estimate", "input", "--neighbours", 3,
+            "--normal-weight", 0.5, "--any-instance", "--atlas-size", 64)
+    photo = np.clip(scene.input.rgb * np.float32(scene.exposure), 0, 1)
+    maps = mateval.lift(scene, base_color=photo, neighbours=3, normal_weight=0.5, any_instance=True, atlas_size=64)
+    assert all(found.roughness is None for found in maps.values())
+    compare_maps(written(tmp_path / "ours", dataset, scene, maps), out)
+
+
+def test_lift_decodes_integers_as_the_plain_adapter_does(root, dataset, scene, command, tmp_path):
+    photo = scene.input.preview
+    folder = tmp_path / "estimate"
+    folder.mkdir()
+    # The plain adapter reads the preview, which is a PNG of the same bytes.
+    adapter = tmp_path / "plain.toml"
+    adapter.write_text('name = "x"\n[base_color]\nfiles = ["{scene}.png"]\nencoding = "srgb"\n')
+    (folder / "room.png").write_bytes((root / "scenes/room/views/input/rgb.png").read_bytes())
+    out = tmp_path / "command"
+    command("baseline", "nn", "--dataset", root, "--out", out, "--estimate", folder, "--adapter", adapter)
+    compare_maps(written(tmp_path / "ours", dataset, scene, mateval.lift(scene, base_color=photo)), out)
+
+
+def test_lint_is_the_commands(root, dataset, nn, command):
+    report = mateval.lint(nn, dataset)
+    assert report.json == command("eval", "lint", nn, "--dataset", root, "--format", "json").stdout
+    assert str(report) == command("eval", "lint", nn, "--dataset", root).stdout
+    assert report.good and isinstance(report.findings, list)
+
+
+def test_lint_finds_faults(dataset, tmp_path):
+    out = tmp_path / "empty"
+    with mateval.Submission(out, dataset, method="empty"):
+        pass
+    report = mateval.lint(out, dataset)
+    assert "missing_map" in {finding["code"] for finding in report.findings}
+
+
+def test_score_is_the_commands(root, dataset, nn, command, tmp_path):
+    command("eval", "score", nn, "--dataset", root, "--out", tmp_path / "result.json")
+    result = mateval.score(nn, dataset, cache=tmp_path / "cache")
+    assert result.json == (tmp_path / "result.json").read_text()
+    assert result["albedo.input.psnr"] == result.scenes["room"]["albedo.input.psnr"] > 20
+    assert len(result.fingerprint) == 64 and len(result) > 20 and result.method == "nn-gt"
+    records = result.to_records()
+    assert len(records) > 50 and {"scene", "view", "picture", "metric", "value"} <= set(records[0])
+    assert mateval.score(nn, dataset, scenes=["room"], cache=tmp_path / "cache").json == result.json
+
+
+def test_score_refuses_what_it_does_not_know(dataset, nn, tmp_path):
+    with pytest.raises(mateval.Error, match="there is no protocol 'best'; use one of: .*mateval-2"):
+        mateval.score(nn, dataset, protocol="best")
+    with pytest.raises(mateval.UnknownId, match="has no scene 'hall'; it has 'room'"):
+        mateval.score(nn, dataset, scenes=["hall"])
+    with pytest.raises(TypeError, match="found the text 'room'"):
+        mateval.score(nn, dataset, scenes="room")
+    with pytest.raises(mateval.Error, match="cannot read '.*no-such"):
+        mateval.score(tmp_path / "no-such", dataset)
+
+
+def test_the_dtype_decides_the_encoding(dataset, scene, tmp_path):
+    ids = [id for id, instance in scene.instances.items() if instance.atlas_size]
+    flat = np.full((64, 64, 3), 0.5)
+    arrays = {
+        np.uint8: (flat * 255).astype(np.uint8), np.uint16: (flat * 65535).astype(np.uint16),
+        np.float16: flat.astype(np.float16), np.float32: flat.astype(np.float32), np.float64: flat,
+    }
+    out = tmp_path / "out"
+    with mateval.Submission(out, dataset, method="m", cost={"seconds_a_scene": 3, "hardware": "a CPU"}) as submission:
+        for id, array in zip(ids, arrays.values()):
+            # Not contiguous, which must not matter.
+            submission.write("room", id, base_color=array[::-1, ::-1], roughness=array[..., 0].T)
+    endings = [sorted(path.name for path in (out / "scenes/room" / id).iterdir()) for id in ids[:5]]
+    assert endings == 2 * [["base_color.png", "roughness.png"]] + 3 * [["base_color.exr", "roughness.exr"]]
+    assert json.loads((out / "submission.json").read_text())["cost"] == {"seconds_a_scene": 3.0, "hardware": "a CPU"}
+    report = mateval.lint(out, dataset)
+    assert not {"linear_in_png", "srgb_in_exr", "unsound_map"} & {finding["code"] for finding in report.findings}
+    assert report.good
+
+
+FLAT = np.full((64, 64, 3), 0.5, np.float32)
+
+
+def with_value(value):
+    array = FLAT.copy()
+    array[3, 5, 1] = value
+    return array
+
+
+@pytest.mark.parametrize(
+    "error, match, arguments",
+    [
+        (TypeError, "base_color: expected a NumPy array, found list", {"base_color": [[0.5]]}),
+        (TypeError, "base_color: expected uint8, .* found int64", {"base_color": FLAT.astype(np.int64)}),
+        (TypeError, "base_color: expected uint8, .* found bool", {"base_color": FLAT > 0}),
+        (ValueError, r"base_color: expected the shape \(side, side, 3\) .*64 to 4096.*found \[64, 64\]", {"base_color": FLAT[..., 0]}),
+        (ValueError, r"base_color: .*found \[32, 64, 3\]", {"base_color": FLAT[:32]}),
+        (ValueError, r"base_color: .*found \[32, 32, 3\]", {"base_color": FLAT[:32, :32]}),
+        (ValueError, r"roughness: expected the shape \(side, side\) .*found \[64, 64, 3\]", {"roughness": FLAT}),
+        (ValueError, r"base_color: expected values from -1 to 16, found NaN at \[3, 5, 1\]", {"base_color": with_value(np.nan)}),
+        (ValueError, r"base_color: .*found 16.5 at \[3, 5, 1\]", {"base_color": with_value(16.5)}),
+        (ValueError, r"metallic: expected values from 0 to 1, found 2 at \[3, 5\]", {"metallic": with_value(2)[..., 1]}),
+        (ValueError, "expected base_color, roughness or metallic, found none", {}),
+    ],
+)
+def test_wrong_maps_are_refused(dataset, scene, tmp_path, error, match, arguments):
+    id = next(id for id, instance in scene.instances.items() if instance.atlas_size)
+    with mateval.Submission(tmp_path / "out", dataset, method="m") as submission:
+        with pytest.raises(error, match=match):
+            submission.write("room", id, **arguments)
+        submission.write("room", id, base_color=FLAT)
+        with pytest.raises(ValueError, match="base_color: expected a map that was not written yet"):
+            submission.write("room", id, base_color=FLAT)
+        with pytest.raises(mateval.UnknownId, match="has no scene 'hall'; it has 'room'"):
+            submission.write("hall", id, base_color=FLAT)
+        with pytest.raises(mateval.UnknownId, match="scene 'room' has no instance 'x'; it has '"):
+            submission.write("room", "x", base_color=FLAT)
+    with pytest.raises(ValueError, match="is closed; expected an open one"):
+        submission.write("room", id, roughness=FLAT[..., 0])
+
+
+@pytest.mark.parametrize(
+    "error, match, arguments",
+    [
+        (ValueError, "found none of them", {}),
+        (ValueError, "base_color: expected finite values, found NaN", {"base_color": with_value(np.nan)}),
+        (ValueError, r"roughness: expected the height and width of base_color, \[64, 64\], found", {"base_color": FLAT, "roughness": FLAT[:9, :, 0]}),
+        (ValueError, "neighbours: expected 1 to 255, found 0", {"base_color": FLAT, "neighbours": 0}),
+        (ValueError, "normal_weight: expected 0 to 100 m, found -1", {"base_color": FLAT, "normal_weight": -1}),
+        (ValueError, "atlas_size: expected 64 to 4096 texels, found 5", {"base_color": FLAT, "atlas_size": 5}),
+        (mateval.Error, "has 64x64 pixels, the input view 96x72; expected the same proportions", {"base_color": FLAT}),
+    ],
+)
+def test_wrong_estimates_are_refused(scene, error, match, arguments):
+    with pytest.raises(error, match=match):
+        mateval.lift(scene, **arguments)
+
+
+def test_a_submission_replaces_nothing_unasked(root, dataset, scene, tmp_path, command, nn):
+    out = tmp_path / "out"
+    mateval.Submission(out, dataset, method="first").close()
+    with pytest.raises(mateval.Error, match="already exists") as caught:
+        mateval.Submission(out, dataset, method="second")
+    said = command("baseline", "grey", "--dataset", root, "--out", out, good=(2,)).stderr
+    assert said == f"error: {caught.value}\n"
+    mateval.Submission(out, dataset, method="third", force=True).close()
+    assert json.loads((out / "submission.json").read_text())["method"] == "third"
+    with pytest.raises(mateval.Error, match="lies in the dataset"):
+        mateval.Submission(root / "out", dataset, method="m")
+    with pytest.raises(ValueError, match="cost: expected 'seconds_a_scene', found no such key"):
+        mateval.Submission(tmp_path / "other", dataset, method="m", cost={})
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_an_exception_leaves_nothing(dataset, tmp_path):
+    with pytest.raises(RuntimeError):
+        with mateval.Submission(tmp_path / "out", dataset, method="m"):
+            raise RuntimeError
+    submission = mateval.Submission(tmp_path / "out", dataset, method="m")
+    submission.discard()
+    submission.close()
+    mateval.Submission(tmp_path / "out", dataset, method="m")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_program_leaves_no_half_submission(root, dataset, scene, tmp_path):
+    first, second = [id for id, instance in scene.instances.items() if instance.atlas_size][:2]
+    program = textwrap.dedent(f"""
+        import os, numpy as np, mateval
+        submission = mateval.Submission({str(tmp_path / "out")!r}, mateval.open({str(root)!r}), method="m")
+        submission.write("room", {first!r}, base_color=np.zeros((64, 64, 3), np.uint8))
+        os._exit(7)
+    """)
+    assert subprocess.run([sys.executable, "-c", program]).returncode == 7
+    assert not (tmp_path / "out").exists()
+    assert [path.name for path in tmp_path.iterdir()] == [".out.partial"]
+    # What the killed program left is removed by the next one.
+    with mateval.Submission(tmp_path / "out", dataset, method="m") as submission:
+        submission.write("room", second, base_color=np.zeros((64, 64, 3), np.uint8))
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    assert [path.name for path in (tmp_path / "out/scenes/room").iterdir()] == [second]
+
+
+def test_metrics_are_the_scorers(scene):
+    rng = np.random.default_rng(1)
+    a, b = rng.random((2, 40, 50, 3), np.float32)
+    mask = rng.random((40, 50)) > 0.001
+    error = np.mean((a - b).astype(np.float64) ** 2)
+    assert mateval.metrics.psnr(a, b) == pytest.approx(-10 * np.log10(error), abs=1e-9)
+    error = np.mean((a - b)[mask].astype(np.float64) ** 2)
+    assert mateval.metrics.psnr(a, b, mask) == pytest.approx(-10 * np.log10(error), abs=1e-9)
+    assert mateval.metrics.psnr(a[..., 0], a[..., 0]) == 100
+    assert mateval.metrics.psnr(a, b, np.zeros((40, 50), bool)) is None
+    assert mateval.metrics.ssim(a, a) == pytest.approx(1)
+    assert 0 < mateval.metrics.ssim(a, b, mask) < 0.5
+    assert mateval.metrics.ssim(np.zeros((11, 11), np.uint8), np.zeros((11, 11), np.uint8)) == 1
+    with pytest.raises(mateval.Error, match="reference has 50x39 pixels; expected 50x40"):
+        mateval.metrics.psnr(a, b[1:])
+    with pytest.raises(mateval.Error, match="at least 11x11 pixels; found 5x5"):
+        mateval.metrics.ssim(a[:5, :5], b[:5, :5])
+    with pytest.raises(TypeError, match="reference: expected floats like the prediction, found integers"):
+        mateval.metrics.psnr(a, (b * 255).astype(np.uint8))
+    with pytest.raises(TypeError, match="mask: expected bool, found uint8"):
+        mateval.metrics.psnr(a, b, mask.astype(np.uint8))
+    with pytest.raises(mateval.Error, match="has the value NaN at pixel"):
+        mateval.metrics.ssim(np.full((20, 20), np.nan), np.zeros((20, 20)))
+
+
+def test_lpips_is_computed_or_says_how_to_get_its_weights(tmp_path):
+    a = np.random.default_rng(1).random((64, 64, 3), np.float32)
+    program = "import mateval, numpy as np\nmateval.metrics.lpips(*np.zeros((2, 64, 64, 3)))"
+    environment = {**os.environ, "MATEVAL_CACHE": str(tmp_path)}
+    ended = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert "mateval.errors.Error: lpips_alex is missing: cannot read" in ended.stderr and "run: " in ended.stderr
+    try:
+        assert mateval.metrics.lpips(a, a) == 0
+    except mateval.Error as error:
+        pytest.skip(str(error))
+    assert mateval.metrics.lpips(a, 1 - a) > 0.1

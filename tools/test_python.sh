@@ -1,0 +1,35 @@
+#!/bin/sh
+# Builds the wheel of the Python package and tests it in fresh environments of every Python from 3.9 that is found.
+# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters.
+set -eu
+cd "$(dirname "$0")/.."
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# With the extension module, so that both are built from the same libraries.
+cargo build --release --package mateval --package mateval-python
+mateval="${CARGO_TARGET_DIR:-$PWD/target}/release/mateval"
+
+python3 -m venv "$work/maturin"
+"$work/maturin/bin/pip" install --quiet 'maturin>=1.9.4,<2'
+"$work/maturin/bin/maturin" build --release --manifest-path crates/python/Cargo.toml --out "$work/dist"
+ls -l "$work/dist"
+
+# One scene of the built-in sample, small enough to be rendered in seconds.
+"$mateval" sample "$work/source"
+printf '%s\n' 'name = "sample"' 'resolution = [96, 72]' 'atlas_size = 128' \
+    '[[scene]]' 'id = "room"' 'bitterli = "room/scene.xml"' 'house = "sample"' > "$work/source/recipe.toml"
+"$mateval" prep build "$work/source/recipe.toml" --out "$work/dataset"
+"$mateval" prep render "$work/dataset" --renderer builtin --samples 1
+
+tested=0
+for python in ${PYTHONS:-python3.9 python3.10 python3.11 python3.12 python3.13 python3.14}; do
+    "$python" -c 'import venv' 2> /dev/null || continue
+    "$python" --version
+    "$python" -m venv "$work/env$tested"
+    "$work/env$tested/bin/pip" install --quiet "$work"/dist/*.whl pytest mypy trimesh
+    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_WHEELS="$work/dist" \
+        "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
+    tested=$((tested + 1))
+done
+[ "$tested" -gt 0 ] || { echo "no Python from 3.9 was found" >&2; exit 1; }
