@@ -60,11 +60,7 @@ impl Dataset {
     }
 
     fn __getitem__(&self, key: &str) -> PyResult<Scene> {
-        let Some(at) = self.0.scenes.iter().position(|scene| scene.id.as_str() == key) else {
-            let known: Vec<String> = self.0.scenes.iter().map(|scene| format!("'{}'", scene.id)).collect();
-            let root = self.0.root.display();
-            return Err(unknown_id(format!("'{root}' has no scene '{key}'; it has {}", known.join(", "))));
-        };
+        let at = scene_place(&self.0, key)?;
         Ok(Scene::new(SceneSource::new(Arc::clone(&self.0), at)))
     }
 
@@ -76,4 +72,18 @@ impl Dataset {
         let root = self.0.root.display();
         format!("<mateval.Dataset '{}' in '{root}', {} scenes>", self.0.file.name, self.0.scenes.len())
     }
+}
+
+/// The place of the scene with this id. Fails where the dataset has none.
+pub fn scene_place(dataset: &open::Dataset, id: &str) -> PyResult<usize> {
+    dataset.scenes.iter().position(|scene| scene.id.as_str() == id).ok_or_else(|| {
+        let root = dataset.root.display();
+        let known = quoted(dataset.scenes.iter().map(|scene| scene.id.as_str()));
+        unknown_id(format!("'{root}' has no scene '{id}'; it has {known}"))
+    })
+}
+
+/// `'a', 'b'`.
+pub fn quoted<'a>(ids: impl Iterator<Item = &'a str>) -> String {
+    ids.map(|id| format!("'{id}'")).collect::<Vec<_>>().join(", ")
 }

@@ -3,7 +3,7 @@
 //! Python's signal handlers run in its main thread, and only when that thread asks for them. The work therefore runs in
 //! the pool, which owns its inputs, while the calling thread waits and asks several times a second. After an interrupt
 //! the call returns at once. The work itself ends at its next report of progress, by unwinding; until then it takes
-//! processor time, but nobody sees its result.
+//! processor time, but nobody sees its result, and later calls have other threads.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use std::time::Duration;
 use mateval_scene::Progress;
 use pyo3::prelude::*;
 
-use crate::pool::pool;
+use crate::pool::{abandon_pool, pool};
 
 /// How long signals may wait.
 const BETWEEN_SIGNALS: Duration = Duration::from_millis(50);
@@ -54,6 +54,7 @@ pub fn run_long<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(interrupt) = py.check_signals() {
                     unwanted.store(true, Ordering::Relaxed);
+                    abandon_pool(py);
                     return Err(interrupt);
                 }
             }

@@ -123,7 +123,7 @@ impl MapInput {
             return Ok(());
         }
         let expected = format!("the height and width of {}, {:?}", other.name, size(other));
-        Err(self.wrong_shape(&expected))
+        Err(PyValueError::new_err(format!("{}: expected {expected}, found {:?}", self.name, size(self))))
     }
 
     fn is_stored(&self) -> bool {

@@ -35,3 +35,10 @@ pub fn pool(_attached: Python<'_>) -> PyResult<Arc<ThreadPool>> {
     std::mem::forget(parents);
     Ok(pool)
 }
+
+/// Lets the threads of this process end with their work; the next call gets new ones. Work that nobody wants any more
+/// would keep them from later calls.
+pub fn abandon_pool(_attached: Python<'_>) {
+    let mut owned = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    owned.take_if(|owned| owned.process == std::process::id());
+}

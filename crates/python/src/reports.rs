@@ -15,7 +15,7 @@ use mateval_submission::archive;
 use mateval_submission::lint::{LintFile, LintPlan, lint as check, plain, refused};
 use pyo3::prelude::*;
 
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, scene_place};
 use crate::failure::failed;
 use crate::long_work::run_long;
 
@@ -48,8 +48,10 @@ pub fn score(
     protocol: &str,
     cache: Option<PathBuf>,
 ) -> PyResult<String> {
+    let dataset = Arc::clone(&dataset.0);
+    scenes.iter().try_for_each(|id| scene_place(&dataset, id).map(drop))?;
     let task = ScoreTask {
-        dataset: Arc::clone(&dataset.0),
+        dataset,
         submission,
         scenes: scenes.into_iter().map(SceneId::new).collect::<Result<_, _>>().map_err(failed)?,
         protocol: Protocol::named(protocol).map_err(failed)?,

@@ -16,7 +16,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, quoted, scene_place};
 use crate::failure::{failed, unknown_id};
 use crate::map_input::{MapInput, Numbers};
 
@@ -177,18 +177,10 @@ impl Submission {
     }
 
     fn find(&self, scene: &str, instance: &str) -> PyResult<(&SceneId, &Instance)> {
-        let scenes = &self.dataset.scenes;
-        let Some(file) = scenes.iter().find(|file| file.id.as_str() == scene) else {
-            let known: Vec<String> = scenes.iter().map(|file| format!("'{}'", file.id)).collect();
-            let root = self.dataset.root.display();
-            return Err(unknown_id(format!("'{root}' has no scene '{scene}'; it has {}", known.join(", "))));
-        };
+        let file = &self.dataset.scenes[scene_place(&self.dataset, scene)?];
         let Some(found) = file.instances.iter().find(|file| file.id.as_str() == instance) else {
-            let known: Vec<String> = file.instances.iter().map(|file| format!("'{}'", file.id)).collect();
-            return Err(unknown_id(format!(
-                "scene '{scene}' has no instance '{instance}'; it has {}",
-                known.join(", ")
-            )));
+            let known = quoted(file.instances.iter().map(|file| file.id.as_str()));
+            return Err(unknown_id(format!("scene '{scene}' has no instance '{instance}'; it has {known}")));
         };
         if found.atlas.is_none() {
             let message = format!("instance '{instance}' of scene '{scene}' has no atlas, so it takes no maps");

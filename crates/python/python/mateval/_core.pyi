@@ -7,9 +7,29 @@ from typing import Any, Optional, Union, final
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import Self
+from typing_extensions import Self, disjoint_base
 
 from .by_id import ById
+
+__all__ = [
+    "Camera",
+    "Dataset",
+    "Instance",
+    "Maps",
+    "Mesh",
+    "Part",
+    "Scene",
+    "Submission",
+    "Truth",
+    "View",
+    "lift",
+    "lint",
+    "lpips",
+    "main",
+    "psnr",
+    "score",
+    "ssim",
+]
 
 _Path = Union[str, os.PathLike[str]]
 _Floats = npt.NDArray[np.float32]
@@ -19,6 +39,7 @@ _Ids = npt.NDArray[np.uint16]
 _Mask = npt.NDArray[np.bool_]
 _Input = npt.NDArray[Any]
 
+@disjoint_base
 class Dataset:
     def __new__(cls, path: _Path) -> Self: ...
     @property
