@@ -44,7 +44,7 @@ impl Camera {
 
     /// Projects world points of shape (..., 3), in metres. Returns their positions in the picture, (..., 2) in pixels from
     /// the top left, and their depths along the camera's axis, (...) in metres; NaN for points behind the camera.
-    #[allow(clippy::type_complexity)] // A tuple of arrays, as NumPy's own functions return.
+    #[expect(clippy::type_complexity, reason = "a tuple of arrays, as NumPy's own functions return")]
     fn project<'py>(
         &self,
         py: Python<'py>,

@@ -158,3 +158,9 @@ def test_views_are_a_map_style_dataset(dataset, scene):
     assert len(pickle.loads(pickle.dumps(views))) == 1
     with pytest.raises(IndexError):
         views[1]
+    with pytest.raises(ValueError, match="fields: expected arrays of View, .* found 'colour'"):
+        mateval.torch.Views(dataset, fields=["colour"])
+    with pytest.raises(TypeError, match=r"fields: expected a list such as \['rgb'\]"):
+        mateval.torch.Views(dataset, fields="rgb")
+    with pytest.raises(mateval.UnknownId, match="has no view 'left'"):
+        mateval.torch.Views(dataset, views=["left"])

@@ -149,6 +149,21 @@ def test_eight_threads_at_once(scene, dataset, nn):
     assert not faults and found == 16 * [True]
 
 
+def test_eight_threads_score_at_once(dataset, nn, tmp_path):
+    expected = mateval.score(nn, dataset).json
+    found = {}
+
+    def work(number):
+        found[number] = mateval.score(nn, dataset, cache=tmp_path / str(number)).json
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=300)
+    assert found == dict.fromkeys(range(8), expected)
+
+
 def test_python_runs_meanwhile(scene):
     ticks, done = [], threading.Event()
 
@@ -178,7 +193,7 @@ def test_the_console_script_is_the_command(command):
 
 def test_stubs_fit_the_module():
     pytest.importorskip("mypy")
-    checked = subprocess.run([sys.executable, "-m", "mypy.stubtest", "mateval"], capture_output=True, text=True)
+    checked = subprocess.run([sys.executable, "-m", "mypy.stubtest", "mateval._core"], capture_output=True, text=True)
     assert checked.returncode == 0, checked.stdout
 
 

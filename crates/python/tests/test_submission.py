@@ -88,6 +88,8 @@ def test_score_is_the_commands(root, dataset, nn, command, tmp_path):
     assert result.json == (tmp_path / "result.json").read_text()
     assert result["albedo.input.psnr"] == result.scenes["room"]["albedo.input.psnr"] > 20
     assert len(result.fingerprint) == 64 and len(result) > 20 and result.method == "nn-gt"
+    with pytest.raises(mateval.UnknownId, match="no mean 'albedo.input.pnsr'; expected a key such as 'albedo.input.psnr'"):
+        result["albedo.input.pnsr"]
     records = result.to_records()
     assert len(records) > 50 and {"scene", "view", "picture", "metric", "value"} <= set(records[0])
     assert mateval.score(nn, dataset, scenes=["room"], cache=tmp_path / "cache").json == result.json

@@ -1,6 +1,7 @@
 """The extension module. Its documentation is that of its Rust code, which ``help`` shows."""
 
 import os
+import pathlib
 from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, Optional, Union, final
@@ -43,7 +44,7 @@ _Input = npt.NDArray[Any]
 class Dataset:
     def __new__(cls, path: _Path) -> Self: ...
     @property
-    def path(self) -> os.PathLike[str]: ...
+    def path(self) -> pathlib.Path: ...
     @property
     def name(self) -> str: ...
     @property

@@ -6,7 +6,7 @@ class Error(Exception):
 
 
 class UnknownId(Error, KeyError):
-    """A scene, view, instance or part that does not exist."""
+    """A scene, view, instance, part or key that does not exist."""
 
     def __str__(self) -> str:
         # KeyError would show the text in quotation marks.

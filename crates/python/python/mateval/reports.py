@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from . import _core
+from .errors import UnknownId
 
 
 class LintReport:
@@ -76,7 +77,13 @@ class Result(Mapping[str, float]):
         return list(self._protocol["pictures"])
 
     def __getitem__(self, key: str) -> float:
-        return self._summary[key]
+        try:
+            return self._summary[key]
+        except KeyError:
+            import difflib  # Only mistakes pay for it.
+
+            nearest = ", ".join(f"'{near}'" for near in difflib.get_close_matches(key, self._summary, cutoff=0.3))
+            raise UnknownId(f"the result has no mean '{key}'; expected a key such as {nearest}") from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._summary)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from . import _core
 from .dataset import Dataset
 
 
@@ -22,10 +23,16 @@ class Views:
         fields: Iterable[str] = ("rgb", "depth", "valid"),
         views: Iterable[str] = ("input",),
     ) -> None:
+        for name, given in (("fields", fields), ("views", views)):
+            if isinstance(given, str):
+                raise TypeError(f"{name}: expected a list such as ['{given}'], found the text '{given}'")
         self.dataset = dataset
         self.fields = tuple(fields)
+        for field in self.fields:
+            _check_field(field)
         views = tuple(views)
-        self._places = [(scene, view) for scene in dataset for view in views if view in dataset[scene].views]
+        # An unknown id fails here, not in a worker.
+        self._places = [(scene, dataset[scene].views[view].id) for scene in dataset for view in views]
 
     def __len__(self) -> int:
         return len(self._places)
@@ -34,6 +41,12 @@ class Views:
         scene, id = self._places[index]
         view = self.dataset[scene].views[id]
         return {"scene": scene, "view": id, **{field: _field(view, field) for field in self.fields}}
+
+
+def _check_field(field: str) -> None:
+    holder, name = (_core.Truth, field[len("truth.") :]) if field.startswith("truth.") else (_core.View, field)
+    if name.startswith("_") or not hasattr(holder, name):
+        raise ValueError(f"fields: expected arrays of View, or of Truth as in 'truth.albedo', found '{field}'")
 
 
 def _field(view: Any, field: str) -> Any:
