@@ -6,8 +6,8 @@ cd "$(dirname "$0")/.."
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# With the extension module, so that both are built from the same libraries.
-cargo build --release --package mateval --package mateval-python
+# Named together with the extension module, so that both use the libraries with the same features.
+cargo build --release --package mateval --package mateval-python --bin mateval
 mateval="${CARGO_TARGET_DIR:-$PWD/target}/release/mateval"
 
 python3 -m venv "$work/maturin"
