@@ -3,6 +3,7 @@
 # Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters.
 set -eu
 cd "$(dirname "$0")/.."
+tools/apt_install.sh python3-venv
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
