@@ -57,7 +57,7 @@ pub fn write(out: &Path) -> Result<(), SampleError> {
     write_at(out, RESOLUTION)
 }
 
-/// [`write`] with a recipe whose views have `width` times `height` pixels.
+/// [`write()`] with a recipe whose views have `width` times `height` pixels.
 pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError> {
     write_room(out)?;
     house::write(out)?;
