@@ -63,7 +63,12 @@ def test_a_forked_child_leaves_its_parents_submission_alone(dataset, tmp_path):
 def seconds_to_interrupt(program, words=()):
     """Starts Python, sends SIGINT once it has printed a line and worked for a second, and returns how long it then ran."""
     ran = subprocess.Popen(
-        [sys.executable, "-c", program, *map(str, words)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", program, *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell ignores SIGINT in what it runs in the background, and so would Python.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     ran.stdout.readline()
     time.sleep(1)
