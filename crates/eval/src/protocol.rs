@@ -55,9 +55,7 @@ impl Protocol {
                 (MaskRule::Inside, AlbedoSpace::Linear, LightRules::new(tracks, PrincipledFlavour::Blender))
             }
             "paper" => {
-                let mut light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
-                // Where a stage's lights are assumed to be moves these numbers by more.
-                light.noise.target_db = 0.1;
+                let light = LightRules::new(vec![Track::Fitted], PrincipledFlavour::Mitsuba);
                 (MaskRule::BlackFill, AlbedoSpace::Srgb, light)
             }
             "mateval-1" => return Err(EvalError::RemovedProtocol { name: name.to_owned() }),

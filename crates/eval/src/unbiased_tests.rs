@@ -1,6 +1,6 @@
 //! Corrected light against plain renders of 4,096 samples: companions take noise away, and move no expectation.
 //!
-//! The room holds a mirror, rough metal, glass, a lamp and a window; one of its true materials is made black. Each small block
+//! The input view shows a mirror, rough metal, glass and the sky, and no lamp; one of its true materials is made black. Each small block
 //! of pixels is compared with its own standard error, so that a bias shows wherever it is.
 
 use std::collections::BTreeMap;

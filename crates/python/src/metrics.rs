@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use anyhow::anyhow;
 use mateval_eval::score::LpipsWeights;
-use mateval_image::{Mask, Picture};
+use mateval_image::{Mask, Picture, SrgbRgb};
 use mateval_metrics::{Lpips, MetricError, Net, Pixel, Psnr, mse, ssim_valid_windows};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -15,7 +15,7 @@ use crate::map_input::{ColoursOrNumbers, MapInput, mask_of};
 
 /// Prediction and reference, both of colours or both of numbers.
 enum Pair {
-    Colours(Picture<mateval_image::SrgbRgb>, Picture<mateval_image::SrgbRgb>),
+    Colours(Picture<SrgbRgb>, Picture<SrgbRgb>),
     Numbers(Picture<f32>, Picture<f32>),
 }
 
@@ -47,12 +47,7 @@ pub fn psnr(
         let error = mse(a, b, mask)?;
         Ok(error.map(Psnr::from_mse).transpose()?.map(|psnr| psnr.db))
     }
-    let (pair, mask) = (Pair::new(prediction, reference)?, mask.map(mask_of).transpose()?);
-    let work = move || match &pair {
-        Pair::Colours(a, b) => of(a, b, mask.as_ref()),
-        Pair::Numbers(a, b) => of(a, b, mask.as_ref()),
-    };
-    run_long(py, move |_| work())?.map_err(failed)
+    measured(py, Pair::new(prediction, reference)?, mask, of, of)
 }
 
 /// The structural similarity in windows of 11x11 pixels, of arrays as `psnr` takes them, at least 11 pixels wide and high.
@@ -72,10 +67,23 @@ pub fn ssim(
             None => mateval_metrics::ssim(a, b).map(Some),
         }
     }
-    let (pair, mask) = (Pair::new(prediction, reference)?, mask.map(mask_of).transpose()?);
+    measured(py, Pair::new(prediction, reference)?, mask, of, of)
+}
+
+/// A metric of two pictures; `None` where no pixel counts.
+type Metric<P> = fn(&Picture<P>, &Picture<P>, Option<&Mask>) -> Result<Option<f64>, MetricError>;
+
+fn measured(
+    py: Python<'_>,
+    pair: Pair,
+    mask: Option<&Bound<'_, PyAny>>,
+    of_colours: Metric<SrgbRgb>,
+    of_numbers: Metric<f32>,
+) -> PyResult<Option<f64>> {
+    let mask = mask.map(mask_of).transpose()?;
     let work = move || match &pair {
-        Pair::Colours(a, b) => of(a, b, mask.as_ref()),
-        Pair::Numbers(a, b) => of(a, b, mask.as_ref()),
+        Pair::Colours(a, b) => of_colours(a, b, mask.as_ref()),
+        Pair::Numbers(a, b) => of_numbers(a, b, mask.as_ref()),
     };
     run_long(py, move |_| work())?.map_err(failed)
 }

@@ -25,7 +25,6 @@ def lift_in_child(root, queue):
     queue.put(sorted(lifted(mateval.open(root)["room"])))
 
 
-@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system cannot fork")
 def test_a_forked_child_does_not_hang(root, scene):
     expected = sorted(lifted(scene))
     context = multiprocessing.get_context("fork")
