@@ -7,14 +7,18 @@
 )]
 
 mod suite {
+    mod apart;
     mod arrows;
     mod bad_input;
     mod blender;
+    mod blender_import;
     mod circles;
     mod command;
     mod compare;
     mod converted;
     mod determinism;
+    mod estimates;
+    mod fetching;
     mod flat_bases;
     mod full_disk;
     mod help;
@@ -26,16 +30,22 @@ mod suite {
     mod map;
     mod mitsuba_export;
     mod part_labels;
+    mod partial;
+    mod partial_board;
     mod planted;
     mod publish;
     mod real_scenes;
+    mod recentred;
+    mod release;
     mod relit;
     mod reprojection;
+    mod results_folder;
     mod resume;
     mod sample;
     mod schemas;
     mod scores;
     mod stats;
+    mod survey;
     mod unsound_submissions;
     mod verify_faults;
 }

@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""Runs Marigold IID appearance on a dataset's input pictures; `mateval baseline --adapter marigold` reads the result.
+"""Runs Marigold IID on a dataset's input pictures; `mateval baseline --adapter marigold` reads the result.
 
 Input: a dataset's folder, whose `scenes/<scene>/views/input/rgb.png` are the pictures, and the model: a folder, or an
 id that diffusers downloads from Hugging Face (once, 5 GB). Output: `OUT/<scene>/albedo.png` and
 `OUT/<scene>/material.png` (red: roughness, green: metallic, blue: 0), 8-bit, of the picture's size, and `OUT/run.json`,
 which records how they were made. Finished scenes are skipped, so that a run that was killed resumes.
+
+The model is IID appearance, or IID lighting (--model prs-eth/marigold-iid-lighting-v1-1), which predicts neither
+roughness nor metallic: of the latter only `albedo.png` is written, and not its shading and residual.
 
 The files hold the model's own numbers, times 255 and rounded; the adapter states their encoding. There is one
 exception: an albedo that the model's configuration calls linear is encoded by the power 1/2.2, as diffusers does to
@@ -47,9 +50,9 @@ class Places(NamedTuple):
 
     albedo: int  # target
     albedo_is_linear: bool
-    material: int  # target
-    roughness: int  # its channel
-    metallic: int  # its channel
+    material: int | None  # target; None where the model predicts no material, then roughness and metallic too
+    roughness: int | None  # its channel
+    metallic: int | None  # its channel
 
 
 # --- The run's input --------------------------------------------------------------------------------------------
@@ -103,14 +106,16 @@ def model_folder(*, model: str, half: bool) -> tuple[Path, str | None]:
 
 
 def places(*, properties: Any) -> Places:
-    """Finds albedo, roughness and metallic in the model's `target_properties`."""
+    """Finds albedo, and roughness and metallic if the model predicts them, in the model's `target_properties`."""
     properties = properties if isinstance(properties, dict) else {}
     names = properties.get("target_names") or []
-    if not {"albedo", "material"} <= set(names):
-        raise RunError(f"the model predicts {names}; expected albedo and material, as {MODEL} does")
+    if "albedo" not in names:
+        raise RunError(f"the model predicts {names}; expected albedo, as {MODEL} does")
     space = properties.get("albedo", {}).get("prediction_space", "srgb")
     if space not in ("srgb", "linear"):
         raise RunError(f"the model's albedo is in the space '{space}'; expected srgb or linear")
+    if "material" not in names:
+        return Places(names.index("albedo"), space == "linear", None, None, None)
     channels = properties.get("material", {}).get("sub_target_names") or []
     if len(channels) != 3 or not {"roughness", "metallicity"} <= set(channels):
         raise RunError(f"the model's material holds {channels}; expected roughness and metallicity among three")
@@ -173,17 +178,21 @@ def scene_seed(*, seed: int, scene: str) -> int:
 
 
 def pictures(*, prediction: Any, where: Places) -> tuple[Any, Any]:
-    """Returns albedo and material as 8-bit pictures; the pipeline gives [target, row, column, channel] from 0 to 1."""
+    """Returns albedo and material as 8-bit pictures; the pipeline gives [target, row, column, channel] from 0 to 1.
+
+    The material is None for a model without one.
+    """
     import numpy as np
 
     if not np.isfinite(prediction).all():
         raise RunError("the prediction has numbers that are not finite; run without --half")
     both = np.zeros((2, *prediction.shape[1:]))
     both[0] = prediction[where.albedo] ** (1 / 2.2 if where.albedo_is_linear else 1)
-    both[1, ..., 0] = prediction[where.material, ..., where.roughness]
-    both[1, ..., 1] = prediction[where.material, ..., where.metallic]
+    if where.material is not None:
+        both[1, ..., 0] = prediction[where.material, ..., where.roughness]
+        both[1, ..., 1] = prediction[where.material, ..., where.metallic]
     albedo, material = np.rint(255 * np.clip(both, 0, 1)).astype(np.uint8)
-    return albedo, material
+    return albedo, None if where.material is None else material
 
 
 def load(*, folder: Path, device: str, half: bool) -> Any:
@@ -230,7 +239,8 @@ def write_scene(*, folder: Path, albedo: Any, material: Any) -> None:
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir()
     Image.fromarray(albedo).save(beside / "albedo.png")
-    Image.fromarray(material).save(beside / "material.png")
+    if material is not None:
+        Image.fromarray(material).save(beside / "material.png")
     beside.rename(folder)
 
 
@@ -287,7 +297,7 @@ def at_least(smallest: int) -> Any:
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the tool with command-line arguments and returns the exit code."""
-    parser = argparse.ArgumentParser(description="run Marigold IID appearance on a dataset's input pictures")
+    parser = argparse.ArgumentParser(description="run Marigold IID on a dataset's input pictures")
     parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder of the dataset, which must be rendered")
     parser.add_argument("out", type=Path, metavar="OUT", help="folder for the pictures")
     parser.add_argument("--model", default=MODEL, metavar="ID_OR_FOLDER", help="the model (default: %(default)s)")

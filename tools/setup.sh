@@ -16,5 +16,15 @@ python3 -m pip --version >/dev/null 2>&1 || missing="$missing python3-pip"
 # shellcheck disable=SC2086
 [ -z "$missing" ] || tools/apt_install.sh $missing
 
-python3 tools/fetch_lpips_weights.py >&2
-tools/setup_blender.sh
+fetch=crates/cli/src/fetch
+# The X and GL libraries that Blender's module is linked to. Systems other than Debian have other names for them.
+libraries=$(sed -n 's/^LIBRARIES = "\(.*\)"$/\1/p' "$fetch/blender_module.py")
+if command -v dpkg >/dev/null 2>&1; then
+    # shellcheck disable=SC2086
+    tools/apt_install.sh $libraries python3-venv
+fi
+
+# The same as `mateval fetch`, which has not been built yet.
+cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
+python3 "$fetch/lpips_weights.py" --out "$cache" >&2
+python3 "$fetch/blender_module.py" --cache "$cache" --requirements "$(cat "$fetch/blender_requirements.txt")" >&2

@@ -23,13 +23,22 @@ printf '%s\n' 'name = "sample"' 'resolution = [96, 72]' 'atlas_size = 128' \
 "$mateval" prep build "$work/source/recipe.toml" --out "$work/dataset"
 "$mateval" prep render "$work/dataset" --renderer builtin --samples 1
 
+{
+    printf '%s\n' 'name = "eight"' 'resolution = [48, 36]' 'atlas_size = 64'
+    for number in 1 2 3 4 5 6 7 8; do
+        printf '%s\n' '[[scene]]' "id = \"room$number\"" 'bitterli = "room/scene.xml"' 'house = "sample"'
+    done
+} > "$work/source/eight.toml"
+"$mateval" prep build "$work/source/eight.toml" --out "$work/eight"
+"$mateval" prep render "$work/eight" --renderer builtin --samples 1
+
 tested=0
 for python in ${PYTHONS:-python3.9 python3.10 python3.11 python3.12 python3.13 python3.14}; do
     "$python" -c 'import venv' 2> /dev/null || continue
     "$python" --version
     "$python" -m venv "$work/env$tested"
     "$work/env$tested/bin/pip" install --quiet "$work"/dist/*.whl pytest mypy trimesh
-    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_WHEELS="$work/dist" \
+    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$work/dist" \
         "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
     tested=$((tested + 1))
 done

@@ -30,6 +30,8 @@ APPEARANCE = {
     "roughness": {"prediction_space": "linear", "up_to_scale": False},
     "metallicity": {"prediction_space": "linear", "up_to_scale": False},
 }
+# As that of the lighting model (config/train_marigold_iid_lighting.yaml).
+LIGHTING = {"target_names": ["albedo", "shading", "residual"], "albedo": {"prediction_space": "linear"}}
 SIZES = {"attic": (40, 24), "cellar": (24, 33)}  # width, height; neither is a multiple of eight both ways
 
 
@@ -100,11 +102,11 @@ class Plan(unittest.TestCase):
             "material": {"sub_target_names": ["metallicity", None, "roughness"]},
         }
         self.assertEqual(tool.places(properties=turned), (2, True, 0, 2, 0))
+        self.assertEqual(tool.places(properties=LIGHTING), (0, True, None, None, None))
 
     def test_a_model_of_another_kind_is_refused(self) -> None:
-        lighting = {"target_names": ["albedo", "shading", "residual"]}
-        for properties in (None, {}, lighting):
-            self.refused("expected albedo and material", tool.places, properties=properties)
+        for properties in (None, {}, {"target_names": ["depth"]}):
+            self.refused("expected albedo, as", tool.places, properties=properties)
         space = APPEARANCE | {"albedo": {"prediction_space": "stack"}}
         self.refused("space 'stack'", tool.places, properties=space)
         for names in (None, ["roughness", "metallicity"], ["roughness", None, None]):
@@ -127,6 +129,8 @@ class Plan(unittest.TestCase):
         self.assertEqual(found, expected)
         # The power by which the model's authors encode its targets, and `pictures` a linear albedo.
         self.assertEqual({adapter[key]["encoding"] for key in expected}, {"gamma22"})
+        # The lighting model has no material.
+        self.assertEqual([adapter[key].get("optional", False) for key in expected], [False, True, True])
 
     def test_a_folder_of_other_pictures_is_refused(self) -> None:
         out, asked = self.folder / "out", {"seed": 1}
@@ -174,6 +178,11 @@ class Mapping(unittest.TestCase):
         # Computed with bc: 255*e(l(0.1)/2.2) = 89.5, then 122.7 and 147.5.
         self.check(picture=albedo, expected=[90, 123, 148])
         self.check(picture=material, expected=[102, 128, 0])
+
+    def test_the_lighting_model_has_no_material(self) -> None:
+        albedo, material = self.pictures(properties=LIGHTING)
+        self.check(picture=albedo, expected=[90, 123, 148])
+        self.assertIsNone(material)
 
     def test_values_that_are_not_finite_are_refused(self) -> None:
         import numpy as np
@@ -384,8 +393,8 @@ class Pipeline(unittest.TestCase):
 
     def test_a_damaged_model_or_picture_is_reported(self) -> None:
         spoilt = self.fresh("model")
-        write_tiny_model(folder=spoilt, properties=APPEARANCE | {"target_names": ["albedo", "shading"]})
-        self.check_refused("--model", str(spoilt), expected="expected albedo and material")
+        write_tiny_model(folder=spoilt, properties=APPEARANCE | {"target_names": ["depth", "shading"]})
+        self.check_refused("--model", str(spoilt), expected="expected albedo, as")
         (spoilt / "model_index.json").write_bytes((self.root / "model/model_index.json").read_bytes())
         (spoilt / "unet/diffusion_pytorch_model.safetensors").unlink()
         self.check_refused("--model", str(spoilt), expected="cannot load the model in")

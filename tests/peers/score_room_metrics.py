@@ -21,7 +21,7 @@ WINDOW = 11
 
 
 def network(weights: str | None) -> lpips.LPIPS:
-    """AlexNet with the weights of `tools/fetch_lpips_weights.py`; without a file random ones, as fast."""
+    """AlexNet with the weights of `mateval fetch lpips`; without a file random ones, as fast."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         net = lpips.LPIPS(net="alex", version="0.1", pretrained=False, pnet_rand=True, spatial=True, verbose=False)

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import tempfile
 import time
+from urllib.parse import unquote, urlsplit
 
 TIMEOUT_S = 60
 
@@ -23,7 +24,9 @@ class Page:
         to_browser, self._write = os.pipe()
         self._read, from_browser = os.pipe()
         words = ["chromium", "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu",
-                 "--hide-scrollbars", "--no-first-run", "--disable-dev-shm-usage", f"--user-data-dir={self._profile}"]
+                 "--hide-scrollbars", "--no-first-run", "--disable-dev-shm-usage", f"--user-data-dir={self._profile}",
+                 # WebGL without a graphics card.
+                 "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         # The browser reads from descriptor 3 and writes to 4. Some shells support only descriptors under 10, which do
         # not suffice for two pages at once.
         self._process = subprocess.Popen(
@@ -36,6 +39,8 @@ class Page:
         self._session = None
         #: Errors that pages wrote to their console, and files that could not be loaded.
         self.faults: list[str] = []
+        #: Files that the page and its parts were read from.
+        self.files: list[str] = []
         self._loaded = False
         target = self.send("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -91,6 +96,8 @@ class Page:
             self.faults.append(f"{params['entry']['text']} {params['entry'].get('url', '')}")
         elif event.get("method") == "Network.requestWillBeSent":
             url = params["request"]["url"]
+            if url.startswith("file:"):
+                self.files.append(unquote(urlsplit(url).path))
             if not url.startswith(("file:", "data:", "about:")):
                 self.faults.append(f"asked for {url}")
 
@@ -102,6 +109,7 @@ class Page:
         self.send("Page.navigate", url="about:blank")
         self._wait_for_load()
         self._loaded = False
+        self.files.clear()
         start = time.monotonic()
         self.send("Page.navigate", url=url)
         self._wait_for_load()
@@ -118,9 +126,17 @@ class Page:
             raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
         return answer["result"].get("value")
 
+    def wait_for(self, condition: str) -> None:
+        """Waits until a script is true."""
+        end = time.monotonic() + TIMEOUT_S
+        while not self.run(f"Boolean({condition})"):
+            if time.monotonic() > end:
+                raise TimeoutError(f"never true: {condition}")
+            time.sleep(0.05)
+
     def key(self, key: str) -> None:
         """Presses and releases a key."""
-        code = {"ArrowRight": 39, "ArrowLeft": 37, "Tab": 9, "Enter": 13, " ": 32}[key]
+        code = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowUp": 38, "Tab": 9, "Enter": 13, " ": 32}[key]
         text = {"Enter": "\r", " ": " "}.get(key)
         down = {"type": "keyDown" if text else "rawKeyDown", "key": key, "windowsVirtualKeyCode": code}
         self.send("Input.dispatchKeyEvent", **down, **({"text": text} if text else {}))

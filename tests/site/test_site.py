@@ -1,13 +1,12 @@
 """Tests the leaderboard's site in headless Chromium: at two widths, light and dark, by mouse and by keyboard.
 
-`tools/test_site.sh` installs the browser, builds `mateval` and runs this. With MATEVAL_TEST_PICTURES=DIR it writes
-screenshots there.
+`tools/test_site.sh` installs the browser, builds `mateval` and runs this with the other tests of this folder. With
+MATEVAL_TEST_PICTURES=DIR it writes screenshots there.
 """
 
 import csv
 import json
 import os
-import subprocess
 import tempfile
 import unittest
 from contextlib import closing
@@ -15,62 +14,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-import results
 from chromium import Page
+from sites import EVIL, SCENES, make_large, make_small
 
-MATEVAL = os.environ.get("MATEVAL", str(Path(__file__).parents[2] / "target/debug/mateval"))
 PICTURES = os.environ.get("MATEVAL_TEST_PICTURES")
-EVIL = "<script>document.title='broken in'</script>"
-
-#: Name, id, PSNR, seed and further keys of each method. Two are copies of one method; one attempts to inject a script.
-METHODS = [
-    ("TrueTexture", "truetexture", 33.0, 1, {"licence": "MIT", "url": "https://example.org/true",
-                                             "cost": {"seconds_a_scene": 12.5, "hardware": "one laptop"}}),
-    ("CopyA", "copya", 27.0, 2, {"licence": "CC-BY-NC-4.0", "cost": {"seconds_a_scene": 340.0, "hardware": "one large GPU"}}),
-    ("CopyB", "copyb", 27.0, 2, {"description": "the same as CopyA, bit by bit"}),
-    ("A method with a name that is quite a bit longer than others", "a-method-with-a-name-that-is-quite-a-bit-longer", 24.0, 4,
-     {"cost": {"seconds_a_scene": 3.0, "hardware": ""}}),
-    (EVIL, "script-document-title-broken-in-script", 20.0, 5, {"url": "javascript:alert(1)"}),
-    ("grey", "grey", 11.0, 6, {"description": "0.5 everywhere"}),
-]
-SCENES = results.scene_names(12)
-
-
-def make_small(folder: Path) -> Path:
-    """Six submissions on twelve scenes, with pictures of six, errata and verifications."""
-    paths = []
-    for name, method, psnr, seed, said in METHODS:
-        path = folder / f"{method[:10]}.json"
-        path.write_text(results.pretty(results.result(method=name, psnr=psnr, scenes=SCENES, seed=seed, **said)))
-        paths.append(path)
-    results.write_verification(paths[0], confirmed=True)
-    results.write_verification(paths[5], confirmed=False)
-    misses = {method: 0.1 * at for at, (_, method, *_) in enumerate(METHODS)}
-    results.write_pictures(folder / "pictures", methods=misses, scenes=SCENES[:6], width=64, height=36)
-    entry = {"date": "2026-03-01", "title": "A lamp was missing", "text": "room-002 was rendered again.", "affects": ["room-002"]}
-    (folder / "errata.json").write_text(results.pretty({"format": "mateval-errata/1", "entries": [entry]}))
-    site = folder / "site"
-    ceiling = folder / "truth.json"
-    ceiling.write_text(results.pretty(results.result(method="gt", psnr=48.0, scenes=SCENES, seed=7)))
-    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", site, "--pictures", folder / "pictures", "--ceiling", ceiling,
-                    "--errata", folder / "errata.json"], check=True, stdout=subprocess.DEVNULL)
-    return site
-
-
-def make_large(folder: Path) -> Path:
-    """Fifty methods on 184 scenes; pictures of the first scene."""
-    scenes = results.scene_names(184)
-    paths = []
-    for at in range(50):
-        path = folder / f"{at}.json"
-        path.write_text(json.dumps(results.result(method=f"method {at}", psnr=15 + 0.3 * at, scenes=scenes, seed=at)))
-        paths.append(path)
-    misses = {f"method-{at}": 0.01 * at for at in range(50)}
-    results.write_pictures(folder / "pictures", methods=misses, scenes=scenes[:1], width=32, height=18)
-    subprocess.run([MATEVAL, "eval", "leaderboard", *paths, "--out", folder / "site", "--pictures", folder / "pictures"],
-                   check=True, stdout=subprocess.DEVNULL)
-    return folder / "site"
-
 
 def setUpModule() -> None:
     global temporary, small
@@ -173,6 +120,7 @@ class TestLooks(unittest.TestCase):
         self.assertEqual(first["head"], first["foot"])
         self.assertIn("ceiling: the truth itself", first["text"])
         page.run("document.querySelector('input[name=metric][value=ssim]').click()")
+        page.wait_for("location.hash.includes('ssim')")
         page.run("document.querySelector('thead th:not([hidden]) button').click()")
         second = page.run(shown)
         self.assertEqual(second["head"], second["foot"])
@@ -256,6 +204,8 @@ class TestBoard(unittest.TestCase):
 
     def tick(self, name: str, value: str) -> None:
         self.page.run(f"document.querySelector('#controls input[name={name}][value=\"{value}\"]').click()")
+        # The first choice loads the columns that the page does not hold; then the address holds the choices.
+        self.page.wait_for("location.hash.includes('sort=')")
 
     def test_sorts(self) -> None:
         values = "[...document.querySelectorAll('#board tbody tr')].map((row) => Number(row.cells[%d].dataset.v))"
@@ -300,6 +250,7 @@ class TestBoard(unittest.TestCase):
         # The address holds the complete state.
         address = self.page.run("location.href")
         self.page.open(address)
+        self.page.wait_for("document.querySelector('#board th[data-key=\"albedo.novel.ssim\"]')")
         self.assertEqual((self.names(), self.heads()[2:-2]), (["CopyA", "CopyB"], ["albedo.novel.psnr", "albedo.novel.ssim"]))
 
     def test_intervals_and_ranks_are_shown(self) -> None:
@@ -339,40 +290,54 @@ class TestScene(unittest.TestCase):
     def tearDown(self) -> None:
         self.assertEqual(self.page.faults, [])
 
-    def source(self, image: str) -> str:
-        return self.page.run(f"document.getElementById('{image}').src").split("/pictures/")[1]
+    def source(self, part: str, kind: str = "albedo") -> str:
+        """The picture of a part, as in `.truth`, of the slider of a kind."""
+        return self.page.run(f"document.querySelector('[data-kind={kind}] {part} img').src").split("/pictures/")[1]
+
+    def shown(self) -> list[str]:
+        """The kinds of pictures whose sliders are shown."""
+        return self.page.run("[...document.querySelectorAll('#compare .kind:not([hidden])')].map((part) => part.dataset.kind)")
 
     def choose(self, name: str, value: str) -> None:
         self.page.run(f"""(() => {{ const box = document.querySelector('#compare-form [name={name}]'); box.value = '{value}';
                           box.dispatchEvent(new Event('input', {{ bubbles: true }})); }})()""")
 
     def test_the_slider_moves(self) -> None:
-        at = lambda: self.page.run("getComputedStyle(document.querySelector('.slider')).getPropertyValue('--at')")
+        sliders = "[...document.querySelectorAll('.slider')]"
+        at = lambda: self.page.run(f"getComputedStyle({sliders}[0]).getPropertyValue('--at')")
         self.assertEqual(at(), "50%")
-        self.page.run("document.getElementById('split').focus()")
+        self.page.run("document.querySelector('.slider input').focus()")
         self.page.key("ArrowRight")
         self.assertEqual(at(), "51%")
         box = self.page.run("document.querySelector('.slider').getBoundingClientRect().toJSON()")
         middle = box["y"] + box["height"] / 2
         self.page.drag((box["x"] + 0.51 * box["width"], middle), (box["x"] + 0.2 * box["width"], middle))
         self.assertLess(abs(float(at().strip("%")) - 20), 3)
-        # The truth is shown to the left of the slider.
-        self.assertIn("clip-path", self.page.run("document.querySelector('#truth').computedStyleMap().has('clip-path') ? 'clip-path' : ''"))
+        # All sliders of a page move together.
+        places = self.page.run(f"{sliders}.map((slider) => slider.style.getPropertyValue('--at'))")
+        self.assertEqual((len(places), set(places)), (2, {at()}))
+        # The truth is shown to the left of the line: the rest of it is clipped.
+        clip = self.page.run("getComputedStyle(document.querySelector('.slider .truth')).clipPath")
+        self.assertRegex(clip, r"^inset\(0px (7[7-9]|8[0-3])")
 
     def test_pictures_are_those_chosen(self) -> None:
-        self.assertEqual(self.source("truth"), "_truth/room-002/input/albedo.png")
+        self.assertEqual(self.source(".truth"), "_truth/room-002/input/albedo.png")
+        # Light is shown beside albedo.
+        self.assertEqual(self.shown(), ["albedo", "rgb_true"])
         self.choose("method", "grey")
         self.choose("view", "up_left")
-        self.assertEqual(self.source("prediction"), "grey/room-002/up_left/albedo.png")
-        self.assertEqual(self.source("truth"), "_truth/room-002/up_left/albedo.png")
-        self.assertEqual(self.source("error"), "grey/room-002/up_left/albedo-error.png")
-        # This kind has no heat map.
-        self.choose("kind", "rgb_true")
-        self.assertEqual(self.source("prediction"), "grey/room-002/up_left/rgb_true.png")
-        self.assertTrue(self.page.run("document.getElementById('heat').hidden"))
+        for kind in ["albedo", "rgb_true"]:
+            self.assertEqual(self.source(".prediction", kind), f"grey/room-002/up_left/{kind}.png")
+            self.assertEqual(self.source(".truth", kind), f"_truth/room-002/up_left/{kind}.png")
+        self.assertEqual(self.source(".heat"), "grey/room-002/up_left/albedo-error.png")
+        # Light has no heat map here.
+        hidden = "[...document.querySelectorAll('.heat')].map((heat) => heat.hidden)"
+        self.assertEqual(self.page.run(hidden), [False, True])
+        self.page.run("document.querySelector('#compare-form [value=albedo]').click()")
+        self.assertEqual(self.shown(), ["rgb_true"])
         # A click on a small picture selects it.
         self.page.run("document.querySelector('.pick[data-method=copya][data-view=input]').click()")
-        self.assertEqual(self.source("prediction"), "copya/room-002/input/rgb_true.png")
+        self.assertEqual(self.source(".prediction", "rgb_true"), "copya/room-002/input/rgb_true.png")
         self.assertEqual(self.page.run("document.querySelectorAll('.pick[aria-pressed=true]').length"), 1)
 
     def test_the_gallery_shows_all_views_of_all_methods(self) -> None:
@@ -390,6 +355,8 @@ class TestLarge(unittest.TestCase):
             page = Page(width=1400, height=900, dark=False)
             self.addCleanup(page.close)
             seconds = page.open((site / "index.html").as_uri())
+            page.run("document.querySelector('input[name=metric][value=ssim]').click()")
+            page.wait_for("location.hash.includes('ssim')")
             rows, columns = page.run("[document.querySelectorAll('#board tbody tr').length, document.querySelectorAll('#board th[data-metric]').length]")
             self.assertEqual(rows, 50)
             self.assertGreater(columns, 80)

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
 /// The crates of ours that each crate may use; names without `mateval-`.
-pub const ARROWS: [(&str, &[&str]); 15] = [
+pub const ARROWS: [(&str, &[&str]); 17] = [
     ("mateval-image", &[]),
     ("mateval-scene", &["image"]),
     ("mateval-metrics", &["image"]),
@@ -15,10 +15,12 @@ pub const ARROWS: [(&str, &[&str]); 15] = [
     ("mateval-sources", &["scene", "image", "tracer"]),
     ("mateval-prep", &["sources", "sample", "scene", "image", "tracer"]),
     ("mateval-audit", &["prep", "scene", "image", "metrics", "tracer"]),
+    ("mateval-export", &["scene", "image"]),
     ("mateval-baselines", &["scene", "image", "tracer", "light"]),
     ("mateval-submission", &["scene", "image", "tracer"]),
     ("mateval-eval", &["submission", "light", "metrics", "tracer", "scene", "image"]),
     ("mateval-report", &["eval", "submission", "metrics", "scene", "image"]),
+    ("mateval-release", &["audit", "eval", "prep", "report", "scene", "image"]),
     (
         "mateval",
         &[
@@ -31,10 +33,12 @@ pub const ARROWS: [(&str, &[&str]); 15] = [
             "sources",
             "prep",
             "audit",
+            "export",
             "baselines",
             "submission",
             "eval",
             "report",
+            "release",
         ],
     ),
     ("mateval-python", &["mateval", "image", "scene", "metrics", "baselines", "submission", "eval"]),

@@ -1,5 +1,5 @@
-//! `prep render --renderer blender`: with the Blender that tools/setup.sh installs, and with programs that stand in for
-//! a failing Blender.
+//! `prep render --renderer blender`: with the Blender that `mateval fetch blender` installs, and with programs that
+//! stand in for a failing Blender.
 
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::Command;
 use std::sync::{LazyLock, Mutex, MutexGuard};
 
 use mateval_image::{LinearRgb, Picture, exr_io, png_io};
-use mateval_testkit::data::say_skipped;
+use mateval_testkit::data::report_missing;
 
 use super::command::{Run, build, mateval, render, run, verify};
 use super::sample::{copied_dataset, files_below, json, manifest, write_source};
@@ -39,7 +39,7 @@ pub fn blender() -> Option<(PathBuf, MutexGuard<'static, ()>)> {
         .or_else(|| set("HOME").map(|folder| folder.join(".cache/mateval")))?;
     let python = set("MATEVAL_BLENDER").unwrap_or(cache.join("blender/bin/python"));
     if !python.exists() {
-        say_skipped("there is no Blender; tools/setup.sh installs it");
+        report_missing("there is no Blender; run: mateval fetch blender");
         return None;
     }
     Some((python, TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner)))
@@ -218,5 +218,5 @@ fn without_a_blender_it_says_what_to_do() {
     let mut command = mateval();
     command.args(["prep", "render", "--renderer", "blender"]).arg(copy.path());
     let refused = run(command.env("MATEVAL_CACHE", empty.path()).env_remove("MATEVAL_BLENDER"));
-    refused.ends_with(2).says("tools/setup.sh");
+    refused.ends_with(2).says("mateval fetch blender");
 }

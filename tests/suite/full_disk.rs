@@ -48,7 +48,8 @@ fn a_build_fails_cleanly_and_resumes_when_the_disk_has_space() {
 fn a_render_fails_cleanly_and_resumes() {
     let copy = copied_dataset();
     std::fs::remove_dir_all(copy.path().join("scenes/room/ground_truth/renders")).unwrap();
-    let failed = limited(8, &render(copy.path(), 1)).ends_with(2);
+    // Enough for the list of the scene's files, which is kept first.
+    let failed = limited(100, &render(copy.path(), 1)).ends_with(2);
     assert!(failed.error().contains("cannot write '") && failed.error().contains("rgb"), "{}", failed.stderr);
     assert_eq!(partial_files(copy.path()), [""; 0]);
     run(&mut render(copy.path(), 1)).ends_with(0);
@@ -83,6 +84,10 @@ fn a_place_that_cannot_be_written_to() {
         let failed = run(&mut command).ends_with(2);
         assert!(failed.error().contains("file/"), "{}", failed.stderr);
     }
+    // The demo announces the sample's faults before anything is made.
+    let mut demo = mateval();
+    demo.args(["demo", "--renderer", "builtin", "--out"]).arg(&below);
+    run(&mut demo).ends_with(2).says("the house has faults that are planted on purpose").says("file/");
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "mine");
 }
 
@@ -96,11 +101,20 @@ fn a_full_stdout() {
         command.args(words).arg(&picture).arg(&picture);
         command
     };
-    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-    let mut child = command().stdout(full).stderr(Stdio::null()).spawn().unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(2));
+    let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let help = |words: &[&str]| {
+        let mut command = mateval();
+        command.args(words);
+        command
+    };
+    for mut command in [command(), help(&["--help"]), help(&["--version"]), help(&["eval", "score", "--help"])] {
+        let child = command.stdout(full()).stderr(Stdio::piped()).spawn().unwrap();
+        let failed = Run::of(child.wait_with_output().unwrap()).ends_with(2);
+        assert!(failed.error().starts_with("error: cannot write to stdout: "), "{command:?}: {}", failed.stderr);
 
-    let mut child = command().stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-    drop(child.stdout.take());
-    assert_eq!(child.wait().unwrap().code(), Some(0));
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let closed = Run::of(child.wait_with_output().unwrap()).ends_with(0);
+        assert_eq!(closed.stderr, "", "{command:?}");
+    }
 }

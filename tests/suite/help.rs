@@ -20,7 +20,7 @@ fn the_version() {
 #[test]
 fn inputs_that_do_not_exist() {
     let not_there = "No such file or directory (os error 2)\n";
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["prep", "build", "mini.toml", "--out", "out"], "cannot build the dataset: cannot read 'mini.toml': "),
         (&["prep", "render", "nowhere"], "cannot render the dataset: cannot read 'nowhere/dataset.json': "),
         (
@@ -31,6 +31,10 @@ fn inputs_that_do_not_exist() {
         (
             &["prep", "mitsuba", "nowhere", "--scene", "room", "--out", "out"],
             "cannot export to Mitsuba: cannot read 'nowhere/dataset.json': ",
+        ),
+        (
+            &["prep", "export", "nowhere", "--as", "tar", "--out", "out"],
+            "cannot export the dataset: cannot read 'nowhere/dataset.json': ",
         ),
         (&["eval", "image", "a.png", "b.png"], "cannot read 'a.png': "),
         (
@@ -77,7 +81,7 @@ fn missing_arguments() {
 /// Every subcommand has a help text.
 #[test]
 fn every_subcommand_has_help() {
-    let subcommands: [&[&str]; 18] = [
+    let subcommands: [&[&str]; 19] = [
         &["demo"],
         &["sample"],
         &["prep"],
@@ -89,6 +93,7 @@ fn every_subcommand_has_help() {
         &["prep", "verify"],
         &["prep", "stats"],
         &["prep", "mitsuba"],
+        &["prep", "export"],
         &["baseline"],
         &["eval", "image"],
         &["eval", "lint"],

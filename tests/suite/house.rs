@@ -86,12 +86,15 @@ fn a_list_rejects_with_its_reason_and_a_survey_is_reproducible_to_the_byte() {
     assert_eq!(listed["rejections"][0]["rule"], "listed");
     assert!(listed["rejections"][0]["reason"].as_str().unwrap().contains("the bed is made"), "{listed}");
     run(&mut survey_of(&SURVEYED.source, &out)).ends_with(2).says("--force");
-    for notes in ["notes.txt", "thumbnails/notes.txt"] {
-        std::fs::write(out.join(notes), "mine").unwrap();
-        run(survey_of(&SURVEYED.source, &out).arg("--force")).ends_with(2).says("choose another --out");
-        std::fs::remove_file(out.join(notes)).unwrap();
-    }
+    // What else lies there stays.
+    let notes = ["notes.txt", "thumbnails/notes.txt"].map(|name| out.join(name));
+    notes.iter().for_each(|notes| std::fs::write(notes, "mine").unwrap());
     run(survey_of(&SURVEYED.source, &out).arg("--force")).ends_with(0);
+    assert!(notes.iter().all(|notes| notes.is_file()));
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::create_dir(&elsewhere).unwrap();
+    std::fs::write(elsewhere.join("notes.txt"), "mine").unwrap();
+    run(survey_of(&SURVEYED.source, &elsewhere).arg("--force")).ends_with(2).says("choose another --out");
     for file in ["survey.json", "recipe.toml", "index.html"] {
         let read = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
         assert!(read(&out) == read(&SURVEYED.survey), "{file} differs");

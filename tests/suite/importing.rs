@@ -13,17 +13,17 @@ use serde_json::{Value, json};
 use super::command::{Run, baseline, mateval, run};
 use super::lifting::{ROOM, boxes, is_all, psnr, summary_of};
 
-fn import(dataset: &Path, files: &Path, out: &Path, words: &[&str]) -> Run {
+pub fn import(dataset: &Path, files: &Path, out: &Path, words: &[&str]) -> Run {
     let mut command = mateval();
     command.args(["baseline", "import"]).arg(files).arg("--dataset").arg(dataset).arg("--out").arg(out);
     run(command.args(words))
 }
 
-fn nodes(dataset: &Path) -> Vec<glb::GlbNode> {
+pub fn nodes(dataset: &Path) -> Vec<glb::GlbNode> {
     glb::read(&dataset.join("scenes/room/geometry/instances.glb")).unwrap()
 }
 
-fn mesh_of(dataset: &Path, id: &str) -> TriangleMesh {
+pub fn mesh_of(dataset: &Path, id: &str) -> TriangleMesh {
     nodes(dataset).into_iter().find(|node| node.name == id).unwrap().mesh
 }
 
@@ -52,11 +52,9 @@ fn write_quarter(from: &Path, to: &Path) {
     png_io::write_rgb_bytes(to, &Picture::from_fn(2 * size, 2 * size, quarter)).unwrap();
 }
 
-#[test]
-fn the_truth_in_other_uv_scores_as_the_truth() {
-    let folder = tempfile::tempdir().unwrap();
-    let [gt, files] = ["gt", "files"].map(|name| folder.path().join(name));
-    run(&mut baseline("gt", &ROOM, &gt)).ends_with(0);
+/// Writes every instance's mesh, changed, with the truth's textures in a quarter of larger pictures; returns their
+/// number.
+pub fn write_meshes(gt: &Path, files: &Path, change: impl Fn(&TriangleMesh) -> TriangleMesh) -> usize {
     std::fs::create_dir_all(files.join("room")).unwrap();
     let mut count = 0;
     for node in nodes(&ROOM) {
@@ -64,19 +62,26 @@ fn the_truth_in_other_uv_scores_as_the_truth() {
         if !truth.is_dir() {
             continue;
         }
-        let own = |name: &str| files.join("room").join(format!("{}{name}", node.name));
-        for map in ["base_color", "roughness", "metallic"] {
+        let (id, own) = (&node.name, |name: &str| files.join("room").join(format!("{}{name}", node.name)));
+        let mut mtl = "newmtl it\nKd 0.8 0.8 0.8\n".to_owned();
+        for (map, word) in [("base_color", "map_Kd"), ("roughness", "map_Pr"), ("metallic", "map_Pm")] {
             write_quarter(&truth.join(map).with_extension("png"), &own(&format!("-{map}.png")));
+            writeln!(mtl, "{word} {id}-{map}.png").unwrap();
         }
-        let id = &node.name;
-        let mtl = format!(
-            "newmtl it\nKd 0.8 0.8 0.8\nmap_Kd {id}-base_color.png\nmap_Pr {id}-roughness.png\nmap_Pm {id}-metallic.png\n"
-        );
         std::fs::write(own(".mtl"), mtl).unwrap();
-        let text = obj(&node.mesh, [0.0; 3], |[u, v]| [(u + 1.0) / 2.0, v / 2.0]);
+        let text = obj(&change(&node.mesh), [0.0; 3], |[u, v]| [(u + 1.0) / 2.0, v / 2.0]);
         std::fs::write(own(".obj"), text.replace("it.mtl", &format!("{id}.mtl"))).unwrap();
         count += 1;
     }
+    count
+}
+
+#[test]
+fn the_truth_in_other_uv_scores_as_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let [gt, files] = ["gt", "files"].map(|name| folder.path().join(name));
+    run(&mut baseline("gt", &ROOM, &gt)).ends_with(0);
+    let count = write_meshes(&gt, &files, TriangleMesh::clone);
     assert!(count > 10, "{count}");
     let out = folder.path().join("out");
     import(&ROOM, &files, &out, &["--method", "mine"]).ends_with(0);
@@ -100,7 +105,7 @@ fn the_truth_in_other_uv_scores_as_the_truth() {
 /// A `.gltf` of the boxes beside its `.bin` and a picture whose left half is black: below a node that shifts and
 /// mirrors,
 /// `red` looks its right half up by a transform of its uv, `green` has colours at its vertices.
-fn write_gltf(dataset: &Path, files: &Path, names: [&str; 2]) {
+pub fn write_gltf(dataset: &Path, files: &Path, names: [&str; 2]) {
     let mut bytes = Vec::new();
     let mut views = Vec::new();
     let mut view = |bytes: &mut Vec<u8>, data: Vec<u8>| {
@@ -161,7 +166,7 @@ fn is_byte(submission: &Path, instance: &str, map: &str, byte: u8) -> bool {
     places.map(|(x, y)| byte_from_unit(map.texel(x, y)[0])).all(|found| found == byte)
 }
 
-fn srgb(bytes: [u8; 3]) -> [f32; 3] {
+pub fn srgb(bytes: [u8; 3]) -> [f32; 3] {
     bytes.map(mateval_image::transfer::linear_from_srgb_byte)
 }
 
@@ -274,9 +279,20 @@ fn distances_and_texels_without_a_match_are_reported() {
     let strict = report_of_red("strict", &["--max-distance", "0.001"]);
     let share = strict["texels_without"].as_f64().unwrap() / strict["texels"].as_f64().unwrap();
     assert!((0.28..0.4).contains(&share), "{strict}");
-    write([5.0, 0.0, 0.0]);
+    // A box that is stretched and moved: no similarity explains it.
+    let stretched = obj(&red, [0.0; 3], |uv| uv);
+    let moved = stretched.lines().map(|line| match line.strip_prefix("v ") {
+        None => format!("{line}\n"),
+        Some(place) => {
+            let [x, y, z] =
+                <[f32; 3]>::try_from(place.split(' ').map(|v| v.parse().unwrap()).collect::<Vec<_>>()).unwrap();
+            format!("v {} {y} {z}\n", 2.0 * x + 5.0)
+        }
+    });
+    std::fs::write(files.join("room/red.obj"), moved.collect::<String>()).unwrap();
     let far = folder.path().join("far");
-    import(&dataset, &files, &far, &[]).ends_with(2).says("the nearest 4.2").says("world space");
+    let refused = import(&dataset, &files, &far, &[]).ends_with(2).says("the nearest 3.4").says("world space");
+    refused.says("48 orders of axes: no box has the right proportions");
     assert!(!far.exists());
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::command::{Run, run, run_words, verify};
+use super::command::{Run, baseline, run, run_words, score, verify};
 use super::sample::{copied_dataset, dataset, files_below, manifest};
 use mateval_testkit::kept_folder::copy_folder;
 
@@ -27,13 +27,17 @@ fn the_two_trees_together_are_the_dataset() {
     assert!(hidden.len() > 20 && hidden.iter().all(|path| is_truth(path)), "{hidden:?}");
     assert_eq!(manifest(&public), manifest(dataset()));
     run(&mut verify(&public)).ends_with(0);
+    let [grey, result] = ["grey", "grey.json"].map(|name| out.path().join(name));
+    run(&mut baseline("grey", dataset(), &grey)).ends_with(0);
+    run(&mut score(&grey, &public, &result)).ends_with(2).says("this needs the whole dataset");
     // The commitment can be computed from the public tree.
     let lines = manifest(&public);
     let lines: String =
         lines.lines().filter(|line| line.contains("/ground_truth/")).map(|line| format!("{line}\n")).collect();
     assert_eq!(commitment(&published), mateval_scene::manifest::sha256_of_bytes(lines.as_bytes()));
     copy_folder(&private, &public);
-    let whole: Vec<_> = files_below(dataset());
+    // What `prep` keeps for itself is not published.
+    let whole: Vec<_> = files_below(dataset()).into_iter().filter(|file| !file.starts_with(".build")).collect();
     assert_eq!(files_below(&public), whole);
     for file in whole {
         assert!(

@@ -37,6 +37,13 @@ fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
     assert!(child.wait().unwrap().code().is_none(), "it ended before it could be killed");
 }
 
+/// The unfinished folder of a scene.
+fn unfinished(out: &Path, scene: &str) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(out.join("scenes")).ok()?;
+    let mut paths = entries.flatten().map(|entry| entry.path());
+    paths.find(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&format!(".{scene}."))))
+}
+
 /// Asserts that the folder cannot be mistaken for a finished dataset.
 fn assert_unfinished(out: &Path) {
     assert!(!out.join("dataset.json").exists());
@@ -47,12 +54,12 @@ fn assert_unfinished(out: &Path) {
 fn killed_after_the_first_scene() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("dataset");
-    let mark = out.join(".build/first.json");
+    let mark = out.join(".build/scenes/first.json");
     kill_when(&mut build(&WHOLE.recipe, &out), || mark.is_file());
     assert_unfinished(&out);
     run(&mut build(&WHOLE.recipe, &out)).ends_with(0).says("scene 'first' was already made by an earlier run");
     assert!(manifest(&out) == WHOLE.manifest);
-    assert!(!out.join(".build").exists());
+    assert_eq!(std::fs::read_dir(out.join(".build/leases/scenes")).unwrap().count(), 0);
     run(&mut verify(&out)).ends_with(0);
 }
 
@@ -60,13 +67,12 @@ fn killed_after_the_first_scene() {
 fn killed_at_once_and_within_a_scene() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("dataset");
-    let work = out.join("scenes/.first.partial");
-    let moments: [&dyn Fn() -> bool; 3] = [&|| out.exists(), &|| work.join("views/input/depth.exr").is_file(), &|| {
-        work.join("geometry/parts.glb").is_file()
-    }];
+    let holds = |file: &str| unfinished(&out, "first").is_some_and(|work| work.join(file).is_file());
+    let moments: [&dyn Fn() -> bool; 3] =
+        [&|| out.exists(), &|| holds("views/input/depth.exr"), &|| holds("geometry/parts.glb")];
     for is_time in moments {
         // Files of the previous run must not be mistaken for those of this run.
-        let _ = std::fs::remove_dir_all(&work);
+        let _ = unfinished(&out, "first").map(std::fs::remove_dir_all);
         kill_when(&mut build(&WHOLE.recipe, &out), is_time);
         assert_unfinished(&out);
         assert!(!out.join("scenes/first").exists());
@@ -81,12 +87,12 @@ fn killed_at_once_and_within_a_scene() {
 fn half_written_scenes_are_made_again() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("dataset");
-    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/first.json").is_file());
-    std::fs::remove_file(out.join(".build/first.json")).unwrap();
+    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/scenes/first.json").is_file());
+    std::fs::remove_file(out.join(".build/scenes/first.json")).unwrap();
     std::fs::write(out.join("scenes/first/views/input/depth.exr"), "half").unwrap();
     std::fs::create_dir_all(out.join("scenes/second")).unwrap();
     std::fs::write(out.join("scenes/second/scene.json"), "{").unwrap();
-    std::fs::write(out.join(".build/second.json"), "[").unwrap();
+    std::fs::write(out.join(".build/scenes/second.json"), "[").unwrap();
     std::fs::write(out.join("scenes/second/stray"), "half").unwrap();
     let again = run(&mut build(&WHOLE.recipe, &out)).ends_with(0);
     assert!(!again.stderr.contains("already made"), "{}", again.stderr);
@@ -101,10 +107,12 @@ fn files_that_were_missing_before_are_used() {
     let recipe = write_source(&source, SMALL, &["first", "second"]);
     let [texture, aside] = ["room/textures/planks.png", "planks.png"].map(|name| source.join(name));
     std::fs::rename(&texture, &aside).unwrap();
-    kill_when(&mut build(&recipe, &out), || out.join(".build/first.json").is_file());
+    kill_when(&mut build(&recipe, &out), || out.join(".build/scenes/first.json").is_file());
     // The twin: while the file is still missing, the scene is the same.
-    kill_when(&mut build(&recipe, &out), || out.join("scenes/.second.partial/views/input/depth.exr").is_file());
-    assert!(out.join(".build/first.json").is_file() && !out.join("scenes/.first.partial").exists());
+    kill_when(&mut build(&recipe, &out), || {
+        unfinished(&out, "second").is_some_and(|work| work.join("views/input/depth.exr").is_file())
+    });
+    assert!(out.join(".build/scenes/first.json").is_file() && unfinished(&out, "first").is_none());
     std::fs::rename(&aside, &texture).unwrap();
     let again = run(&mut build(&recipe, &out)).ends_with(0);
     assert!(!again.stderr.contains("already made"), "{}", again.stderr);
@@ -115,18 +123,19 @@ fn files_that_were_missing_before_are_used() {
 fn another_recipe_does_not_resume() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("dataset");
-    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/first.json").is_file());
+    kill_when(&mut build(&WHOLE.recipe, &out), || out.join(".build/scenes/first.json").is_file());
     let other = WHOLE.recipe.with_file_name("other.toml");
     std::fs::write(&other, recipe_text("resolution = [80, 60]\natlas_size = 128", &["first", "second"])).unwrap();
-    run(&mut build(&other, &out)).ends_with(2).says("unfinished build of another recipe").says("--force");
+    run(&mut build(&other, &out)).ends_with(2).says("1 scene would be made otherwise: 'first'").says("--force");
     assert_unfinished(&out);
-    assert!(out.join(".build/first.json").is_file(), "the refusal changed the folder");
+    assert!(out.join(".build/scenes/first.json").is_file(), "the refusal changed the folder");
 
     let forced = run(build(&other, &out).arg("--force")).ends_with(0);
     assert!(!forced.stderr.contains("already made"), "{}", forced.stderr);
     assert!(manifest(&out) != WHOLE.manifest);
     run(&mut verify(&out)).ends_with(0);
-    run(&mut build(&other, &out)).ends_with(2).says("holds a finished dataset").says("--force");
+    run(&mut build(&WHOLE.recipe, &out)).ends_with(2).says("2 scenes would be made otherwise").says("--force");
+    run(&mut build(&other, &out)).ends_with(0).says("scene 'second' was already made");
 }
 
 #[test]

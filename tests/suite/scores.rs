@@ -27,6 +27,11 @@ static SCORED: LazyLock<PathBuf> = LazyLock::new(|| {
     folder
 });
 
+/// The result of `grey` or `gt`.
+pub fn result(method: &str) -> PathBuf {
+    SCORED.join(method).with_extension("json")
+}
+
 fn score_without_lpips(submission: &Path, dataset: &Path, result: &Path) -> std::process::Command {
     let mut command = score(submission, dataset, result);
     command.env("MATEVAL_CACHE", submission.join("no-such-folder"));
@@ -34,7 +39,7 @@ fn score_without_lpips(submission: &Path, dataset: &Path, result: &Path) -> std:
 }
 
 fn summary(method: &str, protocol: &str) -> Value {
-    json(&SCORED.join(method).with_extension("json"))["protocols"][protocol]["summary"].clone()
+    json(&result(method))["protocols"][protocol]["summary"].clone()
 }
 
 fn value(summary: &Value, key: &str) -> f64 {
@@ -126,7 +131,6 @@ fn the_truth_is_far_above_grey() {
 
 #[test]
 fn tables_show_both_and_refuse_other_fingerprints() {
-    let result = |name: &str| SCORED.join(name).with_extension("json");
     let shown = run(mateval().args(["eval", "tables"]).args([result("gt"), result("grey")])).ends_with(0);
     let albedo = shown.stdout.split("### Albedo, input view").nth(1).unwrap();
     // Without weights no result has LPIPS, so there is no column for it.
@@ -149,7 +153,7 @@ fn tables_show_both_and_refuse_other_fingerprints() {
 
 #[test]
 fn lpips_without_weights_is_missing_and_names_the_fix() {
-    const FIX: &str = "python3 tools/fetch_lpips_weights.py";
+    const FIX: &str = "mateval fetch lpips";
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("RESULT.json");
     let mut command = score(&SCORED.join("grey"), &SCORED.join("dataset"), &out);

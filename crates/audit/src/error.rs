@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use mateval_prep::render::RendererKind;
+use mateval_scene::ids::quoted;
 use mateval_scene::{SceneId, ViewId};
 
 /// Why a dataset could not be examined, exported or published.
@@ -106,9 +107,4 @@ impl AuditError {
         let path = path.into();
         move |source| Self::Io { action, path, source }
     }
-}
-
-/// `'a', 'b'`.
-fn quoted(scenes: &[SceneId]) -> String {
-    scenes.iter().map(|scene| format!("'{scene}'")).collect::<Vec<_>>().join(", ")
 }

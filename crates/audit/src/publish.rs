@@ -5,10 +5,12 @@
 
 use std::path::Path;
 
+use mateval_scene::dataset::{DatasetFile, FORMAT};
 use mateval_scene::layout::{DATASET, MANIFEST};
 use mateval_scene::manifest::{self, Entry, sha256_of_bytes};
-use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Progress, SceneError};
+use mateval_scene::open::check_whole;
+use mateval_scene::work_folder::{WorkFolder, check_holds_none};
+use mateval_scene::{Progress, Report, SceneError, json};
 
 use crate::error::AuditError;
 
@@ -27,17 +29,19 @@ pub struct Published {
 /// Writes the public files of the dataset in `root` to `public` and its ground truth to `private`; both are replaced where
 /// they exist. Fails before anything is written where a file differs from the manifest or there is no ground truth.
 pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_>) -> Result<Published, AuditError> {
-    progress("hashes", 0, 1);
+    let dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
+    check_whole(root, &dataset)?;
+    [public, private].into_iter().try_for_each(|out| check_holds_none(out, &[root]))?;
+    progress(Report::step("hashes", 0, 1));
     let findings = manifest::check(root)?;
     if !findings.is_empty() {
         return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
     }
-    let (withheld, shown): (Vec<Entry>, Vec<Entry>) =
-        manifest::entries(root)?.into_iter().partition(|entry| is_ground_truth(&entry.file));
+    let (withheld, shown) = split(root)?;
     if withheld.is_empty() {
         return Err(AuditError::NoGroundTruth { path: root.to_owned() });
     }
-    let lines: String = withheld.iter().map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect();
+    let commitment_sha256 = commitment_of(&withheld);
     let mut shown: Vec<&str> = shown.iter().map(|entry| entry.file.as_str()).collect();
     shown.extend([MANIFEST, DATASET]);
     let withheld: Vec<&str> = withheld.iter().map(|entry| entry.file.as_str()).collect();
@@ -45,15 +49,26 @@ pub fn publish(root: &Path, public: &Path, private: &Path, progress: Progress<'_
     let mut works = Vec::new();
     for (place, files, what) in folders {
         let work = WorkFolder::start(place)?;
-        copy(root, work.path(), files, &|done| progress(what, done, files.len()))?;
+        copy(root, work.path(), files, &|done| progress(Report::step(what, done, files.len())))?;
         works.push(work);
     }
     works.into_iter().try_for_each(WorkFolder::finish)?;
-    Ok(Published {
-        commitment_sha256: sha256_of_bytes(lines.as_bytes()),
-        public_files: shown.len(),
-        private_files: withheld.len(),
-    })
+    Ok(Published { commitment_sha256, public_files: shown.len(), private_files: withheld.len() })
+}
+
+/// The commitment to the ground truth of the dataset in `root`, from its manifest alone: [`Published::commitment_sha256`].
+pub fn commitment(root: &Path) -> Result<String, AuditError> {
+    Ok(commitment_of(&split(root)?.0))
+}
+
+/// The manifest's files: the ground truth, then all others.
+fn split(root: &Path) -> Result<(Vec<Entry>, Vec<Entry>), AuditError> {
+    Ok(manifest::entries(root)?.into_iter().partition(|entry| is_ground_truth(&entry.file)))
+}
+
+fn commitment_of(withheld: &[Entry]) -> String {
+    let lines: String = withheld.iter().map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect();
+    sha256_of_bytes(lines.as_bytes())
 }
 
 /// Whether the path is of the form `scenes/<scene>/ground_truth/...`.

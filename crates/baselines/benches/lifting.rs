@@ -77,7 +77,7 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
 fn whole_room(dataset: &Dataset, scene: &SceneFile) {
     let folder = tempfile::tempdir().unwrap();
     let options = NnOptions { atlas_size: Some(SIZE as u32), ..NnOptions::default() };
-    nn::write_scene(dataset, scene, folder.path(), &EstimateSource::Truth, &options, &|_, _, _| {}).unwrap();
+    nn::write_scene(dataset, scene, folder.path(), &EstimateSource::Truth, &options, &|_| ()).unwrap();
 }
 
 /// Seconds of each stage, and the filling step of the instance with the most unseen texels.

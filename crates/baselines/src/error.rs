@@ -54,6 +54,15 @@ pub enum BaselineError {
         /// The files that were searched for.
         paths: Vec<PathBuf>,
     },
+    /// No source of the scenes with pictures states what they show, so there is no truth to compare them with.
+    #[error(
+        "cannot compare {}: no scene that has such a picture has a source that states it; expected source.states_{} = true in the dataset; use another dataset, or compare base_color",
+        maps.join(" and "), maps.join(" or source.states_")
+    )]
+    UnstatedTruth {
+        /// The words of the maps, `roughness` or `metallic`.
+        maps: Vec<&'static str>,
+    },
     /// An estimate without any picture.
     #[error("the estimate of scene '{0}' holds no picture")]
     EmptyEstimate(String),
@@ -65,8 +74,18 @@ pub enum BaselineError {
         /// Column and row.
         pixel: (usize, usize),
     },
+    /// A value is far above what a material can have.
+    #[error("'{}' holds {value} after decoding; expected linear values up to {largest}; if the numbers run from 0 to 255, write range = [0, 255] below the map in the adapter", path.display())]
+    TooLarge {
+        /// The picture.
+        path: PathBuf,
+        /// The first such value, linear.
+        value: f32,
+        /// The largest value that is accepted.
+        largest: f32,
+    },
     /// An estimate has other proportions than the input view.
-    #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions", size.0, size.1, view.0, view.1)]
+    #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions, within 5 %; {}", size.0, size.1, view.0, view.1, proportions_advice(*adapted))]
     Proportions {
         /// The scene's id.
         scene: String,
@@ -74,6 +93,8 @@ pub enum BaselineError {
         size: (usize, usize),
         /// Width and height of the view.
         view: (usize, usize),
+        /// Whether an adapter describes the pictures.
+        adapted: bool,
     },
     /// TEXGen paints base colour, and the estimate has none.
     #[error(
@@ -129,7 +150,7 @@ pub enum BaselineError {
         scene: String,
     },
     /// A scene's meshes lie too far from all its instances.
-    #[error("'{}': no mesh for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb", folder.display())]
+    #[error("'{}': no mesh for scene '{scene}' lies within {max_distance_m} m of any instance, the nearest {nearest_m:.3} m away; expected meshes in the dataset's world space (metres, +Y up), as in geometry/instances.glb, or moved from it by a scale, a turn and a shift; tried equal triangles, and the boxes of both meshes in 48 orders of axes: {}", folder.display(), best(*best_residual_m))]
     NothingNear {
         /// The folder of imported files.
         folder: PathBuf,
@@ -139,6 +160,8 @@ pub enum BaselineError {
         nearest_m: f64,
         /// Largest distance that counts, in metres.
         max_distance_m: f64,
+        /// Smallest distance that a similarity leaves, in metres; none where no box has the right proportions.
+        best_residual_m: Option<f64>,
     },
     /// The geometry cannot be traced.
     #[error(transparent)]
@@ -149,6 +172,24 @@ pub enum BaselineError {
     /// A picture could not be read or written.
     #[error(transparent)]
     Image(#[from] mateval_image::ImageError),
+}
+
+fn proportions_advice(adapted: bool) -> &'static str {
+    if adapted {
+        "if the method stretches the view to its own size, write placement = \"stretched\" at the top of the adapter, or \
+         placement = \"centre_crop\" if it cuts off what lies outside its own proportions"
+    } else {
+        "if the method stretches the view to its own size, scale it back to the view's proportions; if it cuts off a part of \
+         the view, save its pictures and lift them with an adapter that states placement = \"centre_crop\": mateval \
+         baseline nn --estimate FOLDER --adapter FILE.toml"
+    }
+}
+
+fn best(residual_m: Option<f64>) -> String {
+    match residual_m {
+        Some(residual_m) => format!("the best leaves {residual_m:.4} m (root mean square)"),
+        None => "no box has the right proportions".to_owned(),
+    }
 }
 
 fn list(paths: &[PathBuf]) -> String {

@@ -1,5 +1,6 @@
 //! Where an estimate comes from: the dataset's ground truth, the input picture, or a method's files.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use mateval_image::LinearRgb;
@@ -7,11 +8,14 @@ use mateval_image::exr_io::{read_linear, read_scalar};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
+use mateval_scene::stored_encoding::StoredEncoding;
+use mateval_scene::submission::Map;
 
 use crate::adapter::Adapter;
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::geometry::input_view;
+use crate::placement::Placement;
 
 /// Where an estimate comes from.
 #[derive(Clone, Debug)]
@@ -37,8 +41,26 @@ impl EstimateSource {
             Self::Input => "the input picture itself".to_owned(),
             Self::Files { folder, adapter } => {
                 let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
-                format!("the pictures of {} ({})", adapter.name, adapter.inventory(folder, &scenes))
+                let placement = match adapter.placement {
+                    Placement::Whole => String::new(),
+                    other => format!("; placed by the rule '{}'", other.word()),
+                };
+                let assumed = adapter.assumed_encodings();
+                let assumed = match assumed.keys().map(|map| map.stem()).collect::<Vec<_>>() {
+                    stems if stems.is_empty() => String::new(),
+                    stems => format!("; its authors do not state the encoding of {}", stems.join(", ")),
+                };
+                let inventory = adapter.inventory(folder, &scenes);
+                format!("the pictures of {} ({inventory}{placement}{assumed})", adapter.name)
             }
+        }
+    }
+
+    /// The encodings that the adapter of a method's pictures assumes, because its authors do not state them.
+    pub fn assumed_encodings(&self) -> BTreeMap<Map, StoredEncoding> {
+        match self {
+            Self::Truth | Self::Input => BTreeMap::new(),
+            Self::Files { adapter, .. } => adapter.assumed_encodings(),
         }
     }
 
@@ -68,6 +90,7 @@ fn truth(folder: &SceneFolder, view: &View) -> Result<Estimate, BaselineError> {
         base_color: Some(read_linear(&folder.join("albedo.exr"))?),
         roughness: Some(read_scalar(&folder.join("roughness.exr"))?),
         metallic: Some(read_scalar(&folder.join("metallic.exr"))?),
+        ..Estimate::default()
     })
 }
 

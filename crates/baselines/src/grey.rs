@@ -16,7 +16,7 @@ pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, Baseli
     let texel = [byte_from_unit(srgb_from_linear(GREY)); 3];
     let size = *MAP_SIZES.start();
     let method = Method::new("grey", "base colour 0.5 (linear) everywhere, roughness 0.5, metallic 0");
-    submission::write(dataset, out, force, &method, |_, _, folder| {
+    submission::write(dataset, out, force, &method, &|_| (), |_, _, folder| {
         let path = folder.join(Map::BaseColor.stem()).with_extension("png");
         Ok(png_io::write_rgb_bytes(&path, &Picture::filled(size, size, texel))?)
     })

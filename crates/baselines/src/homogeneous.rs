@@ -16,7 +16,6 @@ use crate::maps::Maps;
 use crate::median::{Medians, median};
 use crate::nn::seen_pixels;
 use crate::part_colors::{PartColors, parts_of};
-use crate::seen::view_pixel;
 use crate::submission::{self, Method};
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
@@ -29,8 +28,9 @@ pub fn write_by_instance(
     source: &EstimateSource,
 ) -> Result<usize, BaselineError> {
     let description = format!("the median of {} under each instance's mask; {UNSEEN}", source.description(dataset));
-    let method = Method { name: name("median", source), description };
-    submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+    let assumed_encodings = source.assumed_encodings();
+    let method = Method { name: name("median", source), description, assumed_encodings };
+    submission::write_scenes(dataset, out, force, &method, &|_| (), |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
         let medians = Medians::new(&geometry, &seen_pixels(&geometry, &estimate)?, &estimate);
@@ -59,8 +59,9 @@ pub fn write_by_part(
         source.description(dataset)
     );
     let stem = set.map_or("median-part".to_owned(), |set| format!("median-part-{set}"));
-    let method = Method { name: name(&stem, source), description };
-    submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+    let assumed_encodings = source.assumed_encodings();
+    let method = Method { name: name(&stem, source), description, assumed_encodings };
+    submission::write_scenes(dataset, out, force, &method, &|_| (), |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
         let parts = colors_of_parts(&geometry, set, &estimate)?;
@@ -95,7 +96,7 @@ fn colors_of_parts(
     let medians = Medians::new(geometry, &seen, estimate);
     let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); parts.len()];
     for (x, y, _) in seen.shown_pixels() {
-        let (x_of_view, y_of_view) = view_pixel(geometry, &seen.camera, x, y);
+        let (x_of_view, y_of_view) = seen.view_pixel(x, y);
         let index = picture.get(x_of_view, y_of_view);
         if let Some(at) = parts.iter().position(|part| part.index.0.get() == index) {
             pixels[at].push(estimate.at(x, y));

@@ -11,7 +11,10 @@
 //! Steps: [`geometry`] reads the scene as methods see it; [`seen`] determines which instance each pixel shows; [`lift`]
 //! writes the estimate into an atlas; [`fill`] computes unseen texels; [`maps`] writes the files.
 
+pub mod adapted_file;
 pub mod adapter;
+pub mod encoding_fit;
+pub mod encoding_report;
 pub mod error;
 pub mod estimate;
 pub mod estimate_source;
@@ -27,6 +30,8 @@ pub mod nn;
 pub mod objects;
 pub mod part_colors;
 pub mod partfield;
+pub mod placement;
+pub mod scale;
 pub mod seen;
 pub mod seen_cloud;
 pub mod submission;

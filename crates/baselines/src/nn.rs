@@ -5,10 +5,10 @@
 
 use std::path::Path;
 
-use mateval_scene::Progress;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::MAP_SIZES;
+use mateval_scene::{Progress, Report};
 use rayon::prelude::*;
 
 use crate::error::BaselineError;
@@ -22,10 +22,6 @@ use crate::median::Medians;
 use crate::seen::{SeenPixels, SeenPoint};
 use crate::seen_cloud::{FillRule, SeenCloud};
 use crate::submission::{self, Method};
-
-/// Largest relative difference between the proportions of an estimate and the view, because methods round sizes to
-/// multiples of 8 or 16.
-const PROPORTIONS: f64 = 0.05;
 
 /// How unseen texels are filled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,8 +67,9 @@ pub fn write(
     let method = Method {
         name: format!("nn-{}", source.name()),
         description: options.description(&source.description(dataset)),
+        assumed_encodings: source.assumed_encodings(),
     };
-    submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+    submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         write_scene(dataset, scene, folder, source, options, progress)
     })
 }
@@ -108,14 +105,10 @@ pub struct Lifted {
 
 /// Determines which instance each pixel of the estimate shows.
 pub fn seen_pixels(geometry: &SceneGeometry<'_>, estimate: &Estimate) -> Result<SeenPixels, BaselineError> {
-    let scene = || geometry.scene.id.to_string();
-    let size = estimate.size().ok_or_else(|| BaselineError::EmptyEstimate(scene()))?;
     let view = (geometry.valid.width(), geometry.valid.height());
-    let stretch = (size.0 * view.1) as f64 / (size.1 * view.0) as f64;
-    if !(1.0 - PROPORTIONS..=1.0 + PROPORTIONS).contains(&stretch) {
-        return Err(BaselineError::Proportions { scene: scene(), size, view });
-    }
-    Ok(SeenPixels::new(geometry, size))
+    let region = estimate.region(geometry.scene.id.as_str(), view)?;
+    let size = estimate.size().unwrap_or(view);
+    Ok(SeenPixels::of_region(geometry, size, region))
 }
 
 /// Lifts an estimate to every instance that has an atlas, several at once. `each` receives the instance's index and its
@@ -154,11 +147,11 @@ pub fn lift_scene(
     };
     let (step, mut done) = (format!("{} lift", geometry.scene.id), 0);
     for batch in batches(&with_atlas) {
-        progress(&step, done, with_atlas.len());
+        progress(Report::step(&step, done, with_atlas.len()));
         batch.par_iter().try_for_each(|&(instance, size)| each(instance, lifted(instance, size), &medians))?;
         done += batch.len();
     }
-    progress(&step, done, with_atlas.len());
+    progress(Report::step(&step, done, with_atlas.len()));
     Ok(with_atlas.len())
 }
 

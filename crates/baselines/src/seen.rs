@@ -7,6 +7,7 @@ use mateval_tracer::aov::{COARSE_SUBPIXELS, coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
 use crate::geometry::SceneGeometry;
+use crate::placement::Region;
 
 /// Marks pixels that show no instance.
 const NO_INSTANCE: u16 = u16::MAX;
@@ -37,8 +38,10 @@ pub struct SeenPoint {
 /// Only valid pixels count. A pixel on the edge between two instances mixes the colours of both, so it counts only for
 /// instances that cover no whole pixel.
 pub struct SeenPixels {
-    /// The camera at the picture's size.
+    /// The camera whose picture this is.
     pub camera: Camera,
+    /// The part of the view that the picture shows.
+    region: Region,
     owners: Picture<Owner>,
     /// For each instance, whether it covers a whole pixel.
     has_whole: Vec<bool>,
@@ -46,16 +49,23 @@ pub struct SeenPixels {
 
 impl SeenPixels {
     /// Traces 16 rays through every pixel of the input view at this width and height.
-    pub fn new(geometry: &SceneGeometry<'_>, (width, height): (usize, usize)) -> Self {
-        let camera = geometry.view.camera.resized(width as u32, height as u32);
-        let rows: Vec<Vec<Owner>> =
-            (0..height).into_par_iter().map(|y| (0..width).map(|x| owner(geometry, &camera, x, y)).collect()).collect();
+    pub fn new(geometry: &SceneGeometry<'_>, size: (usize, usize)) -> Self {
+        Self::of_region(geometry, size, Region::whole((geometry.valid.width(), geometry.valid.height())))
+    }
+
+    /// The same for a picture of this width and height that shows a part of the input view.
+    pub fn of_region(geometry: &SceneGeometry<'_>, (width, height): (usize, usize), region: Region) -> Self {
+        let camera = geometry.view.camera.cropped(region.corner, region.size, width as u32, height as u32);
+        let rows: Vec<Vec<Owner>> = (0..height)
+            .into_par_iter()
+            .map(|y| (0..width).map(|x| owner(geometry, &camera, region, x, y)).collect())
+            .collect();
         let owners = Picture::from_fn(width, height, |x, y| rows[y][x]);
         let mut has_whole = vec![false; geometry.scene.instances.len()];
         for owner in owners.pixels().iter().filter(|owner| owner.whole && owner.instance != NO_INSTANCE) {
             has_whole[usize::from(owner.instance)] = true;
         }
-        Self { camera, owners, has_whole }
+        Self { camera, region, owners, has_whole }
     }
 
     /// Whether the pixel's colour is that of the instance.
@@ -83,6 +93,11 @@ impl SeenPixels {
         shown.into_par_iter().filter_map(point).collect()
     }
 
+    /// The pixel of the input view that contains the centre of pixel (`x`, `y`).
+    pub fn view_pixel(&self, x: usize, y: usize) -> (usize, usize) {
+        view_pixel(self.region, (self.owners.width(), self.owners.height()), x, y)
+    }
+
     /// Column, row and instance of every pixel that shows an instance.
     pub fn shown_pixels(&self) -> impl Iterator<Item = (usize, usize, usize)> + '_ {
         let (width, height) = (self.owners.width(), self.owners.height());
@@ -94,15 +109,16 @@ impl SeenPixels {
     }
 }
 
-/// The pixel of the input view that contains the centre of pixel (`x`, `y`) of the view at `camera`'s size.
-pub(crate) fn view_pixel(geometry: &SceneGeometry<'_>, camera: &Camera, x: usize, y: usize) -> (usize, usize) {
-    let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-    ((2 * x + 1) * geometry.valid.width() / (2 * width), (2 * y + 1) * geometry.valid.height() / (2 * height))
+/// The pixel of the input view that contains the centre of pixel (`x`, `y`) of a picture.
+fn view_pixel(region: Region, size: (usize, usize), x: usize, y: usize) -> (usize, usize) {
+    let place = region.place(size, x, y);
+    (place.x as usize, place.y as usize)
 }
 
-fn owner(geometry: &SceneGeometry<'_>, camera: &Camera, x: usize, y: usize) -> Owner {
+fn owner(geometry: &SceneGeometry<'_>, camera: &Camera, region: Region, x: usize, y: usize) -> Owner {
     let none = Owner { instance: NO_INSTANCE, whole: false };
-    let of_view = view_pixel(geometry, camera, x, y);
+    let size = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+    let of_view = view_pixel(region, size, x, y);
     if !geometry.valid.get(of_view.0, of_view.1) {
         return none;
     }

@@ -1,12 +1,14 @@
 //! Writes a submission, complete or not at all.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::open::Dataset;
-use mateval_scene::submission::{SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
-use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{SceneError, json};
+use mateval_scene::stored_encoding::StoredEncoding;
+use mateval_scene::submission::{Map, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile, scene_folder};
+use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_scene::{Progress, Report, SceneError, json};
 
 use crate::error::BaselineError;
 
@@ -17,12 +19,15 @@ pub struct Method {
     pub name: String,
     /// All choices that were made.
     pub description: String,
+    /// By map, the encodings that an adapter assumed.
+    pub assumed_encodings: BTreeMap<Map, StoredEncoding>,
 }
 
 impl Method {
-    /// A method with this name and description.
+    /// A method with this name and description, which assumes no encodings.
     pub fn new(name: &str, description: &str) -> Self {
-        Self { name: name.to_owned(), description: description.to_owned() }
+        let (name, description) = (name.to_owned(), description.to_owned());
+        Self { name, description, assumed_encodings: BTreeMap::new() }
     }
 }
 
@@ -33,9 +38,10 @@ pub fn write(
     out: &Path,
     force: bool,
     method: &Method,
+    progress: Progress<'_>,
     write_instance: impl Fn(&SceneFile, &Instance, &Path) -> Result<(), BaselineError>,
 ) -> Result<usize, BaselineError> {
-    write_scenes(dataset, out, force, method, |scene, folder| {
+    write_scenes(dataset, out, force, method, progress, |scene, folder| {
         let mut instances = 0;
         for instance in scene.instances.iter().filter(|instance| instance.atlas.is_some()) {
             let folder = folder.join(instance.id.as_str());
@@ -54,12 +60,14 @@ pub fn write_scenes(
     out: &Path,
     force: bool,
     method: &Method,
+    progress: Progress<'_>,
     write_scene: impl Fn(&SceneFile, &Path) -> Result<usize, BaselineError>,
 ) -> Result<usize, BaselineError> {
     check_out(dataset, out, force)?;
     let work = WorkFolder::start(out)?;
     let mut instances = 0;
-    for scene in &dataset.scenes {
+    for (at, scene) in dataset.scenes.iter().enumerate() {
+        progress(Report::part(&format!("scene {}", scene.id), at, dataset.scenes.len()));
         // The submission names the dataset by its manifest, so the files that it is made from must match the manifest.
         dataset.check_files(&scene.id, |path| !path.contains("/renders/"))?;
         let folder = scene_folder(work.path(), &scene.id);
@@ -73,6 +81,7 @@ pub fn write_scenes(
         url: None,
         licence: None,
         cost: None,
+        assumed_encodings: method.assumed_encodings.clone(),
         dataset_manifest_sha256: dataset.file.manifest_sha256.clone(),
     };
     json::write(&work.path().join(SUBMISSION), &file)?;
@@ -95,14 +104,7 @@ pub(crate) fn check_new_place(dataset: &Dataset, out: &Path) -> Result<(), Basel
 
 /// Fails where `out` lies in the dataset's folder, which must hold no other files.
 fn check_outside(dataset: &Dataset, out: &Path) -> Result<(), BaselineError> {
-    let found = |path: &Path| path.canonicalize().ok();
-    let Some(root) = found(&dataset.root) else { return Ok(()) };
-    let there = std::path::absolute(out).ok();
-    let above = there.iter().flat_map(|path| path.ancestors()).find_map(found);
-    match above {
-        Some(above) if above.starts_with(&root) => Err(BaselineError::InDataset(out.to_owned())),
-        _ => Ok(()),
-    }
+    if is_inside(out, &dataset.root) { Err(BaselineError::InDataset(out.to_owned())) } else { Ok(()) }
 }
 
 fn check_place(out: &Path, force: bool) -> Result<(), BaselineError> {

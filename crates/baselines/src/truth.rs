@@ -11,7 +11,7 @@ use crate::submission::{self, Method};
 /// Copies the baked maps of every instance and returns the number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
     let method = Method::new("gt", "the true materials baked to the dataset's own atlases");
-    submission::write(dataset, out, force, &method, |scene, instance, folder| {
+    submission::write(dataset, out, force, &method, &|_| (), |scene, instance, folder| {
         let truth = dataset.folder(&scene.id).truth_material(&instance.id);
         for map in Map::ALL {
             let name = Path::new(map.stem()).with_extension("png");

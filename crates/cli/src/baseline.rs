@@ -1,5 +1,6 @@
 //! `mateval baseline`: makes a submission by a method that comes with the tool, or from another method's files.
 
+mod encoding;
 mod estimate;
 mod import;
 mod partfield;
@@ -34,6 +35,9 @@ pub enum Command {
     Median(MedianArgs),
     /// One colour per part: the median of an estimate inside the part's mask.
     MedianPart(MedianPartArgs),
+    /// Compares a method's pictures with the truth and reports which encoding their numbers fit; exit code 1 if it is
+    /// not the adapter's.
+    Encoding(encoding::EncodingArgs),
     /// Transfers a method's own textured meshes, or one material per part, to the dataset's atlases.
     Import(import::ImportArgs),
     /// Writes seen instances as TEXGen reads objects: mesh, partial atlas, masks, positions and picture of each.
@@ -105,6 +109,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             let set = args.part_set.as_ref();
             places.done(homogeneous::write_by_part(&places.open()?, &places.out, places.force, &source, set)?)
         }
+        Command::Encoding(args) => encoding::run(args),
         Command::Import(args) => import::run(args),
         Command::TexgenExport(args) => texgen::export(args),
         Command::TexgenImport(args) => texgen::import(args),

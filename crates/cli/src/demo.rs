@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context as _, bail};
 
 use mateval_eval::result::ResultFile;
+use mateval_prep::render::RendererKind;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use mateval_scene::open::Dataset;
 
@@ -52,9 +53,9 @@ pub struct Args {
     /// Folder for everything that the demo makes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
-    /// Samples per pixel of each half of a rendered picture.
-    #[arg(long, default_value_t = 64)]
-    samples: u32,
+    /// Samples per pixel of each half of a rendered picture [default: 32; with --full 64].
+    #[arg(long)]
+    samples: Option<u32>,
     #[command(flatten)]
     by: RendererArgs,
     /// Baselines to make and score [default: gt, nn, grey; with --full also median].
@@ -68,10 +69,19 @@ pub struct Args {
     force: bool,
 }
 
+/// Samples per pixel of the leaderboard's lit pictures: two for their two halves at least, and few at most, since noise is
+/// filtered for display.
+const LEAST_SHOWN_SAMPLES: u32 = 2;
+const MOST_SHOWN_SAMPLES: u32 = 16;
+
 /// Width and height of a view, unless everything is asked for: large enough to look at, and rendered in seconds.
 const SMALL: [u32; 2] = [160, 120];
 
 impl Args {
+    fn samples(&self) -> u32 {
+        self.samples.unwrap_or(if self.full { 64 } else { 32 })
+    }
+
     fn baselines(&self) -> Vec<DemoBaseline> {
         use DemoBaseline::{Grey, Gt, Median, Nn};
         match (self.baselines.is_empty(), self.full) {
@@ -104,9 +114,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if out.exists() && !args.force {
         bail!("'{}' already exists; choose another --out, or add --force to replace what a demo left", out.display());
     }
-    args.by.checked()?;
+    args.by.clone().or(RendererKind::Blender).checked()?;
     let plan = plan(args)?;
-    say("1/6 sample: the source scenes, a house and a room that the program generates");
+    say(
+        "1/6 sample: the source scenes, a house and a room that the program generates; the house has faults that are planted \
+         on purpose, which later steps report as notes",
+    );
     let source = out.join("source");
     let written = if args.full { mateval_sample::write(&source) } else { mateval_sample::write_at(&source, SMALL) };
     written.context("cannot write the sample")?;
@@ -148,12 +161,14 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     let score: ScoreArgs = parse_args(&score_words)?;
     let board = board(&baselines, score.result_paths());
     let mut shown = vec![path_option("dataset", &dataset), path_option("out", &args.out.join("leaderboard"))];
+    let samples = args.samples().clamp(LEAST_SHOWN_SAMPLES, MOST_SHOWN_SAMPLES);
+    shown.push(format!("--samples={samples}").into());
     shown.extend(board.ceiling.iter().map(|ceiling| path_option("ceiling", ceiling)));
     let ranked = baselines.iter().filter(|baseline| board.ceiling.is_none() || **baseline != DemoBaseline::Gt);
     shown.extend(ranked.map(|baseline| path_option("submission", &submission(baseline))));
-    let render_words = words(vec![format!("--samples={}", args.samples).into()], std::slice::from_ref(&dataset));
+    let render_words = words(vec![format!("--samples={}", args.samples()).into()], std::slice::from_ref(&dataset));
     let mut render: RenderArgs = parse_args(&render_words)?;
-    render.by = args.by.clone();
+    render.by = args.by.clone().or(RendererKind::Blender);
     Ok(Plan {
         build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
         render,

@@ -11,7 +11,9 @@ mod bars;
 mod baseline;
 mod demo;
 mod eval;
+mod fetch;
 mod format;
+mod open_dataset;
 mod outcome;
 mod output_file;
 mod parsing;
@@ -53,6 +55,8 @@ enum Command {
     /// Checks, scores and compares submissions.
     #[command(subcommand)]
     Eval(eval::Command),
+    /// Downloads LPIPS' weights and Blender, which are not part of the tool.
+    Fetch(fetch::Args),
     /// Writes the JSON Schemas of the format's files.
     #[command(hide = true)]
     Schema(schema::Args),
@@ -66,21 +70,14 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 }
 
 fn run(words: &[OsString]) -> u8 {
-    let command = match Cli::try_parse_from(words) {
-        Ok(cli) => cli.command,
-        Err(refusal) => {
-            // As `Cli::parse` does: nothing can be done where the terminal is gone.
+    let result = match Cli::try_parse_from(words) {
+        Ok(cli) => carry_out(&cli.command),
+        Err(refusal) if refusal.use_stderr() => {
+            // Nothing can be done where stderr is gone.
             let _ = refusal.print();
             return u8::try_from(refusal.exit_code()).unwrap_or(2);
         }
-    };
-    let result = match command {
-        Command::Demo(args) => demo::run(&args),
-        Command::Sample(args) => sample::run(&args),
-        Command::Prep(command) => prep::run(&command),
-        Command::Baseline(command) => baseline::run(&command),
-        Command::Eval(command) => eval::run(&command),
-        Command::Schema(args) => schema::run(&args),
+        Err(help) => outcome::print_help(&help).map(|()| Outcome::Good),
     };
     match result {
         Ok(Outcome::Good) => 0,
@@ -89,5 +86,17 @@ fn run(words: &[OsString]) -> u8 {
             outcome::say(&format!("error: {}", outcome::error_text(&error)));
             2
         }
+    }
+}
+
+fn carry_out(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Demo(args) => demo::run(args),
+        Command::Sample(args) => sample::run(args),
+        Command::Prep(command) => prep::run(command),
+        Command::Baseline(command) => baseline::run(command),
+        Command::Eval(command) => eval::run(command),
+        Command::Fetch(args) => fetch::run(args),
+        Command::Schema(args) => schema::run(args),
     }
 }

@@ -18,7 +18,16 @@ pub enum Outcome {
 /// closed the pipe.
 pub fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    written(out.write_all(text.as_bytes()).and_then(|()| out.flush()))
+}
+
+/// Prints a help text or the version to stdout, in colours on a terminal; fails as [`print()`] does.
+pub fn print_help(help: &clap::Error) -> anyhow::Result<()> {
+    written(help.print().and_then(|()| std::io::stdout().flush()))
+}
+
+fn written(result: std::io::Result<()>) -> anyhow::Result<()> {
+    match result {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error).context("cannot write to stdout"),
         _ => Ok(()),
     }

@@ -4,6 +4,8 @@ pub mod blender;
 pub mod build;
 mod companions;
 mod compare;
+mod export;
+mod finish;
 mod mitsuba;
 mod publish;
 pub mod render;
@@ -22,6 +24,8 @@ pub enum Command {
     Survey(survey::SurveyArgs),
     /// Renders the dataset's RGB pictures.
     Render(render::RenderArgs),
+    /// Writes the files that describe the whole dataset, after scenes were made or rendered apart by --scene.
+    Finish(finish::FinishArgs),
     /// Adds the pictures with which scoring corrects render noise, so that no user has to render them. Changes the manifest:
     /// run it before the dataset is given to anyone.
     Companions(companions::CompanionsArgs),
@@ -29,8 +33,11 @@ pub enum Command {
     Compare(compare::CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
     Verify(verify::VerifyArgs),
-    /// Writes a dataset as two folders: the public files, and the ground truth of a hidden split.
+    /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes the
+    /// release. Exit code 1: the page states a fault.
     Publish(publish::PublishArgs),
+    /// Writes a dataset in a format that other tools read: tars, Croissant, Hugging Face, nerfstudio or COLMAP.
+    Export(export::ExportArgs),
     /// Counts what a dataset holds: the paper's Table I, objects by category, and numbers scene by scene.
     Stats(stats::StatsArgs),
     /// Writes a view with its ground truth as a scene for Mitsuba 3. Exit code 1: Mitsuba cannot express all of it.
@@ -43,10 +50,12 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Build(args) => build::run(args),
         Command::Survey(args) => survey::run(args),
         Command::Render(args) => render::run(args),
+        Command::Finish(args) => finish::run(args),
         Command::Companions(args) => companions::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Publish(args) => publish::run(args),
+        Command::Export(args) => export::run(args),
         Command::Stats(args) => stats::run(args),
         Command::Mitsuba(args) => mitsuba::run(args),
     }

@@ -14,6 +14,13 @@ pub struct Args {
     /// Write into a folder that already exists and replace files of the same name.
     #[arg(long)]
     force: bool,
+    /// Write this many houses made of the built-in one instead, with a recipe of one scene a house: a rehearsal of a
+    /// release at full size.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    houses: Option<u32>,
+    /// With --houses: what the houses are drawn from.
+    #[arg(long, requires = "houses", default_value_t = 0)]
+    seed: u64,
 }
 
 /// Writes the sample and prints the path of its recipe.
@@ -21,7 +28,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.exists() && !args.force {
         bail!("'{}' already exists; choose another folder, or add --force to write into it", args.out.display());
     }
-    mateval_sample::write(&args.out).context("cannot write the sample")?;
+    match args.houses {
+        None => mateval_sample::write(&args.out),
+        Some(count) => mateval_sample::write_houses(&args.out, count, args.seed),
+    }
+    .context("cannot write the sample")?;
     print(&format!("{}\n", args.out.join("recipe.toml").display()))?;
     Ok(Outcome::Good)
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context as _, bail};
 use mateval_audit::compare::file::CompareFile;
 use mateval_audit::stats::StatsFile;
+use mateval_baselines::encoding_report::EncodingReport;
 use mateval_baselines::import::{FlatMaterials, ImportReport};
 use mateval_eval::companion_pictures::CompanionsFile;
 use mateval_eval::result::ResultFile;
@@ -12,6 +13,7 @@ use mateval_eval::verify::VerificationFile;
 use mateval_prep::blender::{BlenderJob, BlenderResult};
 use mateval_prep::render::RenderFile;
 use mateval_prep::survey::SurveyFile;
+use mateval_release::ReleaseFile;
 use mateval_report::explain::file::ExplainFile;
 use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
@@ -48,7 +50,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 22] {
+fn schemas() -> [(&'static str, Schema); 24] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -66,10 +68,12 @@ fn schemas() -> [(&'static str, Schema); 22] {
         ("leaderboard", schema_for!(LeaderboardFile)),
         ("errata", schema_for!(ErrataFile)),
         ("stats", schema_for!(StatsFile)),
+        ("release", schema_for!(ReleaseFile)),
         ("survey", schema_for!(SurveyFile)),
         ("blender_job", schema_for!(BlenderJob)),
         ("blender_result", schema_for!(BlenderResult)),
         ("compare", schema_for!(CompareFile)),
+        ("encoding", schema_for!(EncodingReport)),
         ("import", schema_for!(ImportReport)),
         ("import_materials", schema_for!(FlatMaterials)),
     ]

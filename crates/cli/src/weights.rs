@@ -7,10 +7,10 @@ use mateval_metrics::{Lpips, Net};
 
 use crate::outcome::say;
 
-/// The command that downloads missing weights, run from the project's folder.
-pub const FIX: &str = "python3 tools/fetch_lpips_weights.py";
+/// The command that downloads missing weights.
+pub const FETCH_LPIPS: &str = "mateval fetch lpips";
 
-/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`, as in `tools/fetch_lpips_weights.py`.
+/// `$MATEVAL_CACHE`, else `$XDG_CACHE_HOME/mateval`, else `~/.cache/mateval`.
 pub fn cache_folder() -> PathBuf {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     set("MATEVAL_CACHE")
@@ -23,7 +23,7 @@ pub fn cache_folder() -> PathBuf {
 pub fn find_weights(net: Net) -> LpipsWeights {
     match Lpips::load(net, &cache_folder().join(net.file_name())) {
         Ok(lpips) => LpipsWeights::Loaded(Box::new(lpips)),
-        Err(error) => LpipsWeights::Missing { reason: error.to_string(), fix: FIX.to_owned() },
+        Err(error) => LpipsWeights::Missing { reason: error.to_string(), fix: FETCH_LPIPS.to_owned() },
     }
 }
 

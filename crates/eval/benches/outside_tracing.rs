@@ -76,7 +76,7 @@ fn score_materials(
         }
     }
     steps.of("texture space", || {
-        texture_space(folder, scene, world, atlases, predictions, &|_, _, _| {}).unwrap();
+        texture_space(folder, scene, world, atlases, predictions, &|_| ()).unwrap();
     });
 }
 

@@ -48,9 +48,10 @@ fn main() {
             tool: "bench".to_owned(),
             jobs: 1,
             cache: None,
+            only_cached: false,
             companion_cache: None,
         };
-        let results = score(&plan, &|_, _, _| ()).unwrap().into_iter();
+        let results = score(&plan, &|_| ()).unwrap().into_iter();
         results.map(|mut result| result.protocols.pop_first().unwrap().1).collect::<Vec<ProtocolResult>>()
     };
     let (seeds, samples): (usize, u32) = (seeds.parse().unwrap(), samples.parse().unwrap());

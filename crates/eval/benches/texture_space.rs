@@ -40,7 +40,7 @@ fn bench_scene(folder: &SceneFolder, scene: &SceneFile, submissions: &[PathBuf])
     let predictions: Vec<_> = submissions.iter().map(|path| read_scene(path, scene, &meshes).unwrap()).collect();
     let read_s = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let compared = texture_space(folder, scene, &world, &atlases, &predictions, &|_, _, _| {}).unwrap();
+    let compared = texture_space(folder, scene, &world, &atlases, &predictions, &|_| ()).unwrap();
     let all_s = start.elapsed().as_secs_f64();
     println!("{}: {all_s:.2} s for {} submissions, after {read_s:.2} s of reading them", scene.id, submissions.len());
     print_steps(folder, scene, &world, &atlases, &predictions);

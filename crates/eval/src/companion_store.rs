@@ -3,18 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use mateval_scene::bounded_cache::{keep_below, mark_used};
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{Progress, json};
+use mateval_scene::{Progress, Report, json};
 use tempfile::TempDir;
 
-use crate::cache_bound;
-use crate::companion_pictures::{CompanionPictures, HALVES};
+use crate::companion_pictures::{COMPANIONS_JSON, CompanionPictures, HALVES};
 use crate::companions::{COMPANION_SCALES, Companions};
 use crate::error::EvalError;
 use crate::light_pass::LightPass;
 use crate::light_rules::LightRules;
 use crate::lit_scene::LitScene;
 use crate::protocol::SCORER_VERSION;
+
+/// The largest size of a cache, in bytes.
+const MOST_BYTES: u64 = 20 << 30;
 
 /// Where pictures that are not found are made.
 #[derive(Clone, Copy, Debug)]
@@ -59,11 +62,13 @@ impl<'a> CompanionStore<'a> {
             match CompanionPictures::open(folder, &key) {
                 Some(Ok(found)) => {
                     if cached.as_ref() == Some(folder) {
-                        cache_bound::mark_used(folder);
+                        mark_used(&folder.join(COMPANIONS_JSON));
                     }
                     return Ok(found);
                 }
-                Some(Err(reason)) => progress(&format!("scene {}: companions not used: {reason}", lit.scene.id), 0, 1),
+                Some(Err(reason)) => {
+                    progress(Report::Message(&format!("scene {}: companions not used: {reason}", lit.scene.id)))
+                }
                 None => {}
             }
         }
@@ -75,7 +80,7 @@ impl<'a> CompanionStore<'a> {
                 // A cache that cannot be written must not end the score.
                 Err(error) if error.is_io() => {
                     let what = format!("scene {}: companions cannot be kept: {error}", lit.scene.id);
-                    progress(&what, 0, 1);
+                    progress(Report::Message(&what));
                     make(&self.temporary_folder(&key)?)
                 }
                 made => {
@@ -94,10 +99,10 @@ impl<'a> CompanionStore<'a> {
     fn bound_cache(&self, lit: &LitScene<'_>, progress: Progress<'_>) {
         let MadeIn::Cache(cache) = self.made_in else { return };
         // A cache that is too large must not end the score.
-        if let Err(error) = cache_bound::keep_below(cache, cache_bound::MOST_BYTES) {
+        if let Err(error) = keep_below(cache, MOST_BYTES) {
             let what =
                 format!("scene {}: cannot remove old companions from '{}': {error}", lit.scene.id, cache.display());
-            progress(&what, 0, 1);
+            progress(Report::Message(&what));
         }
     }
 

@@ -3,11 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::SceneFile;
-use mateval_scene::layout::{DATASET, SceneFolder};
+use mateval_scene::layout::SceneFolder;
 use mateval_scene::manifest;
 use mateval_scene::open::Dataset;
-use mateval_scene::{Progress, SceneId, json};
+use mateval_scene::scene_change::change_scene;
+use mateval_scene::scene_cost::{self, Step, TimedStep};
+use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::companion_pictures::COMPANIONS_JSON;
 use crate::companion_store::{MadeIn, UNFINISHED};
@@ -28,10 +31,10 @@ pub struct CompanionsReport {
 }
 
 /// Renders the companions' pictures of these scenes (of all, if none is named) into the dataset in `root`, for every pass of
-/// the protocol that has companions, then writes a new manifest.
+/// the protocol that has companions. The manifest lists them once the dataset is finished again (`prep finish`).
 ///
 /// Pictures of the same inputs and rules are kept, so that a killed run resumes where it ended; others are replaced. As the
-/// manifest changes, results made before belong to another dataset. Only one process at a time may work on a dataset.
+/// manifest changes, results made before belong to another dataset. Several processes may work on different scenes at once.
 pub fn make_companions(
     root: &Path,
     scenes: &[SceneId],
@@ -39,19 +42,29 @@ pub fn make_companions(
     progress: Progress<'_>,
 ) -> Result<CompanionsReport, EvalError> {
     protocol.check()?;
-    let mut dataset = Dataset::open(root)?;
+    let dataset = Dataset::open(root)?;
+    // The new manifest lists the files that exist.
+    dataset.check_whole()?;
     let mut report = CompanionsReport::default();
-    for scene in dataset.chosen_scenes(scenes)? {
-        let folder = dataset.folder(&scene.id);
-        remove_unfinished(&folder)?;
-        let before = lists(&folder)?;
-        for (pass, sha256) in of_scene(&dataset, scene, protocol, progress)? {
-            if before.get(&pass) == Some(&sha256) { report.kept += 1 } else { report.made += 1 }
-        }
+    let changed = BuildFolder::of(root).changed();
+    if dataset.file.scored_renderer.is_none() && !changed.is_empty() {
+        return Err(SceneError::Unfinished { path: root.to_owned(), scenes: changed }.into());
     }
-    progress("hashes", 0, 1);
-    dataset.file.manifest_sha256 = manifest::write(root)?;
-    json::write(&root.join(DATASET), &dataset.file)?;
+    let chosen = dataset.chosen_scenes(scenes)?;
+    for (at, scene) in chosen.iter().enumerate() {
+        progress(Report::part(&format!("scene {}", scene.id), at, chosen.len()));
+        let work = || {
+            let folder = dataset.folder(&scene.id);
+            remove_unfinished(&folder)?;
+            Ok::<_, EvalError>((lists(&folder)?, of_scene(&dataset, scene, protocol, progress)?))
+        };
+        let step = TimedStep { step: Step::Companions, renderer: None, is_alone: true };
+        let work = || scene_cost::timed(root, &scene.id, &step, work);
+        let (before, after) = change_scene(root, &scene.id, |path| path.contains("/companions/"), work)?;
+        let kept = after.iter().filter(|(pass, sha256)| before.get(*pass) == Some(sha256)).count();
+        report.kept += kept;
+        report.made += after.len() - kept;
+    }
     Ok(report)
 }
 

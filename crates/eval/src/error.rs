@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+use mateval_scene::ids::quoted;
 use mateval_scene::{InstanceId, SceneId, ViewId};
 
 /// Why something could not be scored or shown.
@@ -17,6 +18,15 @@ pub enum EvalError {
         path: PathBuf,
         /// What the system reported.
         source: std::io::Error,
+    },
+    /// Scores may only be taken from the cache, and are not there.
+    #[error(
+        "these scores are not in the cache:{}\nscore these scenes with the same --cache, --protocol and version first",
+        missing.iter().map(|(path, scenes)| missing_line(path, scenes)).collect::<String>()
+    )]
+    NotCached {
+        /// The submissions and their scenes.
+        missing: Vec<(PathBuf, Vec<SceneId>)>,
     },
     /// The pictures of companions changed while they were read.
     #[error("the companions in '{}' were changed or removed while they were in use; score again", path.display())]
@@ -193,4 +203,8 @@ impl EvalError {
         use mateval_scene::SceneError;
         matches!(self, Self::Io { .. } | Self::Image(ImageError::Io { .. }) | Self::Dataset(SceneError::Io { .. }))
     }
+}
+
+fn missing_line(submission: &std::path::Path, scenes: &[SceneId]) -> String {
+    format!("\n  '{}': {} scenes: {}", submission.display(), scenes.len(), quoted(scenes))
 }

@@ -19,7 +19,6 @@
 
 pub mod alignment;
 mod batch_mixes;
-mod cache_bound;
 pub mod companion_pictures;
 mod companion_store;
 mod companions;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use mateval_image::{LinearRgb, Picture};
-use mateval_scene::{Camera, Progress};
+use mateval_scene::{Camera, Progress, Report};
 use mateval_submission::prediction::{PredictedMaterial, PredictedScene};
 use mateval_tracer::{
     Coat, LightGroups, LightMix, Lighting, Repaint, Scattering, ViewsRender, World, render_repainted,
@@ -165,7 +165,7 @@ impl<'a> LightPass<'a> {
         let what = format!("scene {}: {what}", self.lit.scene.id);
         let seeds = [seed(&self.rules.noise.seed, &self.lit.scene.id, self.name, stream)];
         let settings = self.rules.settings(samples);
-        let shown = |done: usize, all: usize| (self.progress)(&what, done, all);
+        let shown = |done: usize, all: usize| (self.progress)(Report::step(&what, done, all));
         let which = 0..repaint.predictions();
         Ok(render_repainted(self.world, repaint, which, cameras, lighting, &settings, &seeds, &shown)?)
     }

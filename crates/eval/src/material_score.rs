@@ -1,6 +1,7 @@
 //! Submissions compared with a scene's truth without light: pictures of maps, and texels.
 
 use mateval_image::{LinearRgb, Picture};
+use mateval_scene::Report;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::submission::Map;
 use rayon::prelude::*;
@@ -51,7 +52,7 @@ impl SceneTask<'_> {
     ) -> Result<Vec<Vec<Picture<LinearRgb>>>, EvalError> {
         let mut base_colors: Vec<Vec<Picture<LinearRgb>>> = vec![Vec::new(); self.predictions.len()];
         for (at, (view, truth)) in self.views.iter().zip(truths).enumerate() {
-            (self.progress)(&format!("scene {}: materials", self.scene.id), at, self.views.len());
+            (self.progress)(Report::step(&format!("scene {}: materials", self.scene.id), at, self.views.len()));
             let pictures = material_pictures(self.world, self.atlases, &view.camera, self.predictions);
             let predicted: Vec<Predicted> =
                 pictures.into_par_iter().map(|pictures| Predicted::new(pictures, truth)).collect();

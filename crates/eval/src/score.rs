@@ -6,12 +6,13 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_metrics::Lpips;
+use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{SUBMISSION, SubmissionFile};
-use mateval_scene::{Finding, Progress, SceneId, Severity, json};
+use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json};
 
 use crate::companion_store::MadeIn;
 use crate::error::EvalError;
@@ -70,6 +71,8 @@ pub struct ScorePlan<'a> {
     pub jobs: usize,
     /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run resumes.
     pub cache: Option<&'a Path>,
+    /// Take every score from the cache and compute none.
+    pub only_cached: bool,
     /// A folder in which the converged pictures of companions are kept between runs. Without one, and without those of the
     /// dataset, each run makes its own.
     pub companion_cache: Option<&'a Path>,
@@ -116,9 +119,10 @@ struct Outcome {
 ///     tool: "my tool 1.0".to_owned(),
 ///     jobs: 1,
 ///     cache: None,
+///     only_cached: false,
 ///     companion_cache: None,
 /// };
-/// for (key, value) in &score(&plan, &|_, _, _| ())?[0].protocols["mateval-2"].summary {
+/// for (key, value) in &score(&plan, &|_| ())?[0].protocols["mateval-2"].summary {
 ///     println!("{key} {value}");
 /// }
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -126,6 +130,11 @@ struct Outcome {
 pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultFile>, EvalError> {
     plan.check()?;
     let scenes = plan.dataset.chosen_scenes(&plan.scenes)?;
+    check_finished(plan.dataset, &scenes)?;
+    plan.check_cached(&scenes)?;
+    if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {
+        progress(Report::Message(&absence));
+    }
     let mut entries =
         plan.submissions.iter().map(|path| open_submission(path, plan)).collect::<Result<Vec<_>, EvalError>>()?;
     for (scene, outcomes) in scenes.iter().zip(score_scenes(plan, &scenes, progress)?) {
@@ -140,6 +149,17 @@ pub fn score(plan: &ScorePlan<'_>, progress: Progress<'_>) -> Result<Vec<ResultF
     Ok(entries.into_iter().map(|entry| finish(plan, &scenes, entry)).collect())
 }
 
+/// Fails where a scene was rendered apart since the manifest was written: its light would silently not be scored.
+fn check_finished(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), EvalError> {
+    let changed = BuildFolder::of(&dataset.root).changed();
+    let unfinished: Vec<SceneId> =
+        changed.into_iter().filter(|id| scenes.iter().any(|scene| scene.id == *id)).collect();
+    match unfinished.is_empty() {
+        true => Ok(()),
+        false => Err(SceneError::Unfinished { path: dataset.root.clone(), scenes: unfinished }.into()),
+    }
+}
+
 /// Outcomes by scene, then by submission. Scores several scenes at a time; the first failure ends the work.
 fn score_scenes(
     plan: &ScorePlan<'_>,
@@ -152,6 +172,8 @@ fn score_scenes(
         loop {
             let at = next.fetch_add(1, Ordering::Relaxed);
             let Some(scene) = scenes.get(at) else { break };
+            let finished = done.iter().filter(|outcome| outcome.get().is_some()).count();
+            progress(Report::part(&format!("scene {}", scene.id), finished, scenes.len()));
             let outcome = score_one(plan, scene, progress);
             if outcome.is_err() {
                 next.store(scenes.len(), Ordering::Relaxed);
@@ -196,6 +218,27 @@ impl ScorePlan<'_> {
         self.protocols.iter().try_for_each(Protocol::check)?;
         let (expected, found) = (LPIPS_NET.name(), self.lpips.network().map_or(LPIPS_NET, Lpips::net).name());
         if expected == found { Ok(()) } else { Err(EvalError::LpipsNet { expected, found }) }
+    }
+
+    /// Fails where scores are missing that may not be computed, and names them all.
+    fn check_cached(&self, scenes: &[&SceneFile]) -> Result<(), EvalError> {
+        if !self.only_cached {
+            return Ok(());
+        }
+        let mut missing = Vec::new();
+        for path in &self.submissions {
+            let mut of_submission = Vec::new();
+            for scene in scenes {
+                let prediction = read_scene(path, scene, &AtlasMeshes::on_demand(self.dataset, scene))?;
+                if self.read_cached(scene, &prediction).is_none() {
+                    of_submission.push(scene.id.clone());
+                }
+            }
+            if !of_submission.is_empty() {
+                missing.push((path.to_path_buf(), of_submission));
+            }
+        }
+        if missing.is_empty() { Ok(()) } else { Err(EvalError::NotCached { missing }) }
     }
 
     fn score_uncached(

@@ -14,7 +14,7 @@ use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::reference::SurfaceIndex;
 use mateval_scene::submission::{MAP_SIZES, Map};
-use mateval_scene::{InstanceId, Progress, TriangleMesh};
+use mateval_scene::{InstanceId, Progress, Report, TriangleMesh};
 use mateval_tracer::World;
 use rayon::prelude::*;
 
@@ -88,7 +88,7 @@ pub fn texture_space(
     let mut compared = vec![Vec::new(); submissions.len()];
     for (at, instance) in scene.instances.iter().enumerate() {
         let Some(size) = atlas_size(folder, instance)? else { continue };
-        progress(&format!("texels of {}", scene.id), at, scene.instances.len());
+        progress(Report::step(&format!("texels of {}", scene.id), at, scene.instances.len()));
         let (map, truth) = rayon::join(
             || TexelMap::new(world, SurfaceIndex(at), &atlases[at], size, &input.camera),
             || TruthMaterial::read(folder, &instance.id, size),
@@ -356,7 +356,7 @@ mod tests {
         let atlases = AtlasMeshes::in_memory(&meshes);
         let submissions = [submission, std::path::Path::new("nowhere")];
         let submissions = submissions.map(|path| read_scene(path, scene, &atlases).unwrap());
-        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, &|_, _, _| {})
+        texture_space(folder, scene, &world(&meshes[0]), &meshes, &submissions, &|_| ())
     }
 
     #[test]

@@ -1,14 +1,14 @@
 //! Corrected light against plain renders of 4,096 samples: companions take noise away, and move no expectation.
 //!
-//! The input view shows a mirror, rough metal, glass and the sky, and no lamp; one of its true materials is made black. Each small block
-//! of pixels is compared with its own standard error, so that a bias shows wherever it is.
+//! The input view shows a mirror, rough metal, glass, the sky and a lamp; one of its true materials is made black. Each
+//! small block of pixels is compared with its own standard error, so that a bias shows wherever it is.
 
 use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Picture, png_io};
-use mateval_scene::RendererId;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
+use mateval_scene::{RendererId, Report};
 use mateval_submission::prediction::{PredictedScene, one_texel, scattering_key};
 use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 use mateval_testkit::sample_dataset::dataset;
@@ -61,6 +61,10 @@ impl Room {
         let mut truths: Vec<ViewTruth> =
             views.iter().map(|view| ViewTruth::read(&opened.folder, view).unwrap()).collect();
         let lights = views.iter().map(|view| RgbTruth::read(&opened.folder, renderer, view).unwrap()).collect();
+        for shown in ["mirror", "window_glass", "lamp_shade"] {
+            let index = scene.instances.iter().find(|instance| instance.id.as_str() == shown).unwrap().index.0.get();
+            assert!(truths[0].instances.pixels().contains(&index), "{shown}");
+        }
         let copy = kept_folder("unbiased").join("room");
         copy_folder(opened.folder.path(), &copy);
         let black = scene
@@ -138,7 +142,7 @@ impl Room {
         let mut of_views: Vec<Vec<Picture<LinearRgb>>> = vec![Vec::new(); views.len()];
         for seed in 0..SEEDS {
             let rules = rules(&format!("{seed} {samples}"), samples);
-            let quiet = |_: &str, _: usize, _: usize| ();
+            let quiet = |_: Report<'_>| ();
             let store = CompanionStore::new(self.opened.folder.companions(), MadeIn::ThisRun, String::new());
             let find = |pass: &LightPass<'_>, companions: &Companions| {
                 let converged = used.map_or(companions, |[_, converged]| converged);

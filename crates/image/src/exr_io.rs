@@ -53,6 +53,18 @@ pub fn read_linear(path: &Path) -> Result<Picture<LinearRgb>, ImageError> {
     Ok(read_triples(path, ["R", "G", "B"])?.map(LinearRgb))
 }
 
+/// Channels `R`, `G`, `B` of the first layer of an EXR's bytes, or channel `V` or `Y` three times where there is no
+/// `R`. Every value must be finite. `path` serves for errors only.
+pub(crate) fn linear_or_grey_of_bytes(path: &Path, bytes: &[u8]) -> Result<Picture<LinearRgb>, ImageError> {
+    let layer = first_layer(path, bytes)?;
+    let has = |name: &str| layer.channel_data.list.iter().any(|channel| channel.name.eq(name));
+    let names = match ["V", "Y"].into_iter().find(|name| has(name)) {
+        Some(grey) if !has("R") => [grey; 3],
+        _ => ["R", "G", "B"],
+    };
+    Ok(triples(path, &layer, names)?.map(LinearRgb))
+}
+
 /// Reads channels `X`, `Y`, `Z` of the first layer. Every value must be finite.
 pub fn read_normal(path: &Path) -> Result<Picture<Normal>, ImageError> {
     Ok(read_triples(path, ["X", "Y", "Z"])?.map(Normal))
@@ -78,8 +90,11 @@ pub(crate) fn channels_of_bytes(
     bytes: &[u8],
     names: [&str; 3],
 ) -> Result<(usize, usize, [Vec<f32>; 3]), ImageError> {
-    let layer = first_layer(path, bytes)?;
-    let [a, b, c] = names.map(|name| channel(path, &layer, name));
+    planes(path, &first_layer(path, bytes)?, names)
+}
+
+fn planes(path: &Path, layer: &FlatLayer, names: [&str; 3]) -> Result<(usize, usize, [Vec<f32>; 3]), ImageError> {
+    let [a, b, c] = names.map(|name| channel(path, layer, name));
     Ok((layer.size.width(), layer.size.height(), [a?, b?, c?]))
 }
 
@@ -142,7 +157,11 @@ pub fn write_channels(
 type FlatLayer = ex::Layer<ex::AnyChannels<ex::FlatSamples>>;
 
 fn read_triples(path: &Path, names: [&'static str; 3]) -> Result<Picture<[f32; 3]>, ImageError> {
-    let (width, height, [a, b, c]) = channels_of_bytes(path, &read_file(path)?, names)?;
+    triples(path, &first_layer(path, &read_file(path)?)?, names)
+}
+
+fn triples(path: &Path, layer: &FlatLayer, names: [&str; 3]) -> Result<Picture<[f32; 3]>, ImageError> {
+    let (width, height, [a, b, c]) = planes(path, layer, names)?;
     let pixels: Vec<[f32; 3]> = a.into_iter().zip(b).zip(c).map(|((a, b), c)| [a, b, c]).collect();
     check_finite(path, width, pixels.iter().map(|p| p.iter().all(|v| v.is_finite())))?;
     Picture::new(width, height, pixels)

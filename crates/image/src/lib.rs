@@ -1,21 +1,27 @@
 //! Pictures and textures whose types state their contents, and the files that hold them.
 //!
-//! In: PNG, JPEG, HDR, BMP and EXR files, which are untrusted input, or pixels from the other crates. Out: typed
-//! pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for lookups
-//! ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
+//! In: PNG, JPEG, WebP, HDR, BMP, EXR and NumPy files, which are untrusted input, or pixels from the other crates. Out:
+//! typed pictures ([`Picture`] of [`LinearRgb`], [`SrgbRgb`], [`Normal`], scalars, ids, mask bits), textures for
+//! lookups ([`Texture`]), and files with the same bytes on every machine (no dates, no host names).
 //!
 //! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours
 //! between sRGB and linear.
 
+mod encoding;
 pub mod error;
 pub mod exr_header;
 pub mod exr_io;
+pub mod jpeg_io;
 pub mod limits;
 pub mod map_io;
+pub mod npy_header;
+mod npy_io;
+pub mod owner;
 pub mod picture;
 pub mod png_header;
 pub mod png_io;
 pub mod store;
+pub mod temporary;
 pub mod texture;
 pub mod texture_io;
 pub mod transfer;

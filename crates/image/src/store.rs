@@ -1,28 +1,25 @@
 //! Writes a file whole or not at all: beside its place first, then renamed.
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::ImageError;
+use crate::{ImageError, temporary};
 
-/// Writes `bytes` to `path`, replacing an existing file. `path` never holds a half-written file; the `NAME.partial` of
-/// a killed process is overwritten by the next one.
+/// Writes `bytes` to `path`, replacing an existing file. `path` never holds a half-written file, and of several
+/// processes that write it at once the last one's bytes stay, whole.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ImageError> {
-    let partial = partial_path(path);
+    let refused = |source| ImageError::Io { action: "write", path: path.to_owned(), source };
+    let Some(partial) = temporary::beside(path) else {
+        return Err(refused(std::io::ErrorKind::InvalidFilename.into()));
+    };
     let written = std::fs::File::create(&partial)
         .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_data()))
         .and_then(|()| std::fs::rename(&partial, path));
     written.map_err(|source| {
         // The disk may be full, so the partial file is removed; if that fails too, the first error is reported.
         let _ = std::fs::remove_file(&partial);
-        ImageError::Io { action: "write", path: path.to_owned(), source }
+        refused(source)
     })
-}
-
-fn partial_path(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".partial");
-    path.with_file_name(name)
 }
 
 #[cfg(test)]

@@ -1,21 +1,14 @@
-//! Reads textures from untrusted PNG, JPEG, BMP, Radiance HDR and OpenEXR files.
+//! Reads textures from untrusted PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR and NumPy files.
 
 use std::io::Cursor;
 use std::path::Path;
 
 use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 
+pub use crate::encoding::Encoding;
 use crate::limits::{check_size, read_file};
-use crate::{ImageError, Texels, Texture, Wrap, exr_io};
-
-/// How the integers of a file encode colours. Float files (EXR, HDR) are always linear.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Encoding {
-    /// With the sRGB curve.
-    Srgb,
-    /// Linearly.
-    Linear,
-}
+use crate::npy_header::NPY_SIGNATURE;
+use crate::{ImageError, Texels, Texture, Wrap, exr_io, npy_io};
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
@@ -23,7 +16,7 @@ pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Textu
     Ok(picture)
 }
 
-/// Reads a texture from a file's bytes, of any format but OpenEXR. `path` serves for errors only.
+/// Reads a texture from a file's bytes, of any format but OpenEXR and NumPy. `path` serves for errors only.
 pub fn texture_of_bytes(path: &Path, bytes: Vec<u8>, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
     let decoded = decode(path, bytes)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -44,9 +37,12 @@ pub fn read_texture_and_alpha(path: &Path, wrap: Wrap) -> Result<(Texture, Optio
 fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
     let bytes = read_file(path)?;
     if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        let picture = exr_io::read_linear(path)?;
+        let picture = exr_io::linear_or_grey_of_bytes(path, &bytes)?;
         let texels = Texels::Linear(picture.pixels().iter().map(|p| p.0).collect());
         return Ok((Texture::new(picture.width(), picture.height(), texels, wrap)?, None));
+    }
+    if bytes.starts_with(NPY_SIGNATURE) {
+        return Ok((npy_io::texture_of_npy(path, &bytes, encoding, wrap)?, None));
     }
     let decoded = decode(path, bytes)?;
     let (width, height) = (decoded.width() as usize, decoded.height() as usize);
@@ -67,7 +63,8 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
         source,
     })?;
     if reader.format().is_none() {
-        let what = "not a known picture format; expected PNG, JPEG, BMP, Radiance HDR or OpenEXR".to_owned();
+        let what =
+            "not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy".to_owned();
         return Err(ImageError::Unsupported { path: path.to_owned(), what });
     }
     let decoder = reader.into_decoder().map_err(invalid)?;
@@ -137,5 +134,62 @@ mod tests {
             let error = read_texture(&path, Encoding::Srgb, Wrap::Repeat).unwrap_err();
             assert!(error.to_string().contains("rubbish.png"), "{error}");
         }
+    }
+
+    /// Other programs write scalars as one channel.
+    #[test]
+    fn a_grey_exr_is_read_as_a_colour() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let read = || read_texture(&path, Encoding::Linear, Wrap::Clamp).map(|texture| texture.texel(1, 0));
+        let picture = Picture::from_fn(2, 1, |x, _| x as f32 / 4.0);
+        exr_io::write_grey(&path, &picture, exr_io::Precision::Float).unwrap();
+        assert_eq!(read().unwrap(), [0.25; 3]);
+        exr_io::write_scalar(&path, &picture, exr_io::Precision::Float).unwrap();
+        assert_eq!(read().unwrap(), [0.25; 3]);
+        // Twins: a vector, whose Y is no grey, beside R, and a channel of another name.
+        let planes = |names: &[&'static str]| names.iter().map(|name| (*name, vec![0.0, 1.0])).collect();
+        exr_io::write_channels(&path, 2, 1, planes(&["R", "Y"]), exr_io::Precision::Float).unwrap();
+        assert!(read().unwrap_err().to_string().contains("expected a channel G"));
+        exr_io::write_channels(&path, 2, 1, planes(&["roughness"]), exr_io::Precision::Float).unwrap();
+        assert!(read().unwrap_err().to_string().contains("expected a channel R, found roughness"));
+    }
+
+    fn webp(width: u32, height: u32, bytes: &[u8], color: image::ExtendedColorType) -> Vec<u8> {
+        let mut file = Vec::new();
+        image::codecs::webp::WebPEncoder::new_lossless(&mut file).encode(bytes, width, height, color).unwrap();
+        file
+    }
+
+    /// With and without alpha, from bytes and from a file whose name states another format.
+    #[test]
+    fn webp_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let pixels = [255, 0, 51, 0, 51, 255, 51, 255, 0, 0, 0, 102];
+        let file = webp(2, 2, &pixels, image::ExtendedColorType::Rgb8);
+        let read = texture_of_bytes(Path::new("a"), file.clone(), Encoding::Linear, Wrap::Clamp).unwrap();
+        assert_eq!((read.texel(0, 0), read.texel(1, 1)), ([1.0, 0.0, 0.2], [0.0, 0.0, 0.4]));
+        std::fs::write(&path, file).unwrap();
+        assert_eq!(read_texture(&path, Encoding::Linear, Wrap::Clamp).unwrap().texel(0, 0), [1.0, 0.0, 0.2]);
+        std::fs::write(&path, webp(1, 2, &[255, 0, 51, 0, 0, 0, 0, 102], image::ExtendedColorType::Rgba8)).unwrap();
+        let alpha = read_alpha(&path, Wrap::Clamp).unwrap().unwrap();
+        assert_eq!((alpha.texel(0, 0)[0], alpha.texel(0, 1)[0]), (0.0, 0.4));
+    }
+
+    /// Cut anywhere it is an error, and one that claims 16383 x 16383 pixels is refused by its header.
+    #[test]
+    fn unsound_webp_is_refused() {
+        let sound = webp(40, 30, &[77; 40 * 30 * 3], image::ExtendedColorType::Rgb8);
+        let read = |bytes: &[u8]| texture_of_bytes(Path::new("a.webp"), bytes.to_vec(), Encoding::Linear, Wrap::Clamp);
+        assert!(read(&sound).is_ok());
+        for length in (0..sound.len() - 4).step_by(3) {
+            assert!(read(&sound[..length]).unwrap_err().to_string().contains("a.webp"), "{length}");
+        }
+        // Bytes 21 to 24 of a lossless file hold both sides, less one, in 14 bits each (RFC 9649, section 3.4).
+        let mut huge = sound.clone();
+        huge[21..25].copy_from_slice(&0x0fff_bffe_u32.to_le_bytes());
+        let refused = read(&huge).unwrap_err().to_string();
+        assert!(refused.contains("16383x16383 pixels; expected"), "{refused}");
     }
 }

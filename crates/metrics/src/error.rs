@@ -66,7 +66,7 @@ pub enum MetricError {
 
     /// The weights file does not exist or cannot be read.
     #[error(
-        "cannot read the LPIPS weights '{}': {source}; make them with tools/fetch_lpips_weights.py",
+        "cannot read the LPIPS weights '{}': {source}; run: mateval fetch lpips",
         path.display()
     )]
     WeightsIo {
@@ -78,7 +78,7 @@ pub enum MetricError {
 
     /// The weights file has another hash than the published one.
     #[error(
-        "'{}' has SHA-256 {found}; expected {expected}; write it again with tools/fetch_lpips_weights.py",
+        "'{}' has SHA-256 {found}; expected {expected}; write it again: mateval fetch lpips",
         path.display()
     )]
     WeightsHash {
@@ -91,7 +91,7 @@ pub enum MetricError {
     },
 
     /// The weights do not fit the network.
-    #[error("the LPIPS weights are malformed: {reason}; write them again with tools/fetch_lpips_weights.py")]
+    #[error("the LPIPS weights are malformed: {reason}; write them again: mateval fetch lpips")]
     WeightsMalformed {
         /// What was expected and what was found.
         reason: String,

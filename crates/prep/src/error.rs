@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use mateval_scene::ids::quoted;
 use mateval_scene::{SceneId, ViewId};
 
 use crate::build_scene::fault::SceneFault;
@@ -64,6 +65,16 @@ pub enum PrepError {
         /// The source's folder.
         path: PathBuf,
     },
+    /// A house that was named alone is none of the survey's.
+    #[error(
+        "'{name}' is none of the survey's {houses} houses; name one by its file relative to --source, or by the file's name"
+    )]
+    UnknownHouse {
+        /// The name.
+        name: String,
+        /// Number of houses.
+        houses: usize,
+    },
     /// The paths given to a survey lie in no common folder.
     #[error("'{}' has no folder in common with the other paths; put them into one and name it with --source", path.display())]
     NoCommonFolder {
@@ -74,13 +85,17 @@ pub enum PrepError {
     #[error("{0}; a recipe cannot refer to it: name the folder that contains all inputs with --source")]
     OutsideSource(#[from] mateval_sources::below::BelowError),
     /// The output of a survey exists and is not a survey.
-    #[error("'{}' exists and is not a survey, or contains other files too; it is not replaced: choose another --out", path.display())]
+    #[error("'{}' exists and is not a survey; it is not replaced: choose another --out", path.display())]
     NotASurvey {
         /// The folder.
         path: PathBuf,
     },
     /// The dataset's build did not finish.
-    #[error("'{}' has no MANIFEST.sha256: its build did not finish; run `prep build` again", path.display())]
+    #[error(
+        "'{}' lacks MANIFEST.sha256 or dataset.json: its build did not finish; run `prep build` again, or `prep finish` \
+         where all scenes are made",
+        path.display()
+    )]
     UnfinishedBuild {
         /// The dataset's folder.
         path: PathBuf,
@@ -113,14 +128,56 @@ pub enum PrepError {
         /// Width and height of the map, in pixels.
         found: [usize; 2],
     },
-    /// The output folder holds an unfinished build with another key.
-    #[error("'{}' holds an unfinished build of another recipe, source or version; add --force to replace it", path.display())]
+    /// The output folder holds scenes that the recipe would make otherwise, or not at all.
+    #[error("'{}' holds a build of another recipe, other source files or another version:{}", path.display(), other_scenes(changed, dropped))]
     OtherBuild {
         /// The dataset's folder.
         path: PathBuf,
+        /// The scenes that were made otherwise.
+        changed: Vec<SceneId>,
+        /// The scenes that the recipe lacks.
+        dropped: Vec<SceneId>,
+    },
+    /// Every scene would be left out.
+    #[error("'{}' would have no scene left; leave one --without away", path.display())]
+    NoSceneLeft {
+        /// The dataset's folder.
+        path: PathBuf,
+    },
+    /// A dataset without its `.build` can lose no scenes.
+    #[error("'{}' was not built here, so --without cannot leave scenes out of it", path.display())]
+    NotBuiltHere {
+        /// The dataset's folder.
+        path: PathBuf,
+    },
+    /// Scenes of the recipe are not made.
+    #[error(
+        "'{}' lacks {} of the recipe: {}; make them by `prep build --scene`, or finish without them by --without",
+        path.display(), counted_scenes(scenes), quoted(scenes)
+    )]
+    MissingScenes {
+        /// The dataset's folder.
+        path: PathBuf,
+        /// The scenes.
+        scenes: Vec<SceneId>,
+    },
+    /// The folder of scenes holds something else.
+    #[error(
+        "'{}' holds what is no scene of the dataset: '{}'; run `mateval prep finish` if it was built apart, otherwise move \
+         it away",
+        path.display(), names.join("', '")
+    )]
+    StrayScenes {
+        /// The folder.
+        path: PathBuf,
+        /// The names.
+        names: Vec<String>,
     },
     /// The output folder holds a finished dataset.
-    #[error("'{}' holds a finished dataset; add --force to replace it", path.display())]
+    #[error(
+        "'{}' holds a finished dataset without the `.build` of its making; --force without --scene replaces it as a whole",
+        path.display()
+    )]
     FinishedDataset {
         /// The dataset's folder.
         path: PathBuf,
@@ -167,4 +224,23 @@ impl PrepError {
 
 fn joined(faults: &[RecipeFault]) -> String {
     faults.iter().map(RecipeFault::to_string).collect::<Vec<_>>().join("; ")
+}
+
+fn other_scenes(changed: &[SceneId], dropped: &[SceneId]) -> String {
+    let mut text = String::new();
+    if !changed.is_empty() {
+        let (count, ids) = (counted_scenes(changed), quoted(changed));
+        text += &format!("\n  {count} would be made otherwise: {ids}; replace one by --scene SCENE --force");
+    }
+    if !dropped.is_empty() {
+        let (count, ids) = (counted_scenes(dropped), quoted(dropped));
+        text += &format!(
+            "\n  {count} not in the recipe: {ids}; name them there, and leave them out by `prep finish --without`"
+        );
+    }
+    text + "\n  --force without --scene makes the whole dataset again"
+}
+
+fn counted_scenes(scenes: &[SceneId]) -> String {
+    if scenes.len() == 1 { "1 scene".to_owned() } else { format!("{} scenes", scenes.len()) }
 }

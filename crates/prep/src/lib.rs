@@ -16,6 +16,7 @@ pub mod build_scene;
 pub mod conversion;
 pub mod error;
 pub mod faults;
+pub mod finish;
 pub mod instances;
 pub mod numbering;
 pub mod part_labels;

@@ -55,6 +55,12 @@ impl Dataset {
         self.0.file.scored_renderer.as_ref().map(|renderer| renderer.as_str())
     }
 
+    /// Ids of the scenes that the dataset lists and whose folders are missing: they were not downloaded.
+    #[getter]
+    fn absent(&self) -> Vec<&str> {
+        self.0.absent.iter().map(|scene| scene.as_str()).collect()
+    }
+
     fn __len__(&self) -> usize {
         self.0.scenes.len()
     }
@@ -78,6 +84,11 @@ impl Dataset {
 pub fn scene_place(dataset: &open::Dataset, id: &str) -> PyResult<usize> {
     dataset.scenes.iter().position(|scene| scene.id.as_str() == id).ok_or_else(|| {
         let root = dataset.root.display();
+        if dataset.absent.iter().any(|absent| absent.as_str() == id) {
+            return unknown_id(format!(
+                "scene '{id}' is listed in '{root}/dataset.json', but its folder is not there: unpack 'scenes/{id}.tar' in '{root}'"
+            ));
+        }
         let known = quoted(dataset.scenes.iter().map(|scene| scene.id.as_str()));
         unknown_id(format!("'{root}' has no scene '{id}'; it has {known}"))
     })

@@ -13,6 +13,7 @@ use mateval_baselines::seen_cloud::FillRule;
 use mateval_image::{Mask, Picture};
 use mateval_scene::Progress;
 use mateval_scene::submission::MAP_SIZES;
+use mateval_submission::bad_texels::BASE_COLOR_RANGE;
 use numpy::{PyArray2, PyArray3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -86,7 +87,7 @@ fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Es
         array.as_ref().map(|array| MapInput::new(name, array)).transpose()
     };
     let inputs = [read(&given[0])?, read(&given[1])?, read(&given[2])?];
-    inputs.iter().flatten().try_for_each(MapInput::check_finite)?;
+    inputs.iter().flatten().try_for_each(|input| input.check_range(&BASE_COLOR_RANGE))?;
     let mut present = inputs.iter().flatten();
     let Some(first) = present.next() else {
         return Err(PyValueError::new_err("expected base_color, roughness or metallic, found none of them"));
@@ -97,6 +98,7 @@ fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Es
         base_color: base_color.as_ref().map(MapInput::linear).transpose()?,
         roughness: roughness.as_ref().map(MapInput::plane).transpose()?,
         metallic: metallic.as_ref().map(MapInput::plane).transpose()?,
+        ..Estimate::default()
     })
 }
 

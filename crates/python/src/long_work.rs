@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use mateval_scene::Progress;
+use mateval_scene::{Progress, Report};
 use pyo3::prelude::*;
 
 use crate::pool::{abandon_pool, pool};
@@ -32,7 +32,7 @@ pub fn run_long<T: Send + 'static>(
     let is_unwanted = Arc::clone(&unwanted);
     let (sender, mut receiver) = channel();
     pool(py)?.spawn(move || {
-        let progress = |_: &str, _: usize, _: usize| {
+        let progress = |_: Report<'_>| {
             if is_unwanted.load(Ordering::Relaxed) {
                 resume_unwind(Box::new(Unwanted));
             }

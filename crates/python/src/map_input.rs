@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use half::f16;
+use mateval_image::limits::MAX_PIXELS;
 use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{LinearRgb, Mask, Picture, SrgbRgb};
 use numpy::{Element, PyArrayDyn, PyArrayMethods as _, PyUntypedArray, PyUntypedArrayMethods as _};
@@ -30,12 +31,19 @@ pub struct MapInput {
 }
 
 impl MapInput {
-    /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`].
+    /// Copies the array. Fails for anything but an array of the dtypes of [`Numbers`], and for one of more numbers than a
+    /// picture may have: views such as those of `numpy.broadcast_to` may be larger than memory.
     pub fn new(name: &'static str, given: &Bound<'_, PyAny>) -> PyResult<Self> {
         let Ok(array) = given.cast::<PyUntypedArray>() else {
             let found = given.get_type().fully_qualified_name()?;
             return Err(PyTypeError::new_err(format!("{name}: expected a NumPy array, found {found}")));
         };
+        let count = array.shape().iter().try_fold(1_u64, |count, axis| count.checked_mul(*axis as u64));
+        if count.is_none_or(|count| count > 4 * MAX_PIXELS) {
+            let found = array.shape();
+            let message = format!("{name}: expected at most {MAX_PIXELS} pixels, found an array of shape {found:?}");
+            return Err(PyValueError::new_err(message));
+        }
         let numbers = if let Some(bytes) = copied::<u8>(array)? {
             Numbers::Bytes(bytes)
         } else if let Some(words) = copied::<u16>(array)? {
@@ -51,11 +59,6 @@ impl MapInput {
             return Err(PyTypeError::new_err(format!("{name}: expected {expected}, found {}", array.dtype())));
         };
         Ok(Self { name, shape: array.shape().to_vec(), numbers })
-    }
-
-    /// Fails where a number is not finite.
-    pub fn check_finite(&self) -> PyResult<()> {
-        self.check("finite values", f32::is_finite)
     }
 
     /// The array as a picture of colours. `None` where its shape is not (height, width, 3).

@@ -86,6 +86,7 @@ impl ScoreTask {
             // Threads of the scorer's own would work in rayon's global pool.
             jobs: 1,
             cache: self.cache.as_deref(),
+            only_cached: false,
             companion_cache: Some(&companions),
         };
         let results = mateval_eval::score::score(&plan, progress).context("cannot score")?;

@@ -72,8 +72,11 @@ impl Submission {
             url,
             licence,
             cost: cost.map(|cost| cost_of(&cost)).transpose()?,
+            assumed_encodings: std::collections::BTreeMap::new(),
             dataset_manifest_sha256: dataset.file.manifest_sha256.clone(),
         };
+        // Later writes go to the same folder even if the program changes its current one.
+        let out = std::path::absolute(&out)?;
         check_out(&dataset, &out, force).map_err(failed)?;
         let open = OpenFolder { work: Some(WorkFolder::start(&out).map_err(failed)?), process: std::process::id() };
         Ok(Self { dataset, out, file, open: Mutex::new(Some(open)) })

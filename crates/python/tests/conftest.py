@@ -17,6 +17,12 @@ def root():
 
 
 @pytest.fixture(scope="session")
+def eight_scenes():
+    """A dataset of eight tiny scenes, which are one room under eight names."""
+    return pathlib.Path(os.environ["MATEVAL_EIGHT_SCENES"])
+
+
+@pytest.fixture(scope="session")
 def dataset(root):
     return mateval.open(root)
 
@@ -36,6 +42,14 @@ def command():
         return done
 
     return run
+
+
+@pytest.fixture(scope="session")
+def eight_greys(eight_scenes, command, tmp_path_factory):
+    """The submission of `mateval baseline grey` for the eight scenes."""
+    out = tmp_path_factory.mktemp("grey") / "grey"
+    command("baseline", "grey", "--dataset", eight_scenes, "--out", out)
+    return out
 
 
 @pytest.fixture(scope="session")

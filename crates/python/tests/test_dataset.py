@@ -3,6 +3,7 @@
 import collections.abc
 import json
 import pickle
+import shutil
 
 import numpy as np
 import pytest
@@ -23,6 +24,21 @@ def test_a_dataset_is_a_mapping_of_scenes(root, dataset):
     copy = pickle.loads(pickle.dumps(dataset))
     assert copy.manifest_sha256 == dataset.manifest_sha256
     assert dataset == dataset and copy != dataset and len({dataset, copy}) == 2
+
+
+def test_absent_scenes_are_not_in_the_mapping(root, tmp_path):
+    whole = mateval.open(root)
+    assert whole.absent == []
+    copy = tmp_path / "part"
+    shutil.copytree(root, copy, ignore=lambda folder, names: names if folder == str(root / "scenes") else [])
+    part = mateval.open(copy)
+    assert len(part) == 0 and list(part) == [] and "room" not in part and part.absent == ["room"]
+    with pytest.raises(mateval.UnknownId, match="'room' is listed in .* folder is not there: unpack 'scenes/room.tar'"):
+        part["room"]
+    assert part.manifest_sha256 == whole.manifest_sha256
+    (copy / "scenes/room").mkdir()
+    with pytest.raises(mateval.Error, match="scenes/room/scene.json"):
+        mateval.open(copy)
 
 
 def test_a_scene_is_its_file(root, scene):

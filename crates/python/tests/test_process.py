@@ -95,19 +95,20 @@ def test_ctrl_c_ends_a_long_call(root):
     assert seconds < 1.5
 
 
-def test_ctrl_c_ends_scoring(root, nn):
+def test_ctrl_c_ends_scoring(eight_scenes, eight_greys, tmp_path):
+    # A quarter of a minute of two cores, without what was kept.
     program = textwrap.dedent("""
         import sys, mateval
         dataset = mateval.open(sys.argv[1])
         print("started", flush=True)
-        mateval.score(sys.argv[2], dataset)
+        mateval.score(sys.argv[2], dataset, protocol="paper", cache=sys.argv[3])
     """)
-    seconds, code, error = seconds_to_interrupt(program, [root, nn])
+    seconds, code, error = seconds_to_interrupt(program, [eight_scenes, eight_greys, tmp_path / "cache"])
     assert "KeyboardInterrupt" in error and code != 0
     assert seconds < 1.5
 
 
-def test_ctrl_c_ends_the_command(root, nn, tmp_path):
+def test_ctrl_c_ends_the_command(eight_scenes, eight_greys, tmp_path):
     program = textwrap.dedent("""
         import sys
         print("started", flush=True)
@@ -115,7 +116,8 @@ def test_ctrl_c_ends_the_command(root, nn, tmp_path):
         from mateval.__main__ import main
         sys.exit(main())
     """)
-    words = ["eval", "score", nn, "--dataset", root, "--out", tmp_path / "result.json"]
+    words = ["eval", "score", eight_greys, "--dataset", eight_scenes, "--protocol", "paper"]
+    words += ["--cache", tmp_path / "cache", "--out", tmp_path / "result.json"]
     seconds, code, _ = seconds_to_interrupt(program, words)
     assert code == -signal.SIGINT and seconds < 1
 
@@ -153,19 +155,23 @@ def test_eight_threads_at_once(scene, dataset, nn):
     assert not faults and found == 16 * [True]
 
 
-def test_eight_threads_score_at_once(dataset, nn, tmp_path):
-    expected = mateval.score(nn, dataset).json
-    found = {}
+def test_eight_threads_score_eight_scenes(eight_scenes, eight_greys, tmp_path):
+    dataset, found = mateval.open(eight_scenes), {}
 
-    def work(number):
-        found[number] = mateval.score(nn, dataset, cache=tmp_path / str(number)).json
+    def work(scene):
+        found[scene] = mateval.score(eight_greys, dataset, scenes=[scene], cache=tmp_path / "cache").scenes[scene]
 
-    threads = [threading.Thread(target=work, args=(number,)) for number in range(8)]
+    threads = [threading.Thread(target=work, args=(scene,)) for scene in dataset]
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(timeout=300)
-    assert found == dict.fromkeys(range(8), expected)
+        thread.join(timeout=600)
+    assert len(dataset) == 8 and sorted(found) == sorted(dataset)
+    # Alone, without what the threads kept.
+    alone = sorted(dataset)[:2]
+    assert mateval.score(eight_greys, dataset, scenes=alone).scenes == {scene: found[scene] for scene in alone}
+    # The twin: other scenes have other numbers.
+    assert found[alone[0]] != found[alone[1]]
 
 
 def test_python_runs_meanwhile(scene):

@@ -171,17 +171,30 @@ def test_wrong_maps_are_refused(dataset, scene, tmp_path, error, match, argument
     "error, match, arguments",
     [
         (ValueError, "found none of them", {}),
-        (ValueError, "base_color: expected finite values, found NaN", {"base_color": with_value(np.nan)}),
+        (ValueError, "base_color: expected values from -1 to 16, found NaN", {"base_color": with_value(np.nan)}),
+        (ValueError, "base_color: expected values from -1 to 16, found 128", {"base_color": with_value(128)}),
+        (ValueError, "base_color: expected at most 67108864 pixels", {"base_color": np.broadcast_to(np.uint8(3), (100000, 100000, 3))}),
         (ValueError, r"roughness: expected the height and width of base_color, \[64, 64\], found", {"base_color": FLAT, "roughness": FLAT[:9, :, 0]}),
         (ValueError, "neighbours: expected 1 to 255, found 0", {"base_color": FLAT, "neighbours": 0}),
         (ValueError, "normal_weight: expected 0 to 100 m, found -1", {"base_color": FLAT, "normal_weight": -1}),
         (ValueError, "atlas_size: expected 64 to 4096 texels, found 5", {"base_color": FLAT, "atlas_size": 5}),
-        (mateval.Error, "has 64x64 pixels, the input view 96x72; expected the same proportions", {"base_color": FLAT}),
+        (mateval.Error, "has 64x64 pixels, the input view 96x72; expected the same proportions.*scale it back", {"base_color": FLAT}),
     ],
 )
 def test_wrong_estimates_are_refused(scene, error, match, arguments):
     with pytest.raises(error, match=match):
         mateval.lift(scene, **arguments)
+
+
+def test_a_relative_place_stays_the_same_folder(dataset, scene, tmp_path, monkeypatch):
+    id = next(id for id, instance in scene.instances.items() if instance.atlas_size)
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path)
+    with mateval.Submission("out", dataset, method="m") as submission:
+        monkeypatch.chdir(tmp_path / "elsewhere")
+        submission.write("room", id, base_color=FLAT)
+    assert (tmp_path / "out" / "submission.json").is_file()
+    assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
 def test_a_submission_replaces_nothing_unasked(root, dataset, scene, tmp_path, command, nn):
@@ -221,7 +234,8 @@ def test_a_killed_program_leaves_no_half_submission(root, dataset, scene, tmp_pa
     """)
     assert subprocess.run([sys.executable, "-c", program]).returncode == 7
     assert not (tmp_path / "out").exists()
-    assert [path.name for path in tmp_path.iterdir()] == [".out.partial"]
+    left = [path.name for path in tmp_path.iterdir()]
+    assert len(left) == 1 and left[0].startswith(".out.") and left[0].endswith(".partial")
     # What the killed program left is removed by the next one.
     with mateval.Submission(tmp_path / "out", dataset, method="m") as submission:
         submission.write("room", second, base_color=np.zeros((64, 64, 3), np.uint8))
@@ -265,3 +279,15 @@ def test_lpips_is_computed_or_says_how_to_get_its_weights(tmp_path):
     except mateval.Error as error:
         pytest.skip(str(error))
     assert mateval.metrics.lpips(a, 1 - a) > 0.1
+
+
+def test_of_two_submissions_at_one_place_one_stays_whole(dataset, scene, tmp_path):
+    ids = [id for id, instance in scene.instances.items() if instance.atlas_size][:2]
+    first, second = [mateval.Submission(tmp_path / "out", dataset, method=id) for id in ids]
+    for submission, id in zip((first, second), ids):
+        submission.write("room", id, metallic=np.zeros((64, 64)))
+    first.close()
+    with pytest.raises(Exception, match="was made by another process meanwhile"):
+        second.close()
+    assert json.loads((tmp_path / "out/submission.json").read_text())["method"] == ids[0]
+    assert [path.name for path in (tmp_path / "out/scenes/room").iterdir()] == ids[:1]

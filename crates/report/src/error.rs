@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use mateval_scene::Finding;
+
 use crate::mismatch::Mismatch;
 
 /// Why results could not be shown.
@@ -14,6 +16,25 @@ pub enum ReportError {
     /// No result was given: name at least one.
     #[error("cannot compare results: none was given; name at least one RESULT.json")]
     NoResults,
+    /// A folder of results holds none: name another one.
+    #[error(
+        "'{}' holds no result; expected <name>.json or <method>/<name>.json below it, as `mateval eval score --out` writes it",
+        folder.display()
+    )]
+    NoResultsBelow {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A `.json` entry of a folder of results is a link or something else that is not a regular file: copy the file
+    /// there.
+    #[error("'{}' is not a regular file; expected a file, not a link to one; copy it there", path.display())]
+    NotAFile {
+        /// The entry of the folder.
+        path: PathBuf,
+    },
+    /// Files from which a leaderboard should be made cannot make one: every reason. Correct the files, or leave them out.
+    #[error("these results cannot make a leaderboard:{}", Finding::list(.0))]
+    UnfitFiles(Vec<Finding>),
     /// The results hold no score that can be shown: choose another protocol, or score again.
     #[error("the results hold no score under protocol '{protocol}' that {output} can show")]
     NothingToShow {
@@ -23,7 +44,7 @@ pub enum ReportError {
         output: &'static str,
     },
     /// A folder that is not a leaderboard would be replaced: choose another one.
-    #[error("cannot write the leaderboard: '{}' exists and is not a leaderboard; choose another --out", path.display())]
+    #[error("'{}' exists and is not a leaderboard; choose another --out", path.display())]
     NotALeaderboard {
         /// The folder.
         path: PathBuf,

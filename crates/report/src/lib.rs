@@ -9,6 +9,7 @@ pub mod error;
 pub mod explain;
 pub mod leaderboard;
 pub mod mismatch;
+pub mod page_style;
 pub mod pair;
 pub mod picture_set;
 pub mod ranking;

@@ -8,7 +8,7 @@ use mateval_image::{LinearRgb, Picture, SrgbRgb, png_io};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::check_free;
-use mateval_scene::{Progress, SceneError, SceneId};
+use mateval_scene::{Progress, Report, SceneError, SceneId};
 
 use crate::error::ReportError;
 use mateval_eval::light_rules::Track;
@@ -83,6 +83,9 @@ impl Shown {
 /// truth; their last row is the colour scale, from black for 0 on the left to white for [`WHITE_ERROR`] on the right.
 pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf>, ReportError> {
     let chosen = plan.dataset.chosen_scenes(plan.scenes)?;
+    if let Some(absence) = plan.dataset.absence().filter(|_| plan.scenes.is_empty()) {
+        progress(Report::Message(&absence));
+    }
     let paths = |scene: &SceneId, shown: Shown| {
         ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.kind())))
     };
@@ -94,7 +97,7 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
     std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
     let mut written = Vec::new();
     for (done, &(scene, shown)) in jobs.iter().enumerate() {
-        progress("pictures", done, jobs.len());
+        progress(Report::step("pictures", done, jobs.len()));
         let rows = rows(plan, scene, shown, progress)?;
         let files = paths(&scene.id, shown);
         let strips: Vec<Vec<Picture<[u8; 3]>>> = rows.iter().map(strip).collect();

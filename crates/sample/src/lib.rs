@@ -66,6 +66,24 @@ pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError
     write_text(&out.join("recipe.toml"), &recipe)
 }
 
+/// The rooms of which scenes of varied houses are made, with a designer's camera of each.
+const VARIED_ROOMS: [(&str, &str); 2] = [("living", "LivingDiningRoom-101"), ("bedroom", "MasterBedroom-102")];
+
+/// Writes `count` houses made of the built-in one into the folder `out`, with a recipe of one scene a house. The same
+/// `seed` gives the same houses.
+pub fn write_houses(out: &Path, count: u32, seed: u64) -> Result<(), SampleError> {
+    let [width, height] = RESOLUTION;
+    let mut recipe = format!("name = \"houses\"\nresolution = [{width}, {height}]\n");
+    for (at, file) in house::write_variants(out, count, seed)?.into_iter().enumerate() {
+        let (kind, room) = VARIED_ROOMS[at % VARIED_ROOMS.len()];
+        recipe += &format!(
+            "\n[[scene]]\nid = \"{kind}{at:03}\"\ncamera = {{ designer = 0 }}\n\n[scene.front3d]\nhouse = \"{file}\"\n\
+             room = \"{room}\"\nmodels = \"house/3D-FUTURE-model\"\ntextures = \"house/3D-FRONT-texture\"\n"
+        );
+    }
+    write_text(&out.join("recipe.toml"), &recipe)
+}
+
 fn write_room(out: &Path) -> Result<(), SampleError> {
     let room = out.join("room");
     for folder in ["models", "textures"] {

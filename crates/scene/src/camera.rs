@@ -134,10 +134,17 @@ impl Camera {
 
     /// The same camera with a picture of `width` times `height` pixels.
     pub fn resized(&self, width: u32, height: u32) -> Self {
+        let whole = DVec2::new(f64::from(self.intrinsics.width), f64::from(self.intrinsics.height));
+        self.cropped(DVec2::ZERO, whole, width, height)
+    }
+
+    /// The same camera with a picture of `width` times `height` pixels that shows a rectangle of the present picture:
+    /// `corner` is its upper left corner and `size` its width and height, both in pixels of the present picture.
+    pub fn cropped(&self, corner: DVec2, size: DVec2, width: u32, height: u32) -> Self {
         let k = &self.intrinsics;
-        let (x, y) = (f64::from(width) / f64::from(k.width), f64::from(height) / f64::from(k.height));
-        let intrinsics = Intrinsics { width, height, fx: k.fx * x, fy: k.fy * y, cx: k.cx * x, cy: k.cy * y };
-        Self { intrinsics, ..*self }
+        let (x, y) = (f64::from(width) / size.x, f64::from(height) / size.y);
+        let (cx, cy) = ((k.cx - corner.x) * x, (k.cy - corner.y) * y);
+        Self { intrinsics: Intrinsics { width, height, fx: k.fx * x, fy: k.fy * y, cx, cy }, ..*self }
     }
 
     /// Whether the point `pixel` lies in the picture.

@@ -40,7 +40,7 @@ impl DatasetId {
             version: dataset.file.version.clone(),
             manifest_sha256: dataset.file.manifest_sha256.clone(),
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
-            total_scenes: dataset.scenes.len(),
+            total_scenes: dataset.file.scenes.len(),
             houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
             scored_renderer: dataset.file.scored_renderer.clone(),
         }

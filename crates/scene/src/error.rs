@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 
+use mateval_image::owner::Owner;
+
+use crate::ids::quoted;
+use crate::layout::DATASET;
 use crate::{Finding, SceneId};
 
 /// Why a dataset or a part of it could not be read or written.
@@ -17,6 +21,47 @@ pub enum SceneError {
         /// The system's error.
         source: std::io::Error,
     },
+    /// A folder that did not exist when work on it began exists now.
+    #[error("'{}' was made by another process meanwhile; it stays as it is, and this run's result is removed", path.display())]
+    MadeMeanwhile {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// An output that may be replaced holds an input.
+    #[error("'{}' holds '{}', which would be deleted with it; choose another output", path.display(), input.display())]
+    HoldsInput {
+        /// The output.
+        path: PathBuf,
+        /// The input.
+        input: PathBuf,
+    },
+    /// Another process works on the same scene or dataset.
+    #[error(
+        "process {} on {} is at work on {what}, and gave its last sign of life {} seconds ago; wait for it, or, if it is \
+         gone, remove '{}'",
+        holder.process, holder.host, silence.as_secs(), path.display()
+    )]
+    InUse {
+        /// What is being worked on, as in "scene 'room'".
+        what: String,
+        /// The process.
+        holder: Box<Owner>,
+        /// How long it has given no sign of life.
+        silence: std::time::Duration,
+        /// The file that states it.
+        path: PathBuf,
+    },
+    /// Scenes were changed apart, and the dataset does not list the changes yet.
+    #[error(
+        "'{}' is not finished: {} changed since its manifest was written; run `mateval prep finish {}`",
+        path.display(), if scenes.len() == 1 { format!("scene {}", quoted(scenes)) } else { format!("scenes {}", quoted(scenes)) }, path.display()
+    )]
+    Unfinished {
+        /// The dataset.
+        path: PathBuf,
+        /// The scenes.
+        scenes: Vec<SceneId>,
+    },
     /// A file breaks the format; every fault is listed.
     #[error("'{}' is not valid:{}", path.display(), Finding::list(findings))]
     Invalid {
@@ -24,6 +69,21 @@ pub enum SceneError {
         path: PathBuf,
         /// All its faults.
         findings: Vec<Finding>,
+    },
+    /// Files of the ground truth are missing, and nothing else is wrong: the public part of a dataset. Use the whole
+    /// dataset.
+    #[error(
+        "'{}' lacks {files} files of the ground truth ('{first}' first), like the public part of a dataset: this needs \
+         the whole dataset, which its keeper has; a submission can be checked without it: mateval eval lint",
+        path.display()
+    )]
+    TruthWithheld {
+        /// The dataset.
+        path: PathBuf,
+        /// The number of files.
+        files: usize,
+        /// The first of them, relative to the dataset.
+        first: String,
     },
     /// A file of another version than the one that is read here.
     #[error(
@@ -57,6 +117,19 @@ pub enum SceneError {
         /// All scenes that it has.
         known: Vec<SceneId>,
     },
+    /// Scenes that the dataset lists are needed and their folders are missing: download them.
+    #[error(
+        "the folders of {} of the {total} scenes that '{}' lists are missing: unpack {} in the dataset's folder",
+        absent.len(), dataset.join(DATASET).display(), tars(absent)
+    )]
+    AbsentScenes {
+        /// The dataset's folder.
+        dataset: PathBuf,
+        /// The scenes that are needed and absent.
+        absent: Vec<SceneId>,
+        /// The number of scenes that the dataset lists.
+        total: usize,
+    },
     /// An output exists and replacing it was not allowed.
     #[error("'{}' already exists; choose another {place}, or add --force to overwrite it", path.display())]
     Exists {
@@ -78,7 +151,12 @@ impl SceneError {
     }
 }
 
-/// `'a', 'b'`.
-fn quoted(scenes: &[SceneId]) -> String {
-    scenes.iter().map(|scene| format!("'{scene}'")).collect::<Vec<_>>().join(", ")
+/// `'a.tar', 'b.tar'`: the files in which scenes are published.
+fn tars(scenes: &[SceneId]) -> String {
+    const SHOWN: usize = 5;
+    let mut tars: Vec<String> = scenes.iter().take(SHOWN).map(|scene| format!("'scenes/{scene}.tar'")).collect();
+    if scenes.len() > SHOWN {
+        tars.push(format!("and {} more", scenes.len() - SHOWN));
+    }
+    tars.join(", ")
 }

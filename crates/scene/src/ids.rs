@@ -31,6 +31,11 @@ pub fn id_text_from(name: &str, fallback: &str) -> String {
     if trimmed.is_empty() { fallback.to_owned() } else { trimmed }
 }
 
+/// Ids as sentences list them: `'a', 'b'`.
+pub fn quoted<I: std::fmt::Display>(ids: &[I]) -> String {
+    ids.iter().map(|id| format!("'{id}'")).collect::<Vec<_>>().join(", ")
+}
+
 macro_rules! id_type {
     ($(#[$doc:meta])* $name:ident) => {
         $(#[$doc])*

@@ -5,8 +5,10 @@
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
 //! [`mod@reference`] describe a scene with its materials and lights; [`role`] states what its instances are;
 //! [`dataset`], [`layout`], [`manifest`] and [`open`] are the files of a dataset, [`submission`] those of a submission.
-//! [`obj`], [`gltf_accessor`] and [`source_folder`] read untrusted files.
+//! [`bounded_cache`] keeps what later runs can use again. [`obj`], [`gltf_accessor`] and [`source_folder`] read untrusted files.
 
+pub mod bounded_cache;
+pub mod build_folder;
 pub mod camera;
 pub mod dataset;
 pub mod dataset_id;
@@ -18,19 +20,25 @@ pub mod gltf_error;
 pub mod ids;
 pub mod json;
 pub mod layout;
+pub mod lease;
 pub mod manifest;
 pub mod material;
 pub mod mesh;
 pub mod obj;
 pub mod open;
 pub mod plain_instances;
+pub mod process_cpu;
 pub mod progress;
 pub mod reference;
 pub mod reference_io;
 pub mod role;
+pub mod scene_change;
+pub mod scene_cost;
+pub mod scene_hashes;
 pub mod source_folder;
 pub mod source_materials;
 pub mod splitmix64;
+pub mod stored_encoding;
 pub mod submission;
 pub mod super_categories;
 pub mod text_table;
@@ -43,5 +51,5 @@ pub use error::SceneError;
 pub use findings::{Finding, FindingCount, Severity};
 pub use ids::{InstanceId, InstanceIndex, PartId, PartSetId, RendererId, SceneId, ViewId};
 pub use mesh::TriangleMesh;
-pub use progress::Progress;
+pub use progress::{Progress, Report};
 pub use role::{Role, SceneLights, SourceKind};

@@ -1,13 +1,18 @@
 //! `MANIFEST.sha256`: a line `<sha256>  <path>` for each file, sorted by path, in the format of `sha256sum -c`.
 
+use std::collections::BTreeMap;
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mateval_image::store::write_whole;
+use mateval_image::temporary::{is_abandoned, is_temporary};
 use sha2::{Digest as _, Sha256};
 
 use crate::layout::{DATASET, MANIFEST};
-use crate::{Finding, SceneError, Severity};
+use crate::{Finding, SceneError, Severity, work_folder};
+
+/// The code of a finding about a file that the manifest lists and the dataset lacks.
+pub const MISSING_FILE: &str = "missing_file";
 
 /// SHA-256 of bytes, hex.
 pub fn sha256_of_bytes(bytes: &[u8]) -> String {
@@ -28,15 +33,23 @@ pub fn sha256_of_file(path: &Path) -> Result<String, SceneError> {
     }
 }
 
-fn hex(bytes: &[u8]) -> String {
+/// Bytes in hexadecimal digits, as hashes are written.
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The files below `root`, relative and sorted, without the manifest, `dataset.json` and hidden files in `root` itself.
 /// Links to folders are not followed.
 pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
+    let mut files = list_below(root, Path::new(""))?;
+    files.retain(|file| file != MANIFEST && file != DATASET && !file.starts_with('.'));
+    Ok(files)
+}
+
+/// The files below the folder `below` of `root`, relative to `root` and sorted. Links to folders are not followed.
+pub(crate) fn list_below(root: &Path, below: &Path) -> Result<Vec<String>, SceneError> {
     let mut files = Vec::new();
-    let mut folders = vec![PathBuf::new()];
+    let mut folders = vec![below.to_owned()];
     while let Some(folder) = folders.pop() {
         let path = root.join(&folder);
         for entry in std::fs::read_dir(&path).map_err(SceneError::io("list", &path))? {
@@ -50,27 +63,49 @@ pub fn list_files(root: &Path) -> Result<Vec<String>, SceneError> {
             }
         }
     }
-    files.retain(|file| file != MANIFEST && file != DATASET && !file.starts_with('.'));
     files.sort();
     Ok(files)
 }
 
-/// Whether the file was left half-written by a killed process.
-fn is_partial(file: &str) -> bool {
-    file.ends_with(".partial") || file.contains(".partial/")
+/// Removes the unfinished files and folders below `folder` whose processes are gone.
+pub(crate) fn remove_abandoned(folder: &Path) -> Result<(), SceneError> {
+    remove_those(folder, is_abandoned)
 }
 
-/// Hashes every file of the dataset and writes the manifest; half-written files of killed runs are removed. Returns the
-/// manifest's own hash, which `dataset.json` holds.
-pub fn write(root: &Path) -> Result<String, SceneError> {
-    let mut text = String::new();
-    for file in list_files(root)? {
-        if is_partial(&file) {
-            let path = root.join(&file);
-            std::fs::remove_file(&path).map_err(SceneError::io("remove", path))?;
-            continue;
+/// Removes all unfinished files and folders below `folder`, for a caller that holds the leases of everybody who writes
+/// there.
+pub fn remove_unfinished(folder: &Path) -> Result<(), SceneError> {
+    remove_those(folder, |path| path.file_name().is_some_and(|name| is_temporary(&name.to_string_lossy())))
+}
+
+fn remove_those(folder: &Path, is_unwanted: fn(&Path) -> bool) -> Result<(), SceneError> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.flatten() {
+        let path = entry.path();
+        if is_unwanted(&path) {
+            work_folder::remove(&path)?;
+        } else if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            remove_those(&path, is_unwanted)?;
         }
-        text.push_str(&format!("{}  {file}\n", sha256_of_file(&root.join(&file))?));
+    }
+    Ok(())
+}
+
+/// Hashes every file of the dataset and writes the manifest; unfinished files are left out, and removed where their
+/// processes are gone. Returns the manifest's own hash, which `dataset.json` holds.
+pub fn write(root: &Path) -> Result<String, SceneError> {
+    write_with(root, &BTreeMap::new())
+}
+
+/// Like [`write()`], without reading the files whose hashes are `known` by their paths in the dataset.
+pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<String, SceneError> {
+    let mut text = String::new();
+    remove_abandoned(&root.join("scenes"))?;
+    for file in list_files(root)?.into_iter().filter(|file| !file.split('/').any(is_temporary)) {
+        match known.get(&file) {
+            Some(sha256) => text.push_str(&format!("{sha256}  {file}\n")),
+            None => text.push_str(&format!("{}  {file}\n", sha256_of_file(&root.join(&file))?)),
+        }
     }
     write_whole(&root.join(MANIFEST), text.as_bytes())?;
     Ok(sha256_of_bytes(text.as_bytes()))
@@ -129,21 +164,14 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
             Err(error) if root.join(&file).exists() => {
                 findings.push(fault("unreadable", &file, String::new(), &error.to_string()));
             }
-            Err(_) => findings.push(fault("missing_file", &file, String::new(), "listed in the manifest, but missing")),
-            Ok(found) if found != hash => {
-                findings.push(fault(
-                    "changed_file",
-                    &file,
-                    String::new(),
-                    &format!("SHA-256 is {found}, expected {hash}"),
-                ));
-            }
+            Err(_) => findings.push(missing_file(&file)),
+            Ok(found) if found != hash => findings.push(changed_file(&file, &found, &hash)),
             Ok(_) => {}
         }
     }
     for file in list_files(root)? {
         if concerns(&file) && !listed.contains(&file) {
-            findings.push(fault("unlisted_file", &file, String::new(), "not listed in the manifest"));
+            findings.push(unlisted_file(&file));
         }
     }
     Ok(findings)
@@ -151,6 +179,18 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
 
 fn is_inside(file: &str) -> bool {
     Path::new(file).components().all(|part| matches!(part, std::path::Component::Normal(_)))
+}
+
+pub(crate) fn missing_file(file: &str) -> Finding {
+    fault(MISSING_FILE, file, String::new(), "listed in the manifest, but missing")
+}
+
+pub(crate) fn changed_file(file: &str, found: &str, expected: &str) -> Finding {
+    fault("changed_file", file, String::new(), &format!("SHA-256 is {found}, expected {expected}"))
+}
+
+pub(crate) fn unlisted_file(file: &str) -> Finding {
+    fault("unlisted_file", file, String::new(), "not listed in the manifest")
 }
 
 fn fault(code: &str, file: &str, place: String, message: &str) -> Finding {
@@ -185,9 +225,16 @@ mod tests {
         }
         write(root).unwrap();
         assert!(check(root).unwrap().is_empty());
-        std::fs::write(root.join("scenes/e.partial"), "half").unwrap();
+        let live = mateval_image::temporary::beside(&root.join("scenes/e")).unwrap();
+        let own = mateval_image::owner::Owner::this_process();
+        let dead = root.join(format!("scenes/.e.{}-{}-1-0.partial", own.host, own.process));
+        for path in [&live, &dead] {
+            std::fs::write(path, "half").unwrap();
+        }
         write(root).unwrap();
-        assert!(check(root).unwrap().is_empty() && !root.join("scenes/e.partial").exists());
+        assert!(live.exists() && !dead.exists());
+        assert_eq!(check(root).unwrap().len(), 1, "the unfinished file alone is not listed");
+        std::fs::remove_file(live).unwrap();
         std::fs::remove_file(root.join("scenes/a")).unwrap();
         std::fs::write(root.join("scenes/b"), "other").unwrap();
         std::fs::write(root.join("d"), "new").unwrap();

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::build_folder::BuildFolder;
 use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use crate::ids::SceneId;
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
@@ -16,14 +17,17 @@ pub struct Dataset {
     pub file: DatasetFile,
     /// `targets.json`, what is scored.
     pub targets: TargetsFile,
-    /// `scene.json` of every scene, in the dataset's order.
+    /// `scene.json` of every scene whose folder exists, in the dataset's order.
     pub scenes: Vec<SceneFile>,
+    /// The scenes that `dataset.json` and the manifest list and whose whole folder is missing, in the dataset's order: each
+    /// scene can be downloaded on its own.
+    pub absent: Vec<SceneId>,
 }
 
 impl Dataset {
     /// Opens the dataset in `root`. Fails where a JSON file is not valid or not the one that the manifest lists, or
     /// where the manifest is not the one that `dataset.json` names. Faults of several files are reported together.
-    /// Other files are not hashed: see [`Dataset::check_files`].
+    /// Other files are not hashed: see [`Dataset::check_files`]. A scene may be missing as a whole, but not in part.
     pub fn open(root: &Path) -> Result<Self, SceneError> {
         let path = root.join(DATASET);
         let file: DatasetFile = json::read_format(&path, FORMAT)?;
@@ -35,19 +39,20 @@ impl Dataset {
             );
             return Err(SceneError::Unsupported { path, what });
         }
-        let is_json = |path: &str| path == TARGETS || (path.starts_with("scenes/") && path.ends_with("/scene.json"));
-        check_hashes(root, is_json)?;
+        let absent = absent_scenes(root, &file)?;
+        let is_scene = |path: &str| path.starts_with("scenes/") && path.ends_with("/scene.json");
+        check_hashes(root, |path| path == TARGETS || (is_scene(path) && !is_below(path, &absent)))?;
         let mut faults = Vec::new();
         let targets = read_targets(root).map_err(|fault| faults.push((TARGETS.to_owned(), fault))).ok();
         let mut scenes = Vec::new();
-        for id in &file.scenes {
+        for id in file.scenes.iter().filter(|id| !absent.contains(id)) {
             match read_scene(root, id) {
                 Ok(scene) => scenes.push(scene),
                 Err(fault) => faults.push((format!("scenes/{id}/scene.json"), fault)),
             }
         }
         match targets {
-            Some(targets) if faults.is_empty() => Ok(Self { root: root.to_owned(), file, targets, scenes }),
+            Some(targets) if faults.is_empty() => Ok(Self { root: root.to_owned(), file, targets, scenes, absent }),
             _ => Err(together(root, faults)),
         }
     }
@@ -59,11 +64,33 @@ impl Dataset {
         check_hashes(&self.root, |path| path.strip_prefix(&folder).is_some_and(&concerns))
     }
 
-    /// The scenes with these ids, in the dataset's order; all scenes where `ids` is empty. Fails where an id is
-    /// unknown.
+    /// The scenes with these ids, in the dataset's order; all that are not absent where `ids` is empty. Fails where an
+    /// id is unknown or its scene is absent, and where every scene is.
     pub fn chosen_scenes(&self, ids: &[SceneId]) -> Result<Vec<&SceneFile>, SceneError> {
-        let chosen = chosen_ids(&self.root, &self.file, ids)?;
+        let chosen = known_ids(&self.root, &self.file, ids)?;
+        let is_needed = |id: &&SceneId| ids.contains(id) || self.scenes.is_empty();
+        self.check_present(self.absent.iter().filter(is_needed).cloned().collect())?;
         Ok(self.scenes.iter().filter(|scene| chosen.contains(&&scene.id)).collect())
+    }
+
+    /// Fails where a scene is absent, for work that needs all scenes.
+    pub fn check_whole(&self) -> Result<(), SceneError> {
+        self.check_present(self.absent.clone())
+    }
+
+    fn check_present(&self, absent: Vec<SceneId>) -> Result<(), SceneError> {
+        if absent.is_empty() {
+            return Ok(());
+        }
+        Err(SceneError::AbsentScenes { dataset: self.root.clone(), absent, total: self.file.scenes.len() })
+    }
+
+    /// For work on the scenes that exist: a sentence that states how many are absent, or none where all exist.
+    pub fn absence(&self) -> Option<String> {
+        let (absent, total) = (self.absent.len(), self.file.scenes.len());
+        (absent > 0).then(|| {
+            format!("{absent} of the {total} scenes of '{}' are absent; only the others are used", self.root.display())
+        })
     }
 
     /// The scene with this id. Fails where the dataset has none.
@@ -79,8 +106,39 @@ impl Dataset {
 }
 
 /// The ids among `ids` in the order of the dataset in `root`; all its ids where `ids` is empty. Fails where an id is
-/// unknown.
+/// unknown, or where the folder of any scene is missing: this serves work that rewrites the manifest.
 pub fn chosen_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, SceneError> {
+    check_whole(root, file)?;
+    known_ids(root, file, ids)
+}
+
+/// Fails where the folder of a scene that `file`, the `dataset.json` in `root`, lists is missing.
+pub fn check_whole(root: &Path, file: &DatasetFile) -> Result<(), SceneError> {
+    let absent = absent_scenes(root, file)?;
+    if absent.is_empty() {
+        return Ok(());
+    }
+    Err(SceneError::AbsentScenes { dataset: root.to_owned(), absent, total: file.scenes.len() })
+}
+
+/// The scenes that `dataset.json` and the manifest list and whose folders do not exist, in the order of `dataset.json`.
+pub fn absent_scenes(root: &Path, file: &DatasetFile) -> Result<Vec<SceneId>, SceneError> {
+    let mut absent: Vec<SceneId> =
+        file.scenes.iter().filter(|id| !SceneFolder::of(root, id).path().exists()).cloned().collect();
+    if !absent.is_empty() {
+        let listed = manifest::entries(root)?;
+        absent.retain(|id| listed.iter().any(|entry| is_below(&entry.file, std::slice::from_ref(id))));
+    }
+    Ok(absent)
+}
+
+/// Whether a path in the dataset lies in the folder of one of the scenes.
+pub fn is_below(path: &str, scenes: &[SceneId]) -> bool {
+    let folder = path.strip_prefix("scenes/").and_then(|rest| rest.split_once('/'));
+    folder.is_some_and(|(folder, _)| scenes.iter().any(|scene| scene.as_str() == folder))
+}
+
+fn known_ids<'a>(root: &Path, file: &'a DatasetFile, ids: &[SceneId]) -> Result<Vec<&'a SceneId>, SceneError> {
     let unknown: Vec<SceneId> = ids.iter().filter(|id| !file.scenes.contains(id)).cloned().collect();
     if !unknown.is_empty() {
         return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: file.scenes.clone() });
@@ -131,7 +189,20 @@ fn read_scene(root: &Path, id: &SceneId) -> Result<SceneFile, SceneError> {
 
 fn check_hashes(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<(), SceneError> {
     let findings = manifest::check_those(root, concerns)?;
-    if findings.is_empty() { Ok(()) } else { Err(SceneError::Invalid { path: root.to_owned(), findings }) }
+    if findings.is_empty() {
+        return Ok(());
+    }
+    let path = root.to_owned();
+    let scenes = BuildFolder::of(root).changed();
+    if !scenes.is_empty() {
+        return Err(SceneError::Unfinished { path, scenes });
+    }
+    let is_withheld =
+        |finding: &Finding| finding.code == manifest::MISSING_FILE && finding.file.contains("/ground_truth/");
+    if findings.iter().all(is_withheld) {
+        return Err(SceneError::TruthWithheld { path, files: findings.len(), first: findings[0].file.clone() });
+    }
+    Err(SceneError::Invalid { path, findings })
 }
 
 #[cfg(test)]
@@ -176,7 +247,7 @@ mod tests {
             manifest_sha256: String::new(),
         };
         let chosen =
-            |ids: &[SceneId]| chosen_ids(Path::new("d"), &file, ids).map(|ids| ids.into_iter().cloned().collect());
+            |ids: &[SceneId]| known_ids(Path::new("d"), &file, ids).map(|ids| ids.into_iter().cloned().collect());
         let all: Vec<SceneId> = chosen(&[]).unwrap();
         assert_eq!(all, file.scenes);
         assert_eq!(chosen(&[hall.clone(), room]).unwrap(), file.scenes);

@@ -1,11 +1,13 @@
 //! A submission: `submission.json` and `scenes/<scene>/<instance>/{base_color,roughness,metallic}.{png,exr}`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::ids::{InstanceId, SceneId};
+use crate::stored_encoding::StoredEncoding;
 use crate::{SceneError, json};
 
 /// `submission.json`.
@@ -37,6 +39,9 @@ pub struct SubmissionFile {
     /// The cost as its makers state it, unchecked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
+    /// By map, the encodings of the method's pictures that its authors do not state, and that the adapter assumed.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub assumed_encodings: BTreeMap<Map, StoredEncoding>,
     /// `manifest_sha256` of the dataset that it was made for.
     pub dataset_manifest_sha256: String,
 }

@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use mateval_image::temporary;
+use rustix::fs::{CWD, RenameFlags, renameat_with};
+use rustix::io::Errno;
+
 use crate::SceneError;
 
 /// Fails where the output `path` exists and `force` does not allow replacing it. `place` is the argument of the command
@@ -10,21 +14,41 @@ pub fn check_free(path: &Path, force: bool, place: &'static str) -> Result<(), S
     if force || !path.exists() { Ok(()) } else { Err(SceneError::Exists { path: path.to_owned(), place }) }
 }
 
+/// Whether `out`, which need not exist, would lie in `folder`, also by way of links.
+pub fn is_inside(out: &Path, folder: &Path) -> bool {
+    let Ok(folder) = folder.canonicalize() else { return false };
+    let out = std::path::absolute(out).ok();
+    // The nearest ancestor that exists; the folders below it are yet to be made.
+    let above = out.iter().flat_map(|path| path.ancestors()).find_map(|path| path.canonicalize().ok());
+    above.is_some_and(|above| above.starts_with(&folder))
+}
+
+/// Fails where one of the inputs lies in `out`, or is it: replacing `out` would delete it.
+pub fn check_holds_none(out: &Path, inputs: &[&Path]) -> Result<(), SceneError> {
+    let Ok(place) = out.canonicalize() else { return Ok(()) };
+    let is_held = |input: &&&Path| input.canonicalize().is_ok_and(|input| input.starts_with(&place));
+    match inputs.iter().find(is_held) {
+        None => Ok(()),
+        Some(input) => Err(SceneError::HoldsInput { path: out.to_owned(), input: input.to_path_buf() }),
+    }
+}
+
 /// A folder that is filled beside its place. [`WorkFolder::finish`] moves it there, dropping it removes it.
 #[derive(Debug)]
 pub struct WorkFolder {
     place: PathBuf,
     work: PathBuf,
+    replaces: bool,
 }
 
 impl WorkFolder {
-    /// Starts an empty folder, after removing what a killed run left. Fails for a place without a name, as in `.` or
+    /// Starts an empty folder, after removing what killed runs left. Fails for a place without a name, as in `.` or
     /// `/`.
     pub fn start(place: &Path) -> Result<Self, SceneError> {
-        let work = beside(place, "partial")?;
-        remove(&work)?;
+        remove_abandoned(place)?;
+        let work = beside(place)?;
         std::fs::create_dir_all(&work).map_err(SceneError::io("make", &work))?;
-        Ok(Self { place: place.to_owned(), work })
+        Ok(Self { place: place.to_owned(), work, replaces: place.exists() })
     }
 
     /// The folder to fill.
@@ -32,59 +56,82 @@ impl WorkFolder {
         &self.work
     }
 
-    /// Moves the folder to its place. A folder that exists there is put aside first and removed last.
+    /// Moves the folder to its place, in exchange for the folder that was there at the start, which is removed. Fails
+    /// where another process has made a folder there meanwhile.
     pub fn finish(self) -> Result<(), SceneError> {
-        put_aside(&self.place)?;
-        std::fs::rename(&self.work, &self.place).map_err(SceneError::io("rename to", &self.place))?;
-        remove(&beside(&self.place, "old")?)
+        let failed = |error: Errno| SceneError::io("rename to", &self.place)(error.into());
+        // A rename replaces an empty folder and never a full one.
+        match (std::fs::rename(&self.work, &self.place), self.replaces) {
+            (Ok(()), _) => Ok(()),
+            (Err(_), true) => match renameat_with(CWD, &self.work, CWD, &self.place, RenameFlags::EXCHANGE) {
+                // The old one lies at the place of work now, and is removed with it.
+                Ok(()) => Ok(()),
+                // Network file systems often have no exchange.
+                Err(Errno::INVAL | Errno::NOSYS | Errno::NOTSUP) => {
+                    let old = put_aside(&self.place)?;
+                    if let Err(source) = std::fs::rename(&self.work, &self.place) {
+                        // Otherwise the next start would remove it as abandoned.
+                        let _ = old.map(|old| std::fs::rename(old, &self.place));
+                        return Err(SceneError::io("rename to", &self.place)(source));
+                    }
+                    old.map_or(Ok(()), |old| remove(&old))
+                }
+                Err(error) => Err(failed(error)),
+            },
+            (Err(_), false) if self.place.exists() => Err(SceneError::MadeMeanwhile { path: self.place.clone() }),
+            (Err(source), false) => Err(SceneError::io("rename to", &self.place)(source)),
+        }
     }
 }
 
 impl Drop for WorkFolder {
     fn drop(&mut self) {
-        // After `finish` it no longer exists; if it cannot be removed after an error, the next start tries again.
+        // If it cannot be removed after an error, a later start tries again.
         let _ = remove(&self.work);
     }
 }
 
-/// Renames a folder, if it exists, to `.NAME.old` beside it, which frees its place at once. [`remove_aside`] deletes
-/// it.
-pub fn put_aside(place: &Path) -> Result<(), SceneError> {
-    let old = beside(place, "old")?;
-    remove(&old)?;
+/// Renames a folder, if it exists, to an unused name beside it, which frees its place at once. Returns that name, for
+/// [`remove`].
+pub fn put_aside(place: &Path) -> Result<Option<PathBuf>, SceneError> {
+    let old = beside(place)?;
     match std::fs::rename(place, &old) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(SceneError::io("put aside", place)(error)),
-        _ => Ok(()),
+        Ok(()) => Ok(Some(old)),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(SceneError::io("put aside", place)(error)),
     }
 }
 
-/// Deletes the folder that [`put_aside`] renamed.
-pub fn remove_aside(place: &Path) -> Result<(), SceneError> {
-    remove(&beside(place, "old")?)
+/// Removes what killed runs left beside the folder: unfinished ones, and those that were put aside.
+pub fn remove_abandoned(place: &Path) -> Result<(), SceneError> {
+    temporary::abandoned_beside(place).iter().try_for_each(|path| remove(path))
 }
 
-/// `.NAME.ending` beside `NAME`.
-fn beside(place: &Path, ending: &str) -> Result<PathBuf, SceneError> {
-    let Some(name) = place.file_name() else {
-        let what = "a folder without a name; name the folder to be made".to_owned();
-        return Err(SceneError::Unsupported { path: place.to_owned(), what });
-    };
-    let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
-    hidden.push(".");
-    hidden.push(ending);
-    Ok(place.with_file_name(hidden))
+/// Removes all unfinished folders beside the place, for a caller who alone may write there.
+pub fn remove_beside(place: &Path) -> Result<(), SceneError> {
+    temporary::all_beside(place).iter().try_for_each(|path| remove(path))
 }
 
-fn remove(path: &Path) -> Result<(), SceneError> {
-    match std::fs::remove_dir_all(path) {
+/// Removes a folder or file with all that is in it; does nothing where there is none.
+pub fn remove(path: &Path) -> Result<(), SceneError> {
+    let is_folder = std::fs::symlink_metadata(path).is_ok_and(|found| found.is_dir());
+    match if is_folder { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) } {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(SceneError::io("remove", path)(error)),
         _ => Ok(()),
     }
 }
 
+fn beside(place: &Path) -> Result<PathBuf, SceneError> {
+    temporary::beside(place).ok_or_else(|| SceneError::Unsupported {
+        path: place.to_owned(),
+        what: "a folder without a name; name the folder to be made".to_owned(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
+    use mateval_image::owner::Owner;
+
     use super::*;
 
     #[test]
@@ -92,8 +139,11 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let place = root.path().join("out");
         // What a killed run leaves.
-        std::fs::create_dir(root.path().join(".out.partial")).unwrap();
-        std::fs::write(root.path().join(".out.partial/old"), "x").unwrap();
+        let mut ended = std::process::Command::new("true").spawn().unwrap();
+        ended.wait().unwrap();
+        let left = root.path().join(format!(".out.{}-{}-1-0.partial", Owner::this_process().host, ended.id()));
+        std::fs::create_dir(&left).unwrap();
+        std::fs::write(left.join("old"), "x").unwrap();
         std::fs::create_dir(&place).unwrap();
         std::fs::write(place.join("older"), "x").unwrap();
         let folder = WorkFolder::start(&place).unwrap();
@@ -103,6 +153,55 @@ mod tests {
         let names: Vec<_> = std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(names, ["new"]);
         assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn of_two_at_once_each_stays_whole() {
+        let root = tempfile::tempdir().unwrap();
+        let place = root.path().join("out");
+        let make = |name: &str| {
+            let folder = WorkFolder::start(&place).unwrap();
+            std::fs::write(folder.path().join(name), "x").unwrap();
+            folder
+        };
+        let names = || std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
+        let (first, second) = (make("first"), make("second"));
+        first.finish().unwrap();
+        let text = second.finish().unwrap_err().to_string();
+        assert!(text.contains("was made by another process meanwhile"), "{text}");
+        assert_eq!(names(), ["first"]);
+        let (third, fourth) = (make("third"), make("fourth"));
+        third.finish().unwrap();
+        fourth.finish().unwrap();
+        assert_eq!(names(), ["fourth"]);
+        assert_eq!(std::fs::read_dir(root.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn an_output_lies_in_a_folder_also_by_a_link_and_before_it_exists() {
+        let root = tempfile::tempdir().unwrap();
+        let [folder, other, link] = ["folder", "other", "link"].map(|name| root.path().join(name));
+        std::fs::create_dir(&folder).unwrap();
+        std::fs::create_dir(&other).unwrap();
+        std::os::unix::fs::symlink(&folder, &link).unwrap();
+        for inside in [folder.clone(), folder.join("a/b"), link.join("a"), other.join("../folder/a")] {
+            assert!(is_inside(&inside, &folder), "{}", inside.display());
+        }
+        for outside in [root.path().to_owned(), other.join("a"), root.path().join("folder2")] {
+            assert!(!is_inside(&outside, &folder), "{}", outside.display());
+        }
+    }
+
+    #[test]
+    fn what_holds_an_input_is_not_replaced() {
+        let root = tempfile::tempdir().unwrap();
+        let [out, input] = ["out", "out/deep/input"].map(|name| root.path().join(name));
+        std::fs::create_dir_all(&input).unwrap();
+        let text = check_holds_none(&out, &[root.path(), &input]).unwrap_err().to_string();
+        assert!(text.contains("deep/input', which would be deleted"), "{text}");
+        assert!(check_holds_none(&out, &[&out]).is_err());
+        check_holds_none(&input, &[&out]).unwrap();
+        check_holds_none(&root.path().join("new"), &[&input]).unwrap();
     }
 
     #[test]

@@ -1,38 +1,19 @@
 //! Reads one-dimensional NumPy arrays of integers (`.npy`, versions 1 to 3).
 //!
-//! The library takes memory for the header's stated length, recurses as deep as its brackets and multiplies the shape's
-//! numbers unchecked. The header is therefore compared with what NumPy writes for a plain array before the library sees it,
-//! and the data must have exactly the length that follows from the header.
+//! The header is checked before the library sees it, and the data must have exactly the length that follows from it.
 
-/// The largest header. NumPy's own are below 200 bytes.
-pub const MAX_HEADER_BYTES: usize = 4096;
-/// The most bytes before the header: magic string, version and the header's length.
-pub const MAX_PREFIX_BYTES: usize = 12;
+use mateval_image::npy_header::{self, NpyHeaderError};
+pub use mateval_image::npy_header::{MAX_HEADER_BYTES, MAX_PREFIX_BYTES};
+
 /// The widest integer, in bytes.
 pub const MAX_NUMBER_BYTES: usize = 8;
-/// The most digits in a header. The product of any numbers written with so few digits, times a width, is below 10^17.
-const MAX_HEADER_DIGITS: usize = 16;
 
 /// Why bytes are not an array of integers along one axis.
 #[derive(Debug, thiserror::Error)]
 pub enum NpyError {
-    /// The bytes end within the prefix or the header.
-    #[error("expected a NumPy array, found {found} bytes, which end within the header")]
-    CutOff {
-        /// The number of bytes.
-        found: usize,
-    },
-    /// The header is too long.
-    #[error("its header is {found} bytes long; expected at most {most}")]
-    LongHeader {
-        /// The header's stated length.
-        found: usize,
-        /// The greatest length allowed.
-        most: usize,
-    },
-    /// NumPy does not write such a header for an array of integers.
-    #[error("its header is not one that NumPy writes for an array of integers")]
-    OtherHeader,
+    /// The header is cut off, too long, or not that of a plain array.
+    #[error(transparent)]
+    Header(#[from] NpyHeaderError),
     /// The library refused the array.
     #[error("expected a valid NumPy array: {reason}")]
     Unsound {
@@ -69,10 +50,7 @@ fn joined(shape: &[u64]) -> String {
 /// wrap around to negative ones.
 pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, NpyError> {
     // The header, before and by the library.
-    let (header, data) = split(bytes)?;
-    if !is_plain(header) {
-        return Err(NpyError::OtherHeader);
-    }
+    let data = npy_header::checked_data(bytes)?;
     let unsound = |reason| NpyError::Unsound { reason };
     let file = npyz::NpyFile::new(bytes).map_err(unsound)?;
     let count = length(file.shape())?;
@@ -94,31 +72,6 @@ pub fn whole_numbers(bytes: &[u8]) -> Result<Vec<i64>, NpyError> {
     }
     try_types!(file; i64, i32, i16, i8, u64, u32, u16, u8);
     Err(NpyError::NotIntegers { found })
-}
-
-/// The header's text and the data behind it.
-fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
-    let cut_off = || NpyError::CutOff { found: bytes.len() };
-    let from = if bytes.get(6) == Some(&1) { 10 } else { MAX_PREFIX_BYTES };
-    let length = bytes.get(8..from).ok_or_else(cut_off)?;
-    let length = length.iter().rev().fold(0_usize, |sum, byte| sum << 8 | usize::from(*byte));
-    if length > MAX_HEADER_BYTES {
-        return Err(NpyError::LongHeader { found: length, most: MAX_HEADER_BYTES });
-    }
-    bytes[from..].split_at_checked(length).ok_or_else(cut_off)
-}
-
-/// Whether the header is one dictionary with one tuple of decimal numbers, without escapes, lists and large numbers.
-fn is_plain(header: &[u8]) -> bool {
-    let count = |bytes: &[u8]| header.iter().filter(|byte| bytes.contains(byte)).count();
-    let digits = header.iter().filter(|byte| byte.is_ascii_digit()).count();
-    let shape = header.split(|byte| *byte == b'(').nth(1).and_then(|rest| rest.split(|byte| *byte == b')').next());
-    let is_decimal = |shape: &[u8]| shape.iter().all(|byte| byte.is_ascii_digit() || b", ".contains(byte));
-    count(b"{") == 1
-        && count(b"(") == 1
-        && count(b"[\\") == 0
-        && digits <= MAX_HEADER_DIGITS
-        && shape.is_some_and(is_decimal)
 }
 
 /// The number of elements. With two long axes, their order would be ambiguous.
@@ -232,7 +185,10 @@ mod tests {
         whole_numbers(&with_header(&"[".repeat(4000), &[])).unwrap_err();
         let mut long = b"\x93NUMPY\x02\x00".to_vec();
         long.extend(&u32::MAX.to_le_bytes());
-        assert!(matches!(whole_numbers(&long), Err(NpyError::LongHeader { found: 4_294_967_295, .. })));
+        assert!(matches!(
+            whole_numbers(&long),
+            Err(NpyError::Header(NpyHeaderError::LongHeader { found: 4_294_967_295, .. }))
+        ));
     }
 
     proptest! {

@@ -1,12 +1,13 @@
 //! The scene that every reader makes, and the opening of a source's main file.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::error::{InvalidSource, SourceError};
 
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
-use mateval_scene::{Camera, Finding, Role, SceneLights, SourceKind};
+use mateval_scene::{Camera, Finding, Role, SceneLights, SourceKind, TriangleMesh};
 
 /// A licence that must be passed on with the scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -28,6 +29,9 @@ pub struct InstanceOrigin {
     pub super_category: Option<String>,
     /// The part of each triangle, numbered from 0. Without it, connected components are the parts.
     pub part_of_triangle: Option<Vec<usize>>,
+    /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal for all
+    /// copies.
+    pub shape: Option<Arc<TriangleMesh>>,
 }
 
 /// A scene read from any source.

@@ -24,16 +24,38 @@ pub struct HashedSubmission {
     pub maps: usize,
 }
 
+/// The files of a submission, each hashed once, from which the hash over any of its scenes follows.
+pub struct HashedFiles {
+    method: String,
+    json: HashedFile,
+    /// The maps of each scene, in the dataset's order.
+    scenes: Vec<(SceneId, Vec<HashedFile>)>,
+}
+
+impl HashedFiles {
+    /// Reads `submission.json` and the maps of these scenes; of all scenes if none is given.
+    pub fn read(submission: &Path, dataset: &Dataset, scenes: &[SceneId]) -> Result<Self, SubmissionError> {
+        let json = SubmissionJson::read(submission)?;
+        let chosen = dataset.chosen_scenes(scenes)?;
+        let scenes = chosen.into_iter().map(|scene| (scene.id.clone(), map_hashes(submission, scene))).collect();
+        Ok(Self { method: json.file.method, json: json.hashed, scenes })
+    }
+
+    /// The submission as a result of the scenes for which `is_scored` holds identifies it.
+    pub fn over(&self, is_scored: impl Fn(&SceneId) -> bool) -> HashedSubmission {
+        let maps = self.scenes.iter().filter(|(scene, _)| is_scored(scene)).flat_map(|(_, maps)| maps);
+        let files: Vec<HashedFile> = std::iter::once(&self.json).chain(maps).cloned().collect();
+        HashedSubmission { method: self.method.clone(), sha256: submission_sha256(&files), maps: files.len() - 1 }
+    }
+}
+
 /// Hashes `submission.json` and the maps of these scenes. A result has the same hash if it was made of the same files.
 pub fn hashed_submission(
     submission: &Path,
     dataset: &Dataset,
     scenes: &[SceneId],
 ) -> Result<HashedSubmission, SubmissionError> {
-    let json = SubmissionJson::read(submission)?;
-    let mut files = vec![json.hashed];
-    files.extend(dataset.chosen_scenes(scenes)?.into_iter().flat_map(|scene| map_hashes(submission, scene)));
-    Ok(HashedSubmission { method: json.file.method, sha256: submission_sha256(&files), maps: files.len() - 1 })
+    Ok(HashedFiles::read(submission, dataset, scenes)?.over(|_| true))
 }
 
 /// The maps of a scene in the order of [`crate::prediction::PredictedScene::files`]; those that cannot be read have no

@@ -1,7 +1,8 @@
 //! Submissions, read as untrusted input.
 //!
 //! In: a folder or an archive, and the dataset that it answers. Out: maps ready to be rendered ([`prediction`]), the
-//! hash that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`]).
+//! hash that identifies the submission ([`hashed_submission`]), and findings about everything that is wrong ([`lint`],
+//! [`method_name`]).
 //!
 //! Between: [`archive`] unpacks within limits, [`submitted_file`] reads a file once and hashes the same bytes,
 //! [`map_file`] decodes one map, [`bad_texels`] replaces what it holds besides finite numbers in range ([`reach`] finds
@@ -21,6 +22,7 @@ pub mod lint;
 pub mod map_file;
 mod map_folder;
 pub mod memory_budget;
+pub mod method_name;
 mod polygon;
 pub mod prediction;
 pub mod reach;

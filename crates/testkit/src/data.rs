@@ -21,7 +21,7 @@ pub fn lpips_weights(file: &str) -> Option<PathBuf> {
         .or_else(|| variable("XDG_CACHE_HOME").map(|folder| folder.join("mateval")))
         .or_else(|| variable("HOME").map(|folder| folder.join(".cache/mateval")))
         .unwrap_or_default();
-    existing(folder.join(file), "run: python3 tools/fetch_lpips_weights.py")
+    existing(folder.join(file), "run: mateval fetch lpips")
 }
 
 /// Reports that an input of a test is missing: as skipped, or with a panic under `MATEVAL_REQUIRE_DATA=1`.

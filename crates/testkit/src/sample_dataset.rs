@@ -27,7 +27,7 @@ const HEAD: [&str; 2] = ["resolution = [320, 240]\n", "resolution = [64, 48]\nat
 
 static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
     let out = built();
-    render(&out, &RenderOptions::default(), &|_, _, _| ()).unwrap();
+    render(&out, &RenderOptions::default(), &|_| ()).unwrap();
     Dataset::open(&out).unwrap()
 });
 
@@ -40,8 +40,9 @@ pub fn built() -> PathBuf {
     let whole = std::fs::read_to_string(&recipe).unwrap();
     assert!(whole.contains(HEAD[0]), "{whole}");
     std::fs::write(&recipe, whole.replace(HEAD[0], HEAD[1])).unwrap();
-    let options = BuildOptions { recipe, source: None, out: out.clone(), force: false };
-    build(&options, "test", &|_, _, _| ()).unwrap();
+    let options =
+        BuildOptions { recipe, source: None, out: out.clone(), scenes: Vec::new(), force: false, atlas_cache: None };
+    build(&options, "test", &|_| ()).unwrap();
     out
 }
 
@@ -71,7 +72,7 @@ pub fn write_from_photo(out: &Path) {
 }
 
 fn write_lifted(out: &Path, source: &EstimateSource) {
-    nn::write(dataset(), out, false, source, &NnOptions::default(), &|_, _, _| ()).unwrap();
+    nn::write(dataset(), out, false, source, &NnOptions::default(), &|_| ()).unwrap();
 }
 
 /// Makes the base colour of a scene's atlases black where the input view does not show them.
@@ -98,7 +99,7 @@ pub fn blacken_unobserved(scene: &SceneFile, folder: &Path) {
 /// Writes `gt` with the base colour of every atlas (linear) changed.
 pub fn write_changed(out: &Path, change: impl Fn(&Picture<LinearRgb>) -> Picture<LinearRgb>) {
     let method = submission::Method::new("changed", "");
-    submission::write(dataset(), out, false, &method, |scene, instance, folder| {
+    submission::write(dataset(), out, false, &method, &|_| (), |scene, instance, folder| {
         let truth = dataset().folder(&scene.id).truth_material(&instance.id);
         let file = |map: Map| Path::new(map.stem()).with_extension("png");
         for map in [Map::Roughness, Map::Metallic] {

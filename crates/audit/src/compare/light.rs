@@ -36,6 +36,11 @@ impl ShownKinds {
         shown
     }
 
+    /// The pixels whose mean is compared, and to which differences are relative.
+    pub(super) fn counted(&self) -> &[(usize, usize)] {
+        &self.counted
+    }
+
     /// Every tile, and whether it decides.
     pub(super) fn all(&self) -> impl Iterator<Item = (&Tile, bool)> {
         self.tiles.iter().map(|(tile, kind)| (tile, kind.is_none_or(MaterialKind::decides)))

@@ -3,8 +3,8 @@
 //! In: a dataset with Blender's renders. Out: [`CompareFile`], which [`text`] prints as tables; and, on request, a folder
 //! that holds it and a page with both pictures side by side.
 //!
-//! Between: `theirs` reads Blender's pictures and `ours` renders; `geometry` compares pictures without light, and `light`
-//! compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `source` compares
+//! Between: `theirs` reads Blender's pictures, `samples` decides how many samples ours take, and `ours` renders; `geometry`
+//! compares pictures without light, and `light` compares pictures of light by `tiles`. `kind` states which materials may differ, [`bounds`] how far. `source` compares
 //! converted materials with the source's own. `previews` and `page` show the result.
 
 pub mod bounds;
@@ -15,6 +15,7 @@ mod light;
 mod ours;
 mod page;
 mod previews;
+mod samples;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -29,8 +30,8 @@ use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
 use mateval_scene::reference::ReferenceScene;
-use mateval_scene::work_folder::{WorkFolder, check_free};
-use mateval_scene::{Progress, SceneId, json, reference_io};
+use mateval_scene::work_folder::{WorkFolder, check_free, is_inside};
+use mateval_scene::{Progress, Report, SceneId, json, reference_io};
 use mateval_tracer::World;
 
 use crate::error::AuditError;
@@ -39,9 +40,10 @@ use file::{COMPARE_FORMAT, CompareFile, ComparedDataset, LightComparison, SceneC
 use geometry::{OurGeometry, TheirGeometry};
 use kind::MaterialKind;
 use light::ShownKinds;
-use mateval_prep::render::{RENDER_FILE, RenderFile, RendererKind};
+use mateval_prep::render::{RENDER_FILE, RendererKind};
 use ours::OurLight;
 use previews::ViewPreviews;
+use samples::PILOT;
 use theirs::{TheirView, file_check};
 use tiles::Halves;
 
@@ -55,7 +57,8 @@ pub struct CompareOptions {
     pub dataset: PathBuf,
     /// Only these scenes; all where empty.
     pub scenes: Vec<SceneId>,
-    /// Samples per pixel of each half that the built-in tracer renders; as many as Blender's where absent.
+    /// Samples per pixel of each half that the built-in tracer renders. Where absent, as few as leave the decision to Blender's
+    /// noise or to the bound, and at most as many as Blender's.
     pub samples: Option<u32>,
     /// Folder for the page; no page is written where absent.
     pub out: Option<PathBuf>,
@@ -68,6 +71,9 @@ pub struct CompareOptions {
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
     let scenes = dataset.chosen_scenes(&options.scenes)?;
+    if let Some(absence) = dataset.absence().filter(|_| options.scenes.is_empty()) {
+        progress(Report::Message(&absence));
+    }
     check_rendered(&dataset, &scenes)?;
     check_out(options)?;
     let work = options.out.as_deref().map(WorkFolder::start).transpose()?;
@@ -85,7 +91,8 @@ pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> 
         agrees: true,
         scenes: Vec::new(),
     };
-    for scene in scenes {
+    for (at, scene) in scenes.iter().enumerate() {
+        progress(Report::part(&format!("scene {}", scene.id), at, scenes.len()));
         let place = work.as_ref().map(WorkFolder::path);
         let (found, shown) = compare_scene(&dataset.folder(&scene.id), scene, options.samples, place, progress)?;
         file.scenes.push(found);
@@ -124,12 +131,7 @@ fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), AuditE
 /// Fails where the output would lie in the dataset, or exists and may not be replaced.
 fn check_out(options: &CompareOptions) -> Result<(), AuditError> {
     let Some(out) = &options.out else { return Ok(()) };
-    // The nearest ancestor that exists; the folders below it are yet to be made.
-    let above = out.ancestors().skip(1).find_map(|folder| match folder.as_os_str().is_empty() {
-        true => Path::new(".").canonicalize().ok(),
-        false => folder.canonicalize().ok(),
-    });
-    if above.is_some_and(|above| options.dataset.canonicalize().is_ok_and(|dataset| above.starts_with(dataset))) {
+    if is_inside(out, &options.dataset) {
         return Err(AuditError::OutputInDataset { path: out.clone() });
     }
     if !out.exists() {
@@ -161,7 +163,10 @@ fn compare_scene(
     let samples = match samples {
         _ if compared.is_empty() => 0,
         Some(samples) => samples,
-        None => their_samples(folder, &compared)?,
+        None => {
+            let pilot = Pilot { folder, id: &scene.id, world: &world, kinds: &kinds, tile_bound };
+            pilot.samples(&compared, progress)?
+        }
     };
     let mut ours = match compared.is_empty() {
         true => Vec::new(),
@@ -172,19 +177,18 @@ fn compare_scene(
     let (mut views, mut previews) = (Vec::new(), Vec::new());
     let step = format!("{} compare", scene.id);
     for (at, view) in scene.views.iter().enumerate() {
-        progress(&step, at, scene.views.len());
-        let (Some(place), Some(light)) = (rendered(folder, view), rendered(folder, view).and_then(|_| ours.next()))
-        else {
+        progress(Report::step(&step, at, scene.views.len()));
+        let their_view = their_view(folder, view);
+        let (Some(theirs), Some(light)) = (&their_view, their_view.as_ref().and_then(|_| ours.next())) else {
             views.push(missing(view));
             continue;
         };
-        let theirs = TheirView { folder: place, size: size(view) };
         let pair = ViewPair { folder, view, reference: &reference, world: &world, kinds: &kinds, tile_bound };
-        let (found, shown) = pair.compare(&light, &theirs, out.map(|out| (out, scene)))?;
+        let (found, shown) = pair.compare(&light, theirs, out.map(|out| (out, scene)))?;
         views.push(found);
         previews.extend(shown);
     }
-    progress(&step, scene.views.len(), scene.views.len());
+    progress(Report::step(&step, scene.views.len(), scene.views.len()));
     let source_materials = match (compared.first(), first_rgb) {
         (Some(view), Some(rgb)) => {
             let against =
@@ -211,20 +215,43 @@ fn size(view: &View) -> (usize, usize) {
     (view.camera.intrinsics.width as usize, view.camera.intrinsics.height as usize)
 }
 
-/// The largest number of samples that Blender has rendered any of the views with.
-fn their_samples(folder: &SceneFolder, views: &[&View]) -> Result<u32, AuditError> {
-    let mut most = 1;
-    for place in views.iter().filter_map(|view| rendered(folder, view)) {
-        let render: RenderFile = json::read(&place.join(RENDER_FILE))?;
-        most = most.max(render.samples_each_half);
-    }
-    Ok(most)
-}
-
 fn missing(view: &View) -> ViewComparison {
     let message = format!("the view was not rendered; run `mateval prep render DATASET --renderer {COMPARED}`");
     let checks = vec![file_check("render", State::Missing, message)];
     ViewComparison { view: view.id.clone(), checks, light: Vec::new() }
+}
+
+/// What is needed to find the number of samples of a scene.
+struct Pilot<'a> {
+    folder: &'a SceneFolder,
+    id: &'a SceneId,
+    world: &'a World,
+    kinds: &'a [MaterialKind],
+    tile_bound: f64,
+}
+
+impl Pilot<'_> {
+    /// The number of samples for all views, at most as many as Blender's.
+    fn samples(&self, views: &[&View], progress: Progress<'_>) -> Result<u32, AuditError> {
+        let their_views: Vec<TheirView> = views.iter().filter_map(|view| their_view(self.folder, view)).collect();
+        let most = samples::theirs(&their_views)?;
+        if most <= PILOT {
+            return Ok(most);
+        }
+        let ours = ours::render(self.world, self.id, views, PILOT, progress)?;
+        let mut wanted = PILOT;
+        for ((view, ours), theirs) in views.iter().zip(&ours).zip(&their_views) {
+            let geometry = OurGeometry::read(self.folder, view, self.world)?;
+            let shown = ShownKinds::new(&geometry.instance, self.kinds, &geometry.valid);
+            wanted = wanted.max(samples::wanted(ours, theirs, &shown, self.tile_bound));
+        }
+        Ok(wanted.min(most))
+    }
+}
+
+/// Blender's pictures of the view; none where they are missing or incomplete.
+fn their_view(folder: &SceneFolder, view: &View) -> Option<TheirView> {
+    rendered(folder, view).map(|folder| TheirView { folder, size: size(view) })
 }
 
 /// A view that both renderers have rendered.

@@ -3,7 +3,7 @@
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::View;
 use mateval_scene::manifest::sha256_of_bytes;
-use mateval_scene::{Camera, Progress, SceneId};
+use mateval_scene::{Camera, Progress, Report, SceneId};
 use mateval_tracer::light_basis::DEFAULT_BASIS_BYTES;
 use mateval_tracer::{LightGroups, RenderSettings, ViewLight, World, render_views};
 
@@ -51,7 +51,7 @@ pub(super) fn render(
             return Err(AuditError::TooManyLights { scene: id.clone(), lights, most_bytes: DEFAULT_BASIS_BYTES });
         }
         let step = format!("{id} ours");
-        let shown = |done: usize, all: usize| progress(&step, pass * all + done, passes * all);
+        let shown = |done: usize, all: usize| progress(Report::step(&step, pass * all + done, passes * all));
         let rendered = render_views(world, cameras, &groups, &settings, &seeds(id), &shown)?;
         found.extend(rendered.views.iter().map(light));
     }

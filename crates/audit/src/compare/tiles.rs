@@ -70,6 +70,19 @@ impl Halves {
         sum.map(|sum| sum / pixels.len().max(1) as f64)
     }
 
+    /// The variance of each channel's mean over these pixels.
+    pub(super) fn variance(&self, pixels: impl Iterator<Item = (usize, usize)>) -> [f64; 3] {
+        let (mut sum, mut count) = ([0.0_f64; 3], 0_usize);
+        for (x, y) in pixels {
+            let [a, b] = [&self.a, &self.b].map(|half| half.get(x, y).0.map(f64::from));
+            for c in 0..3 {
+                sum[c] += ((a[c] - b[c]) / 2.0).powi(2);
+            }
+            count += 1;
+        }
+        sum.map(|sum| sum / (count.max(1) as f64).powi(2))
+    }
+
     /// The mean of the two halves.
     pub(super) fn mean(&self) -> Picture<LinearRgb> {
         let pixel = |(a, b): (&LinearRgb, &LinearRgb)| LinearRgb([0, 1, 2].map(|c| (a.0[c] + b.0[c]) / 2.0));

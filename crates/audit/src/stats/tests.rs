@@ -67,6 +67,7 @@ fn dataset(scenes: Vec<SceneFile>) -> Dataset {
         },
         targets: TargetsFile { format: FORMAT.to_owned(), targets: Vec::new() },
         scenes,
+        absent: Vec::new(),
     }
 }
 

@@ -11,9 +11,12 @@ use std::sync::Arc;
 
 use mateval_prep::faults::Faults;
 use mateval_prep::scene_meshes;
+use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
+use mateval_scene::ids::quoted;
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
-use mateval_scene::{Finding, Progress, SceneError, json, manifest, reference_io};
+use mateval_scene::open::{absent_scenes, is_below};
+use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference_io};
 use mateval_tracer::World;
 use serde::de::DeserializeOwned;
 
@@ -27,21 +30,36 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
         return Err(AuditError::NotADataset { path: root.to_owned() });
     }
     let mut faults = Faults::default();
-    progress("hashes", 0, 1);
-    check_manifest(root, &mut faults);
+    progress(Report::step("hashes", 0, 1));
+    for scene in BuildFolder::of(root).changed() {
+        faults.all.push(Finding {
+            severity: Severity::Error,
+            code: "unfinished".to_owned(),
+            file: format!("scenes/{scene}"),
+            place: String::new(),
+            message: "the scene was made or rendered apart since the manifest was written".to_owned(),
+            action: "run `mateval prep finish`".to_owned(),
+        });
+    }
     schema::check::<DatasetFile>(root, DATASET, &mut faults);
     schema::check::<TargetsFile>(root, TARGETS, &mut faults);
     let dataset = read_json::<DatasetFile>(DATASET, &dataset_path, &mut faults);
+    // A manifest that cannot be read is reported by the next step.
+    let absent = dataset.as_ref().and_then(|dataset| absent_scenes(root, dataset).ok()).unwrap_or_default();
+    check_manifest(root, &absent, &mut faults);
     if let Some(dataset) = &dataset {
         check_dataset(root, dataset, &mut faults);
-        for (at, id) in dataset.scenes.iter().enumerate() {
-            progress(&format!("scene {id}"), at, dataset.scenes.len());
+        if !absent.is_empty() {
+            faults.all.push(absence(&absent, dataset.scenes.len()));
+        }
+        for (at, id) in dataset.scenes.iter().enumerate().filter(|(_, id)| !absent.contains(id)) {
+            progress(Report::part(&format!("scene {id}"), at, dataset.scenes.len()));
             let folder = SceneFolder::of(root, id);
             faults.prefix = format!("scenes/{id}/");
             check_scene(&folder, dataset, id.as_str(), &mut faults);
             faults.prefix.clear();
         }
-        check_targets(root, dataset, &mut faults);
+        check_targets(root, dataset, &absent, &mut faults);
     }
     faults.all.sort();
     Ok(faults.all)
@@ -58,9 +76,22 @@ fn read_json<T: DeserializeOwned>(name: &str, path: &Path, faults: &mut Faults) 
     }
 }
 
-fn check_manifest(root: &Path, faults: &mut Faults) {
-    if let Some(found) = faults.read(MANIFEST, manifest::check(root)) {
+fn check_manifest(root: &Path, absent: &[SceneId], faults: &mut Faults) {
+    let found = manifest::check_those(root, |path| !is_below(path, absent));
+    if let Some(found) = faults.read(MANIFEST, found) {
         faults.all.extend(found.into_iter().filter(|finding| !is_withheld(root, finding)));
+    }
+}
+
+/// A dataset may be used scene by scene, so that absent scenes are no fault; but nothing was checked of them.
+fn absence(absent: &[SceneId], total: usize) -> Finding {
+    Finding {
+        severity: Severity::Warning,
+        code: "absent_scenes".to_owned(),
+        file: DATASET.to_owned(),
+        place: "/scenes".to_owned(),
+        message: format!("{} of {total} scenes have no folder here: {}", absent.len(), quoted(absent)),
+        action: "they were not checked".to_owned(),
     }
 }
 
@@ -87,7 +118,7 @@ fn check_dataset(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
     }
 }
 
-fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
+fn check_targets(root: &Path, dataset: &DatasetFile, absent: &[SceneId], faults: &mut Faults) {
     let Some(file) = read_json::<TargetsFile>(TARGETS, &root.join(TARGETS), faults) else { return };
     let mut seen = std::collections::BTreeSet::new();
     for scene in dataset.scenes.iter().filter(|id| !file.targets.iter().any(|target| target.scene == **id)) {
@@ -103,7 +134,8 @@ fn check_targets(root: &Path, dataset: &DatasetFile, faults: &mut Faults) {
                 format!("view '{}' of scene '{}' is listed twice", target.view, target.scene),
             );
         }
-        let view_exists = SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
+        let view_exists =
+            absent.contains(&target.scene) || SceneFolder::of(root, &target.scene).view(&target.view).is_dir();
         if !dataset.scenes.contains(&target.scene) || !view_exists {
             let message = format!("the dataset has no view '{}' of a scene '{}'", target.view, target.scene);
             faults.add("dangling_reference", TARGETS, &place, message);

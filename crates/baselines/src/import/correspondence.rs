@@ -67,12 +67,21 @@ impl Correspondence {
     /// Builds the tree of those triangles of the donor whose index `is_included` accepts.
     pub fn new(donor: &Donor, is_included: impl Fn(usize) -> bool) -> Self {
         let numbers = (0..donor.triangles.len()).filter(|triangle| is_included(*triangle));
-        let leaf = |triangle: usize| {
-            let corners = donor.triangles[triangle].corners.map(|corner| corner.as_dvec3());
+        Self::of_triangles(numbers.map(|triangle| (triangle, donor.corners(triangle))))
+    }
+
+    /// Builds the tree of these triangles, each with its index.
+    pub fn of_triangles(triangles: impl Iterator<Item = (usize, [DVec3; 3])>) -> Self {
+        let leaf = |(triangle, corners): (usize, [DVec3; 3])| {
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
             Leaf { corners, normal, triangle }
         };
-        Self { tree: RTree::bulk_load(numbers.map(leaf).collect()) }
+        Self { tree: RTree::bulk_load(triangles.map(leaf).collect()) }
+    }
+
+    /// The distance of the nearest place, in the unit of the triangles; `None` where the tree is empty.
+    pub fn distance(&self, place: DVec3) -> Option<f64> {
+        Some(self.tree.nearest_neighbor(&place.to_array())?.corresponding(place).distance_m)
     }
 
     /// The nearest place; among nearly equal distances, a place that faces as `normal` does. `None` where the tree is

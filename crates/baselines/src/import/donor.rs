@@ -67,6 +67,11 @@ pub struct Scalar {
 }
 
 impl Donor {
+    /// The corners of the triangle with this index, in the mesh's space.
+    pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        self.triangles[triangle].corners.map(|corner| corner.as_dvec3())
+    }
+
     /// Appends a triangle.
     pub(super) fn push(&mut self, triangle: DonorTriangle) -> Result<(), ImportError> {
         if self.triangles.len() >= MAX_TRIANGLES {
@@ -89,9 +94,9 @@ impl Donor {
     /// The side of a texel on the triangle, in metres, in the finest of the material's textures; infinite without
     /// textures.
     pub fn texel_size_m(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
         let triangle = &self.triangles[triangle];
         let material = &self.materials[triangle.material];
-        let [a, b, c] = triangle.corners.map(|corner| corner.as_dvec3());
         let area = (b - a).cross(c - a).length();
         let scalars = [&material.roughness, &material.metallic].into_iter().flatten();
         let scalars = scalars.filter_map(|scalar| scalar.texture.as_ref().map(|(texture, _)| (1, texture)));

@@ -1,5 +1,5 @@
 //! Reads a textured glTF as a donor: base colour, roughness and metallic of the default scene's triangles, with vertex
-//! colours and `KHR_texture_transform`.
+//! colours, `KHR_texture_transform` and `EXT_texture_webp`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,12 +14,13 @@ use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
 use super::error::{ImportError, Limited, Place, Unsupported};
+use super::gltf_webp::with_own_pictures;
 use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
 
 /// Reads the file `name` of the folder.
 pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
-    let file = parse(&bytes)?;
+    let file = parse(&with_own_pictures(&bytes))?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
     let mut bytes = 0;

@@ -2,20 +2,23 @@
 //! texture coordinates, or one material per part. Each place of an instance takes the material of the nearest place of
 //! such a mesh, the donor.
 //!
-//! `files` finds the files; `gltf_donor` and `obj_donor` read them as a `donor`; `correspondence` finds the nearest
-//! place; `rebake` fills the atlases; `flat_materials` reads one material per part; `report` states how much of each
-//! surface was found.
+//! `files` finds the files; `gltf_donor` and `obj_donor` read them as a `donor`; `frame` moves it to the dataset's
+//! world space, by a `similarity`; `correspondence` finds the nearest place; `rebake` fills the atlases;
+//! `flat_materials` reads one material per part; `report` states how much of each surface was found.
 
 mod correspondence;
 mod donor;
 pub mod error;
 mod files;
 mod flat_materials;
+mod frame;
 mod gltf_donor;
+mod gltf_webp;
 mod limits;
 mod obj_donor;
 mod rebake;
 mod report;
+mod similarity;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -23,7 +26,7 @@ use std::path::Path;
 
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
-use mateval_scene::{InstanceId, PartSetId, Progress};
+use mateval_scene::{InstanceId, PartSetId, Progress, Report};
 
 use crate::error::BaselineError;
 use crate::estimate::GivenMaps;
@@ -36,8 +39,9 @@ use correspondence::Correspondence;
 use donor::Donor;
 use files::ImportFolder;
 pub use flat_materials::{FlatMaterial, FlatMaterials};
+use frame::{Frame, Located, preferred_order};
 use rebake::{Distances, rebake};
-pub use report::{IMPORT_FORMAT, ImportReport, ImportTotals, ImportedInstance, ImportedScene};
+pub use report::{IMPORT_FORMAT, ImportReport, ImportTotals, ImportedFrame, ImportedInstance, ImportedScene};
 
 /// Options of an import.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,14 +69,13 @@ pub fn write(
         return Err(BaselineError::NothingToImport(folder.to_owned()));
     }
     let scenes = RefCell::new(Vec::new());
-    submission::write_scenes(dataset, out, force, method, |scene, out| {
+    submission::write_scenes(dataset, out, force, method, progress, |scene, out| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let sources = Sources::read(&files, &geometry, options)?;
-        let with_atlas: Vec<usize> =
-            (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect();
+        let with_atlas = with_atlas(scene);
         let mut instances = Vec::new();
         for (done, &at) in with_atlas.iter().enumerate() {
-            progress(&format!("{} import", scene.id), done, with_atlas.len());
+            progress(Report::step(&format!("{} import", scene.id), done, with_atlas.len()));
             let id = &scene.instances[at].id;
             let imported = sources.instance(&geometry, at)?;
             instances.push(match imported {
@@ -80,11 +83,10 @@ pub fn write(
                 None => undescribed(id),
             });
         }
-        progress(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len());
+        progress(Report::step(&format!("{} import", scene.id), with_atlas.len(), with_atlas.len()));
         let written = instances.iter().filter(|instance| instance.has_maps()).count();
         if has_files(&files, scene) && written == 0 {
-            let nearest_m = instances.iter().filter_map(|instance| instance.nearest_m).reduce(f64::min);
-            return Err(nothing_found(folder, scene, nearest_m, options.max_distance_m));
+            return Err(nothing_found(folder, scene, &instances, options.max_distance_m));
         }
         scenes.borrow_mut().push(ImportedScene { scene: scene.id.clone(), instances });
         Ok(written)
@@ -98,6 +100,8 @@ fn undescribed(instance: &InstanceId) -> ImportedInstance {
     ImportedInstance {
         instance: instance.clone(),
         file: None,
+        own_file: false,
+        frame: None,
         texels: 0,
         texels_without: 0,
         nearest_m: None,
@@ -106,12 +110,21 @@ fn undescribed(instance: &InstanceId) -> ImportedInstance {
     }
 }
 
-fn nothing_found(folder: &Path, scene: &SceneFile, nearest_m: Option<f64>, max_distance_m: f64) -> BaselineError {
+fn nothing_found(
+    folder: &Path,
+    scene: &SceneFile,
+    instances: &[ImportedInstance],
+    max_distance_m: f64,
+) -> BaselineError {
     let (folder, scene) = (folder.to_owned(), scene.id.to_string());
-    match nearest_m {
-        Some(nearest_m) => BaselineError::NothingNear { folder, scene, nearest_m, max_distance_m },
-        None => BaselineError::NothingNamed { folder, scene },
-    }
+    let nearest_m = instances.iter().filter_map(|instance| instance.nearest_m).reduce(f64::min);
+    let Some(nearest_m) = nearest_m else { return BaselineError::NothingNamed { folder, scene } };
+    let best_residual_m = instances.iter().filter_map(|instance| match instance.frame {
+        Some(ImportedFrame::Unexplained { best_residual_m, .. }) => best_residual_m,
+        _ => None,
+    });
+    let best_residual_m = best_residual_m.reduce(f64::min);
+    BaselineError::NothingNear { folder, scene, nearest_m, max_distance_m, best_residual_m }
 }
 
 fn has_files(files: &ImportFolder, scene: &SceneFile) -> bool {
@@ -124,6 +137,8 @@ struct Sources<'a> {
     files: &'a ImportFolder,
     options: &'a ImportOptions,
     mesh: Option<SceneMesh>,
+    /// The file of each instance that has its own, and the frame of that file's mesh, by the instance's index.
+    frames: BTreeMap<usize, (String, Frame)>,
     /// The file of one material per part, its colours and the maps that it gives.
     parts: Option<(String, PartColors, GivenMaps)>,
 }
@@ -131,7 +146,9 @@ struct Sources<'a> {
 /// A mesh of a whole scene.
 struct SceneMesh {
     file: String,
+    /// In the dataset's world space.
     donor: Donor,
+    frame: Frame,
     /// For each instance that groups are named after, the triangles of those groups.
     named: BTreeMap<usize, Correspondence>,
     /// The triangles of groups that are named after no instance.
@@ -141,6 +158,10 @@ struct SceneMesh {
 /// An instance's atlas as the files describe it.
 struct ImportedAtlas {
     file: String,
+    /// Whether the file describes this instance alone.
+    own_file: bool,
+    /// None without a donor.
+    frame: Option<Frame>,
     atlas: PartialAtlas,
     distances: Distances,
     /// Distance of the donor from the nearest texel, in metres; none without a donor.
@@ -156,6 +177,8 @@ impl ImportedAtlas {
         let found = self.distances.count > 0;
         let report = ImportedInstance {
             file: Some(self.file),
+            own_file: self.own_file,
+            frame: self.frame.map(|frame| frame.report),
             texels: texels.iter().filter(|texel| **texel != Texel::Unused).count(),
             texels_without: texels.iter().filter(|texel| **texel == Texel::Unseen).count(),
             nearest_m: self.nearest_m,
@@ -177,7 +200,10 @@ impl<'a> Sources<'a> {
         options: &'a ImportOptions,
     ) -> Result<Self, BaselineError> {
         let scene = &geometry.scene.id;
-        let mesh = files.mesh_of_scene(scene).map(|file| SceneMesh::read(files, file, geometry)).transpose()?;
+        let max_distance_m = options.max_distance_m;
+        let mesh = files.mesh_of_scene(scene);
+        let mesh = mesh.map(|file| SceneMesh::read(files, file, geometry, max_distance_m)).transpose()?;
+        let frames = frames(files, geometry, max_distance_m)?;
         let parts = match files.materials_of_scene(scene) {
             Some(file) => {
                 let (colors, given) =
@@ -186,7 +212,7 @@ impl<'a> Sources<'a> {
             }
             None => None,
         };
-        Ok(Self { files, options, mesh, parts })
+        Ok(Self { files, options, mesh, frames, parts })
     }
 
     /// The instance's atlas from the first file that describes it.
@@ -194,14 +220,18 @@ impl<'a> Sources<'a> {
         let instance = &geometry.scene.instances[at];
         let Some(atlas) = &instance.atlas else { return Ok(None) };
         let size = atlas.size as usize;
-        if let Some(file) = self.files.mesh_of_instance(&geometry.scene.id, &instance.id) {
-            let donor = self.files.read_mesh(&file)?;
+        if let Some((file, frame)) = self.frames.get(&at) {
+            let mut donor = self.files.read_mesh(file)?;
+            frame.apply(&mut donor);
             let all = Correspondence::new(&donor, |_| true);
-            return Ok(Some(self.rebaked(geometry, at, size, file, &donor, &all)));
+            let place = (file.clone(), frame.clone());
+            let rebaked = self.rebaked(geometry, at, size, place, &donor, &all);
+            return Ok(Some(ImportedAtlas { own_file: true, ..rebaked }));
         }
         if let Some(mesh) = &self.mesh {
             let own = mesh.named.get(&at).unwrap_or(&mesh.others);
-            let rebaked = self.rebaked(geometry, at, size, mesh.file.clone(), &mesh.donor, own);
+            let place = (mesh.file.clone(), mesh.frame.clone());
+            let rebaked = self.rebaked(geometry, at, size, place, &mesh.donor, own);
             // A mesh of the scene may leave instances out.
             if rebaked.distances.count > 0 {
                 return Ok(Some(rebaked));
@@ -214,28 +244,37 @@ impl<'a> Sources<'a> {
             let atlas = colors.paint(geometry, at, size);
             let is_described = atlas.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_)));
             let (file, distances) = (file.clone(), Distances::default());
-            is_described.then_some(ImportedAtlas { file, atlas, distances, nearest_m: None, given: *given })
+            let (frame, nearest_m) = (None, None);
+            let atlas = ImportedAtlas { file, own_file: false, frame, atlas, distances, nearest_m, given: *given };
+            is_described.then_some(atlas)
         }))
     }
 
+    /// The instance's atlas from the donor's triangles that belong to it. The donor counts as a mesh of the whole scene.
     fn rebaked(
         &self,
         geometry: &SceneGeometry<'_>,
         at: usize,
         size: usize,
-        file: String,
+        (file, frame): (String, Frame),
         donor: &Donor,
         correspondence: &Correspondence,
     ) -> ImportedAtlas {
         let rebaked = rebake(geometry, at, size, donor, correspondence, self.options.max_distance_m);
         let (atlas, distances, nearest_m) = (rebaked.atlas, rebaked.distances, rebaked.nearest_m);
-        ImportedAtlas { file, atlas, distances, nearest_m, given: donor.given_maps() }
+        let (own_file, frame, given) = (false, Some(frame), donor.given_maps());
+        ImportedAtlas { file, own_file, frame, atlas, distances, nearest_m, given }
     }
 }
 
 impl SceneMesh {
-    fn read(files: &ImportFolder, file: String, geometry: &SceneGeometry<'_>) -> Result<Self, BaselineError> {
-        let donor = files.read_mesh(&file)?;
+    fn read(
+        files: &ImportFolder,
+        file: String,
+        geometry: &SceneGeometry<'_>,
+        max_distance_m: f64,
+    ) -> Result<Self, BaselineError> {
+        let mut donor = files.read_mesh(&file)?;
         let owner_of_name = owners(geometry)?;
         let mut owner_of_triangle = vec![None; donor.triangles.len()];
         for group in &donor.groups {
@@ -243,12 +282,43 @@ impl SceneMesh {
             owner_of_triangle[group.triangles.clone()].fill(owner.copied());
         }
         let owners: BTreeSet<usize> = owner_of_triangle.iter().flatten().copied().collect();
+        // Groups that are named after instances are compared with these, a mesh without such names with all instances.
+        let belongs = |at: &usize| owners.is_empty() || owners.contains(at);
+        let targets = with_atlas(geometry.scene).into_iter().filter(belongs).map(|at| geometry.mesh(at));
+        let is_compared = |triangle: &usize| owners.is_empty() || owner_of_triangle[*triangle].is_some();
+        let compared = (0..donor.triangles.len()).filter(is_compared).map(|triangle| donor.corners(triangle));
+        let frame = Located::new(targets, compared, max_distance_m).frame(None);
+        frame.apply(&mut donor);
         let correspondence =
             |owner: Option<usize>| Correspondence::new(&donor, |triangle| owner_of_triangle[triangle] == owner);
         let named = owners.into_iter().map(|owner| (owner, correspondence(Some(owner)))).collect();
         let others = correspondence(None);
-        Ok(Self { file, donor, named, others })
+        Ok(Self { file, donor, frame, named, others })
     }
+}
+
+/// The file of each instance that has its own, and the frame of that file's mesh, by the instance's index. The meshes
+/// are read again when they are used, so that only one of them is in memory.
+fn frames(
+    files: &ImportFolder,
+    geometry: &SceneGeometry<'_>,
+    max_distance_m: f64,
+) -> Result<BTreeMap<usize, (String, Frame)>, BaselineError> {
+    let mut located = BTreeMap::new();
+    for at in with_atlas(geometry.scene) {
+        let Some(file) = files.mesh_of_instance(&geometry.scene.id, &geometry.scene.instances[at].id) else { continue };
+        let donor = files.read_mesh(&file)?;
+        let triangles = (0..donor.triangles.len()).map(|triangle| donor.corners(triangle));
+        let found = Located::new([geometry.mesh(at)].into_iter(), triangles, max_distance_m);
+        located.insert(at, (file, found));
+    }
+    let preferred = preferred_order(located.values().map(|(_, located)| located));
+    Ok(located.into_iter().map(|(at, (file, located))| (at, (file, located.frame(preferred)))).collect())
+}
+
+/// Indices of the instances that have an atlas.
+fn with_atlas(scene: &SceneFile) -> Vec<usize> {
+    (0..scene.instances.len()).filter(|at| scene.instances[*at].atlas.is_some()).collect()
 }
 
 /// Indices of instances by their own ids and by the ids of their parts in every part set.

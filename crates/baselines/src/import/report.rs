@@ -41,6 +41,12 @@ pub struct ImportedInstance {
     /// The file that describes the instance, relative to the folder; null if none does. An instance has no maps where
     /// `texels_without` equals `texels`.
     pub file: Option<String>,
+    /// Whether the file describes this instance alone, and not the whole scene.
+    #[serde(default)]
+    pub own_file: bool,
+    /// Where the file's mesh lies; null without a mesh.
+    #[serde(default)]
+    pub frame: Option<ImportedFrame>,
     /// Number of texels that the surface uses.
     pub texels: usize,
     /// Number of those texels that found no place of the mesh near enough; they have the format's default values.
@@ -51,6 +57,37 @@ pub struct ImportedInstance {
     pub mean_distance_m: Option<f64>,
     /// Largest distance of the places that were found, in metres; null without any.
     pub max_distance_m: Option<f64>,
+}
+
+/// Where a mesh lies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "state", rename_all = "snake_case", deny_unknown_fields)]
+pub enum ImportedFrame {
+    /// In the dataset's world space, where it belongs.
+    InPlace,
+    /// Elsewhere. A place `p` of it was used as `scale * rotation * p + shift_m`, which lies on the surfaces that it
+    /// belongs to.
+    Moved {
+        /// Metres for one unit of the mesh.
+        scale: f64,
+        /// Rows of an orthogonal matrix; a mirror if its determinant is -1.
+        rotation: [[f64; 3]; 3],
+        /// In metres.
+        shift_m: [f64; 3],
+        /// Root mean square distance that remains between the surfaces, in metres.
+        residual_m: f64,
+        /// Largest residual that is accepted, in metres.
+        limit_m: f64,
+        /// Number of other turns that fit as well, because the mesh is symmetric.
+        other_turns: usize,
+    },
+    /// No similarity brings it to the surfaces that it belongs to. It is used as it is: it may be a part of them.
+    Unexplained {
+        /// Smallest residual of those that were tried, in metres; null if no box has the right proportions.
+        best_residual_m: Option<f64>,
+        /// Largest residual that is accepted, in metres.
+        limit_m: f64,
+    },
 }
 
 impl ImportedInstance {

@@ -9,7 +9,7 @@ use mateval_image::store::write_whole;
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::WorkFolder;
-use mateval_scene::{Progress, SceneError, TriangleMesh};
+use mateval_scene::{Progress, Report, SceneError, TriangleMesh};
 use serde_json::json;
 
 use super::{TEXELS, object_folder};
@@ -49,7 +49,7 @@ pub fn export(
         }
         let seen = seen_pixels(&geometry, &estimate)?;
         for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
-            progress(&format!("{} export", scene.id), at, scene.instances.len());
+            progress(Report::step(&format!("{} export", scene.id), at, scene.instances.len()));
             let known = lift(&geometry, &seen, &estimate, at, TEXELS);
             if !known.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_))) {
                 continue;

@@ -45,8 +45,9 @@ pub fn import(
         "TEXGen's textures where the input view shows nothing, {} where it does; {textured} textures; the rest as nn",
         source.description(dataset)
     );
-    let method = Method { name: format!("texgen-{}", source.name()), description };
-    let instances = submission::write_scenes(dataset, out, force, &method, |scene, folder| {
+    let assumed_encodings = source.assumed_encodings();
+    let method = Method { name: format!("texgen-{}", source.name()), description, assumed_encodings };
+    let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let estimate = source.read(dataset, scene)?;
         if estimate.base_color.is_none() {

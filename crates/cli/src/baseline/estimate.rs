@@ -14,8 +14,9 @@ pub struct EstimateArgs {
     /// median and median-part].
     #[arg(long, value_name = "gt|input|FOLDER")]
     estimate: Option<PathBuf>,
-    /// Names and encodings of the folder's files: colorful-shading, intrinsic, marigold, plain, rgbx, or a TOML file
-    /// like those in crates/baselines/adapters [default: plain].
+    /// Names and encodings of the folder's files: colorful-shading, crefnet, diffusion-renderer, dnf-intrinsic, iid,
+    /// intrinsic, marigold, materialist, mvinverse, ouroboros, plain, rgbx, or a TOML file like those in
+    /// crates/baselines/adapters [default: plain].
     #[arg(long, value_name = "NAME|FILE.toml")]
     adapter: Option<String>,
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use mateval_baselines::import::{self, ImportOptions, ImportReport, ImportedInstance};
+use mateval_baselines::import::{self, ImportOptions, ImportReport, ImportedFrame, ImportedInstance};
 use mateval_baselines::submission::Method;
 use mateval_scene::{PartSetId, json};
 
@@ -55,11 +55,60 @@ pub fn run(args: &ImportArgs) -> anyhow::Result<Outcome> {
     for file in &report.unused {
         say(&format!("warning: '{file}' matches no scene or instance of the dataset; it was not read"));
     }
+    for note in report.scenes.iter().flat_map(|scene| moves(&scene.instances)) {
+        say(&note);
+    }
     match args.format {
         Format::Json => print(&json::to_text(&report))?,
         Format::Text => print(&text(&report))?,
     }
     Ok(Outcome::Good)
+}
+
+/// A line for each file whose mesh was moved.
+fn moves(instances: &[ImportedInstance]) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    for instance in instances {
+        let (Some(file), Some(ImportedFrame::Moved { scale, rotation, shift_m, residual_m, other_turns, .. })) =
+            (&instance.file, &instance.frame)
+        else {
+            continue;
+        };
+        let symmetric = match other_turns {
+            0 => String::new(),
+            count => format!("; it is symmetric: {count} other turns fit as well"),
+        };
+        let note = format!(
+            "note: '{file}' was moved to the dataset's world space: {}, scale {scale:.6}, shift ({}) m; {} remain{symmetric}",
+            turn(rotation),
+            shift_m.map(|metres| format!("{metres:.4}")).join(", "),
+            millimetres(Some(*residual_m)),
+        );
+        // A mesh of the whole scene is listed by each instance that uses it.
+        if !notes.contains(&note) {
+            notes.push(note);
+        }
+    }
+    notes
+}
+
+/// The axes of the world in those of the mesh, such as `axes (x, z, -y)`, or the angle. A mirror image that is not such
+/// an exchange of axes is given as the point reflection and the turn that make it up.
+fn turn(rotation: &[[f64; 3]; 3]) -> String {
+    let axis = |row: &[f64; 3]| {
+        let at = row.iter().position(|share| (share.abs() - 1.0).abs() < 1e-6)?;
+        Some(format!("{}{}", if row[at] < 0.0 { "-" } else { "" }, ["x", "y", "z"][at]))
+    };
+    let axes: Option<Vec<String>> = rotation.iter().map(axis).collect();
+    if let Some(axes) = axes {
+        return format!("axes ({})", axes.join(", "));
+    }
+    let [[a, b, c], [d, e, f], [g, h, i]] = *rotation;
+    let determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+    let (sign, mirrored) = if determinant < 0.0 { (-1.0, "mirrored and ") } else { (1.0, "") };
+    let trace = sign * (a + e + i);
+    let degrees = ((trace - 1.0) / 2.0).clamp(-1.0, 1.0).acos().to_degrees();
+    format!("{mirrored}turned by {degrees:.2} degrees")
 }
 
 /// A line for each scene, and one for each instance that the files do not cover whole.
@@ -91,8 +140,9 @@ fn shortfall(instance: &ImportedInstance) -> String {
         None => "no file describes it; it has no maps and will score as grey".to_owned(),
         Some(file) if !instance.has_maps() => {
             format!(
-                "nothing in '{file}' is near enough, the nearest is {} away; no maps",
-                millimetres(instance.nearest_m)
+                "nothing in '{file}' is near enough, the nearest is {} away{}; no maps",
+                millimetres(instance.nearest_m),
+                tried(instance)
             )
         }
         Some(file) => {
@@ -102,10 +152,39 @@ fn shortfall(instance: &ImportedInstance) -> String {
     }
 }
 
+/// What was tried to bring the mesh of this instance alone to its place.
+fn tried(instance: &ImportedInstance) -> String {
+    match &instance.frame {
+        Some(ImportedFrame::Unexplained { best_residual_m, limit_m }) if instance.own_file => {
+            let best = best_residual_m.map_or("no box has the right proportions".to_owned(), |best| {
+                format!("the best leaves {}, the most is {}", millimetres(Some(best)), millimetres(Some(*limit_m)))
+            });
+            format!(", and no scale, turn and shift brings it there: {best}")
+        }
+        _ => String::new(),
+    }
+}
+
 fn millimetres(metres: Option<f64>) -> String {
     metres.map_or("none".to_owned(), |metres| format!("{:.3} mm", metres * 1e3))
 }
 
 fn percent(count: usize, total: usize) -> f64 {
     100.0 * count as f64 / total.max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat3;
+
+    use super::*;
+
+    #[test]
+    fn turns_and_mirror_images_are_distinguished() {
+        let rows = |matrix: DMat3| matrix.transpose().to_cols_array_2d();
+        let turned = DMat3::from_axis_angle(glam::DVec3::new(0.6, 0.0, 0.8), 0.7);
+        assert_eq!(turn(&rows(turned)), "turned by 40.11 degrees");
+        assert_eq!(turn(&rows(-turned)), "mirrored and turned by 40.11 degrees");
+        assert_eq!(turn(&rows(DMat3::from_rotation_x(std::f64::consts::FRAC_PI_2))), "axes (x, -z, y)");
+    }
 }

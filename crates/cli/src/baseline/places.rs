@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use mateval_scene::open::Dataset;
 
+use crate::open_dataset::open_dataset;
 use crate::outcome::{Outcome, print};
 
 /// Arguments of every baseline that writes a submission.
@@ -35,7 +35,7 @@ pub struct ExportPlaces {
 impl Places {
     /// Opens the dataset.
     pub fn open(&self) -> anyhow::Result<Dataset> {
-        Dataset::open(&self.dataset).context("cannot open the dataset")
+        open_dataset(&self.dataset)
     }
 
     /// Prints where the submission is and how many instances it covers.
@@ -48,6 +48,6 @@ impl Places {
 impl ExportPlaces {
     /// Opens the dataset.
     pub fn open(&self) -> anyhow::Result<Dataset> {
-        Dataset::open(&self.dataset).context("cannot open the dataset")
+        open_dataset(&self.dataset)
     }
 }

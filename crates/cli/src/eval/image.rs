@@ -10,7 +10,7 @@ use mateval_scene::json;
 use crate::format::Format;
 use crate::outcome::{Outcome, print};
 use crate::tool::TOOL;
-use crate::weights;
+use crate::weights::{self, FETCH_LPIPS};
 
 /// Arguments of `eval image`.
 #[derive(clap::Args)]
@@ -55,7 +55,7 @@ pub fn run(args: &ImageArgs) -> anyhow::Result<Outcome> {
             "values": values,
             "missing": missing
                 .iter()
-                .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "fix": weights::FIX }))
+                .map(|(net, reason)| serde_json::json!({ "metric": net, "reason": reason, "fix": FETCH_LPIPS }))
                 .collect::<Vec<_>>(),
         })))?,
         Format::Text => print(&text(&values, &missing))?,
@@ -85,6 +85,6 @@ fn text(values: &PairValues, missing: &[(&str, String)]) -> String {
             }
         }
     }
-    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {}", weights::FIX)));
+    lines.extend(missing.iter().map(|(net, _)| format!("{net:24} missing; run: {FETCH_LPIPS}")));
     lines.join("\n") + "\n"
 }

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
-use mateval_eval::result::ResultFile;
-use mateval_report::leaderboard::errata::ErrataFile;
-use mateval_report::leaderboard::{LeaderboardPlan, Submissions, verified, write};
+use mateval_report::leaderboard::results_folder::ResultsFolder;
+use mateval_report::leaderboard::{LeaderboardPlan, Submissions, entries, verified, write};
 use mateval_scene::open::Dataset;
 
 use super::strip_picture::StripArgs;
@@ -17,8 +16,12 @@ use crate::tool::TOOL;
 #[derive(clap::Args)]
 pub struct LeaderboardArgs {
     /// RESULT.json files. One is marked as verified if RESULT.verified.json, written by `eval verify`, lies beside it.
-    #[arg(required = true, value_name = "RESULT.json")]
+    #[arg(required_unless_present = "from", value_name = "RESULT.json")]
     results: Vec<PathBuf>,
+    /// Folder of results, as collected by pull requests: every .json file in it and in the folders below it. In the
+    /// folder itself, ceiling.json is taken for `--ceiling` and errata.json for `--errata`.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["results", "ceiling", "errata"])]
+    from: Option<PathBuf>,
     /// RESULT.json of the truth itself (`mateval baseline gt`), shown below the methods as the ceiling of each column.
     #[arg(long, value_name = "RESULT.json")]
     ceiling: Option<PathBuf>,
@@ -53,40 +56,37 @@ pub struct LeaderboardArgs {
 
 /// Writes the site and prints the path of its first page.
 pub fn run(args: &LeaderboardArgs) -> anyhow::Result<Outcome> {
-    let errata = args.errata.as_deref().map(ErrataFile::read).transpose()?;
-    let mut results = Vec::new();
-    let mut marks = Vec::new();
-    for path in &args.results {
-        let mut result = ResultFile::read(path)?;
-        marks.push(verified::read(path, &result)?);
-        // Single pictures are most of a result's memory, and the site does not show them.
-        result.protocols.values_mut().for_each(|scores| scores.pictures = Vec::new());
-        results.push(result);
-    }
-    for (path, _) in args.results.iter().zip(&marks).filter(|(_, mark)| **mark == verified::Verified::Stale) {
+    let files = match &args.from {
+        Some(folder) => ResultsFolder::list(folder)?,
+        None => {
+            ResultsFolder { results: args.results.clone(), ceiling: args.ceiling.clone(), errata: args.errata.clone() }
+        }
+    };
+    let entries = entries::read(&files)?;
+    let marked = files.results.iter().zip(&entries.verified);
+    for (path, _) in marked.filter(|(_, mark)| **mark == verified::Verified::Stale) {
         let sidecar = verified::sidecar(path);
         say(&format!(
             "warning: '{}' verifies an earlier version of the result; run `eval verify` again",
             sidecar.display()
         ));
     }
-    let ceiling = args.ceiling.as_deref().map(ResultFile::read).transpose()?;
     let dataset = args.dataset.as_deref().map(Dataset::open).transpose().context("cannot open the dataset")?;
     if let Some(pictures) = args.pictures.as_ref().filter(|pictures| !pictures.is_dir()) {
         bail!("'{}' is not a folder; expected a folder of pictures", pictures.display());
     }
     let plan = LeaderboardPlan {
-        results: &results,
-        ceiling: ceiling.as_ref(),
-        verified: marks,
+        results: &entries.results,
+        ceiling: entries.ceiling.as_ref(),
+        verified: entries.verified.clone(),
         protocol: &args.protocol,
         partial: args.partial,
-        errata: errata.as_ref(),
+        errata: entries.errata.as_ref(),
         pictures: args.pictures.as_deref(),
         submissions: dataset.as_ref().map(|dataset| Submissions {
             dataset,
             folders: args.submissions.clone(),
-            shown: args.strips.shown(),
+            shown: args.strips.shown_in_leaderboard(dataset),
         }),
         tool: TOOL.to_owned(),
     };

@@ -7,6 +7,7 @@ use mateval_eval::protocol::Protocol;
 use mateval_eval::score::{ScorePlan, score};
 use mateval_metrics::Net;
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::is_inside;
 use mateval_scene::{SceneId, json};
 use mateval_submission::archive::{self, Opened};
 
@@ -42,6 +43,10 @@ pub struct ScoreArgs {
     /// killed resumes].
     #[arg(long)]
     cache: Option<PathBuf>,
+    /// Compute nothing: put the result together from the scores in --cache, and fail where one is missing. For scenes that
+    /// were scored apart.
+    #[arg(long, requires = "cache")]
+    only_cached: bool,
     /// Replace result files that already exist.
     #[arg(long)]
     force: bool,
@@ -51,6 +56,14 @@ pub struct ScoreArgs {
 pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let protocols = args.protocols.iter().map(|name| Protocol::named(name)).collect::<Result<Vec<_>, _>>()?;
     let outs = args.result_paths();
+    for (place, path) in [("--out", Some(&args.out)), ("--cache", args.cache.as_ref())] {
+        if let Some(path) = path.filter(|path| is_inside(path, &args.dataset)) {
+            bail!(
+                "'{}' would lie in the dataset, whose manifest does not list it; choose another {place}",
+                path.display()
+            );
+        }
+    }
     check_results(&outs, args)?;
     let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
     let work = std::env::temp_dir();
@@ -67,6 +80,7 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         tool: TOOL.to_owned(),
         jobs: usize::from(args.jobs),
         cache: Some(&cache),
+        only_cached: args.only_cached,
         companion_cache: Some(&companions),
     };
     let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;

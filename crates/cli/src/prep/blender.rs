@@ -8,14 +8,14 @@ use mateval_prep::render::{BlenderOptions, BlenderProgram};
 
 use crate::weights::cache_folder;
 
-/// The command that installs Blender as a Python module, run from the project's folder.
-const INSTALL: &str = "tools/setup.sh";
+/// The command that installs Blender.
+const FETCH_BLENDER: &str = "mateval fetch blender";
 
 /// Arguments that concern Blender alone.
 #[derive(clap::Args, Clone, Debug)]
 pub struct BlenderArgs {
     /// Blender 4.5, or a Python with that version's `bpy` module [default: $MATEVAL_BLENDER, else the one that
-    /// tools/setup.sh installed].
+    /// `mateval fetch blender` installed].
     #[arg(long, value_name = "PATH")]
     blender: Option<PathBuf>,
     /// Number of scenes that Blender renders at once.
@@ -53,7 +53,7 @@ impl BlenderArgs {
             (None, None) => {
                 let place = installed.display();
                 bail!(
-                    "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{place}' does not exist; run: {INSTALL}"
+                    "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{place}' does not exist; run: {FETCH_BLENDER}, or give --renderer builtin"
                 );
             }
         };

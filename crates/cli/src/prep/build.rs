@@ -1,13 +1,15 @@
-//! `mateval prep build`: converts the scenes of a recipe into a dataset.
+//! `mateval prep build`: converts the scenes of a recipe into a dataset. Atlases are kept in the cache's `atlases`.
 
 use std::path::PathBuf;
 
 use anyhow::Context as _;
 use mateval_prep::build::BuildOptions;
+use mateval_scene::SceneId;
 
 use crate::bars::with_progress;
 use crate::outcome::{Outcome, print, say, say_findings};
 use crate::tool::TOOL;
+use crate::weights::cache_folder;
 
 /// Arguments of `prep build`.
 #[derive(clap::Args)]
@@ -20,7 +22,10 @@ pub struct BuildArgs {
     /// Folder that the recipe's paths are relative to [default: the recipe's folder].
     #[arg(long)]
     source: Option<PathBuf>,
-    /// Replace a dataset that already exists.
+    /// Make this scene only, and leave the files of the whole dataset to `prep finish`; may be given several times.
+    #[arg(long = "scene", value_name = "SCENE")]
+    scenes: Vec<SceneId>,
+    /// Replace a dataset that already exists; with --scene, only these scenes.
     #[arg(long)]
     force: bool,
 }
@@ -31,7 +36,9 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
         recipe: args.recipe.clone(),
         source: args.source.clone(),
         out: args.out.clone(),
+        scenes: args.scenes.clone(),
         force: args.force,
+        atlas_cache: Some(cache_folder().join("atlases")),
     };
     let report = with_progress(|progress| mateval_prep::build::build(&options, TOOL, progress))
         .context("cannot build the dataset")?;
@@ -41,6 +48,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
     for (scene, findings) in &report.findings {
         say_findings(scene.as_str(), findings);
     }
-    print(&format!("{}: {} scenes\n", args.out.display(), report.dataset.scenes.len()))?;
+    print(&format!("{}: {} scenes\n", args.out.display(), report.findings.len()))?;
+    super::finish::say_if_apart(&args.scenes, &args.out);
     Ok(Outcome::Good)
 }

@@ -19,7 +19,8 @@ pub struct CompareArgs {
     /// Compare this scene only; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
-    /// Samples per pixel of each half of the built-in tracer's pictures [default: as many as Blender's have].
+    /// Samples per pixel of each half of the built-in tracer's pictures [default: as few as leave the
+    /// decision to Blender's noise or to the bound, and at most as many as Blender's].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     samples: Option<u32>,
     /// How to print the comparison.

@@ -1,30 +1,67 @@
-//! `mateval prep publish`: a dataset as a public and a withheld folder.
+//! `mateval prep publish`: a dataset as a public and a withheld folder, and the report of its release.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use mateval_audit::publish::publish;
+use mateval_release::publication::Day;
+use mateval_release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
+use mateval_scene::work_folder::is_inside;
 
 use crate::bars::with_progress;
 use crate::outcome::{Outcome, print};
+use crate::tool::TOOL;
 
 /// Arguments of `prep publish`.
 #[derive(clap::Args)]
+#[command(group = clap::ArgGroup::new("what").args(["withhold", "report"]).required(true).multiple(true))]
 pub struct PublishArgs {
     /// Folder of the dataset, with its ground truth.
     dataset: PathBuf,
-    /// The part that the public folder leaves out.
-    #[arg(long, value_enum)]
-    withhold: Withheld,
+    /// The part that the public folder leaves out; without it the dataset is not split.
+    #[arg(long, value_enum, requires_all = ["public", "private"])]
+    withhold: Option<Withheld>,
     /// Folder for the public files: the dataset without the withheld part.
-    #[arg(long)]
-    public: PathBuf,
+    #[arg(long, requires = "withhold")]
+    public: Option<PathBuf>,
     /// Folder for the withheld files. Copied over the public folder they give the dataset again.
-    #[arg(long)]
-    private: PathBuf,
+    #[arg(long, requires = "withhold")]
+    private: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArgs,
     /// Replace folders that already exist.
     #[arg(long)]
     force: bool,
+}
+
+/// The report of a release.
+#[derive(clap::Args)]
+struct ReportArgs {
+    /// Folder for a page that describes the release. With --withhold it shows no measurement of single scenes' ground truth.
+    #[arg(long, value_name = "FOLDER")]
+    report: Option<PathBuf>,
+    /// Verdicts for the report: a file of `prep compare`, or a folder with such files in it or directly below it; may be given
+    /// several times.
+    #[arg(long, value_name = "PATH", requires = "report")]
+    verdicts: Vec<PathBuf>,
+    /// For the report: the result of the truth itself, `baseline gt`.
+    #[arg(long, value_name = "RESULT.json", requires = "report")]
+    ceiling: Option<PathBuf>,
+    /// For the report: the result of a constant estimate, `baseline grey`.
+    #[arg(long, value_name = "RESULT.json", requires = "report")]
+    floor: Option<PathBuf>,
+    /// For the report: the protocol whose scores are shown.
+    #[arg(long, default_value = "mateval-2", requires = "report")]
+    protocol: String,
+    /// For the report: the day of publication, as in 2026-11-24.
+    #[arg(long, requires = "report")]
+    date: Option<Day>,
+    /// For the report: the address of the dataset.
+    #[arg(long, requires = "report")]
+    url: Option<String>,
+    /// For the report: the authors, as in "A. Author and B. Author".
+    #[arg(long, requires = "report")]
+    authors: Option<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -34,26 +71,88 @@ enum Withheld {
     GroundTruth,
 }
 
-/// Writes both folders and prints the commitment, a hash of the withheld files.
+/// Checks what is given for the report, then splits the dataset and prints the commitment, a hash of the withheld files,
+/// then writes the report.
 pub fn run(args: &PublishArgs) -> anyhow::Result<Outcome> {
-    let Withheld::GroundTruth = args.withhold;
-    if args.public == args.private {
+    let options = release_options(args);
+    let halves = halves(args)?;
+    if let Some(options) = &options {
+        check_report(options, &halves)?;
+    }
+    let release = options.as_ref().map(CheckedRelease::new).transpose().context("cannot report on the release")?;
+    if let Some([public, private]) = halves {
+        split(args, public, private)?;
+    }
+    let Some(release) = release else { return Ok(Outcome::Good) };
+    let file = with_progress(|progress| release.write(TOOL, progress)).context("cannot report on the release")?;
+    print(&summary(args, &file))?;
+    Ok(if file.is_good() { Outcome::Good } else { Outcome::No })
+}
+
+fn release_options(args: &PublishArgs) -> Option<ReleaseOptions> {
+    let of = &args.report;
+    Some(ReleaseOptions {
+        dataset: args.dataset.clone(),
+        out: of.report.clone()?,
+        force: args.force,
+        withhold: args.withhold.is_some(),
+        verdicts: of.verdicts.clone(),
+        ceiling: of.ceiling.clone(),
+        floor: of.floor.clone(),
+        protocol: of.protocol.clone(),
+        publication: Publication { date: of.date.clone(), url: of.url.clone(), authors: of.authors.clone() },
+    })
+}
+
+/// The public and the private folder, if the dataset is to be split.
+fn halves(args: &PublishArgs) -> anyhow::Result<Option<[&PathBuf; 2]>> {
+    let (Some(public), Some(private)) = (&args.public, &args.private) else { return Ok(None) };
+    if public == private {
         bail!("--public and --private are the same folder; the ground truth would not be withheld");
     }
-    for place in [&args.public, &args.private] {
+    for place in [public, private] {
         if place.exists() && !args.force {
             bail!("'{}' already exists; choose another folder, or add --force to overwrite it", place.display());
         }
     }
-    let found = with_progress(|progress| publish(&args.dataset, &args.public, &args.private, progress))
+    Ok(Some([public, private]))
+}
+
+/// Fails where the report would lie in a folder of the split, which holds nothing but files of the dataset, or the other
+/// way round, where replacing the report would delete it.
+fn check_report(options: &ReleaseOptions, halves: &Option<[&PathBuf; 2]>) -> anyhow::Result<()> {
+    let out = options.out.as_path();
+    let lies_in = |inner: &Path, outer: &Path| inner.starts_with(outer) || is_inside(inner, outer);
+    for half in halves.iter().flatten() {
+        if lies_in(out, half) || lies_in(half, out) {
+            bail!("'{}' and '{}' would lie in each other; choose another --report", out.display(), half.display());
+        }
+    }
+    Ok(())
+}
+
+fn split(args: &PublishArgs, public: &Path, private: &Path) -> anyhow::Result<()> {
+    let found = with_progress(|progress| publish(&args.dataset, public, private, progress))
         .context("cannot publish the dataset")?;
     print(&format!(
         "{}: {} files\n{}: {} files\ncommitment {}\n",
-        args.public.display(),
+        public.display(),
         found.public_files,
-        args.private.display(),
+        private.display(),
         found.private_files,
         found.commitment_sha256
-    ))?;
-    Ok(Outcome::Good)
+    ))
+}
+
+/// One line: where the report lies, and what it states.
+fn summary(args: &PublishArgs, file: &ReleaseFile) -> String {
+    let place = args.report.report.as_ref().map(|out| out.join("index.html")).unwrap_or_default();
+    let verdict = if file.verification.sound { "sound" } else { "NOT sound" };
+    let (all, given) = (file.scenes.len(), file.comparisons().count());
+    let agree = file.comparisons().filter(|verdict| verdict.agrees).count();
+    let compared = match given {
+        0 => "no scene compared".to_owned(),
+        _ => format!("renderers agree on {agree} of {given} compared scenes"),
+    };
+    format!("{}: {all} scenes, {verdict}; {compared}\n", place.display())
 }

@@ -21,7 +21,7 @@ pub struct RenderArgs {
     /// Samples per pixel of each of the two halves of a picture [default: the recipe's].
     #[arg(long)]
     samples: Option<u32>,
-    /// Render this scene only; may be given several times.
+    /// Render this scene only, and leave the manifest to `prep finish`; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
     scenes: Vec<SceneId>,
     /// Render pictures again that already exist.
@@ -32,9 +32,9 @@ pub struct RenderArgs {
 /// Which program renders, and how.
 #[derive(clap::Args, Clone)]
 pub struct RendererArgs {
-    /// The renderer.
-    #[arg(long, default_value = RendererKind::Builtin.name(), value_parser = renderer_parser())]
-    renderer: RendererKind,
+    /// The renderer [default: builtin; of the demo: blender].
+    #[arg(long, value_parser = renderer_parser())]
+    renderer: Option<RendererKind>,
     #[command(flatten)]
     blender: BlenderArgs,
 }
@@ -46,9 +46,15 @@ fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
 }
 
 impl RendererArgs {
+    /// These arguments, with `default` where no renderer was named.
+    pub fn or(mut self, default: RendererKind) -> Self {
+        self.renderer.get_or_insert(default);
+        self
+    }
+
     /// The renderer; fails where Blender is to render and cannot be found.
     pub fn checked(&self) -> anyhow::Result<Renderer> {
-        Ok(match self.renderer {
+        Ok(match self.renderer.unwrap_or(RendererKind::Builtin) {
             RendererKind::Builtin => Renderer::Builtin,
             RendererKind::Blender => Renderer::Blender(self.blender.options()?),
         })
@@ -68,6 +74,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
         say(&failure.to_string());
     }
     print(&format!("{}: {} views rendered, {} kept\n", args.dataset.display(), report.rendered, report.kept))?;
+    super::finish::say_if_apart(&args.scenes, &args.dataset);
     if !report.failures.is_empty() {
         bail!("{} scenes could not be rendered; all others were rendered", report.failures.len());
     }

@@ -6,9 +6,10 @@ use anyhow::{Context as _, bail};
 use mateval_audit::stats;
 use mateval_image::store::write_whole;
 use mateval_scene::json;
-use mateval_scene::open::Dataset;
+use mateval_scene::work_folder::is_inside;
 
 use crate::format::Format;
+use crate::open_dataset::open_dataset;
 use crate::outcome::{Outcome, print};
 use crate::output_file::check_output_file;
 use crate::tool::TOOL;
@@ -34,7 +35,7 @@ pub fn run(args: &StatsArgs) -> anyhow::Result<Outcome> {
     if let Some(picture) = &args.picture {
         check_picture(picture, &args.dataset, args.force)?;
     }
-    let dataset = Dataset::open(&args.dataset).context("cannot open the dataset")?;
+    let dataset = open_dataset(&args.dataset)?;
     let counted = stats::count(&dataset, TOOL).context("cannot count the dataset")?;
     if let Some(picture) = &args.picture {
         write_whole(picture, stats::picture::picture(&counted).as_bytes())?;
@@ -49,9 +50,7 @@ pub fn run(args: &StatsArgs) -> anyhow::Result<Outcome> {
 
 /// The dataset's manifest would not list a chart in its folder, so there must be none.
 fn check_picture(picture: &Path, dataset: &Path, force: bool) -> anyhow::Result<()> {
-    let folder = picture.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let in_dataset = |folder: PathBuf| dataset.canonicalize().is_ok_and(|dataset| folder.starts_with(dataset));
-    if folder.canonicalize().is_ok_and(in_dataset) {
+    if is_inside(picture, dataset) {
         let shown = picture.display();
         bail!("'{shown}' would lie in the dataset, whose manifest does not list it; choose another --picture");
     }

@@ -2,7 +2,8 @@
 //!
 //! `MATEVAL_PEERS_PYTHON=... cargo bench --workspace --bench whole_room -- DATASET SCENE SUBMISSION [full]`;
 //! `tools/bench_whole_room.sh` makes all three arguments from the shared data and runs the bench. Ours: `score` under
-//! protocol `mateval-2` with track `fitted` in place of `relit`, from opening the dataset to the result. Theirs, by
+//! protocol `mateval-2` with track `fitted` in place of `relit`, from opening the dataset to the result, apart from the
+//! companions, which are made once for a dataset and are shown apart. Theirs, by
 //! `tests/peers/score_room_mitsuba.py`: both tracks' five views by Mitsuba, radiances fitted by `prb` and Adam, albedo
 //! by its `aov`; MSE, PSNR and SSIM by scikit-image and LPIPS by `lpips`, for both tracks and for albedo, raw and
 //! aligned. Theirs has no track `relit`, no texture space, no roughness and metallic, no specular regions and no

@@ -7,6 +7,7 @@ use cpu_time::ProcessTime;
 use mateval_eval::result::ResultFile;
 use mateval_eval::score::{LpipsWeights, ScorePlan, score as score_plan};
 use mateval_metrics::{Lpips, Net};
+use mateval_scene::Report;
 use mateval_scene::open::Dataset;
 
 use crate::Run;
@@ -30,13 +31,15 @@ pub fn score(room: &Room) -> (Run, ResultFile) {
         tool: "whole_room".to_owned(),
         jobs: 1,
         cache: None,
+        only_cached: false,
         companion_cache: None,
     };
     let prefix = format!("scene {}: ", room.scene.id);
-    let report = |step: &str, done: usize, all: usize| {
-        let step = step.strip_prefix(&prefix).unwrap_or(step);
+    let report = |report: Report<'_>| {
+        let Report::Step { name, done, total } = report else { return };
+        let step = name.strip_prefix(&prefix).unwrap_or(name);
         // After a finished step follows work that reports no progress.
-        clock.enter(&if done < all { step.to_owned() } else { format!("after {step}") });
+        clock.enter(&if done < total { step.to_owned() } else { format!("after {step}") });
     };
     let result = score_plan(&plan, &report).unwrap().remove(0);
     (Run { stages: clock.stop(), pictures: Default::default() }, result)

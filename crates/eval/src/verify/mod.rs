@@ -59,6 +59,7 @@ fn scored_again(plan: VerifyPlan<'_>, result: &ResultFile, progress: Progress<'_
         tool: result.tool.clone(),
         jobs: plan.jobs,
         cache: None,
+        only_cached: false,
         companion_cache: plan.companion_cache,
     };
     Ok(score(&plan, progress)?.remove(0))

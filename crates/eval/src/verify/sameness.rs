@@ -82,7 +82,7 @@ fn weights(
         LpipsWeights::Loaded(lpips) if lpips.sha256() == said => Ok(None),
         LpipsWeights::Loaded(lpips) => {
             let message = format!("made with weights {said}; those here are {}", lpips.sha256());
-            let action = "fetch the published weights: python3 tools/fetch_lpips_weights.py";
+            let action = "fetch the published weights: mateval fetch lpips";
             Ok(Some(finding("other_weights", "/lpips_weights/alex", message, action)))
         }
     }

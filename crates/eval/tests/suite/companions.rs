@@ -9,8 +9,8 @@ use mateval_eval::dataset_companions::{CompanionsReport, make_companions};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::PictureValue;
 use mateval_eval::score::{ScorePlan, score};
-use mateval_scene::SceneId;
 use mateval_scene::open::Dataset;
+use mateval_scene::{Report, SceneId};
 use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 use super::sample::{dataset, hasty, plan, write_grey};
@@ -34,9 +34,9 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
 /// The scores of a submission, and what was said meanwhile about pictures that were not used or not kept.
 fn scores(dataset: &Dataset, submission: &Path, cache: Option<&Path>) -> (Vec<PictureValue>, Vec<String>) {
     let said = Mutex::new(Vec::new());
-    let progress = |what: &str, _: usize, _: usize| {
-        if what.contains("companions not used") || what.contains("companions cannot") {
-            said.lock().unwrap().push(what.to_owned());
+    let progress = |report: Report<'_>| {
+        if let Report::Message(text) = report {
+            said.lock().unwrap().push(text.to_owned());
         }
     };
     let protocol = hasty();
@@ -53,7 +53,9 @@ fn same_scores(dataset: &Dataset, cache: Option<&Path>) -> Vec<String> {
 }
 
 fn make(root: &Path, protocol: &Protocol) -> CompanionsReport {
-    make_companions(root, &[SceneId::new(SCENE).unwrap()], protocol, &|_, _, _| ()).unwrap()
+    let report = make_companions(root, &[SceneId::new(SCENE).unwrap()], protocol, &|_| ()).unwrap();
+    mateval_prep::finish::finish_again(root, &|_| ()).unwrap();
+    report
 }
 
 /// A copy of the dataset.

@@ -106,7 +106,7 @@ fn quick() -> Protocol {
 fn scores(protocol: &Protocol) -> Value {
     let mut protocol = protocol.clone();
     protocol.light.tracks.clear();
-    let results = score(&plan(&[&GREY], &protocol, &["room"]), &|_, _, _| ()).unwrap();
+    let results = score(&plan(&[&GREY], &protocol, &["room"]), &|_| ()).unwrap();
     let mut protocols = serde_json::to_value(&results[0].protocols).unwrap();
     for result in protocols.as_object_mut().unwrap().values_mut() {
         for key in ["protocol", "fingerprint"] {
@@ -175,7 +175,7 @@ fn refusal(protocol: &Protocol) -> Value {
 fn light(protocol: &Protocol) -> Value {
     let mut protocol = protocol.clone();
     protocol.light.noise.most_samples = protocol.light.noise.least_samples;
-    let results = score(&plan(&[&GREY], &protocol, &["living"]), &|_, _, _| ()).unwrap();
+    let results = score(&plan(&[&GREY], &protocol, &["living"]), &|_| ()).unwrap();
     let result = results[0].protocols.values().next().unwrap();
     let lit = result.summary.iter().filter(|(key, _)| key.to_string().starts_with("rgb_"));
     json!([lit.collect::<Vec<_>>(), result.fits, result.noise])

@@ -26,6 +26,7 @@ pub fn plan<'a>(submissions: &[&'a Path], protocol: &Protocol, scenes: &[&str]) 
         tool: "test".to_owned(),
         jobs: 1,
         cache: None,
+        only_cached: false,
         companion_cache: None,
     }
 }
@@ -43,7 +44,7 @@ pub fn hasty() -> Protocol {
 
 /// Scores without reporting progress.
 pub fn scored(plan: &ScorePlan<'_>) -> Vec<ResultFile> {
-    score(plan, &|_, _, _| ()).unwrap()
+    score(plan, &|_| ()).unwrap()
 }
 
 /// The text of `RESULT.json`.

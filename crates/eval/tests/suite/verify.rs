@@ -35,11 +35,12 @@ static SCORED: LazyLock<Scored> = LazyLock::new(|| {
         scenes: Vec::new(),
         lpips: missing(),
         tool: "test".to_owned(),
+        only_cached: false,
         companion_cache: None,
         jobs: 1,
         cache: None,
     };
-    let result = score(&plan, &|_, _, _| ()).unwrap().remove(0);
+    let result = score(&plan, &|_| ()).unwrap().remove(0);
     Scored { submission, result: serde_json::to_value(result).unwrap(), dataset }
 });
 
@@ -60,7 +61,7 @@ fn verified(result: &Value, submission: &Path) -> VerificationFile {
         companion_cache: None,
         jobs: 1,
     };
-    verify(plan, &|_, _, _| ()).unwrap()
+    verify(plan, &|_| ()).unwrap()
 }
 
 /// Code and place of all findings of a result that is not confirmed.

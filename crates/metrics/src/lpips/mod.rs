@@ -44,7 +44,7 @@ pub struct Lpips {
 }
 
 impl Lpips {
-    /// Reads the weights that `tools/fetch_lpips_weights.py` wrote.
+    /// Reads the weights that `mateval fetch lpips` wrote.
     ///
     /// Fails if the file cannot be read, its hash is not the expected one, or it does not fit the network.
     pub fn load(net: Net, path: &Path) -> Result<Self, MetricError> {

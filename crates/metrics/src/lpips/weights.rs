@@ -1,4 +1,4 @@
-//! Reads the weights file that `tools/fetch_lpips_weights.py` writes.
+//! Reads the weights file that `mateval fetch lpips` writes.
 //!
 //! A safetensors file of little-endian `f32`: `convN.weight` [out, in, height, width], `convN.bias` [out],
 //! `linN.weight` [channels], N from 1.
@@ -129,7 +129,7 @@ mod tests {
         let path = folder.path().join("weights.safetensors");
         let error = load(Net::Alex, &path).unwrap_err();
         assert!(matches!(error, MetricError::WeightsIo { .. }));
-        assert!(error.to_string().contains("tools/fetch_lpips_weights.py"));
+        assert!(error.to_string().contains("mateval fetch lpips"));
         std::fs::write(&path, file(&good())).unwrap();
         assert!(matches!(load(Net::Alex, &path), Err(MetricError::WeightsHash { .. })));
     }
@@ -137,7 +137,7 @@ mod tests {
     /// The tool that writes the files and the code that reads them agree on names and hashes.
     #[test]
     fn the_tool_has_the_same_names_and_hashes() {
-        let tool = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tools/fetch_lpips_weights.py");
+        let tool = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cli/src/fetch/lpips_weights.py");
         let tool = std::fs::read_to_string(tool).unwrap();
         for net in [Net::Alex, Net::Vgg] {
             assert!(tool.contains(&format!("\"{}\"", net.file_name())));

@@ -7,7 +7,7 @@ Run it where these are installed, on the CPU:
     python3 make_vectors.py
 
 The pictures are generated here again from the same integers as in mod.rs; their SHA-256 in vectors.json ties the two
-together. The networks of lpips get the weights that tools/fetch_lpips_weights.py writes, which hold its linear layers
+together. The networks of lpips get the weights that `mateval fetch lpips` writes, which hold its linear layers
 too, so that nothing is downloaded. vectors.json changes only together with mod.rs or with a version below.
 """
 

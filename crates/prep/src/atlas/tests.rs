@@ -1,6 +1,6 @@
 //! Atlases do not overlap, keep their gutters and cover every triangle.
 
-use glam::Vec3;
+use glam::{Quat, Vec2, Vec3};
 use proptest::prelude::*;
 
 use super::*;
@@ -20,26 +20,6 @@ pub(crate) fn cuboid(size: Vec3) -> TriangleMesh {
 fn texels_of(unwrapped: &Unwrapped, triangle: usize) -> [Vec2; 3] {
     let uvs = unwrapped.mesh.uvs.as_ref().unwrap();
     unwrapped.mesh.triangles[triangle].map(|v| uvs[v as usize] * unwrapped.size as f32)
-}
-
-/// The threads of xatlas can miss their last wake-up and hang, so `.cargo/config.toml` builds it without threads. A thread
-/// has the name of the thread that started it.
-#[cfg(target_os = "linux")]
-#[test]
-fn xatlas_has_no_threads_of_its_own() {
-    let named = |name: &str| {
-        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
-        let names = tasks.filter_map(|task| std::fs::read_to_string(task.unwrap().path().join("comm")).ok());
-        names.filter(|found| found.trim() == name).count()
-    };
-    let count = move || {
-        let atlas = Xatlas::new();
-        let count = named("unwraps-alone");
-        drop(atlas);
-        count
-    };
-    let alone = std::thread::Builder::new().name("unwraps-alone".into()).spawn(count).unwrap();
-    assert_eq!(alone.join().unwrap(), 1);
 }
 
 #[test]
@@ -124,11 +104,30 @@ fn the_result_is_deterministic() {
     assert_eq!(unwrap_once().mesh, unwrap_once().mesh);
 }
 
+/// Charts are cut and packed for the shape, so that all copies have the same uv, and each stands in its own place.
+#[test]
+fn copies_share_their_layout() {
+    let shape = cells(30, 0.4, 0.2);
+    let moved = |angle: f32| {
+        let positions = shape.positions.iter().map(|p| Quat::from_rotation_y(angle) * *p + Vec3::X).collect();
+        TriangleMesh { positions, ..shape.clone() }
+    };
+    let copies = [moved(0.3), moved(1.2)];
+    let [fixed, fine, coarse] = [SizeWish::Fixed(256), SizeWish::Texel(0.004), SizeWish::Texel(0.1)];
+    let wanted = [(0, fixed), (1, fixed), (0, fine), (1, coarse)].map(|(at, size)| Wanted { mesh: &copies[at], size });
+    let made: Vec<Unwrapped> = unwrap_copies(&shape, &wanted, None).into_iter().map(Result::unwrap).collect();
+    assert_eq!(made[0].mesh.uvs, made[1].mesh.uvs);
+    for (unwrapped, Wanted { mesh, .. }) in made.iter().zip(wanted) {
+        assert!((0..mesh.triangles.len()).all(|at| unwrapped.mesh.corners(at) == mesh.corners(at)));
+    }
+    assert!(made[2].size > made[3].size, "each has the size that it asks for");
+}
+
 /// A sheet of cells, each separate from its neighbours and turned in another direction, so that each is a chart.
 fn cells(count: u32, length: f32, width: f32) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
     for at in 0..count {
-        let (first, turn) = (4 * at, glam::Quat::from_rotation_y(0.7 * at as f32));
+        let (first, turn) = (4 * at, Quat::from_rotation_y(0.7 * at as f32));
         let corner = |x: f32, z: f32| turn * Vec3::new(x, 0.0, z) + Vec3::Y * (at as f32 * 0.1);
         mesh.positions.extend([corner(0.0, 0.0), corner(0.0, width), corner(length, width), corner(length, 0.0)]);
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);

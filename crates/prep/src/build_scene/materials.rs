@@ -1,15 +1,17 @@
 //! Unwraps every instance and bakes its material.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_image::{Picture, Texture, png_io};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::submission::Map;
-use mateval_scene::{Finding, Progress, Severity, TriangleMesh};
+use mateval_scene::{Finding, Progress, Report, Severity};
 use rayon::prelude::*;
 
 use super::plan::Plan;
-use crate::atlas::{AtlasError, SizeWish, Unwrapped, unwrap};
+use crate::atlas::cache::{AtlasCache, ShapeKey};
+use crate::atlas::{AtlasError, SizeWish, Unwrapped, Wanted, unwrap_copies};
 use crate::bake::{Baked, BakedMaterial, bake};
 use crate::error::PrepError;
 use crate::instances::InstanceEntry;
@@ -21,98 +23,155 @@ pub(super) struct InstanceAtlas {
     findings: Vec<Finding>,
 }
 
-/// Unwraps every instance and bakes its material, in parallel. `nearest` holds the depth at which each instance is seen.
+/// The wanted sizes of a scene's atlases.
+pub(super) struct AtlasSizes<'a> {
+    /// Texels a side, where the recipe states them. Otherwise a texel is at most half a pixel of the input view.
+    pub(super) fixed: Option<u32>,
+    /// The depth at which each instance is seen in metres; none where no view shows it.
+    pub(super) nearest: &'a [Option<f64>],
+}
+
+/// Unwraps every instance and bakes its material, in parallel.
 pub(super) fn write(
     plan: &mut Plan,
     folder: &SceneFolder,
-    fixed_size: Option<u32>,
-    nearest: &[Option<f64>],
+    sizes: &AtlasSizes<'_>,
+    cache: Option<&AtlasCache>,
     progress: Progress<'_>,
 ) -> Result<Vec<InstanceAtlas>, PrepError> {
+    let atlases = unwrap_all(plan, sizes, cache, progress);
+    for remark in cache.map(AtlasCache::finish).unwrap_or_default() {
+        progress(Report::Message(&remark));
+    }
     let textures = plan.scene.texture_list();
-    let focal = plan.views[0].camera.intrinsics.fx;
-    let (done, all) = (AtomicUsize::new(0), plan.instances.len());
+    let (done, all) = (AtomicUsize::new(0), atlases.len());
     let shown: &Plan = plan;
-    let atlases = (0..all)
+    let atlases = atlases
         .into_par_iter()
-        .map(|at| {
-            let half_pixel_m = nearest[at].map(|depth| 0.5 * depth / focal);
-            let atlas = write_instance(shown, folder, at, &textures, fixed_size, half_pixel_m);
-            progress("atlases", done.fetch_add(1, Ordering::Relaxed) + 1, all);
-            atlas
+        .enumerate()
+        .map(|(at, atlas)| {
+            let baked = bake_instance(shown, folder, at, &textures, atlas);
+            progress(Report::step("textures", done.fetch_add(1, Ordering::Relaxed) + 1, all));
+            baked
         })
         .collect::<Result<Vec<_>, PrepError>>()?;
     plan.findings.extend(atlases.iter().flat_map(|atlas| atlas.findings.clone()));
     Ok(atlases)
 }
 
-fn write_instance(
+/// The atlas of every instance that has an appearance. Copies of a shape are unwrapped at once, and shapes with most
+/// triangles first, so that none of them is left for the end.
+fn unwrap_all(
+    plan: &Plan,
+    sizes: &AtlasSizes<'_>,
+    cache: Option<&AtlasCache>,
+    progress: Progress<'_>,
+) -> Vec<InstanceAtlas> {
+    let wishes: Vec<(SizeWish, Option<f64>)> = (0..plan.instances.len()).map(|at| wish(plan, sizes, at)).collect();
+    let shapes = copies_of_shapes(plan);
+    let (done, all) = (AtomicUsize::new(0), shapes.iter().map(Vec::len).sum());
+    let unwrap = |copies: &Vec<usize>| {
+        let wanted: Vec<Wanted<'_>> =
+            copies.iter().map(|at| Wanted { mesh: &plan.scene.surfaces[*at].mesh, size: wishes[*at].0 }).collect();
+        let unwrapped = unwrap_copies(plan.shape(copies[0]), &wanted, cache);
+        progress(Report::step("atlases", done.fetch_add(copies.len(), Ordering::Relaxed) + copies.len(), all));
+        copies.iter().copied().zip(unwrapped).collect::<Vec<_>>()
+    };
+    // The bridge hands out one shape after the other in order, not halves of the list.
+    let mut unwrapped: BTreeMap<usize, _> = shapes.iter().par_bridge().flat_map_iter(unwrap).collect();
+    let of_instance = |at: usize| {
+        let half_pixel_m = wishes[at].1;
+        match unwrapped.remove(&at) {
+            Some(made) => instance_atlas(plan, at, wishes[at], made),
+            None => InstanceAtlas { unwrapped: None, half_pixel_m, findings: Vec::new() },
+        }
+    };
+    (0..plan.instances.len()).map(of_instance).collect()
+}
+
+/// The instances that have an appearance, by their shape; those of the shapes with most triangles first.
+fn copies_of_shapes(plan: &Plan) -> Vec<Vec<usize>> {
+    let has_appearance = |at: &usize| plan.scene.materials[plan.scene.surfaces[*at].material.0].has_appearance();
+    let seen: Vec<usize> = (0..plan.instances.len()).filter(has_appearance).collect();
+    let keys: Vec<ShapeKey> = seen.par_iter().map(|at| ShapeKey::of(plan.shape(*at))).collect();
+    let mut shapes: BTreeMap<ShapeKey, Vec<usize>> = BTreeMap::new();
+    for (at, key) in seen.into_iter().zip(keys) {
+        shapes.entry(key).or_default().push(at);
+    }
+    let mut shapes: Vec<Vec<usize>> = shapes.into_values().collect();
+    shapes.sort_by_key(|copies| std::cmp::Reverse(plan.shape(copies[0]).triangles.len()));
+    shapes
+}
+
+/// The wanted size of an instance's atlas, and half a pixel of the input view at its depth in metres. An instance that no
+/// view shows gets the least size.
+fn wish(plan: &Plan, sizes: &AtlasSizes<'_>, at: usize) -> (SizeWish, Option<f64>) {
+    let focal = plan.views[0].camera.intrinsics.fx;
+    let half_pixel_m = sizes.nearest[at].map(|depth| 0.5 * depth / focal);
+    let wish = match (sizes.fixed, half_pixel_m) {
+        (Some(size), _) => SizeWish::Fixed(size),
+        (None, Some(texel_m)) => SizeWish::Texel(texel_m),
+        (None, None) => SizeWish::Texel(f64::INFINITY),
+    };
+    (wish, half_pixel_m)
+}
+
+/// An instance with its atlas, and what is to be said of it.
+fn instance_atlas(
+    plan: &Plan,
+    at: usize,
+    (wish, half_pixel_m): (SizeWish, Option<f64>),
+    made: Result<Unwrapped, AtlasError>,
+) -> InstanceAtlas {
+    let instance = &plan.instances[at];
+    let finding = |code: &str, message: &str| atlas_finding(plan, instance, code, message);
+    let unwrapped = match made {
+        Ok(unwrapped) => unwrapped,
+        Err(error) => {
+            let findings = vec![finding("no_atlas", &error.to_string())];
+            return InstanceAtlas { unwrapped: None, half_pixel_m, findings };
+        }
+    };
+    let mut findings = Vec::new();
+    match wish {
+        SizeWish::Fixed(size) if unwrapped.size != size => {
+            let error = AtlasError::DoesNotFit { charts: unwrapped.charts, size };
+            findings.push(finding("atlas_grown", &format!("{error}; its atlas is {0}x{0}", unwrapped.size)));
+        }
+        SizeWish::Texel(texel_m) if unwrapped.texel_m > texel_m * COARSE => {
+            let message = format!(
+                "at {0}x{0} texels a texel is {1:.5} m, half a pixel of the input view {texel_m:.5} m",
+                unwrapped.size, unwrapped.texel_m
+            );
+            findings.push(finding("coarse_atlas", &message));
+        }
+        _ => {}
+    }
+    if unwrapped.unmapped > 0 {
+        let all = unwrapped.mesh.triangles.len();
+        let message = format!("{} of {all} triangles have no area in its atlas", unwrapped.unmapped);
+        findings.push(finding("unmapped_triangles", &message));
+    }
+    InstanceAtlas { unwrapped: Some(unwrapped), half_pixel_m, findings }
+}
+
+/// Bakes an instance's material to its atlas, if it has one.
+fn bake_instance(
     plan: &Plan,
     folder: &SceneFolder,
     at: usize,
     textures: &[Texture],
-    fixed_size: Option<u32>,
-    half_pixel_m: Option<f64>,
+    mut atlas: InstanceAtlas,
 ) -> Result<InstanceAtlas, PrepError> {
     let (instance, surface) = (&plan.instances[at], &plan.scene.surfaces[at]);
     let material = &plan.scene.materials[surface.material.0];
-    let mut atlas = InstanceAtlas { unwrapped: None, half_pixel_m, findings: Vec::new() };
-    if !material.has_appearance() {
-        return Ok(atlas);
-    }
-    let (unwrapped, remark) = match unwrap_at_wanted_size(&surface.mesh, fixed_size, half_pixel_m) {
-        Ok(unwrapped) => unwrapped,
-        Err(error) => {
-            atlas.findings.push(atlas_finding(plan, instance, "no_atlas", &error.to_string()));
-            return Ok(atlas);
-        }
-    };
-    atlas.findings.extend(remark.map(|(code, what)| atlas_finding(plan, instance, code, &what)));
-    if unwrapped.unmapped > 0 {
-        let what =
-            format!("{} of {} triangles have no area in its atlas", unwrapped.unmapped, surface.mesh.triangles.len());
-        atlas.findings.push(atlas_finding(plan, instance, "unmapped_triangles", &what));
-    }
-    if let Some(baked) = bake(&unwrapped, &surface.mesh, material, textures) {
+    if let Some(unwrapped) = &atlas.unwrapped
+        && let Some(baked) = bake(unwrapped, &surface.mesh, material, textures)
+    {
         write_material(folder, instance, unwrapped.size, &baked)?;
         atlas.findings.extend(clipped_finding(plan, instance, &baked));
     }
-    atlas.unwrapped = Some(unwrapped);
     Ok(atlas)
-}
-
-type Remark = Option<(&'static str, String)>;
-
-/// Unwraps at the recipe's size, or so that a texel is at most half a pixel of the input view. An instance that no view shows
-/// gets the least size. If its charts do not fit into the recipe's size, it gets the least power of two that they fit into.
-fn unwrap_at_wanted_size(
-    mesh: &TriangleMesh,
-    fixed_size: Option<u32>,
-    half_pixel_m: Option<f64>,
-) -> Result<(Unwrapped, Remark), AtlasError> {
-    // So coarse that only the number of charts and their gutters decide the size.
-    let least = SizeWish::Texel(mesh.area().sqrt().max(f64::MIN_POSITIVE));
-    let unwrapped = match fixed_size {
-        Some(size) => match unwrap(mesh, SizeWish::Fixed(size)) {
-            Err(error @ AtlasError::DoesNotFit { .. }) => {
-                let unwrapped = unwrap(mesh, least)?;
-                let remark = ("atlas_grown", format!("{error}; its atlas is {0}x{0}", unwrapped.size));
-                return Ok((unwrapped, Some(remark)));
-            }
-            other => other?,
-        },
-        None => unwrap(mesh, half_pixel_m.map_or(least, SizeWish::Texel))?,
-    };
-    let coarse = fixed_size.is_none() && half_pixel_m.is_some_and(|wish| unwrapped.texel_m > wish * COARSE);
-    let remark = coarse.then(|| {
-        let wish = half_pixel_m.unwrap_or_default();
-        let what = format!(
-            "at {0}x{0} texels a texel is {1:.5} m, half a pixel of the input view {wish:.5} m",
-            unwrapped.size, unwrapped.texel_m
-        );
-        ("coarse_atlas", what)
-    });
-    Ok((unwrapped, remark))
 }
 
 /// A texel that exceeds half a pixel by more than this factor is a finding.

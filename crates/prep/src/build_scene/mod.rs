@@ -13,12 +13,14 @@ use std::path::Path;
 
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::reference::Surface;
-use mateval_scene::{Progress, reference_io};
+use mateval_scene::{Progress, Report, reference_io};
 use mateval_sources::source_scene::LicenceText;
 
+use crate::atlas::cache::AtlasCache;
 use crate::error::PrepError;
 use crate::recipe::{Recipe, RecipeScene};
 use fault::{PinFault, SceneFault};
+use materials::AtlasSizes;
 use plan::Plan;
 
 /// The facts about a finished scene that its folder does not hold.
@@ -30,16 +32,17 @@ pub struct Built {
     pub absent: Vec<String>,
 }
 
-/// Makes the scene in `folder` from its source below `source`.
+/// Makes the scene in `folder` from its source below `source`. Atlases are taken from the cache where it holds them.
 pub fn build(
     recipe: &Recipe,
     entry: &RecipeScene,
     source: &Path,
     folder: &SceneFolder,
+    cache: Option<&AtlasCache>,
     progress: Progress<'_>,
 ) -> Result<Built, PrepError> {
     // The source, with numbered instances and parts.
-    progress("read the source", 0, 1);
+    progress(Report::step("read the source", 0, 1));
     let read = source::read(recipe, entry, source)?;
     let licence = read.licence.clone();
     let (mut plan, absent) = plan::plan(recipe, entry, source, read)?;
@@ -50,8 +53,8 @@ pub fn build(
     let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
     let expected: Vec<bool> = plan.scene.surfaces.iter().map(has_appearance).collect();
     let mut seen = view_pictures::write(&plan, folder, &expected, progress)?.or_refuse(&entry.id)?;
-    let atlas_size = entry.atlas_size.or(recipe.atlas_size);
-    let atlases = materials::write(&mut plan, folder, atlas_size, &seen.nearest, progress)?;
+    let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };
+    let atlases = materials::write(&mut plan, folder, &sizes, cache, progress)?;
     let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
     if scored != expected {
         // An instance without an atlas cannot be scored, so its pixels must not be valid.

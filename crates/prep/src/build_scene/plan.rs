@@ -1,12 +1,13 @@
 //! Plans a scene: its instances, parts and views, before anything is written.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use mateval_scene::dataset::{TrueMaterials, View};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::source_materials::SourceMaterials;
-use mateval_scene::{Finding, SceneLights, SourceKind};
+use mateval_scene::{Finding, SceneLights, SourceKind, TriangleMesh};
 use mateval_sources::source_scene::SourceScene;
 
 use super::fault::SceneFault;
@@ -28,10 +29,12 @@ pub(super) struct Plan {
     /// Whether the source states roughness and metallic.
     pub(super) states_roughness: bool,
     pub(super) states_metallic: bool,
-    pub(super) scene: std::sync::Arc<ReferenceScene>,
+    pub(super) scene: Arc<ReferenceScene>,
     /// The source's own materials, where they were converted.
     pub(super) source_materials: Option<SourceMaterials>,
     pub(super) instances: Vec<InstanceEntry>,
+    /// The shape that each instance is a copy of, where the source moves copies of a model.
+    pub(super) shapes: Vec<Option<Arc<TriangleMesh>>>,
     /// The source's own parts first.
     pub(super) part_splits: Vec<PartSplit>,
     pub(super) views: Vec<View>,
@@ -40,6 +43,16 @@ pub(super) struct Plan {
     pub(super) file: String,
     /// Every file read and its SHA-256; sorted.
     pub(super) files: Vec<(String, String)>,
+}
+
+impl Plan {
+    /// The mesh before it was moved to its place, if it is known and still the same one; otherwise the mesh itself.
+    pub(super) fn shape(&self, instance: usize) -> &TriangleMesh {
+        let mesh = &self.scene.surfaces[instance].mesh;
+        let is_same =
+            |shape: &&TriangleMesh| shape.triangles == mesh.triangles && shape.positions.len() == mesh.positions.len();
+        self.shapes[instance].as_deref().filter(is_same).unwrap_or(mesh)
+    }
 }
 
 /// Numbers the instances and parts of a scene that was read, and places its cameras. Returns also the files that were
@@ -73,9 +86,10 @@ pub(super) fn plan(
         lights,
         states_roughness,
         states_metallic,
-        scene: std::sync::Arc::new(scene),
+        scene: Arc::new(scene),
         source_materials,
         instances,
+        shapes: read.origins.into_iter().map(|origin| origin.shape).collect(),
         part_splits,
         views,
         findings,

@@ -12,13 +12,10 @@ use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
 use mateval_sources::bitterli;
-use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules};
+use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 use mateval_tracer::World;
-
-/// The size of a room's pictures if the recipe states none.
-const DEFAULT_RESOLUTION: [u32; 2] = [480, 270];
 
 /// Reads the scene; paths are relative to `root`.
 pub(super) fn read(recipe: &Recipe, entry: &RecipeScene, root: &Path) -> Result<SourceScene, PrepError> {
@@ -115,7 +112,7 @@ fn room_camera(
     world: &World,
     room: usize,
 ) -> Result<Camera, SceneFault> {
-    let resolution = entry.resolution.or(recipe.resolution).unwrap_or(DEFAULT_RESOLUTION);
+    let resolution = entry.resolution.or(recipe.resolution).unwrap_or(recipe.camera_rules.resolution());
     match &entry.camera {
         None => Err(RecipeSceneFault::NoCamera.into()),
         Some(RecipeCamera::Given(given)) => given_camera(given, resolution),
@@ -129,9 +126,10 @@ fn room_camera(
         }
         Some(RecipeCamera::Seed { seed, fov_y_deg }) => {
             let [width, height] = resolution;
+            let fov_y_deg = fov_y_deg.unwrap_or(recipe.camera_rules.fov_y_deg());
             let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
             let turns: Vec<[f64; 2]> = recipe.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
-            let rules = SamplerRules::default();
+            let rules = recipe.camera_rules.sampler_rules();
             let sampler = RoomSampler::new(house, world, room);
             let found = sampler.and_then(|sampler| sampler.sample(intrinsics, &turns, &rules, *seed));
             Ok(found?.camera)

@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::png_io;
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
-use mateval_scene::{Finding, Progress, SceneId, Severity, ViewId};
+use mateval_scene::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_tracer::World;
 
 use super::fault::SceneFault;
@@ -51,14 +51,14 @@ pub(super) fn write(
     let mut in_input = vec![None; plan.instances.len()];
     let mut elsewhere = vec![None; plan.instances.len()];
     for (at, view) in plan.views.iter().enumerate() {
-        progress("views", at, plan.views.len());
+        progress(Report::step("views", at, plan.views.len()));
         let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
         check_use(plan, &view.id, &geometry, &mut seen);
         write_view(folder, &view.id, &geometry, &truth)?;
         write_parts(&folder.view(&view.id), &geometry, &parts)?;
     }
-    progress("views", plan.views.len(), plan.views.len());
+    progress(Report::step("views", plan.views.len(), plan.views.len()));
     seen.nearest = in_input.into_iter().zip(elsewhere).map(|(first, other)| first.or(other)).collect();
     Ok(seen)
 }

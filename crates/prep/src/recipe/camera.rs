@@ -4,9 +4,6 @@ use serde::Deserialize;
 
 use super::limits::FARTHEST_M;
 
-/// Vertical field of view of drawn cameras, in degrees, where the recipe states none.
-pub const DRAWN_FOV_Y_DEG: f64 = 45.0;
-
 /// The input camera of a scene.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(try_from = "CameraWords")]
@@ -17,8 +14,8 @@ pub enum RecipeCamera {
     Seed {
         /// The seed of the draw.
         seed: u64,
-        /// Vertical field of view in degrees.
-        fov_y_deg: f64,
+        /// Vertical field of view in degrees; if absent, that of the recipe's camera rules.
+        fov_y_deg: Option<f64>,
     },
     /// A designer's camera, by its number. It keeps its field of view.
     Designer(usize),
@@ -66,7 +63,7 @@ impl TryFrom<CameraWords> for RecipeCamera {
                 designer: None,
             } => Ok(Self::Given(GivenCamera { position, target, fov_y_deg })),
             CameraWords { position: None, target: None, fov_y_deg, seed: Some(seed), designer: None } => {
-                Ok(Self::Seed { seed, fov_y_deg: fov_y_deg.unwrap_or(DRAWN_FOV_Y_DEG) })
+                Ok(Self::Seed { seed, fov_y_deg })
             }
             CameraWords { position: None, target: None, fov_y_deg: None, seed: None, designer: Some(number) } => {
                 Ok(Self::Designer(number))
@@ -85,7 +82,7 @@ impl RecipeCamera {
                 let mut coordinates = camera.position.iter().chain(&camera.target);
                 coordinates.all(|v| v.abs() <= FARTHEST_M) && has_sound_field(camera.fov_y_deg)
             }
-            Self::Seed { fov_y_deg, .. } => has_sound_field(*fov_y_deg),
+            Self::Seed { fov_y_deg, .. } => fov_y_deg.is_none_or(has_sound_field),
             Self::Designer(_) => true,
         }
     }

@@ -16,10 +16,11 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 use mateval_scene::dataset::TrueMaterials;
+use mateval_sources::front3d::camera_rules::CameraRules;
 use serde::Deserialize;
 
 use crate::error::PrepError;
-pub use camera::{DRAWN_FOV_Y_DEG, GivenCamera, RecipeCamera};
+pub use camera::{GivenCamera, RecipeCamera};
 use fault::RecipeFault;
 pub use limits::ATLAS_SIZES;
 pub(crate) use limits::RESOLUTION;
@@ -29,6 +30,9 @@ use sizes::check_sizes;
 pub(crate) use text::read_text;
 pub use views::Offset;
 pub(crate) use views::default_views;
+
+/// The name of the recipe in the dataset.
+pub const RECIPE: &str = "recipe.toml";
 
 /// The most samples a pixel.
 const MOST_SAMPLES: u32 = 1 << 16;
@@ -52,6 +56,9 @@ pub struct Recipe {
     /// The materials of which the truth is made.
     #[serde(default)]
     pub materials: TrueMaterials,
+    /// The rules of cameras that are drawn.
+    #[serde(default, deserialize_with = "camera_rules")]
+    pub camera_rules: CameraRules,
     /// Samples a pixel of each half of a rendered picture.
     #[serde(default = "default_samples")]
     pub samples: u32,
@@ -66,6 +73,10 @@ fn default_version() -> String {
 
 fn default_samples() -> u32 {
     64
+}
+
+fn camera_rules<'de, D: serde::Deserializer<'de>>(words: D) -> Result<CameraRules, D::Error> {
+    String::deserialize(words)?.parse().map_err(serde::de::Error::custom)
 }
 
 /// Reads a recipe. Returns also its text, which the dataset keeps. An error lists every fault of the recipe.

@@ -18,6 +18,16 @@ fn absent_keys_have_their_defaults() {
 }
 
 #[test]
+fn camera_rules_have_names() {
+    let with = |words: &str| read_text(&format!("name = 'x'\n{words}\n[[scene]]\nid = 'a'\nbitterli = 'a'\n"));
+    let name = |recipe: Recipe| recipe.camera_rules.name();
+    assert_eq!(name(with("camera_rules = '3dlg'").unwrap()), "3dlg");
+    assert_eq!(name(with("").unwrap()), "blenderproc");
+    let error = with("camera_rules = 'mine'").unwrap_err().to_string();
+    assert!(error.contains("expected one of: blenderproc, 3dlg"), "{error}");
+}
+
+#[test]
 fn all_faults_are_reported_together() {
     let text = "name = 'x'\nresolution = [4, 9]\nsamples = 0\n\
         [[scene]]\nid = 'a'\nbitterli = 'a'\nexposure = 0.0\n[[scene]]\nid = 'a'\nbitterli = 'b'\natlas_size = 9";

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Finding, Progress, SceneId, Severity, json, reference_io};
+use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference_io};
 
 use super::noise::RenderNoise;
 use super::render_file::RenderFile;
@@ -71,8 +71,12 @@ pub(super) fn render_scenes(
         // A panic of another thread leaves the queue and the list in a valid state.
         let next = || queue.lock().unwrap_or_else(std::sync::PoisonError::into_inner).pop_front();
         while let Some(at) = next() {
+            let finished = done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).len();
+            progress(Report::part(&format!("scene {}", scenes[at]), finished, scenes.len()));
             let scene = BlenderScene { run, options, id: scenes[at], progress };
-            done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((at, scene.render()));
+            done.lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+                .push((at, run.on_scene(scenes[at], || scene.render())));
         }
     };
     std::thread::scope(|scope| {
@@ -153,12 +157,10 @@ impl BlenderScene<'_> {
         [0, 1].map(|half| seed(self.id, view, half) % SEEDS)
     }
 
-    /// Threads of one process: several processes share the processors; 0 leaves the number to Blender.
+    /// Threads of one process: its share of what this process may use, which on a cluster is less than the node has
+    /// (RAYON_NUM_THREADS, or the processors that the job is bound to).
     fn threads(&self) -> u32 {
-        match self.options.jobs {
-            0 | 1 => 0,
-            jobs => (std::thread::available_parallelism().map_or(1, usize::from) / jobs).max(1) as u32,
-        }
+        (rayon::current_num_threads() / self.options.jobs.max(1)).max(1) as u32
     }
 
     /// Runs Blender once and removes the views that it finished from `views`.
@@ -201,11 +203,11 @@ impl BlenderScene<'_> {
     fn show_progress(&self, line: &str, step: &mut String) {
         if let Some(text) = line.strip_prefix("mateval: ") {
             *step = format!("{} {text}", self.id);
-            (self.progress)(step, 0, 1);
+            (self.progress)(Report::step(step, 0, 1));
         } else if let Some((done, all)) = line.rsplit_once("Sample ").and_then(|(_, count)| count.split_once('/'))
             && let (Ok(done), Ok(all)) = (done.trim().parse(), all.trim().parse())
         {
-            (self.progress)(step, done, all);
+            (self.progress)(Report::step(step, done, all));
         }
     }
 

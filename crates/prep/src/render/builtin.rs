@@ -6,7 +6,7 @@ use std::sync::Arc;
 use mateval_image::{ImageError, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::{Progress, SceneId, json, reference_io};
+use mateval_scene::{Progress, Report, SceneId, json, reference_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
@@ -25,8 +25,9 @@ pub(super) fn render_scenes(
     progress: Progress<'_>,
 ) -> Result<RenderReport, PrepError> {
     let mut report = RenderReport::default();
-    for id in scenes {
-        render_scene(run, id, progress, &mut report)?;
+    for (at, id) in scenes.iter().enumerate() {
+        progress(Report::part(&format!("scene {id}"), at, scenes.len()));
+        run.on_scene(id, || render_scene(run, id, progress, &mut report))?;
     }
     Ok(report)
 }
@@ -50,15 +51,15 @@ fn render_scene(
             Some(world) => world,
             none => none.insert(World::new(Arc::new(reference_io::read(&folder)?))?),
         };
-        let step = format!("{id} {}", view.id);
-        let shown = |done: usize, all: usize| progress(&step, done, all);
+        let step = format!("view {}", view.id);
+        let shown = |done: usize, all: usize| progress(Report::step(&step, done, all));
         let settings = RenderSettings { samples: run.samples, max_bounces: MAX_BOUNCES, ..Default::default() };
         let groups = LightGroups::apart(world.emitters().groups());
         let mut render = render_views(world, &[view.camera], &groups, &settings, &seeds, &shown)?;
         let [a, b]: [LightPictures; 2] =
             std::array::from_fn(|_| light_pictures(render.views[0].halves.remove(0).basis));
         let shown = without_noise(&folder, view, [&a, &b])?;
-        report.remarks.extend(remark(&step, &render.stats));
+        report.remarks.extend(remark(&format!("{id} {}", view.id), &render.stats));
         let file = RenderFile {
             renderer: run.renderer.clone(),
             renderer_version: None,

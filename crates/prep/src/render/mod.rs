@@ -1,31 +1,33 @@
 //! The RGB ground truth: every view rendered in two independent halves.
 //!
 //! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the scored renderer's name in `dataset.json`,
-//! its picture of the input view as the photo that methods see, and a new manifest.
+//! its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes, `finish` writes them).
 //!
 //! A new renderer is a file beside `builtin.rs`, a variant of [`RendererKind`] and of [`Renderer`], and its arguments in
 //! the command line's `prep render`.
 
 mod blender_scene;
 mod builtin;
-mod kind;
+pub(crate) mod kind;
 mod noise;
-mod render_file;
+pub(crate) mod render_file;
 mod render_run;
 mod report;
-mod store;
+pub(crate) mod store;
 
 use std::path::Path;
 
-use mateval_scene::dataset::{DatasetFile, SceneFile};
-use mateval_scene::layout::{DATASET, INPUT, MANIFEST, SceneFolder};
+use mateval_scene::build_folder::BuildFolder;
+use mateval_scene::dataset::DatasetFile;
+use mateval_scene::layout::{DATASET, MANIFEST};
 use mateval_scene::open::chosen_ids;
-use mateval_scene::{Progress, RendererId, SceneError, SceneId, json, manifest};
+use mateval_scene::{Progress, SceneId, json};
 
 pub use crate::blender::{BlenderLimits, BlenderProgram};
-use crate::build::RECIPE;
+use crate::build::start::is_build;
 use crate::error::PrepError;
-use crate::recipe;
+use crate::finish::{check_strays, finish_again};
+use crate::recipe::{self, RECIPE};
 pub use blender_scene::BlenderOptions;
 pub use kind::{RendererKind, UnknownRenderer};
 pub use noise::RenderNoise;
@@ -66,6 +68,14 @@ impl Renderer {
         }
     }
 
+    /// The number of scenes that one process renders at once.
+    fn scenes_at_once(&self) -> usize {
+        match self {
+            Self::Builtin => 1,
+            Self::Blender(options) => options.jobs.max(1),
+        }
+    }
+
     fn render_scenes(
         &self,
         run: &RenderRun<'_>,
@@ -79,58 +89,40 @@ impl Renderer {
     }
 }
 
-/// Renders the dataset in `root`, then names the scored renderer and writes a new manifest.
+/// Renders the dataset in `root`. Where no scenes are chosen, it then names the scored renderer and writes a new manifest;
+/// otherwise [`crate::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
 /// cannot render becomes a failure in the report; the others are still rendered.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
-    let mut dataset: DatasetFile = json::read(&root.join(DATASET))?;
+    let build_recipe = is_build(root).then(|| BuildFolder::of(root).recipe());
+    if build_recipe.is_some() && !root.join(DATASET).is_file() {
+        return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
+    }
+    let dataset: DatasetFile = json::read(&root.join(DATASET))?;
     if !root.join(MANIFEST).is_file() {
         return Err(PrepError::UnfinishedBuild { path: root.to_owned() });
     }
+    if options.scenes.is_empty() {
+        // `finish_again` would find them when all is rendered.
+        check_strays(root, &dataset.scenes)?;
+    }
     let wanted = chosen_ids(root, &dataset, &options.scenes)?;
     let renderer = options.renderer.kind().id();
-    check_hashes(root, &renderer)?;
     let samples = match options.samples {
         Some(samples) => samples,
-        None => recipe::read(&root.join(RECIPE))?.0.samples,
+        // The one that `finish` will put in the dataset.
+        None => recipe::read(&build_recipe.unwrap_or(root.join(RECIPE)))?.0.samples,
     };
-    let run = RenderRun { root, renderer: renderer.clone(), samples, force: options.force };
+    let one_at_a_time = options.renderer.scenes_at_once() == 1;
+    let run = RenderRun { root, renderer, samples, force: options.force, one_at_a_time };
     let mut report = options.renderer.render_scenes(&run, &wanted, progress)?;
-    dataset.scored_renderer = scored_renderer(root, &dataset);
-    if dataset.scored_renderer.is_none() {
-        report.remarks.push("some scenes have no pictures yet, so the dataset names no scored renderer".to_owned());
+    if options.scenes.is_empty() {
+        let dataset = finish_again(root, progress)?;
+        if dataset.scored_renderer.is_none() {
+            let what = "some scenes have no pictures yet, so the dataset names no scored renderer";
+            report.remarks.push(what.to_owned());
+        }
     }
-    let shown = dataset.scored_renderer.clone().unwrap_or(renderer);
-    for id in &dataset.scenes {
-        store::show_input(&SceneFolder::of(root, id), &shown)?;
-    }
-    progress("hashes", 0, 1);
-    dataset.manifest_sha256 = manifest::write(root)?;
-    json::write(&root.join(DATASET), &dataset)?;
     Ok(report)
-}
-
-/// Checks every file but this renderer's pictures against the manifest, which is about to be replaced.
-fn check_hashes(root: &Path, renderer: &RendererId) -> Result<(), PrepError> {
-    let ours = format!("/ground_truth/renders/{renderer}/");
-    let shown = format!("/views/{INPUT}/rgb.");
-    let is_ours = |path: &str| path.contains(&ours) || path.contains(&shown) || path.ends_with(".partial");
-    let findings = manifest::check_those(root, |path| !is_ours(path))?;
-    if findings.is_empty() {
-        return Ok(());
-    }
-    Err(SceneError::Invalid { path: root.to_owned(), findings }.into())
-}
-
-/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view; none where none has.
-fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
-    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
-    known.find(|renderer| dataset.scenes.iter().all(|id| is_complete(root, id, renderer)))
-}
-
-fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
-    let folder = SceneFolder::of(root, id);
-    json::read::<SceneFile>(&folder.scene_file())
-        .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(RENDER_FILE).is_file()))
 }

@@ -3,11 +3,14 @@
 use std::path::Path;
 
 use mateval_scene::dataset::View;
-use mateval_scene::layout::SceneFolder;
+use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::scene_change::change_scene;
+use mateval_scene::scene_cost::{self, Step, TimedStep};
 use mateval_scene::{RendererId, SceneId, json};
 
 use super::render_file::{RENDER_FILE, RenderFile};
+use crate::error::PrepError;
 
 /// Number of scatterings after the first hit after which a path is cut.
 pub const MAX_BOUNCES: u32 = 16;
@@ -21,9 +24,24 @@ pub(super) struct RenderRun<'a> {
     pub(super) samples: u32,
     /// Whether pictures that already exist are rendered again.
     pub(super) force: bool,
+    /// Whether scenes are rendered one after the other.
+    pub(super) one_at_a_time: bool,
 }
 
 impl RenderRun<'_> {
+    /// Renders a scene by `work`, as [`change_scene`], and records its cost.
+    pub(super) fn on_scene<T>(
+        &self,
+        id: &SceneId,
+        work: impl FnOnce() -> Result<T, PrepError>,
+    ) -> Result<T, PrepError> {
+        let ours = format!("/ground_truth/renders/{}/", self.renderer);
+        let shown = format!("/views/{INPUT}/rgb.");
+        let step = TimedStep { step: Step::Render, renderer: Some(&self.renderer), is_alone: self.one_at_a_time };
+        let work = || scene_cost::timed(self.root, id, &step, work);
+        change_scene(self.root, id, |path| path.contains(&ours) || path.contains(&shown), work)
+    }
+
     /// Whether the view's pictures exist and were made with these settings.
     pub(super) fn is_done(&self, folder: &SceneFolder, view: &View, seeds: &[String; 2]) -> bool {
         let path = folder.render(&self.renderer, &view.id).join(RENDER_FILE);

@@ -57,12 +57,18 @@ fn write_passes(place: &Path, view: &BlenderView) -> Result<(), PrepError> {
     Ok(())
 }
 
+/// Whether the renderer has rendered the scene's input view.
+pub(crate) fn can_show_input(folder: &SceneFolder, renderer: &RendererId) -> bool {
+    let input = ViewId::new(INPUT).expect("'input' is a valid id");
+    folder.render(renderer, &input).join(RENDER_FILE).is_file()
+}
+
 /// Copies the renderer's picture of the input view to `views/input/`, as the photo that methods see. Does nothing where
 /// the renderer has not rendered that view.
-pub(super) fn show_input(folder: &SceneFolder, renderer: &RendererId) -> Result<(), PrepError> {
+pub(crate) fn show_input(folder: &SceneFolder, renderer: &RendererId) -> Result<(), PrepError> {
     let input = ViewId::new(INPUT).expect("'input' is a valid id");
     let (from, to) = (folder.render(renderer, &input), folder.view(&input));
-    if !from.join(RENDER_FILE).is_file() {
+    if !can_show_input(folder, renderer) {
         return Ok(());
     }
     for name in ["rgb.exr", "rgb.png"] {

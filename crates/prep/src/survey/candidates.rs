@@ -13,17 +13,22 @@ use mateval_tracer::aov::hit_through;
 use rayon::prelude::*;
 
 use super::camera_refusal::{CameraRefusal, RefusedCamera};
-use super::intersect::intersecting_pairs;
+use super::intersect::{MeshIntersection, intersections};
+use super::intersecting_pair::IntersectingPair;
 use super::options::SurveyOptions;
+use super::posed::{CameraDraws, Posed};
 use super::rules::{Rejection, RoomFacts};
-use super::survey_file::{CandidateCamera, SurveyedRoom, THUMBNAILS};
+use super::survey_file::{CandidateCamera, SurveyedRoom};
 use crate::error::PrepError;
 use crate::recipe::Offset;
 use mateval_sources::front3d::FurnishedHouse;
-use mateval_sources::front3d::camera_sampler::{RoomSampler, SamplerRules, score, score_grid};
+use mateval_sources::front3d::camera_sampler::{score, score_grid};
 
 /// A picture of sRGB bytes.
 type Thumbnail = Picture<[u8; 3]>;
+
+/// A thumbnail with the name of its file.
+pub(super) type NamedThumbnail = (String, Thumbnail);
 
 /// Length of a thumbnail's longer side, in pixels.
 const THUMBNAIL_SIDE: u32 = 320;
@@ -31,38 +36,26 @@ const THUMBNAIL_SIDE: u32 = 320;
 /// The rooms of a house and the pictures of their cameras.
 pub(super) struct HouseSurvey {
     pub(super) rooms: Vec<SurveyedRoom>,
-    /// Files, relative to the survey's folder, and what they show.
-    pub(super) pictures: Vec<(String, Thumbnail)>,
+    /// The names of the thumbnails, as the cameras list them, and what they show.
+    pub(super) pictures: Vec<NamedThumbnail>,
 }
 
-/// Searches all rooms of the house. `taken` holds the ids of all scenes so far.
-pub(super) fn search_rooms(
-    options: &SurveyOptions,
-    house: &FurnishedHouse,
-    taken: &mut BTreeSet<String>,
-) -> Result<HouseSurvey, PrepError> {
+/// Searches all rooms of the house.
+pub(super) fn search_rooms(options: &SurveyOptions, house: &FurnishedHouse) -> Result<HouseSurvey, PrepError> {
     let world = World::new(house.scene.clone())?;
-    let search = RoomSearch { options, house, world: &world, views: crate::recipe::default_views() };
+    let views = crate::recipe::default_views();
+    let draws = CameraDraws::new(options, house, &world, &views);
+    let search = RoomSearch { options, house, world: &world, views, draws };
     let mut survey = HouseSurvey { rooms: Vec::new(), pictures: Vec::new() };
     for room in 0..house.house.rooms.len() {
-        let (mut room, pictures) = search.room(room)?;
-        for (camera, picture) in room.cameras.iter_mut().zip(pictures) {
-            camera.scene = free_id(&camera.scene, taken);
-            camera.thumbnail = format!("{THUMBNAILS}/{}.png", camera.scene);
+        let (mut surveyed, pictures) = search.room(room)?;
+        for (camera, picture) in surveyed.cameras.iter_mut().zip(pictures) {
+            camera.thumbnail = format!("{room}-{}.png", camera.origin.replace(' ', ""));
             survey.pictures.push((camera.thumbnail.clone(), picture));
         }
-        survey.rooms.push(room);
+        survey.rooms.push(surveyed);
     }
     Ok(survey)
-}
-
-/// The id, with a number appended where it is taken: the names of several rooms may be shortened to the same id.
-fn free_id(id: &str, taken: &mut BTreeSet<String>) -> String {
-    let numbered = (2..).map(|number| format!("{id}-{number}"));
-    let free = std::iter::once(id.to_owned()).chain(numbered).find(|id| !taken.contains(id));
-    let free = free.expect("ids are finitely many");
-    taken.insert(free.clone());
-    free
 }
 
 /// A house that is searched, and how.
@@ -71,13 +64,7 @@ struct RoomSearch<'a> {
     house: &'a FurnishedHouse,
     world: &'a World,
     views: Vec<Offset>,
-}
-
-/// A camera and where it comes from.
-struct Posed {
-    origin: String,
-    camera: Camera,
-    fov_y_deg: f64,
+    draws: CameraDraws<'a>,
 }
 
 /// A camera that breaks no rule, and its thumbnail.
@@ -113,6 +100,8 @@ impl RoomSearch<'_> {
             intersecting: facts.intersecting,
             missing: facts.missing,
             rejections,
+            rank: None,
+            choice: None,
             cameras,
         };
         Ok((surveyed, pictures))
@@ -125,7 +114,12 @@ impl RoomSearch<'_> {
         let name = |place: usize| house.scene.surfaces[furniture[place]].name.clone();
         // Such a room is rejected anyway, and testing every pair of its pieces takes long.
         let too_many = furniture.len() > self.options.rules.max_objects;
-        let pairs = if too_many { Vec::new() } else { intersecting_pairs(&meshes)? };
+        let found = if too_many { Vec::new() } else { intersections(&meshes)? };
+        let named = |MeshIntersection { pair, depth_m, volume_share }: MeshIntersection| IntersectingPair {
+            pieces: pair.map(name),
+            depth_m,
+            volume_share,
+        };
         let complete = |k: &&usize| house.placed[**k].model.as_ref().is_some_and(|model| model.complete);
         let kinds: BTreeSet<&str> =
             furniture.iter().filter_map(|&k| house.placed[k].origin.super_category.as_deref()).collect();
@@ -134,7 +128,7 @@ impl RoomSearch<'_> {
             objects: furniture.len(),
             super_categories: kinds.len(),
             size_m: self.size_m(room),
-            intersecting: pairs.into_iter().map(|[a, b]| [name(a), name(b)]).collect(),
+            intersecting: found.into_iter().map(named).collect(),
             missing: house.wanted_pieces[room] - furniture.iter().filter(complete).count(),
         })
     }
@@ -171,7 +165,7 @@ impl RoomSearch<'_> {
     /// The drawn cameras and the designers' cameras in this room that break no rule, the best score first; and the others
     /// with the rules that they break.
     fn cameras(&self, room: usize) -> (Vec<Candidate>, Vec<RefusedCamera>) {
-        let (posed, mut refused) = self.posed(room);
+        let (posed, mut refused) = self.draws.posed(room);
         let mut found = Vec::new();
         for Posed { origin, camera, fov_y_deg } in posed {
             match self.candidate(room, &origin, camera, fov_y_deg) {
@@ -181,37 +175,6 @@ impl RoomSearch<'_> {
         }
         found.sort_by(|a, b| b.0.score.total_cmp(&a.0.score).then(a.0.scene.cmp(&b.0.scene)));
         (found, refused)
-    }
-
-    /// Every camera of a room that may be tried; and why no more could be drawn.
-    fn posed(&self, room: usize) -> (Vec<Posed>, Vec<RefusedCamera>) {
-        let [width, height] = self.options.resolution;
-        let sampler = match RoomSampler::new(self.house, self.world, room) {
-            Ok(sampler) => sampler,
-            Err(why) => return (Vec::new(), vec![RefusedCamera { origin: None, why: why.into() }]),
-        };
-        let (mut posed, mut refused) = (Vec::new(), Vec::new());
-        let turns: Vec<[f64; 2]> = self.views.iter().map(|view| [view.x_deg, view.y_deg]).collect();
-        let fov_y_deg = self.options.fov_y_deg;
-        let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
-        for number in 0..self.options.cameras_per_room {
-            let seed = self.options.seed + u64::from(number);
-            match sampler.sample(intrinsics, &turns, &SamplerRules::default(), seed) {
-                Ok(drawn) => posed.push(Posed { origin: format!("seed {seed}"), camera: drawn.camera, fov_y_deg }),
-                Err(why) => {
-                    // Another seed would take as long and is unlikely to succeed.
-                    refused.push(RefusedCamera { origin: Some(format!("seed {seed}")), why: why.into() });
-                    break;
-                }
-            }
-        }
-        let own = self.house.cameras.iter().filter(|camera| sampler.stands_in_room(camera.position));
-        posed.extend(own.filter_map(|camera| {
-            let intrinsics = Intrinsics::from_fov_y(width, height, camera.fov_y_deg.to_radians());
-            let posed = Camera::look_at(camera.position, camera.target, glam::DVec3::Y, intrinsics)?;
-            Some(Posed { origin: format!("designer {}", camera.number), camera: posed, fov_y_deg: camera.fov_y_deg })
-        }));
-        (posed, refused)
     }
 
     /// Looks through a camera. Fails where it breaks a rule.
@@ -227,7 +190,7 @@ impl RoomSearch<'_> {
             turned.iter().chain([&seen]).map(|seen| seen.iter().filter(|hit| hit.is_none()).count()).sum();
         let outside = missed as f64 / pixels as f64;
         let rules = &self.options.rules;
-        if missed == pixels || outside > rules.max_outside {
+        if seen.iter().all(Option::is_none) || outside > rules.max_outside {
             return Err(CameraRefusal::SeesOutside { share: outside, most: rules.max_outside });
         }
         if pieces.len() < rules.min_seen_objects {
@@ -249,7 +212,7 @@ impl RoomSearch<'_> {
             position: position.to_array(),
             target: (position + forward).to_array(),
             fov_y_deg,
-            score: score(self.house, &surfaces),
+            score: score(self.house, &surfaces, self.options.camera_rules.sampler_rules().architecture_weight),
             nearest_m: nearest(&seen),
             outside,
             seen_objects: pieces.len(),
@@ -259,7 +222,7 @@ impl RoomSearch<'_> {
         Ok((candidate, picture))
     }
 
-    /// An id from room, house and camera, so that it does not depend on what else is picked.
+    /// An id from room, house and camera, which may still be another's too.
     fn scene_id(&self, room: usize, origin: &str) -> String {
         let house: String = self.house.house.uid.chars().take(8).collect();
         let room: String = self.house.house.rooms[room].id.chars().take(28).collect();
@@ -334,12 +297,5 @@ mod tests {
             assert_eq!((small.width, small.height), expected);
             assert_eq!((small.cx, small.cy), (f64::from(small.width) / 2.0, f64::from(small.height) / 2.0));
         }
-    }
-
-    #[test]
-    fn every_id_is_unique() {
-        let mut taken = BTreeSet::new();
-        let ids = ["a", "a", "b", "a", "a-2"].map(|id| free_id(id, &mut taken));
-        assert_eq!(ids, ["a", "a-2", "b", "a-3", "a-2-2"]);
     }
 }

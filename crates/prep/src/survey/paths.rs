@@ -78,3 +78,31 @@ pub(super) fn house_files(options: &SurveyOptions, source: &Path) -> Result<Vec<
     files.retain(|file| seen.insert(source.join(file).canonicalize().ok().unwrap_or_else(|| file.clone())));
     if files.is_empty() { Err(PrepError::NoHouses { path: source.to_owned() }) } else { Ok(files) }
 }
+
+/// The houses that `only` names, or all where it names none. Fails where a name is no house's.
+pub(super) fn chosen(houses: &[PathBuf], only: &[String]) -> Result<Vec<PathBuf>, PrepError> {
+    let is_named = |house: &Path, name: &str| {
+        house == Path::new(name) || house.file_stem().is_some_and(|stem| stem.to_string_lossy() == name)
+    };
+    let is_unknown = |name: &&String| !houses.iter().any(|house| is_named(house, name));
+    if let Some(unknown) = only.iter().find(is_unknown) {
+        return Err(PrepError::UnknownHouse { name: unknown.clone(), houses: houses.len() });
+    }
+    let is_chosen = |house: &&PathBuf| only.is_empty() || only.iter().any(|name| is_named(house, name));
+    Ok(houses.iter().filter(is_chosen).cloned().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn houses_are_named_by_path_or_stem() {
+        let houses = ["a/x.json", "b/y.json"].map(PathBuf::from);
+        let of = |only: &[&str]| chosen(&houses, &only.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+        assert_eq!(of(&[]).unwrap(), houses);
+        assert_eq!(of(&["y"]).unwrap(), [PathBuf::from("b/y.json")]);
+        assert_eq!(of(&["b/y.json", "x"]).unwrap(), houses);
+        assert!(of(&["x", "z"]).unwrap_err().to_string().contains("'z'"));
+    }
+}

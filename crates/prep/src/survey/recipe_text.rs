@@ -1,9 +1,10 @@
 //! The rooms that are picked, as text of a recipe: a camera, and the SHA-256 of every file that the scene is made of.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use mateval_scene::dataset::SourceFile;
 use serde::Serialize;
 
 use super::options::SurveyOptions;
@@ -14,9 +15,6 @@ use super::survey_file::{CandidateCamera, SurveyFile};
 pub(super) struct RecipeTexts {
     /// The lines before the first scene.
     pub(super) head: String,
-    /// Ids of scenes that are already taken.
-    #[serde(skip)]
-    pub(super) taken: BTreeSet<String>,
     /// The text of each scene without its inputs, by the scene's id.
     pub(super) scenes: BTreeMap<String, String>,
     /// The inputs of each house's scenes, by the house's file.
@@ -29,11 +27,15 @@ impl RecipeTexts {
         Self { head: head(options), ..Default::default() }
     }
 
-    /// The recipe of the best camera of every room that is offered.
+    /// The recipe of the best camera of every room that is offered, or of those that were chosen, each with the reason.
     pub(super) fn of_best(&self, survey: &SurveyFile) -> String {
         let mut text = self.head.clone();
         for house in &survey.houses {
-            for camera in house.rooms.iter().filter_map(|room| room.cameras.first()) {
+            for room in &house.rooms {
+                let is_in = survey.selection.is_none() || room.choice.as_ref().is_some_and(|c| c.place.is_some());
+                let Some(camera) = room.cameras.first().filter(|_| is_in) else { continue };
+                let reason = room.choice.as_ref().map(|choice| format!("\n# {}", choice.reason)).unwrap_or_default();
+                text.push_str(&reason);
                 text.push_str(&self.scenes[&camera.scene]);
                 text.push_str(&self.inputs[&house.file]);
             }
@@ -46,7 +48,8 @@ impl RecipeTexts {
 fn head(options: &SurveyOptions) -> String {
     let [width, height] = options.resolution;
     let remark = "# Paths are relative to the folder that was surveyed: name it with --source.\n";
-    format!("{remark}name = \"picked\"\nresolution = [{width}, {height}]\n")
+    let rules = options.camera_rules;
+    format!("{remark}name = \"picked\"\nresolution = [{width}, {height}]\ncamera_rules = \"{rules}\"\n")
 }
 
 /// A scene without its inputs, which follow it.
@@ -68,10 +71,10 @@ pub(super) fn scene(options: &SurveyOptions, house: &str, room: &str, camera: &C
 }
 
 /// The files of a house and their SHA-256, which are the same for each of its rooms.
-pub(super) fn inputs(files: &[(String, String)]) -> String {
-    files.iter().fold("[scene.inputs]\n".to_owned(), |mut text, (file, sha256)| {
+pub(super) fn inputs(files: &[SourceFile]) -> String {
+    files.iter().fold("[scene.inputs]\n".to_owned(), |mut text, SourceFile { path, sha256 }| {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "{} = \"{sha256}\"", quoted(file));
+        let _ = writeln!(text, "{} = \"{sha256}\"", quoted(path));
         text
     })
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use mateval_image::limits::read_at_most;
 use serde::Deserialize;
 
+use super::intersecting_pair::IntersectingPair;
 use crate::error::PrepError;
 use crate::recipe::read_text;
 
@@ -23,8 +24,12 @@ pub struct SelectionRules {
     pub min_super_categories: usize,
     /// Longest sides of the bounding box of the floor, in metres.
     pub max_size_m: [f64; 2],
-    /// Largest number of pairs of pieces that intersect.
+    /// Largest number of pairs of pieces that intersect beyond either of the next two limits.
     pub max_intersecting: usize,
+    /// How deep a piece may stand in another, in metres: the shortest way that separates them.
+    pub max_intersection_depth_m: f64,
+    /// How much of the smaller piece's volume may lie in the other, 0 to 1.
+    pub max_intersection_volume: f64,
     /// Largest number of valid pieces whose model or texture is missing.
     pub max_missing: usize,
     /// Largest share of the pixels of the five views that see the outside.
@@ -47,6 +52,8 @@ impl Default for SelectionRules {
             min_super_categories: 2,
             max_size_m: [12.0, 12.0],
             max_intersecting: 0,
+            max_intersection_depth_m: 0.1,
+            max_intersection_volume: 0.1,
             max_missing: 0,
             max_outside: 0.2,
             min_seen_objects: 2,
@@ -78,7 +85,7 @@ pub(super) struct RoomFacts {
     pub(super) objects: usize,
     pub(super) super_categories: usize,
     pub(super) size_m: [f64; 2],
-    pub(super) intersecting: Vec<[String; 2]>,
+    pub(super) intersecting: Vec<IntersectingPair>,
     pub(super) missing: usize,
 }
 
@@ -87,6 +94,11 @@ impl SelectionRules {
     pub fn read(path: &Path) -> Result<Self, PrepError> {
         let text = read_text(path)?;
         toml::from_str(&text).map_err(|source| PrepError::Rules { path: path.to_owned(), source: Box::new(source) })
+    }
+
+    /// Whether the pieces intersect beyond either of the limits.
+    fn is_beyond(&self, pair: &IntersectingPair) -> bool {
+        pair.depth_m > self.max_intersection_depth_m || pair.volume_share > self.max_intersection_volume
     }
 
     /// Every rule that the room breaks.
@@ -117,9 +129,12 @@ impl SelectionRules {
             "max_size_m",
             format!("its floor is {width:.2} by {depth:.2} m, expected at most {:?}", self.max_size_m),
         );
-        let pairs: Vec<String> = room.intersecting.iter().map(|[a, b]| format!("'{a}' in '{b}'")).collect();
+        let pairs: Vec<String> =
+            room.intersecting.iter().filter(|pair| self.is_beyond(pair)).map(ToString::to_string).collect();
         let reason = format!(
-            "furniture stands in other furniture, expected at most {}: {}",
+            "furniture stands in other furniture by more than {} m or {} % of the smaller, expected at most {}: {}",
+            self.max_intersection_depth_m,
+            100.0 * self.max_intersection_volume,
             self.max_intersecting,
             pairs.join(", ")
         );
@@ -185,7 +200,12 @@ mod tests {
         assert_eq!(broken(RoomFacts { objects: 61, ..good() }), "max_objects");
         assert_eq!(broken(RoomFacts { super_categories: 1, ..good() }), "min_super_categories");
         assert_eq!(broken(RoomFacts { size_m: [4.0, 12.5], ..good() }), "max_size_m");
-        assert_eq!(broken(RoomFacts { intersecting: vec![["a".into(), "b".into()]], ..good() }), "max_intersecting");
+        let pair = |depth_m, volume_share| {
+            let pair = IntersectingPair { pieces: ["a".into(), "b".into()], depth_m, volume_share };
+            broken(RoomFacts { intersecting: vec![pair], ..good() })
+        };
+        assert_eq!((pair(0.2, 0.01).as_str(), pair(0.02, 0.2).as_str()), ("max_intersecting", "max_intersecting"));
+        assert_eq!(pair(0.1, 0.1), "");
         assert_eq!(broken(RoomFacts { missing: 1, ..good() }), "max_missing");
         assert_eq!(broken(RoomFacts { missing: 1, objects: 0, ..good() }), "min_objects max_missing");
     }

@@ -4,10 +4,11 @@ use mateval_scene::FindingCount;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::intersecting_pair::IntersectingPair;
 use super::rules::Rejection;
 
 /// The value of `format` in this version of the file.
-pub const SURVEY_FORMAT: &str = "mateval-survey/1";
+pub const SURVEY_FORMAT: &str = "mateval-survey/2";
 
 /// The file's name in the output's folder.
 pub const SURVEY: &str = "survey.json";
@@ -19,14 +20,60 @@ pub(super) const THUMBNAILS: &str = "thumbnails";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurveyFile {
-    /// Always `mateval-survey/1`.
+    /// Always `mateval-survey/2`.
     pub format: String,
     /// The program that made the survey and its version, as in `mateval 0.1.0`.
     pub tool: String,
     /// Seed of the drawn cameras.
     pub seed: u64,
+    /// The rules that drawn cameras keep: `blenderproc` or `3dlg`.
+    pub camera_rules: String,
+    /// The choice of scenes; null where every accepted room is in the recipe.
+    pub selection: Option<Selection>,
     /// Houses in the order of their files.
     pub houses: Vec<SurveyedHouse>,
+}
+
+/// Which scenes were chosen, and what they are like on average.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Selection {
+    /// Number of scenes that were asked for.
+    pub wanted: usize,
+    /// Number of rooms that were accepted.
+    pub candidates: usize,
+    /// Number of scenes that were chosen: fewer where the houses offer no more.
+    pub chosen: usize,
+    /// The most scenes of one house.
+    pub per_house: usize,
+    /// The mean number of objects and its target; null where nothing was chosen.
+    pub objects: TargetedMean,
+    /// The same of super-categories.
+    pub super_categories: TargetedMean,
+    /// Every room type of the candidates, sorted; the target is an equal number of each.
+    pub room_types: Vec<ChosenType>,
+}
+
+/// A mean over the chosen scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetedMean {
+    /// The value aimed at.
+    pub target: f64,
+    /// The value reached; null where nothing was chosen.
+    pub mean: Option<f64>,
+}
+
+/// A room type and its scenes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChosenType {
+    /// The type, as in `LivingDiningRoom`.
+    pub room_type: String,
+    /// Number of accepted rooms of this type.
+    pub candidates: usize,
+    /// Number of them that were chosen.
+    pub chosen: usize,
 }
 
 /// A house.
@@ -59,14 +106,29 @@ pub struct SurveyedRoom {
     pub super_categories: usize,
     /// Sides of the bounding box of the floor, in metres; zeros without a floor.
     pub size_m: [f64; 2],
-    /// Pairs of pieces that intersect; not searched for in a room with more than `max_objects` pieces.
-    pub intersecting: Vec<[String; 2]>,
+    /// Pairs of pieces that intersect, whether they may or not; not searched for in a room with more than `max_objects`
+    /// pieces.
+    pub intersecting: Vec<IntersectingPair>,
     /// Number of valid pieces whose model or texture is missing.
     pub missing: usize,
     /// Why the room is not offered as a scene; empty where it is offered.
     pub rejections: Vec<Rejection>,
+    /// Its place among all accepted rooms by the score of its best camera, from 1; null where it is not accepted.
+    pub rank: Option<usize>,
+    /// Whether it was chosen as a scene, and why; null where nothing was to be chosen, or it is not accepted.
+    pub choice: Option<Choice>,
     /// Cameras to choose from, the best score first.
     pub cameras: Vec<CandidateCamera>,
+}
+
+/// Whether an accepted room became a scene.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// Its place in the order of choice, from 1; null where it was not chosen.
+    pub place: Option<usize>,
+    /// Why.
+    pub reason: String,
 }
 
 /// A camera to choose.
@@ -83,7 +145,7 @@ pub struct CandidateCamera {
     pub target: [f64; 3],
     /// Vertical field of view, in degrees.
     pub fov_y_deg: f64,
-    /// BlenderProc's coverage score of the input view.
+    /// BlenderProc's coverage score of the input view, with the weights of the camera rules.
     pub score: f64,
     /// Distance to the nearest surface in the input view, in metres.
     pub nearest_m: f64,

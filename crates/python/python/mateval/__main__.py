@@ -1,5 +1,6 @@
 """The command ``mateval``."""
 
+import os
 import signal
 import sys
 
@@ -10,6 +11,8 @@ def main() -> int:
     """Runs the command with the words of ``sys.argv`` and returns its exit code."""
     # Python would only note the signal, and act on it when the command has ended.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # `mateval fetch` downloads with the pip of this Python.
+    os.environ.setdefault("MATEVAL_PYTHON", sys.executable)
     return _core.main(["mateval", *sys.argv[1:]])
 
 

@@ -6,14 +6,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The format of this version of explanations.
-pub const EXPLAIN_FORMAT: &str = "mateval-explain/1";
+pub const EXPLAIN_FORMAT: &str = "mateval-explain/2";
 
 /// Where and how the albedo of a submission errs in one scene. Errors are mean squared errors of linear values, over
 /// channels and over the valid pixels of all scored views that show an instance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExplainFile {
-    /// Always `mateval-explain/1`.
+    /// Always `mateval-explain/2`.
     pub format: String,
     /// The tool that wrote it, as in `mateval 0.1.0`.
     pub tool: String,
@@ -33,6 +33,8 @@ pub struct ExplainFile {
     pub views: Vec<ViewId>,
     /// The number of compared pixels in all views.
     pub pixels: usize,
+    /// Those among them that show surfaces which the photo does not show.
+    pub unobserved_pixels: usize,
     /// Mean over those pixels.
     pub mse: f64,
     /// PSNR of that mean, in dB.
@@ -50,11 +52,14 @@ pub struct ExplainFile {
     pub findings: Vec<Finding>,
 }
 
-/// Shares of the squared error by kind, which add up to 1. Each step removes its share from the error that the steps
-/// before it leave. The shares therefore depend on the order of the steps, which is the order of these keys.
+/// Shares of the squared error by kind, which add up to 1. The error in unobserved pixels comes first. Each step then
+/// removes its share from the error that the steps before it leave in the other pixels. The shares therefore depend on
+/// the order of the steps, which is the order of these keys.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KindShares {
+    /// The error in pixels that show surfaces which the photo does not show.
+    pub unobserved: f64,
     /// Removed by one scale for all channels of an instance: wrong brightness.
     pub scale: f64,
     /// Removed by one scale for each channel of an instance: wrong tint.

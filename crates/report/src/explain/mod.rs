@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 use mateval_metrics::Psnr;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::work_folder::check_free;
-use mateval_scene::{Progress, SceneError, ViewId};
+use mateval_scene::{Progress, Report, SceneError, ViewId};
 use rayon::prelude::*;
 
 use self::file::{EXPLAIN_FORMAT, ExplainFile, InstanceExplanation, ViewShift};
@@ -61,9 +61,9 @@ pub struct Explanation {
 pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explanation, ReportError> {
     let scores = belongs::check(plan)?;
     let scene = plan.dataset.scene(plan.scene)?;
-    progress("pictures", 0, 2);
+    progress(Report::step("pictures", 0, 2));
     let views = scene_albedo(plan.dataset, scene, &[plan.submission])?;
-    progress("kinds of error", 1, 2);
+    progress(Report::step("kinds of error", 1, 2));
     let patches = patches(&views);
     let found: Vec<(u16, Explained)> =
         patches.par_iter().map(|(index, patches)| (*index, explained(patches))).collect();
@@ -83,6 +83,7 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
         scene: plan.scene.clone(),
         views: ids,
         pixels: whole.pixels,
+        unobserved_pixels: whole.unobserved_pixels,
         mse: whole.mse(),
         psnr: Psnr::from_mse(whole.mse()).map_err(named)?.db,
         kinds: whole.kinds(),
@@ -92,7 +93,7 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
         findings: plan.findings(),
     };
     belongs::check_scores(scores, &file)?;
-    progress("kinds of error", 2, 2);
+    progress(Report::step("kinds of error", 2, 2));
     Ok(Explanation { file, views, patches, worst })
 }
 

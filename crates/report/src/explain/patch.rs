@@ -24,6 +24,8 @@ pub(super) struct Patch {
     pub(super) truth: Vec<[f64; 3]>,
     /// Linear RGB of the prediction at each place.
     pub(super) predicted: Vec<[f64; 3]>,
+    /// Whether the photo shows the surface at each place.
+    pub(super) observed: Vec<bool>,
 }
 
 /// The patches of every instance that has any, by its index, in the order of views. Pixels that show no instance are
@@ -43,15 +45,23 @@ pub(super) fn patches(views: &[SceneAlbedo]) -> BTreeMap<u16, Vec<Patch>> {
                 places.iter().map(|&[x, y]| picture.get(x, y).0.map(f64::from)).collect()
             };
             let (truth, predicted) = (values(&view.truth.albedo), values(&view.predicted[0]));
-            all.entry(instance).or_default().push(Patch::new(number, places, truth, predicted));
+            let unobserved = view.truth.unobserved.as_ref();
+            let observed = places.iter().map(|&[x, y]| unobserved.is_none_or(|mask| !mask.get(x, y))).collect();
+            all.entry(instance).or_default().push(Patch::new(number, places, truth, predicted, observed));
         }
     }
     all
 }
 
 impl Patch {
-    /// `places` holds at least one position, each once; `truth` and `predicted` hold a value for each of them.
-    pub(super) fn new(view: usize, places: Vec<[usize; 2]>, truth: Vec<[f64; 3]>, predicted: Vec<[f64; 3]>) -> Self {
+    /// `places` holds at least one position, each once. `truth`, `predicted` and `observed` hold a value for each.
+    pub(super) fn new(
+        view: usize,
+        places: Vec<[usize; 2]>,
+        truth: Vec<[f64; 3]>,
+        predicted: Vec<[f64; 3]>,
+        observed: Vec<bool>,
+    ) -> Self {
         let least = |axis: usize| places.iter().map(|place| place[axis]).min().unwrap_or(0);
         let most = |axis: usize| places.iter().map(|place| place[axis]).max().unwrap_or(0);
         let corner = [0, 1].map(least);
@@ -60,7 +70,18 @@ impl Patch {
         for (at, [x, y]) in places.iter().enumerate() {
             index[(y - corner[1]) * size[0] + x - corner[0]] = Some(at as u32);
         }
-        Self { view, corner, size, index, places, truth, predicted }
+        Self { view, corner, size, index, places, truth, predicted, observed }
+    }
+
+    /// The pixels whose surface the photo shows; none if it shows no such pixel.
+    pub(super) fn observed_part(&self) -> Option<Self> {
+        fn kept<T: Copy>(values: &[T], observed: &[bool]) -> Vec<T> {
+            values.iter().zip(observed).filter(|(_, observed)| **observed).map(|(value, _)| *value).collect()
+        }
+        let places = kept(&self.places, &self.observed);
+        let [truth, predicted] = [&self.truth, &self.predicted].map(|values| kept(values, &self.observed));
+        let all = vec![true; places.len()];
+        (!places.is_empty()).then(|| Self::new(self.view, places, truth, predicted, all))
     }
 
     /// The pixel at a position of the box; none if it does not belong to the instance.

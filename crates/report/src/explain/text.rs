@@ -21,14 +21,15 @@ pub(super) struct Crop {
 }
 
 const KINDS: &str = "\
-Shares of the squared error of linear values. Each step removes its share from the error that the steps before it leave:
+Shares of the squared error of linear values. The error of surfaces that the photo does not show (hidden) comes first. Of
+the rest, each step removes its share from the error that the steps before it leave:
 one scale for each instance; one for each channel (chroma); a smooth factor in each view (shading left in the albedo); a
 shift of up to 4 pixels (misplacement); detail of the truth that the prediction lacks (blur). No step removes the rest.";
 
 /// The explanation as text, with aligned tables.
 pub fn plain(file: &ExplainFile) -> String {
     let tables = tables(file).iter().map(Table::text).collect::<Vec<_>>();
-    let mut parts = vec![format!("{}\n", title(file))];
+    let mut parts = vec![format!("{}\n{}", title(file), hidden(file))];
     parts.extend(tables);
     parts.push(format!("{KINDS}\n"));
     parts.extend(findings(file));
@@ -37,7 +38,7 @@ pub fn plain(file: &ExplainFile) -> String {
 
 /// A page with the tables and links to the pictures, in the order of the worst instances.
 pub(super) fn markdown(file: &ExplainFile, crops: &[Crop]) -> String {
-    let mut parts = vec![format!("# {}\n", title(file))];
+    let mut parts = vec![format!("# {}\n\n{}", title(file), hidden(file))];
     for (at, table) in tables(file).iter().enumerate() {
         parts.push(format!("## {}\n\n{}", table.title, rows_in_markdown(table)));
         if at == 0 {
@@ -72,6 +73,16 @@ fn title(file: &ExplainFile) -> String {
     )
 }
 
+/// How much of the error lies where the photo shows nothing.
+fn hidden(file: &ExplainFile) -> String {
+    let Some(kinds) = &file.kinds else { return String::new() };
+    let pixels = file.unobserved_pixels as f64 / file.pixels as f64;
+    let [error, pixels] = [kinds.unobserved, pixels].map(percent);
+    format!(
+        "{error} % of the squared error lies in the {pixels} % of the pixels whose surface the photo does not show.\n"
+    )
+}
+
 fn findings(file: &ExplainFile) -> Option<String> {
     let lines: String = file.findings.iter().map(|finding| format!("- {finding}\n")).collect();
     (!lines.is_empty()).then(|| format!("Findings of the result in this scene:\n\n{lines}"))
@@ -92,12 +103,12 @@ fn worst(file: &ExplainFile) -> impl Iterator<Item = &InstanceExplanation> {
 
 fn kinds(file: &ExplainFile) -> Table {
     let heads = ["Instance", "Category", "Share %", "Pixels", "MSE (1e-3)"];
-    let kinds = ["Scale %", "Chroma %", "Shading %", "Misplaced %", "Detail %", "Rest %"];
+    let kinds = ["Hidden %", "Scale %", "Chroma %", "Shading %", "Misplaced %", "Detail %", "Rest %"];
     let mut rows = vec![heads.into_iter().chain(kinds).map(str::to_owned).collect::<Vec<_>>()];
     let row = |names: [&str; 2], share: f64, pixels: usize, mse: f64, kinds: Option<&KindShares>| {
         let numbers = [percent(share), pixels.to_string(), thousandths(mse)];
-        let kinds = kinds.map_or([(); 6].map(|()| "-".to_owned()), |k| {
-            [k.scale, k.chroma, k.shading, k.misplacement, k.detail, k.rest].map(percent)
+        let kinds = kinds.map_or([(); 7].map(|()| "-".to_owned()), |k| {
+            [k.unobserved, k.scale, k.chroma, k.shading, k.misplacement, k.detail, k.rest].map(percent)
         });
         names.into_iter().map(str::to_owned).chain(numbers).chain(kinds).collect::<Vec<_>>()
     };

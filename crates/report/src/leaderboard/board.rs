@@ -6,8 +6,9 @@ use mateval_scene::dataset_id::DatasetId;
 
 use super::columns::{self, Column};
 use super::file::{Ceiling, LEADERBOARD_FORMAT, LeaderboardDataset, LeaderboardFile, LeaderboardMethod};
-use super::heads::MethodHead;
+use super::heads::{MethodHead, standing};
 use super::plan::LeaderboardPlan;
+use super::rooms::{Room, Rooms};
 use super::verified::Verified;
 use crate::picture_set::PictureSet;
 use crate::ranking::file::{RankedMethod, Ranking};
@@ -22,6 +23,7 @@ pub(super) struct Board<'a> {
     pub(super) heads: Vec<MethodHead>,
     pub(super) columns: Vec<Column>,
     pub(super) pictures: PictureSet,
+    pub(super) rooms: Rooms,
 }
 
 impl<'a> Board<'a> {
@@ -31,6 +33,7 @@ impl<'a> Board<'a> {
         ranking: Ranking,
         ceiling: Option<Ceiling>,
         pictures: PictureSet,
+        rooms: Rooms,
     ) -> Self {
         let method = |((method, result), verified): ((&RankedMethod, &ResultFile), &Verified)| {
             let submission = result.submission.clone();
@@ -61,6 +64,7 @@ impl<'a> Board<'a> {
             heads: heads.collect(),
             columns: columns::columns(&ranking),
             pictures,
+            rooms,
             file: LeaderboardFile {
                 format: LEADERBOARD_FORMAT.to_owned(),
                 tool: plan.tool.clone(),
@@ -74,6 +78,28 @@ impl<'a> Board<'a> {
 
     pub(super) fn ranking(&self) -> &Ranking {
         &self.file.ranking
+    }
+
+    /// Whether any score has an interval. Without intervals, ranks and comparisons of pairs mean nothing.
+    pub(super) fn has_intervals(&self) -> bool {
+        self.ranking().keys.values().flat_map(|key| &key.standings).any(|standing| standing.interval.is_some())
+    }
+
+    /// Whether the scene can be shown in 3D with the textures of a method.
+    pub(super) fn has_room(&self, scene: &SceneId, method: &str) -> bool {
+        matches!(self.rooms.get(scene), Some(Room::Shown { methods }) if methods.iter().any(|id| id == method))
+    }
+
+    /// The indices of the methods in [`Self::heads`], the best first by the column that the board is sorted by
+    /// initially; methods without a value are last.
+    pub(super) fn best_first(&self) -> Vec<usize> {
+        let order = |at: &usize| {
+            let column = self.first()?;
+            Some(-column.better.sign() * standing(self.ranking(), column.key, &self.heads[*at].id)?.value)
+        };
+        let mut places: Vec<usize> = (0..self.heads.len()).collect();
+        places.sort_by(|a, b| order(a).unwrap_or(f64::INFINITY).total_cmp(&order(b).unwrap_or(f64::INFINITY)));
+        places
     }
 
     /// The column that the board is sorted by initially.

@@ -1,13 +1,16 @@
 //! The board itself: one row for each method, one column for each number and each fact.
 
+use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
+use mateval_scene::SceneId;
 use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
 use super::board::Board;
-use super::columns::{Choices, Column, choices};
+use super::columns::{Choices, Column, choices, shown};
+use super::comparison::{Comparison, comparisons};
 use super::facts::{FACTS, Fact, FactColumn, facts};
 use super::heads::{Cell, MethodHead, rank_text, standing};
 use super::site::{Page, SiteWriter};
@@ -17,9 +20,14 @@ use mateval_eval::result_key::ResultKey;
 use crate::ranking::file::{KeyRanking, RankedMethod, Standing};
 use crate::truth_noise::{self, Measured, close_pairs};
 
+/// The number of methods whose pictures the page opens with.
+const BEST: usize = 2;
+
 #[derive(Serialize)]
 struct BoardPage<'a> {
-    columns: &'a [Column],
+    best: Option<BestPictures<'a>>,
+    /// Those that are shown initially; a script holds the others.
+    columns: Vec<&'a Column>,
     facts: [FactColumn; FACTS.len()],
     choices: Choices,
     first: &'a Column,
@@ -27,8 +35,33 @@ struct BoardPage<'a> {
     ceiling: Option<CeilingRow<'a>>,
     /// One sentence a column, on methods that are closer to each other than the noise of the truth's pictures.
     too_close: Vec<String>,
-    has_intervals: bool,
     has_tables: bool,
+}
+
+/// The pictures that the page opens with.
+#[derive(Serialize)]
+struct BestPictures<'a> {
+    scene: &'a SceneId,
+    methods: Vec<BestMethod<'a>>,
+}
+
+#[derive(Serialize)]
+struct BestMethod<'a> {
+    method: &'a MethodHead,
+    /// Its score by the column that the board is sorted by.
+    score: String,
+    has_room: bool,
+    pictures: Vec<Comparison<'a>>,
+}
+
+/// A column that is not shown initially.
+#[derive(Serialize)]
+struct HiddenColumn<'a> {
+    #[serde(flatten)]
+    column: &'a Column,
+    /// By the ids of methods.
+    cells: BTreeMap<&'a str, Cell>,
+    ceiling: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -47,35 +80,35 @@ struct CeilingRow<'a> {
     cells: Vec<Option<String>>,
 }
 
-/// Writes `index.html`, and one script for each number with the comparison of all pairs of methods.
+/// Writes `index.html`, a script with the columns that it does not show initially, and one script for each number with
+/// the comparison of all pairs of methods.
 pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), ReportError> {
     let Some(first) = board.first() else {
         let protocol = board.ranking().protocol.clone();
         return Err(ReportError::NothingToShow { protocol, output: "a leaderboard" });
     };
-    let mut rows: Vec<Row<'_>> = (0..board.heads.len()).map(|at| row(board, at, first)).collect();
-    let order = |row: &Row<'_>| row.value.map_or(f64::INFINITY, |value| -first.better.sign() * value);
-    rows.sort_by(|a, b| order(a).total_cmp(&order(b)));
-    let standings = || board.ranking().keys.values().flat_map(|key| &key.standings);
+    let columns = shown(&board.columns);
+    let rows: Vec<Row<'_>> = board.best_first().into_iter().map(|at| row(board, at, first, &columns)).collect();
     let page = BoardPage {
-        columns: &board.columns,
+        best: best_pictures(board, site, first, &rows),
         facts: FACTS,
         choices: choices(&board.columns),
         first,
         rows,
-        ceiling: ceiling_row(board),
+        ceiling: ceiling_row(board, &columns),
+        columns,
         too_close: board.columns.iter().filter_map(|column| too_close(board, column)).collect(),
-        has_intervals: standings().any(|standing| standing.interval.is_some()),
         has_tables: site.path(super::downloads::TABLES).exists(),
     };
     site.page(&Page {
         file: "index.html",
         template: "board.j2",
         title: &format!("{} {} leaderboard", board.file.dataset.name, board.file.dataset.version),
-        scripts: &["sort.js", "board.js"],
+        scripts: &["sort.js", "slider.js", "board.js"],
         values: context! { board => Serde(&page) },
     })?;
-    for column in &board.columns {
+    site.file("columns.js", &hidden_columns(board))?;
+    for column in board.columns.iter().filter(|_| board.has_intervals()) {
         if let Some(key) = board.ranking().keys.get(&column.key) {
             site.file(&format!("wins/{}.js", column.key), &wins(column.key, key, &board.ranking().methods))?;
         }
@@ -84,10 +117,10 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
 }
 
 /// The row of the method at place `at`.
-fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column) -> Row<'a> {
+fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column, columns: &[&Column]) -> Row<'a> {
     let head = &board.heads[at];
     let of = |column: &Column| standing(board.ranking(), column.key, &head.id);
-    let cells = board.columns.iter().map(|column| of(column).map(|standing| Cell::new(column, standing)));
+    let cells = columns.iter().map(|column| of(column).map(|standing| Cell::new(column, standing)));
     let first = of(first);
     Row {
         method: head,
@@ -98,10 +131,55 @@ fn row<'a>(board: &'a Board<'_>, at: usize, first: &Column) -> Row<'a> {
     }
 }
 
-fn ceiling_row<'a>(board: &'a Board<'_>) -> Option<CeilingRow<'a>> {
+/// The pictures of the best methods that have some in a scene, at most [`BEST`] of them: in the first scene with the
+/// most such methods. None without pictures.
+fn best_pictures<'a>(
+    board: &'a Board<'_>,
+    site: &SiteWriter<'_>,
+    first: &Column,
+    rows: &[Row<'a>],
+) -> Option<BestPictures<'a>> {
+    let in_scene = |scene: &'a SceneId| {
+        let pictures = |row: &Row<'a>| {
+            let score = format!("{} {}", first.metric_title, first.text(row.value?));
+            let pictures = comparisons(board, site, row.method, scene);
+            (!pictures.is_empty()).then_some(BestMethod {
+                method: row.method,
+                score,
+                has_room: board.has_room(scene, &row.method.id),
+                pictures,
+            })
+        };
+        BestPictures { scene, methods: rows.iter().filter_map(pictures).take(BEST).collect() }
+    };
+    let scenes = board.ranking().scenes.iter().map(in_scene).filter(|best| !best.methods.is_empty());
+    scenes.min_by_key(|best| Reverse(best.methods.len()))
+}
+
+fn ceiling_row<'a>(board: &'a Board<'_>, columns: &[&Column]) -> Option<CeilingRow<'a>> {
     let ceiling = board.file.ceiling.as_ref()?;
-    let cell = |column: &Column| ceiling.values.get(&column.key).map(|value| column.text(*value));
-    Some(CeilingRow { name: &ceiling.method, cells: board.columns.iter().map(cell).collect() })
+    Some(CeilingRow {
+        name: &ceiling.method,
+        cells: columns.iter().map(|column| ceiling_text(board, column)).collect(),
+    })
+}
+
+fn ceiling_text(board: &Board<'_>, column: &Column) -> Option<String> {
+    board.file.ceiling.as_ref()?.values.get(&column.key).map(|value| column.text(*value))
+}
+
+/// A script with the keys of all columns in their order, and the columns that are not shown initially.
+fn hidden_columns(board: &Board<'_>) -> String {
+    let cell = |column: &Column, id| Some((id, Cell::new(column, standing(board.ranking(), column.key, id)?)));
+    let hidden = |column| HiddenColumn {
+        column,
+        cells: board.heads.iter().filter_map(|head| cell(column, head.id.as_str())).collect(),
+        ceiling: ceiling_text(board, column),
+    };
+    let order: Vec<&ResultKey> = board.columns.iter().map(|column| &column.key).collect();
+    let columns: Vec<HiddenColumn<'_>> = board.columns.iter().filter(|column| !column.is_shown).map(hidden).collect();
+    // JSON is also valid JavaScript.
+    format!("boardColumns({}, {});\n", serde_json::json!(order), serde_json::json!(columns))
 }
 
 /// A sentence on the methods that the noise of the truth cannot tell apart by a column; none without such.

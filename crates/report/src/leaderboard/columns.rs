@@ -88,6 +88,11 @@ pub(super) fn columns(ranking: &Ranking) -> Vec<Column> {
     columns
 }
 
+/// The columns that are shown initially, four at most: pages of methods open with them.
+pub(super) fn shown(columns: &[Column]) -> Vec<&Column> {
+    columns.iter().filter(|column| column.is_shown).collect()
+}
+
 /// The column that a board is sorted by initially.
 pub(super) fn first(columns: &[Column]) -> Option<&Column> {
     let known = FIRST.iter().find_map(|key| columns.iter().find(|column| column.key == *key));

@@ -64,7 +64,6 @@ pub(super) struct Cell {
     text: String,
     interval: Option<String>,
     rank: String,
-    is_shown: bool,
 }
 
 impl Cell {
@@ -77,7 +76,6 @@ impl Cell {
             text: column.text(standing.value),
             interval: interval.map(|i| format!("{} – {}", column.text(i.low), column.text(i.high))),
             rank: rank_text(standing.rank),
-            is_shown: column.is_shown,
         }
     }
 }

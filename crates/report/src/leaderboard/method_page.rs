@@ -9,7 +9,8 @@ use minijinja::value::Serde;
 use serde::Serialize;
 
 use super::board::Board;
-use super::columns::{Column, headlines};
+use super::columns::{Column, headlines, shown};
+use super::comparison::{Comparison, comparisons};
 use super::heads::{Cell, MethodHead, standing};
 use super::site::{Page, SiteWriter};
 use super::verified::Verified;
@@ -26,6 +27,9 @@ use mateval_eval::result_key::{PictureKind, ResultKey, Views};
 const WORST_SCENES: usize = 5;
 const WORST_INSTANCES: usize = 10;
 
+/// The most scenes whose pictures the page opens with.
+const PICTURED_SCENES: usize = 2;
+
 /// The most findings that a page lists.
 const FINDINGS: usize = 100;
 
@@ -35,6 +39,9 @@ struct MethodPage<'a> {
     verified_text: &'static str,
     submission_sha256: &'a str,
     tool: &'a str,
+    headlines: Vec<Headline<'a>>,
+    /// Its pictures in the first scenes that have some.
+    pictures: Vec<ScenePictures<'a>>,
     metrics: Vec<&'static str>,
     scores: Vec<ScoreRow<'a>>,
     first: Option<&'a Column>,
@@ -46,6 +53,20 @@ struct MethodPage<'a> {
     scenes: Vec<SceneRow<'a>>,
     findings: Vec<String>,
     finding_count: usize,
+}
+
+/// One of the numbers that the page opens with.
+#[derive(Serialize)]
+struct Headline<'a> {
+    column: &'a Column,
+    cell: Option<Cell>,
+}
+
+#[derive(Serialize)]
+struct ScenePictures<'a> {
+    scene: &'a SceneId,
+    pictures: Vec<Comparison<'a>>,
+    has_room: bool,
 }
 
 #[derive(Serialize)]
@@ -112,10 +133,12 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         verified_text: verified_text(head.verified),
         submission_sha256: &result.submission.sha256,
         tool: &result.tool,
+        headlines: shown(&board.columns).into_iter().map(|column| headline(board, &head.id, column)).collect(),
+        pictures: pictures(board, head, site),
         metrics: Metric::ALL.iter().map(|metric| metric.style().title).collect(),
         scores: score_rows(board, &head.id),
         first: board.first(),
-        duels: duels(board, &head.id),
+        duels: if board.has_intervals() { duels(board, &head.id) } else { Vec::new() },
         worst_scenes: worst_scenes(board, at),
         worst_instances: worst_instances(&scores.instances),
         categories: categories(&scores.instances),
@@ -128,7 +151,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         file: &format!("methods/{}.html", head.id),
         template: "method.j2",
         title: &head.name,
-        scripts: &["sort.js"],
+        scripts: &["sort.js", "slider.js"],
         values: context! { page => Serde(&page) },
     })
 }
@@ -140,6 +163,21 @@ fn verified_text(verified: Verified) -> &'static str {
         Verified::Refuted => "no: eval verify computed different numbers",
         Verified::Stale => "no: the result has changed since it was verified",
     }
+}
+
+fn headline<'a>(board: &Board<'_>, id: &str, column: &'a Column) -> Headline<'a> {
+    let standing = standing(board.ranking(), column.key, id);
+    Headline { column, cell: standing.map(|standing| Cell::new(column, standing)) }
+}
+
+fn pictures<'a>(board: &'a Board<'_>, head: &'a MethodHead, site: &SiteWriter<'_>) -> Vec<ScenePictures<'a>> {
+    let of_scene = |scene| ScenePictures {
+        scene,
+        pictures: comparisons(board, site, head, scene),
+        has_room: board.has_room(scene, &head.id),
+    };
+    let scenes = board.ranking().scenes.iter().map(of_scene);
+    scenes.filter(|scene| !scene.pictures.is_empty()).take(PICTURED_SCENES).collect()
 }
 
 /// One row for each picture and views, one column for each metric.

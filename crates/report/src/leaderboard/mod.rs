@@ -3,24 +3,33 @@
 //! In: results under one protocol, and optionally pictures. Out: a folder with pages for the board, for each method and
 //! scene, for the protocol, the paper's own numbers and errata, and with the numbers as files.
 //!
-//! `board` gathers what pages show: `columns` of scores, `facts` about methods, `heads` that name a method. Each page
-//! has a file that collects the values for its template in `templates`, and `site` writes it. No page needs a server or
-//! loads anything from elsewhere.
+//! `results_folder` lists the files of a folder, and `entries` reads them and refuses those that cannot make a board.
+//! `board` gathers what pages show: `columns` of scores, `facts` about methods, `heads` that name a method, `pictures`,
+//! of which `comparison` chooses those beside the truth, and `rooms` in 3D. Each page has a file that collects the
+//! values for its template in `templates`, and `site` writes it. No page needs a server or loads anything from
+//! elsewhere.
 
 mod board;
 mod board_page;
 mod ceiling;
 mod columns;
+mod comparison;
 mod downloads;
+pub mod entries;
 pub mod errata;
 mod facts;
 pub mod file;
 mod heads;
 mod method_page;
+mod named_submission;
 mod paper;
 mod pictures;
 mod plan;
 mod protocol_page;
+pub mod results_folder;
+mod room_maps;
+mod room_page;
+mod rooms;
 mod scene_page;
 mod site;
 #[cfg(test)]
@@ -32,8 +41,8 @@ pub use plan::{LeaderboardPlan, Submissions};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use mateval_scene::Progress;
 use mateval_scene::work_folder::{WorkFolder, check_free};
+use mateval_scene::{Progress, Report};
 use minijinja::context;
 use minijinja::value::Serde;
 
@@ -47,26 +56,29 @@ use crate::ranking::rank;
 /// `force`, and never replaces anything else.
 pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Progress<'_>) -> Result<(), ReportError> {
     check_place(out, force)?;
-    progress("ranking", 0, 1);
+    progress(Report::step("ranking", 0, 1));
     let ranking = rank(plan.results, plan.protocol, plan.partial)?;
     let ceiling = plan.ceiling.map(|result| ceiling::of(result, &ranking)).transpose()?;
     let work = WorkFolder::start(out)?;
-    let pictures = pictures::gather(plan, &ranking, &work.path().join("pictures"), progress)?;
-    let board = Board::new(plan, ranking, ceiling, pictures);
+    let named = named_submission::named(plan, &ranking)?;
+    let pictures = pictures::gather(plan, &named, &ranking, &work.path().join("pictures"), progress)?;
+    let rooms = rooms::write(plan, &named, &ranking, &work.path().join("rooms"), progress)?;
+    let board = Board::new(plan, ranking, ceiling, pictures, rooms);
     let site = SiteWriter::new(work.path(), site(&board));
     site.assets()?;
     downloads::write(&board, plan.protocol, &site)?;
     board_page::write(&board, &site)?;
     let pages = board.heads.len() + board.ranking().scenes.len();
     for at in 0..board.heads.len() {
-        progress("pages", at, pages);
+        progress(Report::step("pages", at, pages));
         method_page::write(&board, at, &site)?;
     }
     for at in 0..board.ranking().scenes.len() {
-        progress("pages", board.heads.len() + at, pages);
+        progress(Report::step("pages", board.heads.len() + at, pages));
         scene_page::write(&board, at, &site)?;
     }
     scene_page::write_list(&board, &site)?;
+    room_page::write(&board, &site)?;
     protocol_page::write(&board, &site)?;
     write_constant_pages(plan, &site)?;
     Ok(work.finish()?)
@@ -91,6 +103,8 @@ fn site(board: &Board<'_>) -> Site {
         fingerprint: ranking.fingerprint.clone(),
         scenes: ranking.scenes.len(),
         houses: ranking.houses.values().collect::<BTreeSet<_>>().len(),
+        has_intervals: board.has_intervals(),
+        least_houses: ranking.rules.least_houses,
         pages: PAGES,
     }
 }

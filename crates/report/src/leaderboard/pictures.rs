@@ -1,23 +1,23 @@
 //! The pictures of a site: copied from a folder, or drawn from the dataset and the submissions.
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use mateval_scene::Progress;
-use mateval_scene::open::Dataset;
+use mateval_scene::{Progress, Report};
 use serde::Serialize;
 
+use super::named_submission::NamedSubmission;
 use super::plan::{LeaderboardPlan, Submissions};
 use crate::error::ReportError;
 use crate::picture_set::{self, ERROR, PictureSet};
 use crate::ranking::file::Ranking;
 use crate::strips::StripPlan;
 use mateval_eval::result_key::PictureKind;
-use mateval_submission::hashed_submission::hashed_submission;
 
 /// Puts all pictures into `folder`, and lists them.
 pub(super) fn gather(
     plan: &LeaderboardPlan<'_>,
+    named: &[NamedSubmission<'_>],
     ranking: &Ranking,
     folder: &Path,
     progress: Progress<'_>,
@@ -26,62 +26,45 @@ pub(super) fn gather(
         PictureSet::list(set)?.copy(set, folder)?;
     }
     if let Some(submissions) = &plan.submissions {
-        make(submissions, ranking, folder, progress)?;
+        make(submissions, named, ranking, folder, progress)?;
     }
     if folder.is_dir() { PictureSet::list(folder) } else { Ok(PictureSet::default()) }
 }
 
-fn make(from: &Submissions<'_>, ranking: &Ranking, folder: &Path, progress: Progress<'_>) -> Result<(), ReportError> {
-    let named = name_submissions(from.dataset, &from.folders, ranking)?;
-    let (names, submissions): (Vec<&str>, Vec<&Path>) = named.iter().map(|(id, path)| (id.as_str(), *path)).unzip();
-    let plan = StripPlan {
-        dataset: from.dataset,
-        submissions: &submissions,
-        scenes: &ranking.scenes,
-        shown: &from.shown,
-        out: folder,
-        force: false,
-    };
-    let scenes: Vec<_> = from.dataset.scenes.iter().filter(|scene| ranking.scenes.contains(&scene.id)).collect();
+fn make(
+    from: &Submissions<'_>,
+    named: &[NamedSubmission<'_>],
+    ranking: &Ranking,
+    folder: &Path,
+    progress: Progress<'_>,
+) -> Result<(), ReportError> {
+    let scenes = from.ranked_scenes(ranking);
     for (done, scene) in scenes.iter().enumerate() {
-        progress("pictures", done, scenes.len());
+        progress(Report::step("pictures", done, scenes.len()));
+        let shown = named.iter().filter(|submission| submission.covers(&scene.id));
+        let (names, submissions): (Vec<&str>, Vec<&Path>) =
+            shown.map(|submission| (submission.id.as_str(), submission.folder)).unzip();
+        let plan = StripPlan {
+            dataset: from.dataset,
+            submissions: &submissions,
+            scenes: &ranking.scenes,
+            shown: &from.shown,
+            out: folder,
+            force: false,
+        };
         picture_set::write(&plan, &names, scene, progress)?;
     }
     Ok(())
 }
 
-/// Each submission with the ids of its methods, which have its hash. Fails for a submission that belongs to none.
-fn name_submissions<'a>(
-    dataset: &Dataset,
-    submissions: &'a [PathBuf],
-    ranking: &Ranking,
-) -> Result<Vec<(String, &'a Path)>, ReportError> {
-    let mut named = Vec::new();
-    for path in submissions {
-        let mut ids = Vec::new();
-        for method in &ranking.methods {
-            let scored: Vec<_> =
-                ranking.scenes.iter().filter(|scene| !method.not_scored.contains(scene)).cloned().collect();
-            if hashed_submission(path, dataset, &scored)?.sha256 == method.submission_sha256 {
-                ids.push((method.id.clone(), path.as_path()));
-            }
-        }
-        if ids.is_empty() {
-            return Err(ReportError::UnscoredSubmission { path: path.clone() });
-        }
-        named.extend(ids);
-    }
-    Ok(named)
-}
-
 /// A kind of picture that a page offers.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(super) struct Kind {
     /// The stem of its files.
-    word: String,
+    pub(super) word: String,
     title: String,
     /// The stem of the files that show its errors; none for errors themselves.
-    error: Option<String>,
+    pub(super) error: Option<String>,
 }
 
 /// The kinds of pictures with these words as stems: those that results have first, each followed by its errors.

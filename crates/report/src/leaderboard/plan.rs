@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use mateval_eval::result::ResultFile;
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 
 use super::errata::ErrataFile;
 use super::verified::Verified;
+use crate::ranking::file::Ranking;
 use crate::strips::Shown;
 
 /// What a leaderboard is made from.
@@ -39,4 +41,11 @@ pub struct Submissions<'a> {
     pub folders: Vec<PathBuf>,
     /// Which pictures are drawn of each.
     pub shown: Vec<Shown>,
+}
+
+impl Submissions<'_> {
+    /// The dataset's scenes that are ranked, in its order.
+    pub(super) fn ranked_scenes(&self, ranking: &Ranking) -> Vec<&SceneFile> {
+        self.dataset.scenes.iter().filter(|scene| ranking.scenes.contains(&scene.id)).collect()
+    }
 }

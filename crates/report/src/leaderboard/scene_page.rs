@@ -10,8 +10,10 @@ use serde::Serialize;
 
 use super::board::Board;
 use super::columns::{Column, headlines};
+use super::comparison::KINDS;
 use super::heads::MethodHead;
 use super::pictures::{Kind, kinds_in_order};
+use super::rooms::Room;
 use super::site::{Page, SiteWriter};
 use crate::error::ReportError;
 use crate::picture_set::{TRUTH, png_size};
@@ -28,14 +30,23 @@ struct ScenePage<'a> {
     kinds: Vec<Kind>,
     views: Vec<&'a str>,
     gallery: Vec<GalleryRow<'a>>,
-    /// The picture that the slider shows before the script runs.
-    start: Option<String>,
-    start_truth: Option<String>,
+    sliders: Vec<Slider>,
+    room: Option<&'a Room>,
     width: u32,
     height: u32,
     white_error: f32,
     columns: Vec<&'a Column>,
     rows: Vec<ScoreRow<'a>>,
+}
+
+/// The slider of one kind of picture.
+#[derive(Serialize)]
+struct Slider {
+    kind: Kind,
+    /// The pictures that it shows before the script runs.
+    prediction: Option<String>,
+    truth: Option<String>,
+    is_shown: bool,
 }
 
 #[derive(Serialize)]
@@ -77,13 +88,11 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
     let columns = headlines(&board.columns);
     let views = views_in_order(board.pictures.views(scene));
     let gallery = gallery(board, scene, &views);
-    let start = |is_truth: bool| {
-        let row = gallery.iter().find(|row| (row.id == TRUTH) == is_truth)?;
-        Some(row.cells.iter().flatten().next()?.src.clone())
-    };
     let words: BTreeSet<&str> =
         gallery.iter().flat_map(|row| row.cells.iter().flatten()).flat_map(|cell| cell.kinds.split(' ')).collect();
-    let [width, height] = size(site, start(true).or_else(|| start(false)));
+    let first = gallery.iter().flat_map(|row| row.cells.iter().flatten()).next();
+    let [width, height] = size(site, first.map(|cell| cell.src.clone()));
+    let kinds = kinds_in_order(words);
     let page = ScenePage {
         id: scene.as_str(),
         house: house(board, scene),
@@ -94,11 +103,11 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
             .collect(),
         before: at.checked_sub(1).map(|at| scenes[at].as_str()),
         next: scenes.get(at + 1).map(SceneId::as_str),
-        kinds: kinds_in_order(words),
-        start: start(false),
-        start_truth: start(true),
+        sliders: sliders(&kinds, &gallery),
+        kinds,
         gallery,
         views,
+        room: board.rooms.get(scene),
         width,
         height,
         white_error: WHITE_ERROR,
@@ -109,7 +118,7 @@ pub(super) fn write(board: &Board<'_>, at: usize, site: &SiteWriter<'_>) -> Resu
         file: &format!("scenes/{scene}.html"),
         template: "scene.j2",
         title: scene.as_str(),
-        scripts: &["sort.js", "scene.js"],
+        scripts: &["sort.js", "slider.js", "scene.js"],
         values: context! { page => Serde(&page), truth => TRUTH },
     })
 }
@@ -147,9 +156,10 @@ fn views_in_order(views: BTreeSet<&str>) -> Vec<&str> {
     views
 }
 
-/// The truth, then the methods, each if it has pictures.
+/// The truth, then the methods, the best first; those without pictures are left out.
 fn gallery<'a>(board: &'a Board<'_>, scene: &SceneId, views: &[&'a str]) -> Vec<GalleryRow<'a>> {
-    let methods = board.heads.iter().map(|head| (head.id.as_str(), head.name.as_str()));
+    let methods = board.best_first().into_iter().map(|at| &board.heads[at]);
+    let methods = methods.map(|head| (head.id.as_str(), head.name.as_str()));
     let row = |(id, name): (&'a str, &'a str)| {
         let cell = |view: &&'a str| {
             let kinds = board.pictures.kinds(id, scene, view);
@@ -163,14 +173,34 @@ fn gallery<'a>(board: &'a Board<'_>, scene: &SceneId, views: &[&'a str]) -> Vec<
     rows.filter(|row| row.cells.iter().any(Option::is_some)).collect()
 }
 
+/// A slider for each kind of picture except errors, with pictures of the first method in the first view. Those of
+/// albedo and light are shown, or the first slider if there are none.
+fn sliders(kinds: &[Kind], gallery: &[GalleryRow<'_>]) -> Vec<Slider> {
+    let path = |is_truth: bool, kind: &Kind| {
+        let row = gallery.iter().find(|row| (row.id == TRUTH) == is_truth)?;
+        let cell = row.cells.iter().flatten().next()?;
+        cell.kinds.split(' ').any(|word| word == kind.word).then(|| format!("{}{}.png", cell.base, kind.word))
+    };
+    let is_known = |kind: &Kind| KINDS.iter().any(|known| known.word() == kind.word);
+    let has_known = kinds.iter().any(is_known);
+    let kinds = kinds.iter().filter(|kind| kind.error.is_some()).enumerate();
+    let slider = |(at, kind): (usize, &Kind)| Slider {
+        kind: kind.clone(),
+        prediction: path(false, kind),
+        truth: path(true, kind),
+        is_shown: if has_known { is_known(kind) } else { at == 0 },
+    };
+    kinds.map(slider).collect()
+}
+
 /// Width and height of the picture that a page names; 4 by 3 if there is none.
 fn size(site: &SiteWriter<'_>, file: Option<String>) -> [u32; 2] {
     file.and_then(|file| png_size(&site.path(file.trim_start_matches("../")))).unwrap_or([4, 3])
 }
 
 fn score_rows<'a>(board: &'a Board<'_>, scene: &SceneId, columns: &[&Column]) -> Vec<ScoreRow<'a>> {
-    let row = |(at, method)| ScoreRow { method, cells: board.texts(at, scene, columns) };
-    board.heads.iter().enumerate().map(row).collect()
+    let row = |at: usize| ScoreRow { method: &board.heads[at], cells: board.texts(at, scene, columns) };
+    board.best_first().into_iter().map(row).collect()
 }
 
 /// The best method by the score that the board is sorted by initially, with that score.

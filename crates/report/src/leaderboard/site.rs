@@ -9,23 +9,27 @@ use minijinja::{AutoEscape, Environment, context};
 use serde::Serialize;
 
 use crate::error::ReportError;
+use crate::page_style::{SORT, STYLE};
 
 /// Files that are written unchanged.
-const ASSETS: [(&str, &str); 5] = [
-    ("site.css", include_str!("templates/site.css")),
-    ("sort.js", include_str!("templates/sort.js")),
+const ASSETS: [(&str, &str); 6] = [
+    ("site.css", STYLE),
+    ("sort.js", SORT),
     ("board.js", include_str!("templates/board.js")),
     ("scene.js", include_str!("templates/scene.js")),
+    ("slider.js", include_str!("templates/slider.js")),
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 9] = [
+const TEMPLATES: [(&str, &str); 11] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
+    ("slider.j2", include_str!("templates/slider.j2")),
     ("board.j2", include_str!("templates/board.j2")),
     ("method.j2", include_str!("templates/method.j2")),
     ("scenes.j2", include_str!("templates/scenes.j2")),
     ("scene.j2", include_str!("templates/scene.j2")),
+    ("room.j2", include_str!("templates/room.j2")),
     ("protocol.j2", include_str!("templates/protocol.j2")),
     ("paper.j2", include_str!("templates/paper.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
@@ -40,6 +44,10 @@ pub(super) struct Site {
     pub(super) fingerprint: String,
     pub(super) scenes: usize,
     pub(super) houses: usize,
+    /// Whether there are enough houses for intervals, ranks and comparisons of pairs.
+    pub(super) has_intervals: bool,
+    /// The fewest houses for which there are intervals.
+    pub(super) least_houses: usize,
     pub(super) pages: [PageLink; 5],
 }
 

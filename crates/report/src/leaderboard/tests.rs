@@ -2,9 +2,9 @@
 
 use mateval_eval::result::ResultFile;
 use mateval_image::{Picture, png_io};
-use mateval_scene::json;
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::submission::Cost;
+use mateval_scene::{Report, json};
 
 use super::file::LeaderboardFile;
 use super::verified::Verified;
@@ -35,7 +35,7 @@ fn plan(results: &[ResultFile]) -> LeaderboardPlan<'_> {
     }
 }
 
-fn quiet(_: &str, _: usize, _: usize) {}
+fn quiet(_: Report<'_>) {}
 
 #[test]
 fn a_site_has_all_its_pages() {
@@ -61,7 +61,19 @@ fn a_site_has_all_its_pages() {
         scene.contains("data-kinds=\"albedo albedo-error\"") && scene.contains("width=\"8\" height=\"6\""),
         "{scene}"
     );
+    // Every page with pictures says once what black is; the twin has no pictures.
+    for (file, legends) in [
+        ("index.html", 1),
+        ("methods/good.html", 1),
+        ("scenes.html", 1),
+        ("scenes/s00.html", 1),
+        ("scenes/s01.html", 0),
+    ] {
+        assert_eq!(text(file).matches("Black areas of the pictures").count(), legends, "{file}");
+    }
     assert!(text("scenes/s01.html").contains("No pictures were given"));
+    // Without a dataset there are no rooms, and the page says why.
+    assert!(scene.contains("There is no 3D view") && !out.join("rooms").exists());
     assert!(text("protocol.html").contains(&results[0].protocols["mateval-2"].fingerprint));
     assert!(text("errata.html").contains("None are known"));
     assert!(text("paper.html").contains("PSDR-Room") && text("paper.html").contains("Not comparable"));

@@ -29,6 +29,9 @@ fn numbers(column: &Column, cell: &Cell) -> impl Iterator<Item = String> {
     [number(cell.value.map(|value| value.value))].into_iter().chain(error)
 }
 
-pub(crate) fn quoted(field: &str) -> String {
-    format!("\"{}\"", field.replace('"', "\"\""))
+/// A cell of text in quotation marks. A single quote goes before text that a spreadsheet would take for a formula (OWASP,
+/// "CSV Injection"): names of methods are untrusted. Numbers have no such quote, as they may begin with a minus.
+pub(crate) fn quoted(text: &str) -> String {
+    let guard = if text.starts_with(['=', '+', '-', '@', '\t', '\r', '\n']) { "'" } else { "" };
+    format!("\"{guard}{}\"", text.replace('"', "\"\""))
 }

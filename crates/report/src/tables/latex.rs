@@ -34,19 +34,25 @@ pub(super) fn text(table: &Table<'_>) -> String {
     }
     text.push_str("\\bottomrule\n\\end{tabular}\n");
     for sentence in &table.too_close {
-        let sentence = sentence.replace(['\n', '\r'], " ");
+        let sentence = sentence.replace(char::is_control, " ");
         let _ = writeln!(text, "% Closer than the noise of the truth's own pictures: {sentence}");
     }
     text.push('\n');
     text
 }
 
+/// LaTeX that shows the text as it is, in one line: names of methods are untrusted.
 fn latex_text(text: &str) -> String {
     text.chars()
         .flat_map(|c| match c {
             '\\' => "\\textbackslash{}".chars().collect::<Vec<_>>(),
             '~' => "\\textasciitilde{}".chars().collect(),
             '^' => "\\textasciicircum{}".chars().collect(),
+            '<' => "\\textless{}".chars().collect(),
+            '>' => "\\textgreater{}".chars().collect(),
+            '|' => "\\textbar{}".chars().collect(),
+            // An empty line would end the paragraph inside the cell.
+            _ if c.is_control() => vec![' '],
             '&' | '%' | '$' | '#' | '_' | '{' | '}' => vec!['\\', c],
             _ => vec![c],
         })

@@ -143,7 +143,7 @@ fn latex_by_the_byte() {
 & \multicolumn{2}{c}{Input view} & \multicolumn{1}{c}{Novel views} \\
 Method & PSNR $\uparrow$ & SSIM $\uparrow$ & MSE ($10^{-3}$) $\downarrow$ \\
 \midrule
-a|1 & 10.00 $\pm$ 0.02 & \textbf{0.5000} & 100.000 \\
+a\textbar{}1 & 10.00 $\pm$ 0.02 & \textbf{0.5000} & 100.000 \\
 b\_2 & \textbf{40.00} $\pm$ 0.02 & missing & \textbf{25.000} \\
 c"3 & \underline{20.00} $\pm$ 0.02 & \textbf{0.5000} & \underline{50.000} \\
 \bottomrule
@@ -165,6 +165,35 @@ fn csv_by_the_byte() {
     assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Csv), expected);
 }
 
+/// Names are untrusted: no format takes a part of one for its own syntax, and no spreadsheet for a formula. The twin, a
+/// negative number, has no quote in front.
+#[test]
+fn names_are_shown_as_they_are() {
+    let row = |name: &str, format| {
+        let results = [result(name, &[("rgb_true.novel.mse", -0.25)])];
+        let text = shown(&results, Grouping::Dataset, format);
+        let is_row = |line: &&str| line.contains("-250");
+        text.lines().find(is_row).unwrap_or_else(|| panic!("{text}")).to_owned()
+    };
+    let hostile = "a|b`c`[d](http://e)<img src=x>*f* _g_ h_i\\\n\n|j";
+    let expected = "| a\\|b\\`c\\`\\[d\\](http://e)&lt;img src=x&gt;\\*f\\* \\_g\\_ h_i\\\\  \\|j | -250.000 |";
+    assert_eq!(row(hostile, TableFormat::Markdown), expected);
+    assert_eq!(row("a\n\n<b>|", TableFormat::Latex), r"a  \textless{}b\textgreater{}\textbar{} & -250.000 \\");
+    for name in ["=1+1", "+1", "-1", "@sum(a1)", "\t=1"] {
+        assert_eq!(row(name, TableFormat::Csv), format!("\"'{name}\",-250"));
+    }
+    assert_eq!(row("a=1", TableFormat::Csv), "\"a=1\",-250");
+}
+
+/// The same names in the list of methods that are too close to each other.
+#[test]
+fn names_in_sentences_are_escaped() {
+    let light = |method, psnr| with_truth_noise(result(method, &[("rgb_true.input.psnr", psnr)]), 0.25);
+    let results = [light("<b>", 20.2), light("[x](y)", 20.3)];
+    let markdown = shown(&results, Grouping::Dataset, TableFormat::Markdown);
+    assert!(markdown.contains("\\[x\\](y) and &lt;b&gt; are 0.100 dB apart"), "{markdown}");
+}
+
 /// Scene a has no values and is left out; scene b shows its own noise.
 #[test]
 fn by_scene_in_the_datasets_order() {
@@ -174,7 +203,7 @@ fn by_scene_in_the_datasets_order() {
     assert!(!markdown.contains("| a | "), "{markdown}");
     let latex = shown(&three(), Grouping::Scene, TableFormat::Latex);
     assert!(latex.contains("{llrrr}\n\\toprule\n&  & \\multicolumn{2}"), "{latex}");
-    assert!(latex.contains("\\midrule\nb & a|1 & 10.00 $\\pm$ 0.25"), "{latex}");
+    assert!(latex.contains("\\midrule\nb & a\\textbar{}1 & 10.00 $\\pm$ 0.25"), "{latex}");
 }
 
 /// The paper's four tables come first, in its order; columns without values and tables without columns are left out.

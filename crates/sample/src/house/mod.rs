@@ -7,8 +7,8 @@
 //!
 //! `layout` defines the rooms and builds them with `surfaces`; their appearance is in `materials` and `textures`. The
 //! furniture's geometry is in `shapes`, its library in `models`, its textures in `swatches`, and `pieces` places it.
-//! `font` draws the letters in all textures. `house_json` makes the JSON of a sound house, `faults` plants the faults, and
-//! `model_files` writes the models.
+//! `font` draws the letters in all textures. `house_json` makes the JSON of a sound house, `faults` plants the faults,
+//! `variants` makes other houses of it, and `model_files` writes the models.
 //!
 //! The first two rooms are sound except for the normals of two walls. All other faults are in the third room.
 
@@ -26,6 +26,7 @@ mod surfaces;
 mod swatches;
 mod textures;
 mod uids;
+mod variants;
 
 use std::path::Path;
 
@@ -53,6 +54,22 @@ pub fn write(out: &Path) -> Result<(), SampleError> {
     }
     write_shapes(out, &models, &textures)?;
     models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
+}
+
+/// Writes the houses with the numbers `0..count` into the folder `out`, with the library and the textures of the built-in
+/// house. Returns their files, relative to `out`.
+pub fn write_variants(out: &Path, count: u32, seed: u64) -> Result<Vec<String>, SampleError> {
+    write(out)?;
+    let (models, textures) = (models::all(), textures::all());
+    (0..count)
+        .map(|number| {
+            let mut house = house_json::house(&models, &textures);
+            variants::vary(&mut house, &models, number, seed);
+            let file = format!("house/3D-FRONT/{}.json", variants::uid(number));
+            write_text(&out.join(&file), &house_json::text(house))?;
+            Ok(file)
+        })
+        .collect()
 }
 
 /// As [`write()`], but without textures, which take most of the time.

@@ -1,8 +1,8 @@
 //! Draws cameras in a room until one keeps its distance from everything and sees enough of the room.
 //!
-//! Height, pitch, clearance and coverage are those of BlenderProc's 3D-FRONT examples. Height and pitch are uniform,
-//! the position is uniform over the floor's bounding box and must be above the floor, and ten by ten rays decide on the
-//! distances and on a score of what is seen.
+//! Height and pitch are uniform, the position is uniform over the floor's bounding box and must be above the floor, and ten
+//! by ten rays decide on the distances and on a score of what is seen. Which heights, distances and scores are wanted is
+//! stated by [`SamplerRules`].
 
 use std::collections::BTreeMap;
 
@@ -12,41 +12,8 @@ use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
+use super::camera_rules::SamplerRules;
 use super::furnished_house::FurnishedHouse;
-
-/// The rules for a camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SamplerRules {
-    /// Range of the height above the floor, in metres.
-    pub height_m: [f64; 2],
-    /// Range of the pitch below the horizon, in degrees.
-    pub pitch_down_deg: [f64; 2],
-    /// The least distance to anything seen in any view, in metres.
-    pub min_distance_m: f64,
-    /// The least distance to anything in any direction, in metres.
-    pub clearance_m: f64,
-    /// Range of the mean distance in the input view, in metres.
-    pub mean_distance_m: [f64; 2],
-    /// The score that the input view must exceed.
-    pub min_score: f64,
-    /// The largest number of draws.
-    pub tries: u32,
-}
-
-impl Default for SamplerRules {
-    fn default() -> Self {
-        Self {
-            height_m: [1.4, 1.8],
-            // In BlenderProc 1.2217 to 1.338 rad, measured from straight down.
-            pitch_down_deg: [13.34, 20.0],
-            min_distance_m: 1.0,
-            clearance_m: 0.3,
-            mean_distance_m: [2.5, 3.5],
-            min_score: 0.8,
-            tries: 10_000,
-        }
-    }
-}
 
 /// A camera that keeps to the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,6 +75,21 @@ impl Refusals {
             Refusal::NoClearance => &mut self.no_clearance,
         } += 1;
     }
+
+    /// Each rule that was broken and how often, as in "3 see the outside, 2 are within 0.3 m of something".
+    fn counted(&self, rules: &SamplerRules) -> String {
+        let [nearest, farthest] = rules.mean_distance_m;
+        let rows = [
+            (self.off_floor, "are not above the room's floor".to_owned()),
+            (self.sees_outside, "see the outside".to_owned()),
+            (self.too_near, format!("see something nearer than {} m", rules.min_distance_m)),
+            (self.mean_distance, format!("have a mean distance outside {nearest} to {farthest} m")),
+            (self.low_score, format!("have a score below {}", rules.min_score)),
+            (self.no_clearance, format!("are within {} m of something", rules.clearance_m)),
+        ];
+        let broken = rows.into_iter().filter(|(count, _)| *count > 0);
+        broken.map(|(count, what)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
+    }
 }
 
 /// Why no camera can be drawn in a room.
@@ -121,12 +103,9 @@ pub enum CameraError {
     },
     /// Every draw breaks a rule.
     #[error(
-        "none of {} cameras drawn in room '{room}' keeps the rules: {} are not above the room's floor, {} see the outside, \
-         {} see something nearer than {} m, {} have a mean distance outside {} to {} m, {} have a score of at most {}, {} \
-         are within {} m of something; give a camera by hand, or try another seed",
-        rules.tries, refusals.off_floor, refusals.sees_outside, refusals.too_near, rules.min_distance_m,
-        refusals.mean_distance, rules.mean_distance_m[0], rules.mean_distance_m[1], refusals.low_score, rules.min_score,
-        refusals.no_clearance, rules.clearance_m
+        "none of {} cameras drawn in room '{room}' keeps the rules: {}; give a camera by hand, or try other rules or \
+         another seed",
+        rules.tries, refusals.counted(rules)
     )]
     NoneFound {
         /// The room's id.
@@ -156,6 +135,12 @@ impl<'a> RoomSampler<'a> {
             return Err(CameraError::NoFloor { room: house.house.rooms[room].id.clone() });
         };
         Ok(Self { house, world, room, floor: [low, high] })
+    }
+
+    /// The area of the room's floor, in square metres.
+    pub fn floor_area_m2(&self) -> f64 {
+        let surfaces = (0..self.house.placed.len()).filter(|&surface| is_floor(self.house, surface, self.room));
+        surfaces.map(|surface| self.house.scene.surfaces[surface].mesh.area()).sum()
     }
 
     /// Whether the first floor below a position belongs to the room. Furniture in between is ignored.
@@ -210,16 +195,18 @@ impl<'a> RoomSampler<'a> {
     fn judge(&self, camera: Camera, turns: &[[f64; 2]], rules: &SamplerRules) -> Result<FoundCamera, Refusal> {
         let holds = |holds: bool, refusal: Refusal| if holds { Ok(()) } else { Err(refusal) };
         // The input view, with few rays.
-        let seen = self.rays(&camera).ok_or(Refusal::SeesOutside)?;
+        let seen = self.rays(&camera, rules)?;
         holds(nearest(&seen) >= rules.min_distance_m, Refusal::TooNear)?;
-        let mean_m = seen.iter().map(|(_, distance)| distance).sum::<f64>() / seen.len() as f64;
+        let distances = || seen.iter().flatten().map(|(_, distance)| distance);
+        let mean_m = distances().sum::<f64>() / distances().count() as f64;
         holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::MeanDistance)?;
-        let score = score(self.house, &seen.iter().map(|(surface, _)| Some(*surface)).collect::<Vec<_>>());
-        holds(score > rules.min_score, Refusal::LowScore)?;
+        let surfaces: Vec<Option<usize>> = seen.iter().map(|hit| Some((*hit)?.0)).collect();
+        let score = score(self.house, &surfaces, rules.architecture_weight);
+        holds(score >= rules.min_score, Refusal::LowScore)?;
         // All views, with few rays and then with many.
         let turned: Vec<Camera> = turns.iter().map(|turn| camera.turned(turn[0], turn[1])).collect();
         for view in &turned {
-            self.rays(view).ok_or(Refusal::SeesOutside)?;
+            self.rays(view, rules)?;
         }
         let views = turned.iter().chain([&camera]);
         let nearest_m = views.map(|view| self.nearest_by_dense_rays(view)).fold(nearest(&seen), f64::min);
@@ -261,15 +248,23 @@ impl<'a> RoomSampler<'a> {
         met.fold(f64::INFINITY, f64::min)
     }
 
-    /// The surfaces that ten by ten rays meet and their distances; none where a ray leaves the house.
-    fn rays(&self, camera: &Camera) -> Option<Vec<(usize, f64)>> {
-        grid(&camera.intrinsics, GRID)
-            .map(|place| {
-                let hit: PixelHit = hit_through(self.world, camera, place)?;
-                let distance = camera.camera_direction(place).length() * hit.depth;
-                Some((hit.surface.0, distance))
-            })
-            .collect()
+    /// The surfaces that ten by ten rays meet and their distances; none for a ray that leaves the house. Fails where a ray
+    /// does and must not, and where all do.
+    fn rays(&self, camera: &Camera, rules: &SamplerRules) -> Result<Vec<Option<(usize, f64)>>, Refusal> {
+        let met = |place: DVec2| {
+            let hit: PixelHit = hit_through(self.world, camera, place)?;
+            let distance = camera.camera_direction(place).length() * hit.depth;
+            Some((hit.surface.0, distance))
+        };
+        let mut seen = Vec::new();
+        for place in grid(&camera.intrinsics, GRID) {
+            let hit = met(place);
+            if hit.is_none() && rules.no_background {
+                return Err(Refusal::SeesOutside);
+            }
+            seen.push(hit);
+        }
+        if seen.iter().all(Option::is_none) { Err(Refusal::SeesOutside) } else { Ok(seen) }
     }
 }
 
@@ -282,8 +277,8 @@ fn is_architecture(house: &FurnishedHouse, surface: usize, wanted: &str) -> bool
     house.placed[surface].origin.role.architecture_kind() == Some(wanted)
 }
 
-fn nearest(seen: &[(usize, f64)]) -> f64 {
-    seen.iter().map(|(_, distance)| *distance).fold(f64::INFINITY, f64::min)
+fn nearest(seen: &[Option<(usize, f64)>]) -> f64 {
+    seen.iter().flatten().map(|(_, distance)| *distance).fold(f64::INFINITY, f64::min)
 }
 
 /// Rays along a side of the coarse grid.
@@ -307,9 +302,10 @@ fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + u
 /// BlenderProc's coverage score of the surfaces that the rays of [`score_grid`] meet.
 ///
 /// It is the product of three factors: the mean weight of the rays, which is 10 for chairs, sofas, tables and beds, 0 for
-/// a ray that meets nothing, and 1 otherwise; a third of the number of different kinds, where walls and floors are kinds
-/// too; and the product over all kinds of one minus the kind's fraction of the rays.
-pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
+/// a ray that meets nothing, `architecture_weight` for walls and the like, and 1 otherwise; a third of the number of
+/// different kinds, where walls and floors are kinds too; and the product over all kinds of one minus the kind's fraction
+/// of the rays.
+pub fn score(house: &FurnishedHouse, seen: &[Option<usize>], architecture_weight: u32) -> f64 {
     const SPECIAL: [&str; 4] = ["chair", "sofa", "table", "bed"];
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     let mut weighted = 0;
@@ -317,7 +313,11 @@ pub fn score(house: &FurnishedHouse, seen: &[Option<usize>]) -> f64 {
         let placed = &house.placed[*surface];
         let kind = || placed.origin.role.architecture_kind().unwrap_or_default().to_lowercase();
         let name = placed.model.as_ref().map_or_else(kind, |model| model.name.clone());
-        weighted += if SPECIAL.iter().any(|special| name.contains(special)) { 10 } else { 1 };
+        weighted += match SPECIAL.iter().any(|special| name.contains(special)) {
+            true => 10,
+            false if placed.model.is_none() => architecture_weight,
+            false => 1,
+        };
         *kinds.entry(name).or_insert(0) += 1;
     }
     let all = seen.len().max(1) as f64;

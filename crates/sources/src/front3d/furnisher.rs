@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
+use glam::{DMat3, DMat4, DVec3};
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Role, Severity, TriangleMesh};
 
@@ -174,7 +176,7 @@ impl<'a> Furnisher<'a> {
         }
         let own = if self.compat { child.placement.mirrored_matrix() } else { child.placement.matrix() };
         let matrix = world_from_house(self.compat) * house.rooms[room].house_from_room * own;
-        let (mesh, repairs) = to_world(model.mesh.clone(), matrix, false);
+        let (mesh, repairs) = to_world((*model.mesh).clone(), matrix, false);
         if self.is_too_far(&repairs, &child.place) {
             return;
         }
@@ -206,6 +208,7 @@ impl<'a> Furnisher<'a> {
                 category: kind.category,
                 super_category: Some(kind.super_category),
                 part_of_triangle: Some(model.part_of_triangle.clone()),
+                shape: is_rigid(matrix, child.placement.scale).then(|| scaled(&model.mesh, child.placement.scale)),
             },
             color: MISSING,
         });
@@ -238,6 +241,21 @@ impl<'a> Furnisher<'a> {
             self.log.note("not_public", "/furniture", message, "left them out");
         }
     }
+}
+
+/// Whether the placement is a scale and then a motion that keeps lengths and does not mirror.
+fn is_rigid(world_from_model: DMat4, scale: DVec3) -> bool {
+    let motion = DMat3::from_mat4(world_from_model) * DMat3::from_diagonal(scale.recip());
+    (motion.transpose() * motion).abs_diff_eq(DMat3::IDENTITY, 1e-6)
+        && DMat3::from_mat4(world_from_model).determinant() > 0.0
+}
+
+fn scaled(mesh: &Arc<TriangleMesh>, scale: DVec3) -> Arc<TriangleMesh> {
+    if scale == DVec3::ONE {
+        return Arc::clone(mesh);
+    }
+    let positions = mesh.positions.iter().map(|p| (p.as_dvec3() * scale).as_vec3()).collect();
+    Arc::new(TriangleMesh { positions, triangles: mesh.triangles.clone(), ..TriangleMesh::default() })
 }
 
 fn read_model_info(models: &mut Library, limits: &Limits, log: &mut Log) -> ModelInfo {

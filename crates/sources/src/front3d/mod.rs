@@ -10,10 +10,11 @@
 //! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `drop_shadow` finds
 //!   painted shadows, `coincident` moves apart the `sheets` that coincide; `cameras` adds the designers' cameras;
 //! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
-//! - [`camera_sampler`] draws cameras in it;
+//! - [`camera_sampler`] draws cameras in it that keep [`camera_rules`];
 //! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
 
 mod appearance;
+pub mod camera_rules;
 pub mod camera_sampler;
 mod cameras;
 mod coincident;

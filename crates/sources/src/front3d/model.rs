@@ -1,5 +1,7 @@
 //! 3D-FUTURE models: reads a model's mesh in metres and its parts, and reports what had to be repaired.
 
+use std::sync::Arc;
+
 use glam::{DMat4, DVec3, Vec3};
 use mateval_image::Wrap;
 use mateval_image::texture_io::read_texture_and_alpha;
@@ -20,7 +22,7 @@ const LARGEST_M: f32 = 10.0;
 /// A model in object space: metres, +y up, origin on the floor under its middle.
 #[derive(Clone, Debug)]
 pub(super) struct Model {
-    pub(super) mesh: TriangleMesh,
+    pub(super) mesh: Arc<TriangleMesh>,
     /// The part of each triangle. Parts are the connected components of each group.
     pub(super) part_of_triangle: Vec<usize>,
 }
@@ -88,7 +90,7 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         return None;
     };
     let (mesh, groups) = without_painted_shadow(mesh, groups, &format!("{jid}/texture.png"), library, &file, log);
-    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh })
+    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh: Arc::new(mesh) })
 }
 
 fn missing_model(code: &'static str) -> &'static str {

@@ -6,6 +6,8 @@ use mateval_testkit::data::shared_data;
 use mateval_tracer::World;
 
 use super::*;
+use crate::front3d::camera_rules::CameraRules;
+use crate::front3d::camera_sampler::RoomSampler;
 
 const TWO_BEDROOMS: &str = "07700701-1835-4532-8af0-bd8c7f624b1b";
 const STORAGE: &str = "dc74ad5c-34cf-4237-a3f3-a94297a907c8";
@@ -131,4 +133,31 @@ fn a_truncated_picture_is_reported() {
         }
     }
     assert!(seen > 0);
+}
+
+/// The number of draws for ten cameras of a room, by the seeds 1 to 10; none where some seed finds no camera.
+fn draws(house: &FurnishedHouse, world: &World, room: usize, rules: CameraRules) -> Option<u32> {
+    let [width, height] = rules.resolution();
+    let intrinsics = Intrinsics::from_fov_y(width, height, rules.fov_y_deg().to_radians());
+    let turns = [[5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
+    let sampler = RoomSampler::new(house, world, room).ok()?;
+    (1..=10).map(|seed| Some(sampler.sample(intrinsics, &turns, &rules.sampler_rules(), seed).ok()?.tries)).sum()
+}
+
+/// The paper's lab relaxed BlenderProc's rules: a camera takes fewer draws in every furnished room.
+#[test]
+fn the_forks_rules_accept_more_draws() {
+    let mut rooms = 0;
+    for house in [TWO_BEDROOMS, STORAGE].into_iter().filter_map(real) {
+        let world = World::new(house.scene.clone()).unwrap();
+        for room in 0..house.house.rooms.len() {
+            if house.wanted_pieces[room] < 4 {
+                continue;
+            }
+            let [strict, relaxed] = CameraRules::ALL.map(|rules| draws(&house, &world, room, rules));
+            assert!(relaxed.unwrap() < strict.unwrap_or(u32::MAX), "{}", house.house.rooms[room].id);
+            rooms += 1;
+        }
+    }
+    assert!(rooms == 6 || shared_data("3d-front").is_none(), "{rooms}");
 }

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::Finding;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::findings::shortened;
 use mateval_scene::open::Dataset;
 use mateval_scene::submission::{Map, SUBMISSION};
+use mateval_scene::{Finding, SceneId};
 
 use super::finding::{error, note, warning};
 use super::names::{distance, nearest, plain};
@@ -35,7 +35,10 @@ pub(super) fn check(dataset: &Dataset, tree: &Tree) -> Vec<Finding> {
             _ => findings.extend(unexpected(name, kind)),
         }
     }
-    let known: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
+    // A submission may cover scenes that were not downloaded, and need not.
+    let is_covered =
+        |id: &&SceneId| !dataset.absent.contains(id) || tree.kind(&joined("scenes", id.as_str())).is_some();
+    let known: Vec<&str> = dataset.file.scenes.iter().filter(is_covered).map(SceneId::as_str).collect();
     if tree.kind("scenes") != Some(Kind::Folder) {
         let message = "the folder 'scenes' is missing";
         findings.push(error(

@@ -2,30 +2,29 @@
 
 use std::path::Path;
 
-use mateval_scene::Finding;
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
+use mateval_scene::{Finding, Severity};
 use serde_json::{Map, Value};
 
 use super::finding::{error, warning};
 use super::names::nearest;
 use crate::file_fault::FileFault;
 use crate::map_folder::exists;
+use crate::method_name;
 use crate::submitted_file::SubmittedFile;
 
 /// Its keys, the kinds of value that each may have, and whether it must be given. They are those of [`SubmissionFile`].
-const KEYS: [(&str, &[&str], bool); 7] = [
+const KEYS: [(&str, &[&str], bool); 8] = [
     ("format", &["a string"], true),
     ("method", &["a string"], true),
     ("description", &["a string"], false),
     ("url", &["a string", "null"], false),
     ("licence", &["a string", "null"], false),
     ("cost", &["an object", "null"], false),
+    ("assumed_encodings", &["an object"], false),
     ("dataset_manifest_sha256", &["a string"], true),
 ];
-
-/// Longest name of a method, in characters.
-const LONGEST_METHOD: usize = 100;
 
 /// The method's name, if it has one, and every fault. `manifest_sha256` is that of the dataset to compare with.
 pub fn check(submission: &Path, manifest_sha256: &str) -> (Option<String>, Vec<Finding>) {
@@ -88,7 +87,7 @@ fn check_object(object: Map<String, Value>, manifest_sha256: &str) -> Vec<Findin
         let Some(text) = value.as_str() else { continue };
         let found = match key.as_str() {
             "format" => check_format(text),
-            "method" => check_method(text),
+            "method" => method_name::check(text, Severity::Warning, SUBMISSION),
             "dataset_manifest_sha256" => check_hash(text, manifest_sha256),
             _ => None,
         };
@@ -129,26 +128,6 @@ fn check_format(text: &str) -> Option<Finding> {
     (text != SUBMISSION_FORMAT).then(|| error("wrong_format", SUBMISSION, message(), action))
 }
 
-fn check_method(text: &str) -> Option<Finding> {
-    if text.trim().is_empty() {
-        return Some(warning(
-            "no_method_name",
-            SUBMISSION,
-            "the method has no name",
-            "write the name that tables should show",
-        ));
-    }
-    let (length, control) = (text.chars().count(), text.chars().any(char::is_control));
-    (length > LONGEST_METHOD || control).then(|| {
-        let message = format!(
-            "the method's name has {length} characters{}",
-            if control { ", some of them unprintable" } else { "" }
-        );
-        let action = format!("use at most {LONGEST_METHOD} printable characters");
-        warning("bad_method_name", SUBMISSION, message, action)
-    })
-}
-
 fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
     let is_hash = text.len() == 64 && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'));
     let action = "copy manifest_sha256 of the dataset's dataset.json, if it was made for that";
@@ -162,6 +141,7 @@ fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_scene::stored_encoding::StoredEncoding;
     use mateval_scene::submission::Cost;
     use serde_json::json;
 
@@ -184,6 +164,7 @@ mod tests {
             url: Some("https://example.org".to_owned()),
             licence: Some("MIT".to_owned()),
             cost: Some(Cost { seconds_a_scene: 1.5, hardware: "a laptop".to_owned() }),
+            assumed_encodings: [(mateval_scene::submission::Map::Roughness, StoredEncoding::Linear)].into(),
             dataset_manifest_sha256: "0".repeat(64),
         };
         let whole = serde_json::to_value(&file).unwrap();

@@ -2,7 +2,7 @@
 
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::open::Dataset;
-use mateval_scene::{Finding, Progress};
+use mateval_scene::{Finding, Progress, Report};
 
 use super::file::LintFile;
 use super::plan::LintPlan;
@@ -19,18 +19,21 @@ pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, Sub
     let (method, of_json) = submission_json::check(plan.submission, &plan.dataset.file.manifest_sha256);
     findings.extend(of_json);
     findings.extend(layout::check(plan.dataset, &tree));
+    if let Some(absence) = plan.dataset.absence() {
+        progress(Report::Message(&absence));
+    }
     let scenes = &plan.dataset.scenes;
     let mut maps = 0;
     let mut decodings = Vec::new();
     for (at, scene) in scenes.iter().enumerate() {
-        progress("scenes checked", at, scenes.len());
+        progress(Report::part("scenes checked", at, scenes.len()));
         let found = scene::check(plan, scene)?;
         findings.extend(found.findings);
         decodings.push(found.decoding);
         maps += found.maps;
     }
     findings.extend(colours::mostly_wrong(decodings));
-    progress("scenes checked", scenes.len(), scenes.len());
+    progress(Report::part("scenes checked", scenes.len(), scenes.len()));
     Ok(report(plan.dataset, &plan.tool, method, maps, findings))
 }
 

@@ -114,7 +114,7 @@ fn lint_reports_what_scoring_reports() {
     let scored: Vec<Finding> = read.findings.into_iter().filter(|finding| finding.code == "bad_texels").collect();
     assert!(scored.len() > 20 && scored.iter().all(|finding| finding.severity == Severity::Warning), "{scored:?}");
     let plan = LintPlan { dataset: dataset(), submission: &submission(&folder), tool: "test".to_owned() };
-    let file = lint(&plan, &|_, _, _| ()).unwrap();
+    let file = lint(&plan, &|_| ()).unwrap();
     let folded = file.findings.iter().find(|finding| finding.code == "bad_texels").unwrap();
     let sorted = |mut all: Vec<Finding>| {
         all.sort();

@@ -43,7 +43,7 @@ fn good() -> tempfile::TempDir {
 
 fn linted(submission: &Path) -> LintFile {
     let plan = LintPlan { dataset: dataset(), submission, tool: "test".to_owned() };
-    lint(&plan, &|_, _, _| ()).unwrap()
+    lint(&plan, &|_| ()).unwrap()
 }
 
 fn codes(file: &LintFile, severity: Severity) -> BTreeSet<String> {
@@ -131,9 +131,8 @@ fn a_public_dataset_is_enough() {
     copy_public(&dataset().root, public.path());
     let opened = mateval_scene::open::Dataset::open(public.path()).unwrap();
     let submission = folder.path().join("gt");
-    let look = |submission: &Path| {
-        lint(&LintPlan { dataset: &opened, submission, tool: "test".to_owned() }, &|_, _, _| ()).unwrap()
-    };
+    let look =
+        |submission: &Path| lint(&LintPlan { dataset: &opened, submission, tool: "test".to_owned() }, &|_| ()).unwrap();
     assert!(look(&submission).findings.is_empty());
     pictures::flip(&submission);
     assert_eq!(codes(&look(&submission), WARNING), BTreeSet::from(["flipped_vertically".to_owned()]));

@@ -4,13 +4,73 @@
 
 const table = document.getElementById("board");
 const form = document.getElementById("controls");
-const heads = [...table.tHead.rows[0].cells];
-const columns = heads.filter((head) => head.dataset.metric);
 const groups = ["picture", "views", "metric", "region"];
+// Without enough houses there are no intervals, and thus no ranks and no pairs.
+const hasRanks = Boolean(form.elements.intervals);
 let sorted = { key: table.dataset.first, ascending: headOf(table.dataset.first).dataset.better === "lower" };
 
 function headOf(key) {
-  return heads.find((head) => head.dataset.key === key);
+  return [...table.tHead.rows[0].cells].find((head) => head.dataset.key === key);
+}
+
+// Columns that are not shown initially are in a script of their own, which is loaded when a choice asks for more than
+// the page holds: it keeps the first page small.
+let hasAllColumns = false;
+function loadColumns(then) {
+  if (hasAllColumns) return then();
+  const script = document.createElement("script");
+  script.src = "columns.js";
+  script.onload = then;
+  script.onerror = () => {
+    document.getElementById("status").textContent = "columns.js is missing beside this page: the other columns cannot be shown.";
+  };
+  document.head.append(script);
+}
+
+function boardColumns(order, hidden) {
+  if (hasAllColumns) return;
+  hasAllColumns = true;
+  const byKey = Object.fromEntries(hidden.map((column) => [column.key, column]));
+  // From the last to the first, so that each is placed before one that the table already has.
+  let next = [...table.tHead.rows[0].cells].findIndex((head, at) => at > 1 && !head.dataset.metric);
+  for (const key of [...order].reverse()) {
+    if (headOf(key)) next = headOf(key).cellIndex;
+    else addColumn(byKey[key], next);
+  }
+}
+
+function addColumn(column, at) {
+  const place = (row, made) => row.insertBefore(Object.assign(made, { hidden: true }), row.cells[at]);
+  place(table.tHead.rows[0], headCell(column));
+  for (const row of table.tBodies[0].rows) place(row, scoreCell(column.cells[row.dataset.id]));
+  if (table.tFoot) place(table.tFoot.rows[0], cell("td", column.ceiling ?? "–"));
+}
+
+function headCell({ key, picture, views, metric, region, better, title, metric_title }) {
+  const made = Object.assign(document.createElement("th"), { scope: "col" });
+  Object.assign(made.dataset, { key, picture, views, metric, region, better });
+  const arrow = cell("span", better === "higher" ? "↑" : "↓");
+  arrow.setAttribute("aria-hidden", "true");
+  const words = Object.assign(cell("span", `${better} is better`), { className: "unseen" });
+  const bold = cell("b", `${metric_title} `);
+  bold.append(arrow, words);
+  const button = Object.assign(cell("button", `${title} `), { type: "button" });
+  button.append(bold);
+  made.append(button);
+  return made;
+}
+
+function scoreCell(score) {
+  if (!score) return cell("td", "missing");
+  const made = cell("td", score.text);
+  Object.assign(made.dataset, { v: score.value, r: score.rank });
+  if (score.low !== null) Object.assign(made.dataset, { l: score.low, h: score.high });
+  if (!hasRanks) return made;
+  const small = document.createElement("small");
+  if (score.interval) small.append(cell("i", score.interval), " ");
+  small.append(cell("span", `rank ${score.rank}`));
+  made.append(small);
+  return made;
 }
 
 function chosen(name) {
@@ -19,7 +79,7 @@ function chosen(name) {
 
 function showColumns() {
   const words = Object.fromEntries(groups.map((name) => [name, chosen(name)]));
-  for (const head of columns) {
+  for (const head of table.tHead.querySelectorAll("[data-metric]")) {
     const hide = !groups.every((name) => words[name].includes(head.dataset[name]));
     if (head.hidden === hide) continue;
     head.hidden = hide;
@@ -27,13 +87,13 @@ function showColumns() {
       for (const row of part ? part.rows : []) row.cells[head.cellIndex].hidden = hide;
     }
   }
-  table.classList.toggle("plain-values", !form.elements.intervals.checked);
+  table.classList.toggle("plain-values", hasRanks && !form.elements.intervals.checked);
 }
 
 function showRows() {
   const name = form.elements.name.value.trim().toLowerCase();
   for (const row of table.tBodies[0].rows) {
-    const fits = row.cells[1].dataset.v.toLowerCase().includes(name);
+    const fits = row.querySelector("th").dataset.v.toLowerCase().includes(name);
     row.hidden = !fits || (form.elements.verified.checked && row.dataset.verified !== "confirmed");
   }
 }
@@ -42,7 +102,7 @@ function sortBoard() {
   const head = headOf(sorted.key);
   sortRows(table.tBodies[0], head.cellIndex, sorted.ascending);
   markSorted(head, sorted.ascending);
-  if (!head.dataset.metric) return;
+  if (!head.dataset.metric || !hasRanks) return;
   for (const row of table.tBodies[0].rows) row.cells[0].textContent = row.cells[head.cellIndex].dataset.r || "";
   drawIntervals(head);
 }
@@ -93,7 +153,7 @@ function boardWins(key, data) {
 }
 
 function loadWins() {
-  if (!headOf(sorted.key).dataset.metric) return;
+  if (!headOf(sorted.key).dataset.metric || !hasRanks) return;
   winsKey = sorted.key;
   if (wins[winsKey]) return showWins();
   const script = document.createElement("script");
@@ -132,7 +192,7 @@ function remember() {
   for (const name of groups) words.set(name, chosen(name).join(","));
   if (form.elements.name.value) words.set("name", form.elements.name.value);
   if (form.elements.verified.checked) words.set("verified", "1");
-  if (!form.elements.intervals.checked) words.set("intervals", "0");
+  if (hasRanks && !form.elements.intervals.checked) words.set("intervals", "0");
   words.set("sort", (sorted.ascending ? "" : "-") + sorted.key);
   history.replaceState(null, "", `#${words}`);
 }
@@ -147,16 +207,19 @@ function recall() {
   }
   form.elements.name.value = words.get("name") || "";
   form.elements.verified.checked = words.has("verified");
-  form.elements.intervals.checked = words.get("intervals") !== "0";
+  if (hasRanks) form.elements.intervals.checked = words.get("intervals") !== "0";
   const key = sort.replace(/^-/, "");
   if (headOf(key)) sorted = { key, ascending: !sort.startsWith("-") };
 }
 
+// Shows what is chosen, once the page holds all columns.
 function update() {
-  showColumns();
-  showRows();
-  showStatus();
-  remember();
+  loadColumns(() => {
+    showColumns();
+    showRows();
+    showStatus();
+    remember();
+  });
 }
 
 form.addEventListener("input", update);
@@ -172,11 +235,19 @@ table.tHead.addEventListener("click", (event) => {
   remember();
   loadWins();
 });
-window.addEventListener("hashchange", () => { recall(); showColumns(); showRows(); sortBoard(); showStatus(); loadWins(); });
+// Shows what the address holds. An address without choices needs the columns of the page only.
+function start() {
+  const show = () => {
+    recall();
+    showColumns();
+    showRows();
+    sortBoard();
+    showStatus();
+    loadWins();
+  };
+  if (location.hash.includes("sort=")) loadColumns(show);
+  else show();
+}
 
-recall();
-showColumns();
-showRows();
-sortBoard();
-showStatus();
-loadWins();
+window.addEventListener("hashchange", start);
+start();

@@ -1,15 +1,10 @@
 "use strict";
-// The pictures of a scene: the slider between prediction and truth, and the kind of picture that the gallery shows.
+// The pictures of a scene: those that the sliders compare, and the kind of picture that the gallery shows.
 
 const form = document.getElementById("compare-form");
 const kinds = document.getElementById("kinds");
 
 if (form) {
-  const split = document.getElementById("split");
-  const slider = split.parentElement;
-
-  const move = () => slider.style.setProperty("--at", `${split.value}%`);
-
   const thumbnail = (method, view) =>
     [...document.querySelectorAll(".pick")].find((pick) => pick.dataset.method === method && pick.dataset.view === view);
 
@@ -26,15 +21,22 @@ if (form) {
   };
 
   const compare = () => {
-    const { method, view, kind } = Object.fromEntries(new FormData(form));
+    const words = new FormData(form);
+    const [method, view, shown] = [words.get("method"), words.get("view"), words.getAll("kind")];
     const name = form.elements.method.selectedOptions[0].textContent;
     const pick = thumbnail(method, view);
-    const truth = picture(document.querySelector(`.gallery tbody tr .pick[data-view="${view}"]`), kind);
-    show(document.getElementById("prediction"), picture(pick, kind), `Prediction of ${name}, ${view}`);
-    show(document.getElementById("truth"), truth, `Truth, ${view}`);
-    const error = picture(pick, form.elements.kind.selectedOptions[0].dataset.error);
-    document.getElementById("heat").hidden = !error;
-    show(document.getElementById("error"), error, `Error of ${name}, ${view}`);
+    const truth = thumbnail("_truth", view);
+    document.querySelectorAll("#compare .kind").forEach((part) => {
+      const { kind, error } = part.dataset;
+      const title = part.querySelector("figcaption").textContent;
+      // A single kind has no box to choose it by.
+      part.hidden = form.elements.kind && !shown.includes(kind);
+      show(part.querySelector(".prediction img"), picture(pick, kind), `${title} by ${name}, ${view}`);
+      show(part.querySelector(".truth img"), picture(truth, kind), `${title}, truth, ${view}`);
+      const heat = picture(pick, error);
+      part.querySelector(".heat").hidden = !heat;
+      show(part.querySelector(".heat img"), heat, `${title}: error of ${name}, ${view}`);
+    });
     document.querySelectorAll(".pick").forEach((other) => other.setAttribute("aria-pressed", other === pick));
   };
 
@@ -48,7 +50,6 @@ if (form) {
     });
   };
 
-  split.addEventListener("input", move);
   form.addEventListener("input", compare);
   kinds.addEventListener("input", gallery);
   document.querySelector(".gallery").addEventListener("click", (event) => {
@@ -60,7 +61,6 @@ if (form) {
     compare();
     document.getElementById("compare").scrollIntoView({ block: "nearest" });
   });
-  move();
   compare();
   gallery();
 }

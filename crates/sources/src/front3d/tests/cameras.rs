@@ -8,7 +8,8 @@ use mateval_scene::camera::Intrinsics;
 use mateval_tracer::{Ray, World};
 
 use super::*;
-use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusals, RoomSampler, SamplerRules, score};
+use crate::front3d::camera_rules::{CameraRules, SamplerRules};
+use crate::front3d::camera_sampler::{CameraError, FoundCamera, Refusals, RoomSampler, score, score_grid};
 
 /// The default intrinsics of a recipe.
 const TURNS: [[f64; 2]; 4] = [[5.0, 5.0], [5.0, -5.0], [-5.0, 5.0], [-5.0, -5.0]];
@@ -136,6 +137,29 @@ fn without_the_rule_near_things_are_seen() {
     assert!(all.iter().any(|found| nearest_seen(&world, &found.camera, 100) < 1.0));
 }
 
+/// The fork's cameras may look at the outside and at near walls; BlenderProc's rules refuse most of them.
+#[test]
+fn the_forks_cameras_have_a_score_of_furniture_alone() {
+    let (house, world) = (bare(), world());
+    let rules = CameraRules::ThreeDlg.sampler_rules();
+    let all = found(&world, LIVING, &rules);
+    assert_eq!(all.len(), 6);
+    for found in &all {
+        let seen: Vec<Option<usize>> = score_grid(&found.camera.intrinsics)
+            .map(|place| {
+                let ray = Ray::endless(found.camera.position().as_vec3(), found.camera.direction(place).as_vec3());
+                world.first_hit(&ray).map(|hit| hit.surface.0)
+            })
+            .collect();
+        let again = score(house, &seen, 0);
+        assert!(again >= 0.5 && (again - found.score).abs() < 0.2, "{again} {}", found.score);
+    }
+    let blenderproc = SamplerRules::default();
+    let in_range = |found: &&FoundCamera| (2.5..=3.5).contains(&found.mean_m) && found.nearest_m >= 1.0;
+    assert!(all.iter().filter(in_range).count() < all.len());
+    assert!(blenderproc.min_score > rules.min_score && blenderproc.clearance_m == rules.clearance_m);
+}
+
 #[test]
 fn rooms_without_a_camera_are_reported() {
     let mut house = bare().clone();
@@ -183,20 +207,23 @@ fn scores_are_those_of_the_formula() {
         all.iter().flat_map(|(surface, count)| std::iter::repeat_n(Some(*surface), *count)).collect()
     };
     let (sofa, wall, floor) = (of_name("sofa"), of_kind("WallInner"), of_kind("Floor"));
-    let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]));
+    let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]), 1);
     assert!((found - 1.54).abs() < 1e-12, "{found}");
     // Rays that hit nothing lower the score: (200 + 0) / 100 * 1 / 3 * 0.8.
     let mut open = rays(&[(sofa, 20)]);
     open.resize(100, None);
-    assert!((score(house, &open) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
+    assert!((score(house, &open, 1) - 2.0 / 3.0 * 0.8).abs() < 1e-12);
+    // Where architecture weighs nothing: (500 + 0) / 100 * 3 / 3 * (0.5 * 0.7 * 0.8) = 1.4.
+    let found = score(house, &rays(&[(sofa, 50), (wall, 30), (floor, 20)]), 0);
+    assert!((found - 1.4).abs() < 1e-12, "{found}");
     // If one kind fills the picture, the score is 0.
-    assert_eq!(score(house, &rays(&[(wall, 100)])), 0.0);
+    assert_eq!(score(house, &rays(&[(wall, 100)]), 1), 0.0);
     // Two surfaces of one kind count as one: 100 / 100 * 2 / 3 * 0.4 * 0.6.
     let walls: Vec<usize> = (0..house.placed.len())
         .filter(|at| house.placed[*at].origin.role.architecture_kind() == Some("WallInner"))
         .collect();
     assert!(walls.len() > 1);
-    let found = score(house, &rays(&[(walls[0], 30), (walls[1], 30), (floor, 40)]));
+    let found = score(house, &rays(&[(walls[0], 30), (walls[1], 30), (floor, 40)]), 1);
     assert!((found - 0.16).abs() < 1e-12, "{found}");
     let mut names: BTreeMap<&str, usize> = BTreeMap::new();
     for placed in &house.placed {

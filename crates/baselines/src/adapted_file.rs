@@ -1,0 +1,147 @@
+//! The files of one map of a method, as its adapter describes them.
+
+use std::path::{Path, PathBuf};
+
+use mateval_image::texture_io::{self, read_texture};
+use mateval_image::{LinearRgb, Picture, Wrap};
+use mateval_scene::stored_encoding::StoredEncoding;
+use serde::Deserialize;
+
+use crate::error::{AdapterError, BaselineError};
+use crate::scale::Scale;
+
+/// The placeholder for the scene's id in a path.
+const SCENE: &str = "{scene}";
+
+/// The largest linear value of an estimate. Materials end at 1 or little above; far larger numbers, such as those from 0 to
+/// 255, have another range than the adapter states.
+const LARGEST: f32 = 16.0;
+
+/// The files of one map.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptedFile {
+    /// Candidate paths below the folder of estimates; the first that exists is read. `{scene}` stands for the scene's
+    /// id.
+    pub files: Vec<String>,
+    /// Transfer function of the stored numbers.
+    pub encoding: StoredEncoding,
+    /// Whether the method's authors state the encoding, in words or by code. Where they do not, submissions name it in
+    /// `assumed_encodings`.
+    #[serde(default = "stated")]
+    pub encoding_stated: bool,
+    /// The stored numbers that stand for 0 and 1, after integers are divided by the largest value of their type.
+    #[serde(default = "unit_range")]
+    pub range: [f32; 2],
+    /// Whether the values are known only up to a factor.
+    #[serde(default)]
+    pub scale: Scale,
+    /// The channel that holds roughness or metallic; the first if absent. `base_color` must have none.
+    #[serde(default)]
+    pub channel: Option<Channel>,
+    /// Whether a scene may lack the file; it then has no such map.
+    #[serde(default)]
+    pub optional: bool,
+}
+
+fn stated() -> bool {
+    true
+}
+
+fn unit_range() -> [f32; 2] {
+    [0.0, 1.0]
+}
+
+/// A channel of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Channel {
+    /// Red.
+    R,
+    /// Green.
+    G,
+    /// Blue.
+    B,
+}
+
+/// The numbers of a file before decoding.
+pub(crate) struct Stored {
+    /// The file.
+    path: PathBuf,
+    /// Its numbers, with those of `range` mapped to 0 and 1.
+    pub(crate) numbers: Picture<[f32; 3]>,
+}
+
+impl AdaptedFile {
+    /// Fails where no path is given, or where the range is empty or not finite.
+    pub(crate) fn check(&self) -> Result<(), AdapterError> {
+        if self.files.is_empty() {
+            return Err(AdapterError::NoFiles);
+        }
+        if !(self.range[1] > self.range[0] && self.range.iter().all(|v| v.is_finite())) {
+            return Err(AdapterError::Range(self.range));
+        }
+        Ok(())
+    }
+
+    /// The linear picture; `channel` selects a scalar, which is repeated in all three channels. None where an optional
+    /// file is missing.
+    pub(crate) fn read(
+        &self,
+        folder: &Path,
+        scene: &str,
+        channel: Option<Channel>,
+    ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
+        let Some(Stored { path, numbers }) = self.stored(folder, scene, channel)? else { return Ok(None) };
+        let picture = numbers.map(|rgb| LinearRgb(rgb.map(|value| self.encoding.decode(value))));
+        let picture = self.scale.apply(picture);
+        let too_large = |rgb: &LinearRgb| rgb.0.into_iter().find(|value| value.is_finite() && value.abs() > LARGEST);
+        if let Some(value) = picture.pixels().iter().find_map(too_large) {
+            return Err(BaselineError::TooLarge { path, value, largest: LARGEST });
+        }
+        match picture.pixels().iter().position(|LinearRgb(rgb)| !rgb.iter().all(|v| v.is_finite())) {
+            None => Ok(Some(picture)),
+            Some(at) => {
+                let pixel = (at % picture.width(), at / picture.width());
+                Err(BaselineError::NotFinite { path, pixel })
+            }
+        }
+    }
+
+    /// The stored numbers. None where an optional file is missing.
+    pub(crate) fn stored(
+        &self,
+        folder: &Path,
+        scene: &str,
+        channel: Option<Channel>,
+    ) -> Result<Option<Stored>, BaselineError> {
+        let path = match self.path(folder, scene) {
+            Err(BaselineError::NoEstimate { .. }) if self.optional => return Ok(None),
+            path => path?,
+        };
+        // Read without decoding: the adapter states the encoding, of float files too.
+        let stored = read_texture(&path, texture_io::Encoding::Linear, Wrap::Clamp)?;
+        let [low, high] = self.range;
+        let numbers = Picture::from_fn(stored.width(), stored.height(), |x, y| {
+            selected(channel, stored.texel(x, y)).map(|value| (value - low) / (high - low))
+        });
+        Ok(Some(Stored { path, numbers }))
+    }
+
+    /// The first path that exists.
+    pub(crate) fn path(&self, folder: &Path, scene: &str) -> Result<PathBuf, BaselineError> {
+        let paths: Vec<PathBuf> = self.files.iter().map(|file| folder.join(file.replace(SCENE, scene))).collect();
+        let found = paths.iter().find(|path| path.is_file()).cloned();
+        found.ok_or(BaselineError::NoEstimate { paths })
+    }
+}
+
+/// The channel's value three times, or all three channels where none is selected.
+fn selected(channel: Option<Channel>, rgb: [f32; 3]) -> [f32; 3] {
+    match channel {
+        None => rgb,
+        Some(Channel::R) => [rgb[0]; 3],
+        Some(Channel::G) => [rgb[1]; 3],
+        Some(Channel::B) => [rgb[2]; 3],
+    }
+}

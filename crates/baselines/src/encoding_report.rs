@@ -1,0 +1,239 @@
+//! `baseline encoding`: compares a method's stored numbers with the truth of the input views, map by map, and reports
+//! which encoding they fit.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use glam::DVec2;
+use mateval_image::exr_io::{read_linear, read_scalar};
+use mateval_image::{LinearRgb, Mask, Picture, png_io};
+use mateval_scene::dataset::SceneFile;
+use mateval_scene::open::Dataset;
+use mateval_scene::stored_encoding::StoredEncoding;
+use mateval_scene::submission::Map;
+use mateval_scene::{Progress, Report};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::adapted_file::{AdaptedFile, Channel};
+use crate::adapter::Adapter;
+use crate::encoding_fit::{Candidate, FittedEncoding, Sample, Verdict, fit};
+use crate::error::BaselineError;
+use crate::geometry::input_view;
+
+/// The value of `format` for this version of the report.
+pub const ENCODING_FORMAT: &str = "mateval-encoding/1";
+
+/// Pixels whose truth is darker are not compared: bytes resolve it too coarsely.
+const LEAST_TRUTH: f32 = 0.02;
+/// Stored numbers nearer to 1 than this may be clipped, and are not compared.
+const CLIPPED: f32 = 1.0 / 300.0;
+/// The most pixels of a scene that are compared.
+const MOST_PIXELS: usize = 1 << 14;
+/// The most pixels of all scenes together, except that every scene has at least [`FEWEST_PIXELS`].
+const MOST_PIXELS_TOGETHER: usize = 1 << 20;
+/// The pixels that every scene may have, whatever the number of scenes.
+const FEWEST_PIXELS: usize = 1 << 8;
+
+/// The most paths that an error names.
+const MOST_NAMED_PATHS: usize = 4;
+
+/// Which encodings a method's numbers fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EncodingReport {
+    /// Always `mateval-encoding/1`.
+    pub format: String,
+    /// The adapter's name.
+    pub adapter: String,
+    /// Whether no map contradicts the adapter.
+    pub agrees: bool,
+    /// The maps that the adapter describes and that have a file in a scene whose source states them.
+    pub maps: Vec<MapEncoding>,
+}
+
+/// One map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MapEncoding {
+    /// The map.
+    pub map: Map,
+    /// The adapter's encoding.
+    pub adapter_encoding: StoredEncoding,
+    /// Whether the method's authors state it, according to the adapter.
+    pub encoding_stated: bool,
+    /// Number of scenes that have a file and whose source states the map.
+    pub scenes: usize,
+    /// Number of instances that are compared.
+    pub instances: usize,
+    /// Number of pixels that are compared; those of base_color count for each channel.
+    pub samples: usize,
+    /// What the numbers show.
+    pub verdict: Verdict,
+    /// The encodings that the numbers fit, the best first.
+    pub fits: Vec<FittedEncoding>,
+    /// Whether the adapter's encoding is one of `fits`, or the verdict is `too_little`.
+    pub agrees: bool,
+    /// All encodings that were compared.
+    pub candidates: Vec<Candidate>,
+}
+
+/// Compares the files below `folder` with the truth. Fails where nothing can be compared: no scene has a file, or none
+/// of the scenes that have one states the map.
+pub fn report(
+    dataset: &Dataset,
+    folder: &Path,
+    adapter: &Adapter,
+    progress: Progress<'_>,
+) -> Result<EncodingReport, BaselineError> {
+    let mut maps = Vec::new();
+    let (mut searched, mut unstated) = (Vec::new(), BTreeSet::new());
+    for (map, file, channel) in adapter.maps() {
+        let mut samples = Samples::default();
+        for (done, scene) in dataset.scenes.iter().enumerate() {
+            progress(Report::step(&format!("{} encoding", map.stem()), done, dataset.scenes.len()));
+            match file.path(folder, scene.id.as_str()) {
+                Err(BaselineError::NoEstimate { paths }) => searched.extend(paths),
+                Err(other) => return Err(other),
+                Ok(_) if !is_stated(scene, map) => {
+                    unstated.insert(map.stem());
+                }
+                Ok(_) => samples.add(dataset, scene, folder, adapter, (map, file, channel))?,
+            }
+        }
+        progress(Report::step(&format!("{} encoding", map.stem()), dataset.scenes.len(), dataset.scenes.len()));
+        if samples.scenes > 0 {
+            maps.push(map_encoding(map, file, &samples));
+        }
+    }
+    if maps.is_empty() && !unstated.is_empty() {
+        return Err(BaselineError::UnstatedTruth { maps: unstated.into_iter().collect() });
+    }
+    if maps.is_empty() {
+        searched.truncate(MOST_NAMED_PATHS);
+        return Err(BaselineError::NoEstimate { paths: searched });
+    }
+    let agrees = maps.iter().all(|map| map.agrees);
+    Ok(EncodingReport { format: ENCODING_FORMAT.to_owned(), adapter: adapter.name.clone(), agrees, maps })
+}
+
+/// Whether the scene's source states the map, so that its truth is more than a default.
+fn is_stated(scene: &SceneFile, map: Map) -> bool {
+    match map {
+        Map::BaseColor => true,
+        Map::Roughness => scene.source.states_roughness,
+        Map::Metallic => scene.source.states_metallic,
+    }
+}
+
+fn map_encoding(map: Map, file: &AdaptedFile, samples: &Samples) -> MapEncoding {
+    let found = fit(&samples.all);
+    let is_named = found.fits.iter().any(|fitted| fitted.stored() == Some(file.encoding));
+    MapEncoding {
+        map,
+        adapter_encoding: file.encoding,
+        encoding_stated: file.encoding_stated,
+        scenes: samples.scenes,
+        instances: found.instances,
+        samples: samples.all.len(),
+        verdict: found.verdict,
+        agrees: is_named || found.verdict == Verdict::TooLittle,
+        fits: found.fits,
+        candidates: found.candidates,
+    }
+}
+
+/// The samples of one map.
+#[derive(Default)]
+struct Samples {
+    all: Vec<Sample>,
+    scenes: usize,
+    groups: usize,
+    instances: usize,
+}
+
+impl Samples {
+    fn add(
+        &mut self,
+        dataset: &Dataset,
+        scene: &SceneFile,
+        folder: &Path,
+        adapter: &Adapter,
+        (map, file, channel): (Map, &AdaptedFile, Option<Channel>),
+    ) -> Result<(), BaselineError> {
+        let Some(stored) = file.stored(folder, scene.id.as_str(), channel)? else { return Ok(()) };
+        let stored = stored.numbers;
+        let view = InputView::read(dataset, scene, map)?;
+        let (size, view_size) = ((stored.width(), stored.height()), (view.valid.width(), view.valid.height()));
+        let region = adapter.placement.region(size, view_size);
+        let region = region.ok_or_else(|| BaselineError::Proportions {
+            scene: scene.id.to_string(),
+            size,
+            view: view_size,
+            adapted: true,
+        })?;
+        let channels = if map == Map::BaseColor { 3 } else { 1 };
+        let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
+        for (x, y) in view.pixels(most) {
+            let Some((sx, sy)) = region.pixel(size, DVec2::new(x as f64, y as f64) + 0.5) else { continue };
+            let (truth, stored) = (view.truth.get(x, y).0, stored.get(sx, sy));
+            let instance = self.instances + usize::from(view.instances.get(x, y));
+            for channel in 0..channels {
+                let (truth, stored) = (truth[channel], stored[channel]);
+                if truth >= LEAST_TRUTH && stored.is_finite() && (stored - 1.0).abs() > CLIPPED {
+                    let ln_truth = libm::log(f64::from(truth));
+                    let group = self.groups + channel;
+                    self.all.push(Sample { ln_truth, stored: f64::from(stored), group, instance });
+                }
+            }
+        }
+        self.scenes += 1;
+        self.groups += channels;
+        // Ids begin at 1.
+        self.instances += scene.instances.len() + 1;
+        Ok(())
+    }
+}
+
+/// The truth of one map in the input view of a scene.
+struct InputView {
+    truth: Picture<LinearRgb>,
+    valid: Mask,
+    instances: Picture<u16>,
+}
+
+impl InputView {
+    fn read(dataset: &Dataset, scene: &SceneFile, map: Map) -> Result<Self, BaselineError> {
+        let folder = dataset.folder(&scene.id);
+        let view = input_view(&folder, scene)?;
+        let (shown, known) = (folder.view(&view.id), folder.truth_view(&view.id));
+        let scalar = |name: &str| Ok::<_, BaselineError>(read_scalar(&known.join(name))?.map(|v| LinearRgb([v; 3])));
+        let truth = match map {
+            Map::BaseColor => read_linear(&known.join("albedo.exr"))?,
+            Map::Roughness => scalar("roughness.exr")?,
+            Map::Metallic => scalar("metallic.exr")?,
+        };
+        let (valid, instances) =
+            (png_io::read_mask(&shown.join("valid.png"))?, png_io::read_ids(&shown.join("instance.png"))?);
+        if truth.same_size(&valid) && instances.same_size(&valid) {
+            return Ok(Self { truth, valid, instances });
+        }
+        let what = "its pictures differ in size; run `mateval prep verify`".to_owned();
+        Err(mateval_scene::SceneError::Unsupported { path: shown, what }.into())
+    }
+
+    /// Valid pixels whose eight neighbours are valid and show the same instance: at most `most`, evenly spaced in
+    /// reading order.
+    fn pixels(&self, most: usize) -> Vec<(usize, usize)> {
+        let (width, height) = (self.valid.width(), self.valid.height());
+        let is_inside = |&(x, y): &(usize, usize)| {
+            let id = self.instances.get(x, y);
+            let around = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| (x, y)));
+            id > 0 && { around }.all(|(x, y)| self.valid.get(x, y) && self.instances.get(x, y) == id)
+        };
+        let inner = (1..height.saturating_sub(1)).flat_map(|y| (1..width.saturating_sub(1)).map(move |x| (x, y)));
+        let all: Vec<(usize, usize)> = inner.filter(is_inside).collect();
+        let step = all.len().div_ceil(most).max(1);
+        all.into_iter().step_by(step).collect()
+    }
+}

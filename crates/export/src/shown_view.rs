@@ -1,0 +1,43 @@
+//! The views of a scene and their pictures.
+
+use std::path::{Path, PathBuf};
+
+use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::layout::INPUT;
+use mateval_scene::open::Dataset;
+
+/// A view that has a picture.
+#[derive(Clone, Debug)]
+pub struct ShownView<'a> {
+    /// The scene.
+    pub scene: &'a SceneFile,
+    /// The view.
+    pub view: &'a View,
+    /// Its 8-bit sRGB picture, relative to the dataset.
+    pub picture: PathBuf,
+}
+
+/// The 8-bit sRGB picture of a view, relative to the dataset: that of the input view, or the reference picture of another
+/// view. None where it does not exist, as with withheld ground truth.
+pub fn picture(dataset: &Dataset, scene: &SceneFile, view: &View) -> Option<PathBuf> {
+    let renderer = dataset.file.scored_renderer.as_ref()?;
+    let folder = dataset.folder(&scene.id);
+    let file = match view.id.as_str() {
+        INPUT => folder.view(&view.id),
+        _ => folder.render(renderer, &view.id),
+    }
+    .join("rgb.png");
+    let relative = file.strip_prefix(&dataset.root).expect("a scene's files lie in the dataset").to_owned();
+    file.is_file().then_some(relative)
+}
+
+/// A path as files state it on every system, with forward slashes.
+pub fn slashed(path: &Path) -> String {
+    path.to_string_lossy().replace('\\', "/")
+}
+
+/// The views of a scene that have a picture, in its order.
+pub fn of_scene<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Vec<ShownView<'a>> {
+    let shown = |view: &'a View| Some(ShownView { scene, view, picture: picture(dataset, scene, view)? });
+    scene.views.iter().filter_map(shown).collect()
+}

@@ -1,0 +1,212 @@
+//! Writes the files that describe a whole dataset, once its scenes are made: `dataset.json`, `targets.json`, the recipe and
+//! the manifest. Files of scenes are not read again where their hashes are known.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use mateval_scene::build_folder::BuildFolder;
+use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
+use mateval_scene::layout::{DATASET, INPUT, SceneFolder, TARGETS};
+use mateval_scene::open::check_whole;
+use mateval_scene::scene_hashes::SceneHashes;
+use mateval_scene::work_folder::remove;
+use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, ViewId, json, manifest};
+
+use crate::build::scene_mark::{SceneMark, settings_sha256};
+use crate::build::start::is_build;
+use crate::error::PrepError;
+use crate::recipe::{self, RECIPE, Recipe};
+use crate::render::kind::RendererKind;
+use crate::render::render_file::RENDER_FILE;
+use crate::render::store::{can_show_input, show_input};
+
+/// Finishes the dataset that `prep build` makes in `root`, without the scenes `without`, which are put aside in `.build`
+/// until a later call wants them. Fails where another process works on the dataset, where a scene is not made, where one
+/// was changed by anything but `prep`, or where a folder is none of the recipe's scenes; everything of one kind is named
+/// at once. Of a dataset that was not built here, the list of scenes stays as it is.
+pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
+    if !is_build(root) {
+        return match without.is_empty() {
+            true => finish_again(root, progress),
+            false => Err(PrepError::NotBuiltHere { path: root.to_owned() }),
+        };
+    }
+    let build = BuildFolder::of(root);
+    let (recipe, text) = recipe::read(&build.recipe())?;
+    let all: Vec<SceneId> = recipe.scenes.iter().map(|entry| entry.id.clone()).collect();
+    let unknown: Vec<SceneId> = without.iter().filter(|id| !all.contains(id)).cloned().collect();
+    if !unknown.is_empty() {
+        return Err(SceneError::UnknownScenes { dataset: root.to_owned(), unknown, known: all }.into());
+    }
+    let _lease = build.lease_of_whole(&all)?;
+    manifest::remove_unfinished(&root.join("scenes"))?;
+    let scenes: Vec<SceneId> = all.iter().filter(|id| !without.contains(id)).cloned().collect();
+    if scenes.is_empty() {
+        return Err(PrepError::NoSceneLeft { path: root.to_owned() });
+    }
+    check_strays(root, &all)?;
+    check_made(root, &recipe, &scenes, tool)?;
+    // Everything that can be refused by names alone has been.
+    for id in &all {
+        put_in_place(root, id, !without.contains(id))?;
+    }
+    let mut dataset = DatasetFile {
+        format: FORMAT.to_owned(),
+        name: recipe.name.clone(),
+        version: recipe.version.clone(),
+        tool: tool.to_owned(),
+        scenes,
+        scored_renderer: None,
+        licences: Vec::new(),
+        manifest_sha256: String::new(),
+    };
+    for id in &dataset.scenes {
+        dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
+    }
+    let known = scene_hashes(root, &mut dataset, progress)?;
+    json::write(&root.join(TARGETS), &targets(&recipe, &dataset))?;
+    mateval_image::store::write_whole(&root.join(RECIPE), text.as_bytes())?;
+    write(root, dataset, &known)
+}
+
+/// Writes the manifest and `dataset.json` again, after scenes that the dataset lists were rendered.
+pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
+    let mut dataset: DatasetFile = json::read_format(&root.join(DATASET), FORMAT)?;
+    check_whole(root, &dataset)?;
+    let _lease = BuildFolder::of(root).lease_of_whole(&dataset.scenes)?;
+    manifest::remove_unfinished(&root.join("scenes"))?;
+    check_strays(root, &dataset.scenes)?;
+    let known = scene_hashes(root, &mut dataset, progress)?;
+    write(root, dataset, &known)
+}
+
+/// Fails where a scene is not made, or was made otherwise than the recipe says.
+fn check_made(root: &Path, recipe: &Recipe, scenes: &[SceneId], tool: &str) -> Result<(), PrepError> {
+    let build = BuildFolder::of(root);
+    let (mut missing, mut changed) = (Vec::new(), Vec::new());
+    for entry in recipe.scenes.iter().filter(|entry| scenes.contains(&entry.id)) {
+        let exists = SceneFolder::of(root, &entry.id).path().exists() || build.left_out(&entry.id).exists();
+        match json::read::<SceneMark>(&build.mark(&entry.id)) {
+            Ok(mark) if exists && mark.settings_sha256 != settings_sha256(recipe, &entry.id, tool) => {
+                changed.push(entry.id.clone());
+            }
+            Ok(_) if exists => {}
+            _ => missing.push(entry.id.clone()),
+        }
+    }
+    if !missing.is_empty() {
+        return Err(PrepError::MissingScenes { path: root.to_owned(), scenes: missing });
+    }
+    match changed.is_empty() {
+        true => Ok(()),
+        false => Err(PrepError::OtherBuild { path: root.to_owned(), changed, dropped: Vec::new() }),
+    }
+}
+
+/// Moves the scene's folder out of the dataset or back.
+fn put_in_place(root: &Path, id: &SceneId, is_wanted: bool) -> Result<(), PrepError> {
+    let (inside, outside) = (SceneFolder::of(root, id).path().to_owned(), BuildFolder::of(root).left_out(id));
+    let (from, to) = if is_wanted { (outside, inside) } else { (inside, outside) };
+    if !from.exists() {
+        return Ok(());
+    }
+    if to.exists() {
+        // The one in the dataset is the newer.
+        remove(if is_wanted { &from } else { &to })?;
+        if is_wanted {
+            return Ok(());
+        }
+    }
+    if is_wanted {
+        BuildFolder::of(root).note_change(id)?;
+    }
+    let parent = to.parent().unwrap_or(root);
+    std::fs::create_dir_all(parent).map_err(PrepError::io("make", parent))?;
+    std::fs::rename(&from, &to).map_err(PrepError::io("move", &from))
+}
+
+/// Fails where `scenes` holds what is no scene of the dataset, such as a copy that was made by hand.
+pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepError> {
+    let folder = root.join("scenes");
+    let entries = std::fs::read_dir(&folder).map_err(PrepError::io("list", &folder))?;
+    let names = entries.flatten().map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let is_stray =
+        |name: &String| !mateval_image::temporary::is_temporary(name) && scenes.iter().all(|id| id.as_str() != name);
+    let mut names: Vec<String> = names.filter(is_stray).collect();
+    names.sort();
+    if names.is_empty() { Ok(()) } else { Err(PrepError::StrayScenes { path: folder, names }) }
+}
+
+/// Checks the scenes' files, shows the scored renderer's photo in each, and returns the hashes of all files. Sets the
+/// scored renderer.
+fn scene_hashes(
+    root: &Path,
+    dataset: &mut DatasetFile,
+    progress: Progress<'_>,
+) -> Result<BTreeMap<String, String>, PrepError> {
+    dataset.scored_renderer = scored_renderer(root, dataset);
+    let shown = dataset.scored_renderer.clone().or_else(|| any_renderer(root, &dataset.scenes));
+    let (mut findings, mut lists) = (Vec::new(), Vec::new());
+    for (at, id) in dataset.scenes.iter().enumerate() {
+        progress(Report::step("hashes", at, dataset.scenes.len()));
+        let mut list = SceneHashes::open(root, id)?;
+        let shown = shown.as_ref().filter(|renderer| can_show_input(&SceneFolder::of(root, id), renderer));
+        // The photo is a copy of that renderer's and is made again.
+        let is_remade = |path: &str| shown.is_some() && is_photo(path);
+        findings.extend(list.check(|path| !is_remade(path))?);
+        lists.push((id, shown, list));
+    }
+    if !findings.is_empty() {
+        return Err(SceneError::Invalid { path: root.to_owned(), findings }.into());
+    }
+    for (id, shown, list) in &mut lists {
+        if let Some(renderer) = shown {
+            list.note_change()?;
+            show_input(&SceneFolder::of(root, id), renderer)?;
+        }
+        list.update()?;
+    }
+    let entries = lists.iter().flat_map(|(_, _, list)| list.entries());
+    Ok(entries.map(|(file, sha256)| (file.to_owned(), sha256.to_owned())).collect())
+}
+
+/// Whether a path in the dataset is that of a photo that methods see.
+fn is_photo(path: &str) -> bool {
+    path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
+}
+
+/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view; none where none has.
+fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
+    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
+    known.find(|renderer| dataset.scenes.iter().all(|id| is_complete(root, id, renderer)))
+}
+
+/// The first renderer that has rendered every view of some scene.
+fn any_renderer(root: &Path, scenes: &[SceneId]) -> Option<RendererId> {
+    let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
+    known.find(|renderer| scenes.iter().any(|id| is_complete(root, id, renderer)))
+}
+
+fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
+    let folder = SceneFolder::of(root, id);
+    json::read::<SceneFile>(&folder.scene_file())
+        .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(RENDER_FILE).is_file()))
+}
+
+fn targets(recipe: &Recipe, dataset: &DatasetFile) -> TargetsFile {
+    let input = ViewId::new(INPUT).expect("our own id is an id");
+    let views: Vec<ViewId> = std::iter::once(input).chain(recipe.views.iter().map(|view| view.id.clone())).collect();
+    let of_scene = |scene: &SceneId| {
+        let scene = scene.clone();
+        views.iter().map(move |view| Target { scene: scene.clone(), view: view.clone() }).collect::<Vec<_>>()
+    };
+    TargetsFile { format: FORMAT.to_owned(), targets: dataset.scenes.iter().flat_map(of_scene).collect() }
+}
+
+/// `dataset.json` is written last: it names the manifest.
+fn write(root: &Path, mut dataset: DatasetFile, known: &BTreeMap<String, String>) -> Result<DatasetFile, PrepError> {
+    dataset.manifest_sha256 = manifest::write_with(root, known)?;
+    json::write(&root.join(DATASET), &dataset)?;
+    BuildFolder::of(root).forget_changes()?;
+    Ok(dataset)
+}

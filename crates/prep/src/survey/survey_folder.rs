@@ -1,0 +1,184 @@
+//! The folder of a survey: its files, and who may write there.
+//!
+//! What was found in each house is kept in `.survey`, so that a survey can be resumed, and so that several processes can
+//! search different houses. `survey.json` is written last: a folder without it holds a survey that is not finished.
+
+use std::path::{Path, PathBuf};
+
+use mateval_scene::lease::{self, Lease};
+use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::work_folder::{check_free, remove};
+use mateval_scene::{SceneError, ids, json};
+use serde::{Deserialize, Serialize};
+
+use super::survey_file::{SURVEY, THUMBNAILS};
+use crate::build::start::holds_only;
+use crate::error::PrepError;
+
+/// The name of the folder that only the survey itself reads.
+const WORK: &str = ".survey";
+
+const KEY_FORMAT: &str = "mateval-survey-work/1";
+
+/// States that a `.survey` is ours.
+#[derive(Serialize, Deserialize)]
+struct WorkKey {
+    format: String,
+}
+
+/// The paths of a survey's folder.
+#[derive(Clone, Debug)]
+pub(super) struct SurveyFolder(PathBuf);
+
+impl SurveyFolder {
+    /// Begins a survey in the folder, or resumes one. Fails where it holds something else, or a finished survey that may
+    /// not be replaced.
+    pub(super) fn begin(out: &Path, force: bool) -> Result<Self, PrepError> {
+        let folder = Self(out.to_owned());
+        folder.check_place(force)?;
+        let work = folder.0.join(WORK);
+        for path in [folder.parts(), folder.0.join(THUMBNAILS)] {
+            std::fs::create_dir_all(&path).map_err(PrepError::io("make", &path))?;
+        }
+        json::write(&work.join("key.json"), &WorkKey { format: KEY_FORMAT.to_owned() })?;
+        Ok(folder)
+    }
+
+    fn check_place(&self, force: bool) -> Result<(), PrepError> {
+        let out = &self.0;
+        // A survey that was killed before it wrote its key has written nothing but `.survey`.
+        let is_new = !out.exists() || holds_only(out, &[WORK, THUMBNAILS]);
+        let key = json::read::<WorkKey>(&out.join(WORK).join("key.json"));
+        if !is_new && !key.is_ok_and(|key| key.format == KEY_FORMAT) {
+            return Err(PrepError::NotASurvey { path: out.clone() });
+        }
+        // What is not finished is resumed.
+        if self.file(SURVEY).exists() {
+            check_free(out, force, "--out")?;
+        }
+        Ok(())
+    }
+
+    /// A file or folder of the survey.
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    /// The folder of what was found in each house.
+    fn parts(&self) -> PathBuf {
+        self.0.join(WORK).join("houses")
+    }
+
+    /// What was found in a house.
+    pub(super) fn part(&self, house: &HouseName) -> PathBuf {
+        self.parts().join(format!("{}.json", house.0))
+    }
+
+    /// The right to search a house. Fails where another process does, or makes the whole survey.
+    pub(super) fn lease_of_house(&self, house: &HouseName) -> Result<Lease, SceneError> {
+        let lease = Lease::take(&self.lease(&format!("houses/{}", house.0)), &format!("house '{}'", house.0))?;
+        lease::check_free(&self.lease("whole"), "the survey")?;
+        Ok(lease)
+    }
+
+    /// The right to make the whole survey. Fails where another process does, or searches a house.
+    pub(super) fn lease_of_whole(&self) -> Result<Lease, SceneError> {
+        let lease = Lease::take(&self.lease("whole"), "the survey")?;
+        let entries = std::fs::read_dir(self.lease("houses")).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        for name in names.filter(|name| !mateval_image::temporary::is_temporary(name)) {
+            lease::check_free(&self.lease(&format!("houses/{name}")), &format!("house '{name}'"))?;
+        }
+        Ok(lease)
+    }
+
+    fn lease(&self, name: &str) -> PathBuf {
+        self.0.join(WORK).join("leases").join(name)
+    }
+
+    /// Marks the survey as not finished, since what was found in a house may change. For the holder of a lease.
+    pub(super) fn reopen(&self, force: bool) -> Result<(), PrepError> {
+        // Another process may have finished it while this one waited for its turn.
+        self.check_place(force)?;
+        Ok(remove(&self.file(SURVEY))?)
+    }
+
+    /// Removes what was found in houses that are no longer searched.
+    pub(super) fn keep_only(&self, houses: &[HouseName]) -> Result<(), PrepError> {
+        let parts = self.parts();
+        let entries = std::fs::read_dir(&parts).map_err(PrepError::io("list", &parts))?;
+        for entry in entries.flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let Some(house) = name.strip_suffix(".json").map(|name| HouseName(name.to_owned())) else { continue };
+            if !houses.contains(&house) {
+                remove(&self.file(&house.thumbnails()))?;
+                remove(&entry.path())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The name that a house has in the survey's folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct HouseName(String);
+
+impl HouseName {
+    /// That of a house's file, relative to the source's folder. Houses of one name in different folders differ.
+    pub(super) fn new(file: &str) -> Self {
+        let stem = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
+        let hash = sha256_of_bytes(file.as_bytes());
+        Self(format!("{}-{}", ids::id_text_from(&stem, "house"), &hash[..8]))
+    }
+
+    /// The folder of its thumbnails, relative to the survey's.
+    pub(super) fn thumbnails(&self) -> String {
+        format!("{THUMBNAILS}/{}", self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn houses_of_one_name_differ_by_their_folders() {
+        let [one, other] = ["a/x.json", "b/x.json"].map(HouseName::new);
+        assert!(one != other && one.0.starts_with("x-") && other.thumbnails().starts_with("thumbnails/x-"));
+        assert_eq!(one, HouseName::new("a/x.json"));
+    }
+
+    /// Parts may be made side by side, but neither twice nor during the making of the whole.
+    #[test]
+    fn leases_exclude_each_other() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = SurveyFolder::begin(&place.path().join("out"), false).unwrap();
+        let [one, other] = ["a.json", "b.json"].map(HouseName::new);
+        let first = folder.lease_of_house(&one).unwrap();
+        let second = folder.lease_of_house(&other).unwrap();
+        assert!(folder.lease_of_house(&one).unwrap_err().to_string().contains("is at work on house 'a-"));
+        assert!(folder.lease_of_whole().unwrap_err().to_string().contains("is at work on house '"));
+        drop((first, second));
+        let whole = folder.lease_of_whole().unwrap();
+        assert!(folder.lease_of_house(&one).unwrap_err().to_string().contains("is at work on the survey"));
+        assert!(folder.lease_of_whole().is_err());
+        drop(whole);
+        folder.lease_of_house(&one).unwrap();
+    }
+
+    #[test]
+    fn only_surveys_are_resumed_and_finished_ones_with_force_alone() {
+        let place = tempfile::tempdir().unwrap();
+        let out = place.path().join("out");
+        SurveyFolder::begin(&out, false).unwrap();
+        let folder = SurveyFolder::begin(&out, false).unwrap();
+        std::fs::write(folder.file(SURVEY), "{}").unwrap();
+        assert!(SurveyFolder::begin(&out, false).unwrap_err().to_string().contains("--force"));
+        SurveyFolder::begin(&out, true).unwrap().reopen(true).unwrap();
+        assert!(!folder.file(SURVEY).exists());
+        let other = place.path().join("other");
+        std::fs::create_dir(&other).unwrap();
+        std::fs::write(other.join("notes.txt"), "mine").unwrap();
+        assert!(SurveyFolder::begin(&other, true).unwrap_err().to_string().contains("choose another --out"));
+    }
+}

@@ -1,0 +1,174 @@
+//! What making a scene has cost. It is kept in `.build`, because the bytes of a dataset must not depend on a clock.
+//!
+//! Costs add up over all runs since the scene was built, so that a resumed step counts as a whole; a run that was killed
+//! or failed is not counted.
+
+use std::path::Path;
+use std::time::Instant;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::build_folder::BuildFolder;
+use crate::{RendererId, SceneError, SceneId, json, process_cpu, work_folder};
+
+/// The format of this version of the file.
+const COST_FORMAT: &str = "mateval-cost/1";
+
+/// A step in the making of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Step {
+    /// `prep build`.
+    Build,
+    /// `prep render`.
+    Render,
+    /// `prep companions`.
+    Companions,
+}
+
+/// The cost of one step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StepCost {
+    /// The step.
+    pub step: Step,
+    /// The renderer of the step `render`; null for the others.
+    pub renderer: Option<RendererId>,
+    /// Number of runs.
+    pub runs: usize,
+    /// Elapsed time of all runs, in seconds.
+    pub wall_seconds: f64,
+    /// Processor time of all runs, on all threads and in child processes such as Blender, in seconds; null where the system
+    /// does not state it, or where a run worked on several scenes at once.
+    pub cpu_seconds: Option<f64>,
+}
+
+/// `.build/costs/<scene>.json`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CostFile {
+    format: String,
+    steps: Vec<StepCost>,
+}
+
+/// The work whose cost is recorded.
+#[derive(Clone, Copy, Debug)]
+pub struct TimedStep<'a> {
+    /// The step.
+    pub step: Step,
+    /// The renderer of the step `render`.
+    pub renderer: Option<&'a RendererId>,
+    /// Whether the process works on no other scene meanwhile, so that its processor time is the scene's.
+    pub is_alone: bool,
+}
+
+/// The costs recorded for a scene of the dataset in `root`; empty where there are none.
+pub fn read(root: &Path, scene: &SceneId) -> Result<Vec<StepCost>, SceneError> {
+    let path = BuildFolder::of(root).cost(scene);
+    if !path.exists() {
+        return Ok(Vec::new());
+    }
+    Ok(json::read_format::<CostFile>(&path, COST_FORMAT)?.steps)
+}
+
+/// Forgets the costs of a scene that is about to be built again.
+pub fn forget(root: &Path, scene: &SceneId) -> Result<(), SceneError> {
+    work_folder::remove(&BuildFolder::of(root).cost(scene))
+}
+
+/// Does the work and, if it succeeds, adds its cost to those recorded. The caller holds the scene's lease. A record that
+/// cannot be read fails before the work.
+pub fn timed<T, E: From<SceneError>>(
+    root: &Path,
+    scene: &SceneId,
+    timed: &TimedStep<'_>,
+    work: impl FnOnce() -> Result<T, E>,
+) -> Result<T, E> {
+    let mut steps = read(root, scene)?;
+    let (start, cpu) = (Instant::now(), process_cpu::used().filter(|_| timed.is_alone));
+    let done = work()?;
+    let cpu = cpu.zip(process_cpu::used()).map(|(before, after)| after.saturating_sub(before));
+    let run = StepCost {
+        step: timed.step,
+        renderer: timed.renderer.cloned(),
+        runs: 1,
+        wall_seconds: milliseconds(start.elapsed()),
+        cpu_seconds: cpu.map(milliseconds),
+    };
+    add(&mut steps, run);
+    write(root, scene, steps)?;
+    Ok(done)
+}
+
+fn write(root: &Path, scene: &SceneId, steps: Vec<StepCost>) -> Result<(), SceneError> {
+    let path = BuildFolder::of(root).cost(scene);
+    let folder = path.parent().unwrap_or(root);
+    std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
+    json::write(&path, &CostFile { format: COST_FORMAT.to_owned(), steps })
+}
+
+/// Seconds, rounded to milliseconds.
+fn milliseconds(time: std::time::Duration) -> f64 {
+    (time.as_secs_f64() * 1e3).round() / 1e3
+}
+
+fn add(steps: &mut Vec<StepCost>, run: StepCost) {
+    match steps.iter_mut().find(|known| known.step == run.step && known.renderer == run.renderer) {
+        Some(known) => {
+            known.runs += run.runs;
+            known.wall_seconds += run.wall_seconds;
+            known.cpu_seconds = known.cpu_seconds.zip(run.cpu_seconds).map(|(a, b)| a + b);
+        }
+        None => steps.push(run),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(root: &Path, step: Step, is_alone: bool, works: bool) -> Result<(), SceneError> {
+        let scene = SceneId::new("room").unwrap();
+        let renderer = RendererId::new("blender").unwrap();
+        let renderer = (step == Step::Render).then_some(&renderer);
+        timed(root, &scene, &TimedStep { step, renderer, is_alone }, || match works {
+            true => Ok(()),
+            false => Err(SceneError::io("read", root)(std::io::Error::other("no"))),
+        })
+    }
+
+    #[test]
+    fn runs_add_up_and_failed_ones_do_not_count() {
+        let root = tempfile::tempdir().unwrap();
+        let scene = SceneId::new("room").unwrap();
+        assert_eq!(read(root.path(), &scene).unwrap(), []);
+        run(root.path(), Step::Build, true, true).unwrap();
+        run(root.path(), Step::Render, true, true).unwrap();
+        run(root.path(), Step::Render, true, false).unwrap_err();
+        run(root.path(), Step::Render, false, true).unwrap();
+        let found = read(root.path(), &scene).unwrap();
+        let counts: Vec<_> = found.iter().map(|cost| (cost.step, cost.runs, cost.cpu_seconds.is_some())).collect();
+        assert_eq!(counts, [(Step::Build, 1, true), (Step::Render, 2, false)]);
+        assert_eq!(found[1].renderer.as_ref().unwrap().as_str(), "blender");
+        forget(root.path(), &scene).unwrap();
+        assert_eq!(read(root.path(), &scene).unwrap(), []);
+    }
+
+    /// A record that nobody can read is not replaced.
+    #[test]
+    fn a_bad_record_fails_before_the_work() {
+        let root = tempfile::tempdir().unwrap();
+        run(root.path(), Step::Build, true, true).unwrap();
+        let path = BuildFolder::of(root.path()).cost(&SceneId::new("room").unwrap());
+        std::fs::write(&path, "{}").unwrap();
+        let mut worked = false;
+        let step = TimedStep { step: Step::Build, renderer: None, is_alone: true };
+        let failed: Result<(), SceneError> = timed(root.path(), &SceneId::new("room").unwrap(), &step, || {
+            worked = true;
+            Ok(())
+        });
+        assert!(failed.is_err() && !worked);
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "{}");
+    }
+}
