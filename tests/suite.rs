@@ -16,6 +16,7 @@ mod suite {
     mod command;
     mod compare;
     mod converted;
+    mod delighting;
     mod determinism;
     mod estimates;
     mod fetching;

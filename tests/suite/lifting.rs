@@ -284,7 +284,7 @@ fn an_estimate_that_cannot_be_lifted_is_refused_with_the_reason() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let nn = |words: &[&str]| -> Run { run(baseline("nn", &ROOM, &out).args(words)).ends_with(2) };
-    nn(&["--estimate", "no-such-folder"]).says("expected gt, input or a folder");
+    nn(&["--estimate", "no-such-folder"]).says("expected gt, input, delight or a folder");
     nn(&["--estimate", "input"]).says("run `mateval prep render`");
     nn(&["--estimate", "gt", "--adapter", "rgbx"]).says("give --estimate FOLDER");
     nn(&["--normal-weight", "1e300"]).says("expected 0 to 100 m");

@@ -16,9 +16,10 @@ use crate::estimate::Estimate;
 use crate::placement::Placement;
 
 /// The built-in adapters, by name.
-const BUILT_IN: [(&str, &str); 12] = [
+const BUILT_IN: [(&str, &str); 13] = [
     ("colorful-shading", include_str!("../adapters/colorful-shading.toml")),
     ("crefnet", include_str!("../adapters/crefnet.toml")),
+    ("delight", include_str!("../adapters/delight.toml")),
     ("diffusion-renderer", include_str!("../adapters/diffusion-renderer.toml")),
     ("dnf-intrinsic", include_str!("../adapters/dnf-intrinsic.toml")),
     ("iid", include_str!("../adapters/iid.toml")),

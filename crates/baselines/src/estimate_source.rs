@@ -12,9 +12,10 @@ use mateval_scene::stored_encoding::StoredEncoding;
 use mateval_scene::submission::Map;
 
 use crate::adapter::Adapter;
+use crate::delight::{DelightOptions, delight};
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
-use crate::geometry::input_view;
+use crate::geometry::{SceneGeometry, input_view};
 use crate::placement::Placement;
 
 /// Where an estimate comes from.
@@ -24,6 +25,8 @@ pub enum EstimateSource {
     Truth,
     /// The input picture as base colour: the estimate of a method that does nothing.
     Input,
+    /// The input picture without its light, as [`crate::delight`] finds it.
+    Delight,
     /// A method's pictures.
     Files {
         /// The folder that the adapter's paths are relative to.
@@ -39,6 +42,7 @@ impl EstimateSource {
         match self {
             Self::Truth => "the truth of the input view".to_owned(),
             Self::Input => "the input picture itself".to_owned(),
+            Self::Delight => "the input picture without its light (`mateval baseline delight`)".to_owned(),
             Self::Files { folder, adapter } => {
                 let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
                 let placement = match adapter.placement {
@@ -59,7 +63,7 @@ impl EstimateSource {
     /// The encodings that the adapter of a method's pictures assumes, because its authors do not state them.
     pub fn assumed_encodings(&self) -> BTreeMap<Map, StoredEncoding> {
         match self {
-            Self::Truth | Self::Input => BTreeMap::new(),
+            Self::Truth | Self::Input | Self::Delight => BTreeMap::new(),
             Self::Files { adapter, .. } => adapter.assumed_encodings(),
         }
     }
@@ -69,6 +73,7 @@ impl EstimateSource {
         match self {
             Self::Truth => "gt",
             Self::Input => "input",
+            Self::Delight => "delight",
             Self::Files { adapter, .. } => &adapter.name,
         }
     }
@@ -79,6 +84,10 @@ impl EstimateSource {
         match self {
             Self::Truth => truth(&folder, input_view(&folder, scene)?)?.of_one_size(folder.path(), scene.id.as_str()),
             Self::Input => photo(&folder, input_view(&folder, scene)?, scene.exposure as f32),
+            Self::Delight => {
+                let geometry = SceneGeometry::read(folder, scene)?;
+                Ok(delight(&geometry, &DelightOptions::default(), &|_| ())?.estimate())
+            }
             Self::Files { folder, adapter } => adapter.read(folder, scene.id.as_str()),
         }
     }

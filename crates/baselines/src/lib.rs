@@ -13,6 +13,7 @@
 
 pub mod adapted_file;
 pub mod adapter;
+pub mod delight;
 pub mod encoding_fit;
 pub mod encoding_report;
 pub mod error;

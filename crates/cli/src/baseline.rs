@@ -1,5 +1,6 @@
 //! `mateval baseline`: makes a submission by a method that comes with the tool, or from another method's files.
 
+mod delight;
 mod encoding;
 mod estimate;
 mod import;
@@ -35,6 +36,9 @@ pub enum Command {
     Median(MedianArgs),
     /// One colour per part: the median of an estimate inside the part's mask.
     MedianPart(MedianPartArgs),
+    /// Takes the light out of every photo: base colour from photo and geometry alone, as pictures that other baselines
+    /// accept as an estimate.
+    Delight(delight::DelightArgs),
     /// Compares a method's pictures with the truth and reports which encoding their numbers fit; exit code 1 if it is
     /// not the adapter's.
     Encoding(encoding::EncodingArgs),
@@ -109,6 +113,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             let set = args.part_set.as_ref();
             places.done(homogeneous::write_by_part(&places.open()?, &places.out, places.force, &source, set)?)
         }
+        Command::Delight(args) => delight::run(args),
         Command::Encoding(args) => encoding::run(args),
         Command::Import(args) => import::run(args),
         Command::TexgenExport(args) => texgen::export(args),

@@ -15,8 +15,17 @@ pub(crate) trait MaterialSource<'w, const K: usize>: Copy {
     /// Prefetches the texels at `place` and returns the uv to pass to [`Self::bsdf`].
     fn prefetch_texels(self, hit: &Hit, place: &SurfaceHit) -> Vec2;
 
-    /// The BSDF at `place`, seen from `wo`.
-    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3) -> Bsdf<'w, K>;
+    /// The BSDF at `place`, seen from `wo`, after `scatterings` earlier scatterings of the path.
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, scatterings: u32) -> Bsdf<'w, K>;
+
+    /// Whether a lamp that is hidden from the camera reflects light as well as emitting it. Blender's lamps do not.
+    const LAMPS_REFLECT: bool = false;
+
+    /// The radiance that leaves `place` towards `wo`, where it is known without tracing further. Never called
+    /// for the first surface of a path.
+    fn known_radiance(self, _place: &SurfaceHit, _wo: Vec3) -> Option<Vec3> {
+        None
+    }
 }
 
 /// The scene's own materials, the same for all variants.
@@ -32,7 +41,7 @@ impl<'w, const K: usize> MaterialSource<'w, K> for OwnMaterials<'w> {
         Vec2::ZERO
     }
 
-    fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3) -> Bsdf<'w, K> {
+    fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
         self.0.bsdf_of_colors(place, wo)
     }
 }

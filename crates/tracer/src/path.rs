@@ -108,7 +108,8 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
     }
 
     /// Traces the paths that begin with `starts` and calls `add` for every contribution, with the index of the start,
-    /// the light and its value for each variant. Calls for one path come in order along the path.
+    /// the light and its value for each variant. Calls for one path come in order along the path. Known radiance is
+    /// booked as one more light after the last.
     pub(crate) fn trace(
         &mut self,
         starts: impl IntoIterator<Item = (Sampler, Ray)>,
@@ -152,7 +153,15 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
             };
             let place = self.world.surface_hit(hit);
             let is_lamp_alone = contributions.add_emitted(&path, &place, ray);
-            if is_lamp_alone {
+            if is_lamp_alone && !M::LAMPS_REFLECT {
+                continue;
+            }
+            // Stop where the rest of the path's light is known.
+            if path.scattered.is_some()
+                && let Some(radiance) = self.materials.known_radiance(&place, -ray.direction())
+            {
+                let known = LightIndex(self.world.emitters().groups());
+                contributions.contribute(path.which, known, path.throughputs.map(|throughput| throughput * radiance));
                 continue;
             }
             // Stop paths that have scattered often enough.
@@ -175,7 +184,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
         self.light_samples.clear();
         self.shadow_rays.clear();
         for Arrival { path, place, uv, wo } in self.arrivals.drain(..) {
-            let bsdf = self.materials.bsdf(&place, uv, wo);
+            let bsdf = self.materials.bsdf(&place, uv, wo, scatterings);
             if bsdf.is_black() {
                 continue;
             }

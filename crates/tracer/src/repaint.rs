@@ -169,7 +169,7 @@ impl<'w, const K: usize> MaterialSource<'w, K> for Painted<'w> {
         uv
     }
 
-    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3) -> Bsdf<'w, K> {
+    fn bsdf(self, place: &SurfaceHit, uv: Vec2, wo: Vec3, _: u32) -> Bsdf<'w, K> {
         let Some(coat) = &self.repaint.coats[place.surface.0] else { return self.world.bsdf_of_colors(place, wo) };
         let base_colors = self.repaint.base_colors(coat, self.first, uv);
         let principled = |maps| self.repaint.principled(base_colors[0], maps, uv);

@@ -73,7 +73,7 @@ impl World {
                 (0..mesh.triangles.len()).map(move |triangle| TriangleRecord::new(mesh, TriangleIndex(triangle), size))
             })
             .collect();
-        let mut world = Self {
+        let world = Self {
             records: Arc::new(on_huge_pages(records)),
             lookups: Arc::new(scene.materials.iter().map(Material::lookups).collect()),
             emitters: Emitters::new(&scene, &textures, size)?,
@@ -83,12 +83,23 @@ impl World {
             scene,
             accel,
         };
-        // Divide light samples between lamps and sky by how much of the sky reaches the places that lamps light.
-        if world.emitters.are_near_and_distant() {
-            let escaping = escape_share(&world.emitters, |from, direction| world.first_behind_glass(from, direction));
-            world.emitters.share_between(escaping);
+        Ok(world.with_shared_samples())
+    }
+
+    /// Divides light samples between lamps and sky by how much of the sky reaches the places that lamps light.
+    fn with_shared_samples(mut self) -> Self {
+        if self.emitters.are_near_and_distant() {
+            let escaping = escape_share(&self.emitters, |from, direction| self.first_behind_glass(from, direction));
+            self.emitters.share_between(escaping);
         }
-        Ok(world)
+        self
+    }
+
+    /// The same, lit by stage lights too, whose light groups follow the scene's own. The world has no stage lights yet.
+    /// Fails as [`Self::on_stage`] does.
+    pub fn with_stage(self, stage: &[StageLight]) -> Result<Self, TracerError> {
+        let emitters = self.emitters.with_stage(stage)?;
+        Ok(Self { emitters, ..self }.with_shared_samples())
     }
 
     /// The same surfaces and materials, lit only by stage lights: the scene's own lamps no longer emit. Light group k

@@ -11,4 +11,5 @@ mod suite {
     mod repaint;
     mod same_bytes;
     mod shared_centre;
+    mod split;
 }

@@ -10,12 +10,12 @@ use mateval_baselines::estimate_source::EstimateSource;
 #[derive(clap::Args)]
 pub struct EstimateArgs {
     /// Estimate of base colour, roughness and metallic in the input view: `gt` (the ground truth), `input` (the input
-    /// picture as base colour), or a folder of a method's pictures [default: gt for nn and texgen-export, input for
-    /// median and median-part].
-    #[arg(long, value_name = "gt|input|FOLDER")]
+    /// picture as base colour), `delight` (the input picture without its light), or a folder of a method's pictures
+    /// [default: gt for nn and texgen-export, input for median and median-part].
+    #[arg(long, value_name = "gt|input|delight|FOLDER")]
     estimate: Option<PathBuf>,
-    /// Names and encodings of the folder's files: colorful-shading, crefnet, diffusion-renderer, dnf-intrinsic, iid,
-    /// intrinsic, marigold, materialist, mvinverse, ouroboros, plain, rgbx, or a TOML file like those in
+    /// Names and encodings of the folder's files: colorful-shading, crefnet, delight, diffusion-renderer, dnf-intrinsic,
+    /// iid, intrinsic, marigold, materialist, mvinverse, ouroboros, plain, rgbx, or a TOML file like those in
     /// crates/baselines/adapters [default: plain].
     #[arg(long, value_name = "NAME|FILE.toml")]
     adapter: Option<String>,
@@ -34,7 +34,8 @@ impl EstimateArgs {
             (None, None) => default,
             (Some("gt"), None) => EstimateSource::Truth,
             (Some("input"), None) => EstimateSource::Input,
-            (Some("gt" | "input") | None, Some(_)) => {
+            (Some("delight"), None) => EstimateSource::Delight,
+            (Some("gt" | "input" | "delight") | None, Some(_)) => {
                 bail!("--adapter describes the files of a folder; give --estimate FOLDER")
             }
             (Some(folder), adapter) => {
@@ -42,7 +43,9 @@ impl EstimateArgs {
                 let folder = PathBuf::from(folder);
                 if !folder.is_dir() {
                     let shown = folder.display();
-                    bail!("--estimate '{shown}' does not exist; expected gt, input or a folder of a method's pictures");
+                    bail!(
+                        "--estimate '{shown}' does not exist; expected gt, input, delight or a folder of a method's pictures"
+                    );
                 }
                 EstimateSource::Files { folder, adapter }
             }

@@ -35,6 +35,8 @@ pub struct Emitters {
     area_of: Vec<Option<usize>>,
     /// The stage lights as surfaces, in the order of `areas`.
     stage: Option<Accel>,
+    /// The place of the first stage light in `areas`.
+    first_on_stage: usize,
     distant: Vec<DistantEmitter>,
     /// The probability of sampling an emitter at infinity.
     distant_share: f32,
@@ -112,6 +114,7 @@ impl Emitters {
             outlines: Outlines::default(),
             area_of: vec![None; scene.surfaces.len()],
             stage: None,
+            first_on_stage: 0,
             distant: Vec::new(),
             distant_share: 0.0,
             camera_visible: scene.lights.iter().map(|group| group.camera_visible).collect(),
@@ -159,6 +162,22 @@ impl Emitters {
 
     /// Stage lights only, one group each, for a scene of `surfaces` surfaces.
     pub(crate) fn on_stage(stage: &[StageLight], surfaces: usize, scene_size: f32) -> Result<Self, TracerError> {
+        let dark = Self {
+            areas: Vec::new(),
+            outlines: Outlines::default(),
+            area_of: vec![None; surfaces],
+            stage: None,
+            first_on_stage: 0,
+            distant: Vec::new(),
+            distant_share: 0.0,
+            camera_visible: Vec::new(),
+            scene_size,
+        };
+        dark.with_stage(stage)
+    }
+
+    /// The same and stage lights, one group each, after the other groups. There are no stage lights yet.
+    pub(crate) fn with_stage(mut self, stage: &[StageLight]) -> Result<Self, TracerError> {
         let meshes: Vec<&TriangleMesh> = stage.iter().map(|light| &light.mesh).collect();
         let accel = Accel::build(&meshes).map_err(|error| match error {
             TracerError::InvalidScene(SceneFault::Surface { surface, fault, .. }) => {
@@ -166,7 +185,8 @@ impl Emitters {
             }
             other => other,
         })?;
-        let mut areas = Vec::with_capacity(stage.len());
+        self.first_on_stage = self.areas.len();
+        let groups = self.groups();
         for (index, light) in stage.iter().enumerate() {
             let located = |fault| RequestFault::StageLight { light: LightIndex(index), fault };
             check_radiance(&light.radiance).map_err(located)?;
@@ -174,18 +194,12 @@ impl Emitters {
                 return Err(located(LightFault::NoTriangles).into());
             }
             let emission = SurfaceEmission { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
-            areas.push(AreaEmitter::on_stage(LightIndex(index), emission, &light.mesh, scene_size));
+            self.areas.push(AreaEmitter::on_stage(LightIndex(groups + index), emission, &light.mesh, self.scene_size));
         }
-        Ok(Self {
-            outlines: Outlines::new(&areas),
-            areas,
-            area_of: vec![None; surfaces],
-            stage: Some(accel),
-            distant: Vec::new(),
-            distant_share: 0.0,
-            camera_visible: vec![false; stage.len()],
-            scene_size,
-        })
+        self.outlines = Outlines::new(&self.areas);
+        self.camera_visible.extend(stage.iter().map(|_| false));
+        self.stage = Some(accel);
+        Ok(self)
     }
 
     /// The number of light groups.
@@ -343,8 +357,8 @@ impl Emitters {
         let mut met = met.into_inner();
         met.sort_by_key(|hit| hit.global);
         met.into_iter().filter_map(move |hit| {
-            let light = hit.surface.0;
-            self.emitted_by(light, &self.areas[light].place_on_stage(hit.triangle, hit.barycentrics), from)
+            let area = self.first_on_stage + hit.surface.0;
+            self.emitted_by(area, &self.areas[area].place_on_stage(hit.triangle, hit.barycentrics), from)
         })
     }
 

@@ -1,0 +1,197 @@
+//! Which parts are mirrors.
+//!
+//! A mirror shows what the photo shows elsewhere. For each flat part a ray is mirrored at every pixel; where it meets a
+//! place that the photo shows too, the pixel should be as bright as that place. The pictures are compared without their
+//! slow changes (both may darken towards a corner), by their correlation, and by how much of the pixel's brightness
+//! follows the mirrored one: gloss over a diffuse floor follows it weakly.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec2, Vec3};
+use mateval_image::{LinearRgb, Normal};
+use mateval_tracer::{PhotoCache, Ray, Sampler, SurfaceHit};
+use rayon::prelude::*;
+
+use super::part_room::PartRoom;
+
+/// A part that mirrors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Mirror {
+    /// Linear, at metallic 1.
+    pub(super) base_color: [f32; 3],
+    /// Perceptual roughness.
+    pub(super) roughness: f32,
+}
+
+/// The least pixels of a part that may be a mirror, as a share of the photo's: 400 of 480x270.
+const LEAST_SHARE: f64 = 0.003;
+/// The least number of its pixels whose mirrored place the photo shows.
+const LEAST_SHOWN: usize = 60;
+/// The least cosine between a flat part's normals and their mean.
+const FLAT_COSINE: f32 = 0.995;
+/// The share of its pixels for which that holds.
+const FLAT_SHARE: f64 = 0.8;
+/// The least correlation of a mirror with what it shows.
+const LEAST_CORRELATION: f64 = 0.6;
+/// The least slope of a mirror's radiance over the mirrored one, both as logarithms.
+const LEAST_SLOPE: f64 = 0.75;
+/// The least radiance that counts, as a share of the mean of what is compared, and the largest deviation of a logarithm.
+const DARKEST: f64 = 1e-4;
+const MOST_CONTRAST: f64 = 1.5;
+/// Pixels on each side over which slow changes are averaged.
+const SLOW_REACH: usize = 7;
+/// Perceptual roughness values that are tried, and the rays of each pixel.
+const ROUGHNESSES: [f32; 4] = [0.02, 0.05, 0.1, 0.2];
+const RAYS: u32 = 8;
+
+/// The mirrors among the surfaces of the room.
+pub(super) fn find(room: &PartRoom, cache: &PhotoCache<'_>) -> BTreeMap<u16, Mirror> {
+    let mut pixels: BTreeMap<u16, Vec<usize>> = BTreeMap::new();
+    for (k, part) in room.parts.pixels().iter().enumerate().filter(|(k, _)| room.valid.pixels()[*k]) {
+        pixels.entry(*part).or_default().push(k);
+    }
+    let least = (LEAST_SHARE * room.photo.pixels().len() as f64) as usize;
+    let flat = pixels.into_iter().filter(|(_, pixels)| pixels.len() >= least);
+    let flat = flat.filter_map(|(part, pixels)| Some((part, flat_pixels(room, &pixels)?)));
+    flat.filter_map(|(part, pixels)| Some((part, mirror(room, cache, &pixels)?))).collect()
+}
+
+/// The pixels of a flat part, without those of its edges; none if it is not flat.
+fn flat_pixels(room: &PartRoom, pixels: &[usize]) -> Option<Vec<usize>> {
+    let normal = |k: usize| Vec3::from_array(room.normals.pixels()[k].0);
+    let mean = pixels.iter().map(|&k| normal(k)).sum::<Vec3>().try_normalize()?;
+    let flat: Vec<usize> = pixels.iter().copied().filter(|&k| normal(k).dot(mean) >= FLAT_COSINE).collect();
+    (flat.len() as f64 >= FLAT_SHARE * pixels.len() as f64).then_some(flat)
+}
+
+/// The part of these pixels as a mirror, of the roughness whose reflection fits best.
+fn mirror(room: &PartRoom, cache: &PhotoCache<'_>, pixels: &[usize]) -> Option<Mirror> {
+    let fits = ROUGHNESSES.iter().filter_map(|roughness| {
+        let pairs: Vec<(usize, [LinearRgb; 2])> = pixels
+            .par_iter()
+            .filter_map(|&k| Some((k, [room.photo.pixels()[k], mirrored(room, cache, k, *roughness)?])))
+            .collect();
+        let found = comparison(room.photo.width(), &pairs)?;
+        let base_color = [0, 1, 2].map(|c| {
+            let median = |which: usize| {
+                let mut values: Vec<f32> = pairs.iter().map(|(_, pair)| pair[which].0[c]).collect();
+                let middle = values.len() / 2;
+                *values.select_nth_unstable_by(middle, f32::total_cmp).1
+            };
+            (median(0) / median(1).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0)
+        });
+        Some((found, Mirror { base_color, roughness: *roughness }))
+    });
+    let best = fits.max_by(|(a, _), (b, _)| a.correlation.total_cmp(&b.correlation))?;
+    (best.0.correlation >= LEAST_CORRELATION && best.0.slope >= LEAST_SLOPE).then_some(best.1)
+}
+
+/// What pixel `k` shows if it is a mirror of this roughness; none unless the photo shows most of it.
+fn mirrored(room: &PartRoom, cache: &PhotoCache<'_>, k: usize, roughness: f32) -> Option<LinearRgb> {
+    let (x, y) = (k % room.photo.width(), k / room.photo.width());
+    let centre = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
+    let towards = room.camera.direction(centre).as_vec3();
+    let hit = room.world.first_hit(&Ray::endless(room.camera.position().as_vec3(), towards))?;
+    let place = room.world.surface_hit(&hit);
+    let Normal(normal) = room.normals.pixels()[k];
+    let normal = Vec3::from_array(normal);
+    let sampler = Sampler::new(0, [x as u32, y as u32], 0);
+    let mut sum = Vec3::ZERO;
+    let mut shown = 0;
+    for ray in 0..RAYS {
+        let [u, v, ..] = sampler.set(ray);
+        let facet = facet(normal, roughness * roughness, [u, v]);
+        let direction = towards - 2.0 * towards.dot(facet) * facet;
+        let radiance = (direction.dot(normal) > 0.0).then(|| met(room, cache, &place, direction)).flatten();
+        if let Some(radiance) = radiance {
+            sum += radiance;
+            shown += 1;
+        }
+    }
+    (2 * shown > RAYS).then(|| LinearRgb((sum / shown as f32).to_array()))
+}
+
+fn met(room: &PartRoom, cache: &PhotoCache<'_>, place: &SurfaceHit, direction: Vec3) -> Option<Vec3> {
+    let hit = room.world.first_hit(&place.spawn(direction))?;
+    cache.radiance(&room.world.surface_hit(&hit), -direction)
+}
+
+/// A normal of the GGX distribution of width `alpha` about `normal` (Walter et al., EGSR 2007, equation 35).
+fn facet(normal: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
+    let slope = alpha * (u / (1.0 - u).max(1e-6)).sqrt();
+    let (sin, cos) = libm::sincosf(std::f32::consts::TAU * v);
+    let (right, up) = normal.any_orthonormal_pair();
+    (normal + slope * (cos * right + sin * up)).normalize()
+}
+
+/// How a part follows what it would mirror, in logarithms of radiance, slow changes apart.
+struct Comparison {
+    correlation: f64,
+    slope: f64,
+}
+
+/// `pairs` holds pixels with their own radiance and the mirrored one.
+fn comparison(width: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Comparison> {
+    if pairs.len() < LEAST_SHOWN {
+        return None;
+    }
+    // Logarithms, so that one lamp in a mirror does not decide alone.
+    let mean = pairs.iter().flat_map(|(_, pair)| pair).map(|color| color.luminance()).sum::<f64>() / pairs.len() as f64;
+    let darkest = (DARKEST * mean).max(f64::MIN_POSITIVE);
+    let log = |color: LinearRgb| libm::log(color.luminance().max(darkest));
+    let values: BTreeMap<usize, [f64; 2]> = pairs.iter().map(|(k, pair)| (*k, pair.map(log))).collect();
+    let mut square = [0.0_f64; 3];
+    for (&k, values_at) in &values {
+        let slow = slow(&values, width, k);
+        let [own, other] = [0, 1].map(|which| (values_at[which] - slow[which]).clamp(-MOST_CONTRAST, MOST_CONTRAST));
+        square[0] += own * own;
+        square[1] += own * other;
+        square[2] += other * other;
+    }
+    let correlation = square[1] / (square[0] * square[2]).sqrt();
+    let slope = square[1] / square[2];
+    (correlation.is_finite() && slope.is_finite()).then_some(Comparison { correlation, slope })
+}
+
+/// The means over the pixels around `k` that are compared.
+fn slow(values: &BTreeMap<usize, [f64; 2]>, width: usize, k: usize) -> [f64; 2] {
+    let (x, y) = (k % width, k / width);
+    let (mut sum, mut count) = ([0.0; 2], 0.0);
+    for row in y.saturating_sub(SLOW_REACH)..=y + SLOW_REACH {
+        let columns = row * width + x.saturating_sub(SLOW_REACH)..=row * width + (x + SLOW_REACH).min(width - 1);
+        for (_, value) in values.range(columns) {
+            sum = [sum[0] + value[0], sum[1] + value[1]];
+            count += 1.0;
+        }
+    }
+    sum.map(|sum| sum / count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stripes over a slow gradient, and a surface that is `share` mirror and for the rest evenly bright.
+    fn pairs(share: f32, noise: f32) -> Vec<(usize, [LinearRgb; 2])> {
+        let grey = |v: f32| LinearRgb([v; 3]);
+        (0..40 * 40)
+            .map(|k| {
+                let (x, y) = ((k % 40) as f32, (k / 40) as f32);
+                let mirrored = 0.2 + 0.01 * y + if (k % 40) / 4 % 2 == 0 { 0.3 } else { 0.0 };
+                let own = share * mirrored + (1.0 - share) * (0.4 + 0.01 * y) + noise * libm::sinf(12.9 * x + 78.2 * y);
+                (k, [grey(own), grey(mirrored)])
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_mirror_differs_from_gloss_and_from_a_common_gradient() {
+        let mirror = comparison(40, &pairs(0.9, 0.01)).unwrap();
+        assert!(mirror.correlation > 0.95 && mirror.slope > 0.8, "{} {}", mirror.correlation, mirror.slope);
+        let gloss = comparison(40, &pairs(0.1, 0.0)).unwrap();
+        assert!(gloss.slope < LEAST_SLOPE, "{}", gloss.slope);
+        let matt = comparison(40, &pairs(0.0, 0.01)).unwrap();
+        assert!(matt.correlation < LEAST_CORRELATION, "{}", matt.correlation);
+        assert!(comparison(40, &pairs(0.9, 0.0)[..LEAST_SHOWN - 1]).is_none());
+    }
+}
