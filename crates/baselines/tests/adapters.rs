@@ -212,6 +212,11 @@ fn scripts() -> Vec<Script> {
             ),
         ),
         script(
+            "delight",
+            (480, 270),
+            straight("living/base_color.exr", "living/roughness.exr", "living/metallic.exr", Linear),
+        ),
+        script(
             "plain",
             (480, 270),
             straight("living/base_color.png", "living/roughness.png", "living/metallic.png", Srgb),
