@@ -27,14 +27,14 @@ use normal_equations::NormalEquations;
 
 use crate::cholesky::dot;
 
-/// How light and colour are told apart.
+/// How light and colour are separated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointFitRules {
     /// Side of the squares of pixels whose averages are compared.
     pub pool: usize,
     /// The residual s, in powers of e, at which a square begins to count as an outlier.
     pub softness: f64,
-    /// The number of squares that a photo counts as: with more pixels it tells no more of what the model leaves out.
+    /// The number of squares that a photo counts as: more pixels are no more evidence about what the model leaves out.
     pub evidence: f64,
     /// The weight k_a of the usual colour.
     pub color_prior: f64,
@@ -93,8 +93,8 @@ pub struct JointFit {
     pub colors: BTreeMap<u16, [f64; 3]>,
 }
 
-/// Fits radiances and colours, from equal radiances on. Squares without light tell nothing; without any, all radiances
-/// are 1 and no part has a colour.
+/// Fits radiances and colours, starting from radiances that are as shown, else equal. Squares without light are
+/// ignored; if no square has light, no part has a colour.
 pub fn fit_jointly(rules: &JointFitRules, target: &JointTarget<'_>) -> JointFit {
     let lights = target.light.first().map_or(0, |light| light.diffuse.pictures().len() - 1);
     let (parts, all) = rows(rules, target, |pixel| pixel.0.iter().map(|v| f64::from(*v)).sum::<f64>() / 3.0);
@@ -132,7 +132,7 @@ pub fn fit_jointly(rules: &JointFitRules, target: &JointTarget<'_>) -> JointFit 
 struct Row {
     /// The place of the part among those that occur.
     part: usize,
-    /// The share of the square that they fill.
+    /// The share of all valid pixels that they are, times [`JointFitRules::evidence`].
     weight: f64,
     /// Means of the photo, and of the pictures of each light and of the photo's own light.
     photo: f64,

@@ -136,7 +136,8 @@ fn comparison(width: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Compari
         return None;
     }
     // Logarithms, so that one lamp in a mirror does not decide alone.
-    let mean = pairs.iter().flat_map(|(_, pair)| pair).map(|color| color.luminance()).sum::<f64>() / pairs.len() as f64;
+    let mean =
+        pairs.iter().flat_map(|(_, pair)| pair).map(|color| color.luminance()).sum::<f64>() / (2 * pairs.len()) as f64;
     let darkest = (DARKEST * mean).max(f64::MIN_POSITIVE);
     let log = |color: LinearRgb| libm::log(color.luminance().max(darkest));
     let values: BTreeMap<usize, [f64; 2]> = pairs.iter().map(|(k, pair)| (*k, pair.map(log))).collect();

@@ -13,7 +13,6 @@ use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{ColorInput, Material, MaterialModel};
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::{Camera, SceneError, glb};
-
 use mateval_tracer::aov::PixelHit;
 use mateval_tracer::{World, aov};
 use rayon::prelude::*;
@@ -118,7 +117,7 @@ impl PartRoom {
     }
 }
 
-/// The photo as it was rendered: linear, before exposure, with radiances above 1.
+/// The photo as it was rendered: linear, before exposure, with radiances above 1. A denoiser may leave values below 0.
 fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineError> {
     let folder: &SceneFolder = &geometry.folder;
     let path = folder.view(&geometry.view.id).join("rgb.exr");
@@ -130,7 +129,7 @@ fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineErr
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
         return Err(SceneError::Unsupported { path, what }.into());
     }
-    Ok(photo.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }))))
+    Ok(photo.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| v.max(0.0)))))
 }
 
 /// Whether each instance glows: it has an atlas, so that it is not glass, and most of its pixels in the input view are
@@ -157,7 +156,7 @@ fn hits(world: &World, camera: &Camera) -> Picture<Option<PixelHit>> {
     Picture::from_fn(width, height, |x, y| hits[y * width + x])
 }
 
-/// The mean of these pixels; none if there are too few to tell.
+/// The mean of these pixels; none if there are too few.
 fn mean(photo: &Picture<LinearRgb>, which: impl Fn(usize, usize) -> bool) -> Option<[f64; 3]> {
     let pixels = (0..photo.height()).flat_map(|y| (0..photo.width()).map(move |x| (x, y)));
     let (mut sum, mut count) = ([0.0; 3], 0);

@@ -6,7 +6,7 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_light::joint_fit::{JointFit, JointFitRules, JointTarget, fit_jointly};
 use mateval_scene::{Progress, Report};
 use mateval_tracer::noise_filter::{self, filtered_mean};
-use mateval_tracer::{LightBasis, PhotoCache, SplitLight, split_light};
+use mateval_tracer::{PhotoCache, SplitLight, split_light};
 
 use super::delit_photo::DelitPhoto;
 use super::mirrors::{self, Mirror};
@@ -33,10 +33,18 @@ const GLOSS_ERROR: f64 = 0.15;
 /// The usual deviation of a pixel's colour from that of its part.
 const PART_DEVIATION: f32 = 0.15;
 
-/// The light of the photo under fitted radiances: what a white surface would show, and what does not depend on colour.
+/// Two independent halves of the light under fitted radiances: what a white surface would show, and what does not
+/// depend on colour.
+struct LightHalves {
+    diffuse: [Picture<LinearRgb>; 2],
+    gloss: [Picture<LinearRgb>; 2],
+}
+
+/// Their means, without noise, and the base colour that the photo has under this light.
 struct FittedLight {
     diffuse: Picture<LinearRgb>,
     gloss: Picture<LinearRgb>,
+    base_color: Picture<LinearRgb>,
 }
 
 /// De-lights the photo of a scene. Fails where the public files of the scene or its photo cannot be read. The bytes are
@@ -74,17 +82,19 @@ pub(super) fn run(
         };
         let halves = [half(0)?, half(1)?];
         let fit = fit(room, &halves);
-        let light = fitted_light(room, &halves, &fit)?;
-        let found = part_colors(room, &divided(room, &light));
+        let weights = weights(&fit);
+        let halves = weighted(&halves, &weights)?;
+        let light = fitted_light(room, &halves);
+        let found = part_colors(room, &light.base_color);
         let change = largest_change(&surfaces.colors, &found);
         surfaces.colors = found;
         round += 1;
         if round < options.samples.len() {
-            surfaces.roughnesses = roughness::choose(room, &cache, &surfaces, &weights(&fit), options.seed, progress)?;
+            surfaces.roughnesses = roughness::choose(room, &cache, &surfaces, &weights, options.seed, progress)?;
         }
         let is_last = (round >= options.samples.len() && change <= SETTLED) || round == MOST_ROUNDS;
         if is_last {
-            let errors = standard_errors(room, &halves, &fit, &light)?;
+            let errors = standard_errors(room, &halves, &light);
             let mirrors = mirrors::find(room, &cache);
             return Ok(finished(room, &fit, light, &errors, &surfaces, &mirrors, round));
         }
@@ -101,7 +111,7 @@ fn finished(
     mirrors: &BTreeMap<u16, Mirror>,
     rounds: usize,
 ) -> DelitPhoto {
-    let base_color = towards_parts(room, &divided(room, &light), &surfaces.colors, errors);
+    let base_color = towards_parts(room, &light.base_color, &surfaces.colors, errors);
     let part = |x: usize, y: usize| room.valid.get(x, y).then(|| room.parts.get(x, y));
     let mirror = |x: usize, y: usize| part(x, y).and_then(|part| mirrors.get(&part));
     let (width, height) = (room.photo.width(), room.photo.height());
@@ -134,7 +144,15 @@ fn weights(fit: &JointFit) -> Vec<[f64; 3]> {
     fit.radiances.iter().copied().chain([[1.0; 3]]).collect()
 }
 
-fn fitted_light(room: &PartRoom, halves: &[SplitLight; 2], fit: &JointFit) -> Result<FittedLight, BaselineError> {
+fn weighted(halves: &[SplitLight; 2], weights: &[[f64; 3]]) -> Result<LightHalves, BaselineError> {
+    let [a, b] = halves;
+    Ok(LightHalves {
+        diffuse: [a.diffuse.weighted(weights)?, b.diffuse.weighted(weights)?],
+        gloss: [a.gloss.weighted(weights)?, b.gloss.weighted(weights)?],
+    })
+}
+
+fn fitted_light(room: &PartRoom, halves: &LightHalves) -> FittedLight {
     let white = room.photo.map(|_| LinearRgb([1.0; 3]));
     let surfaces = noise_filter::Surfaces {
         base_color: &white,
@@ -142,22 +160,20 @@ fn fitted_light(room: &PartRoom, halves: &[SplitLight; 2], fit: &JointFit) -> Re
         normals: &room.normals,
         valid: &room.valid,
     };
-    let weights = weights(fit);
-    let filtered = |part: fn(&SplitLight) -> &LightBasis| -> Result<_, BaselineError> {
-        let [a, b] = [part(&halves[0]).weighted(&weights)?, part(&halves[1]).weighted(&weights)?];
-        Ok(filtered_mean([&a, &b], &surfaces))
-    };
-    Ok(FittedLight { diffuse: filtered(|split| &split.diffuse)?, gloss: filtered(|split| &split.gloss)? })
+    let filtered = |[a, b]: &[Picture<LinearRgb>; 2]| filtered_mean([a, b], &surfaces);
+    let (diffuse, gloss) = (filtered(&halves.diffuse), filtered(&halves.gloss));
+    let base_color = divided(room, &diffuse, &gloss);
+    FittedLight { diffuse, gloss, base_color }
 }
 
 /// The photo without its light.
-fn divided(room: &PartRoom, light: &FittedLight) -> Picture<LinearRgb> {
+fn divided(room: &PartRoom, diffuse: &Picture<LinearRgb>, gloss: &Picture<LinearRgb>) -> Picture<LinearRgb> {
     let least = LEAST_SHADING * mean(room);
     Picture::from_fn(room.photo.width(), room.photo.height(), |x, y| {
         if !room.valid.get(x, y) {
             return LinearRgb::default();
         }
-        let [photo, diffuse, gloss] = [&room.photo, &light.diffuse, &light.gloss].map(|picture| picture.get(x, y).0);
+        let [photo, diffuse, gloss] = [&room.photo, diffuse, gloss].map(|picture| picture.get(x, y).0);
         LinearRgb([0, 1, 2].map(|c| ((photo[c] - gloss[c]) / diffuse[c].max(least)).clamp(0.0, 1.0)))
     })
 }
@@ -208,30 +224,22 @@ fn largest_change(before: &[[f32; 3]], after: &[[f32; 3]]) -> f32 {
     changes.fold(0.0, f32::max)
 }
 
-/// The standard error of each pixel's base colour: from noise, which the difference of both halves tells, and from what
-/// the model of the light leaves out. Infinite where nothing is known.
-fn standard_errors(
-    room: &PartRoom,
-    halves: &[SplitLight; 2],
-    fit: &JointFit,
-    light: &FittedLight,
-) -> Result<Picture<f32>, BaselineError> {
+/// The standard error of each pixel's base colour: from noise, estimated from the difference of both halves, and from
+/// what the model of the light leaves out. Infinite where nothing is known.
+fn standard_errors(room: &PartRoom, halves: &LightHalves, light: &FittedLight) -> Picture<f32> {
     /// Pixels on each side that the noise is averaged over.
     const REACH: usize = 2;
-    let weights = weights(fit);
-    let [a, b] = [halves[0].diffuse.weighted(&weights)?, halves[1].diffuse.weighted(&weights)?];
-    let [gloss_a, gloss_b] = [halves[0].gloss.weighted(&weights)?, halves[1].gloss.weighted(&weights)?];
     let least = f64::from(LEAST_SHADING * mean(room));
-    let halved = |[a, b]: [&Picture<LinearRgb>; 2], x, y| 0.5 * (a.get(x, y).luminance() - b.get(x, y).luminance());
+    let halved = |[a, b]: &[Picture<LinearRgb>; 2], x, y| 0.5 * (a.get(x, y).luminance() - b.get(x, y).luminance());
     // Squares of the error, in f64: those of f32 vanish in dark photos.
     let noise = |x: usize, y: usize| {
         let shading = light.diffuse.get(x, y).luminance().max(least);
         let color = (room.photo.get(x, y).luminance() / shading).min(1.0);
-        let difference = color * halved([&a, &b], x, y) + halved([&gloss_a, &gloss_b], x, y);
+        let difference = color * halved(&halves.diffuse, x, y) + halved(&halves.gloss, x, y);
         (difference / shading).powi(2)
     };
     let (width, height) = (room.photo.width(), room.photo.height());
-    Ok(Picture::from_fn(width, height, |x, y| {
+    Picture::from_fn(width, height, |x, y| {
         if !room.valid.get(x, y) {
             return f32::INFINITY;
         }
@@ -247,7 +255,7 @@ fn standard_errors(
             [&room.photo, &light.diffuse, &light.gloss].map(|picture| picture.get(x, y).luminance());
         let model = (MODEL_ERROR * photo).powi(2) + (GLOSS_ERROR * gloss).powi(2);
         (sum / count + model / shading.max(least).powi(2)).sqrt() as f32
-    }))
+    })
 }
 
 /// Base colours that are not well known nearer to the colour of their part: the most likely ones, if the colours of a

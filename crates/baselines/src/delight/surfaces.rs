@@ -4,7 +4,7 @@ use mateval_tracer::{AssumedSurfaces, RenderSettings};
 
 /// The perceptual roughness of surfaces of which nothing is known: the format's default.
 pub(super) const USUAL_ROUGHNESS: f32 = 0.5;
-/// Scatterings after which a path ends: light that has met so many assumed colours says little.
+/// Scatterings after which a path ends: the light of longer ones depends on assumed colours most.
 const MOST_BOUNCES: u32 = 8;
 
 /// What is known of the surfaces of the room.
