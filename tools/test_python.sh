@@ -1,19 +1,23 @@
 #!/bin/sh
 # Builds the wheel of the Python package and tests it in fresh environments of every Python from 3.9 that is found.
-# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters.
+# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters. MATEVAL_PROFILE=dev builds with the tests'
+# profile, which shares its libraries with tools/test.sh.
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh python3-venv
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
+profile="${MATEVAL_PROFILE:-release}"
+# The folder of the profile `dev` has another name.
+folder="$(echo "$profile" | sed 's/^dev$/debug/')"
 # Named together with the extension module, so that both use the libraries with the same features.
-cargo build --release --package mateval --package mateval-python --bin mateval
-mateval="${CARGO_TARGET_DIR:-$PWD/target}/release/mateval"
+cargo build --profile "$profile" --package mateval --package mateval-python --bin mateval
+mateval="${CARGO_TARGET_DIR:-$PWD/target}/$folder/mateval"
 
 python3 -m venv "$work/maturin"
 "$work/maturin/bin/pip" install --quiet 'maturin>=1.9.4,<2'
-"$work/maturin/bin/maturin" build --release --manifest-path crates/python/Cargo.toml --out "$work/dist"
+"$work/maturin/bin/maturin" build --profile "$profile" --manifest-path crates/python/Cargo.toml --out "$work/dist"
 ls -l "$work/dist"
 
 # One scene of the built-in sample, small enough to be rendered in seconds.

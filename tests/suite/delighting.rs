@@ -1,10 +1,11 @@
 //! `mateval baseline delight`: base colour from the photo and the geometry.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::{LinearRgb, Picture};
+use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 use super::command::{Run, baseline, build, render, run};
@@ -14,7 +15,7 @@ use super::sample::{files_below, json, write_source};
 /// The sample's room, rendered by the built-in tracer.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("delighting");
-    let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64", &["room"]);
+    let recipe = write_source(&folder.join("source"), "resolution = [64, 48]\natlas_size = 64", &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
     run(&mut render(&folder.join("dataset"), 64)).ends_with(0);
     folder.join("dataset")
@@ -48,13 +49,16 @@ fn threads_do_not_change_the_files() {
 fn the_page_shows_its_pictures() {
     let html = std::fs::read_to_string(PICTURES.join("index.html")).unwrap();
     let shown: Vec<&str> = html.split("<img src=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
-    assert_eq!(shown.len(), 6);
+    assert_eq!(shown.len(), 7);
     assert!(shown.iter().all(|picture| PICTURES.join(picture).is_file()) && !html.contains("http"), "{shown:?}");
     let lights = json(&PICTURES.join("room/lights.json"));
-    assert_eq!(lights["format"], "mateval-fitted-lights/1");
+    assert_eq!(lights["format"], "mateval-fitted-lights/2");
     let names: Vec<&str> =
         lights["lights"].as_array().unwrap().iter().filter_map(|light| light["name"].as_str()).collect();
     assert!(names.contains(&"lamp_shade") && names.contains(&"world_3"), "{names:?}");
+    let sources: BTreeSet<&str> =
+        lights["lights"].as_array().unwrap().iter().filter_map(|light| light["source"]["type"].as_str()).collect();
+    assert_eq!(sources, BTreeSet::from(["instance", "quad", "sky"]));
 }
 
 /// Lifted to the atlases, the de-lit photo is nearer to the truth than the photo is.
@@ -97,6 +101,84 @@ fn an_estimate_needs_no_files() {
         .says("--adapter describes the files of a folder");
 }
 
+fn relight(pictures: &Path, out: &Path, words: &[&str]) -> Run {
+    let mut command = baseline("relight", &DATASET, out);
+    run(command.arg(pictures).args(["--samples", "8"]).args(words))
+}
+
+/// The mean of the pixels that are valid.
+fn mean_of_valid(picture: &Picture<LinearRgb>) -> f64 {
+    let valid = png_io::read_mask(&DATASET.join("scenes/room/views/input/valid.png")).unwrap();
+    let values =
+        { picture.pixels().iter().zip(valid.pixels()) }.filter(|(_, valid)| **valid).map(|(v, _)| v.luminance());
+    values.sum::<f64>() / valid.pixels().iter().filter(|valid| **valid).count() as f64
+}
+
+/// Under its fitted lights the room is as bright as in the photo, without one of them darker, and without all of them
+/// black.
+#[test]
+fn a_room_is_lit_anew() {
+    let folder = tempfile::tempdir().unwrap();
+    let photo = exr_io::read_linear(&DATASET.join("scenes/room/views/input/rgb.exr")).unwrap();
+    let brightness = |name: &str, words: &[&str]| {
+        let out = folder.path().join(name);
+        relight(&PICTURES, &out, words).ends_with(0).prints("1 scenes");
+        mean_of_valid(&exr_io::read_linear(&out.join("room/relit.exr")).unwrap()) / mean_of_valid(&photo)
+    };
+    let fitted = brightness("fitted", &[]);
+    assert!((fitted - 1.0).abs() < 0.15, "{fitted}");
+    let without_lamp = brightness("without", &["--light", "lamp_shade=0"]);
+    assert!(without_lamp < 0.98 * fitted, "{without_lamp} {fitted}");
+    let twice = brightness("twice", &["--light", "lamp_shade=3", "--light", "lamp_shade=2"]);
+    assert!(((twice - fitted) / (fitted - without_lamp) - 1.0).abs() < 0.01, "{twice} {fitted} {without_lamp}");
+    let lights = json(&PICTURES.join("room/lights.json"));
+    let all: Vec<String> =
+        lights["lights"].as_array().unwrap().iter().map(|l| format!("{}=0", l["name"].as_str().unwrap())).collect();
+    let words: Vec<&str> = all.iter().flat_map(|light| ["--light", light]).collect();
+    assert_eq!(brightness("dark", &words), 0.0);
+
+    let html = std::fs::read_to_string(folder.path().join("without/index.html")).unwrap();
+    assert!(html.contains("value=\"0\"") && html.contains("lamp_shade") && !html.contains("http"));
+    assert_eq!(html.matches("data-light=").count(), html.matches("type=\"range\"").count());
+    for picture in ["photo.png", "relit.png"] {
+        assert!(folder.path().join("without/room").join(picture).is_file(), "{picture}");
+    }
+}
+
+#[test]
+fn bad_lights() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    relight(&PICTURES, &out, &["--light", "sun=1"])
+        .ends_with(2)
+        .says("no scene has a light named sun")
+        .says("lamp_shade");
+    relight(&PICTURES, &out, &["--light", "lamp_shade"]).ends_with(2).says("expected NAME=FACTOR");
+    relight(&PICTURES, &out, &["--light", "lamp_shade=-1"]).ends_with(2).says("expected 0 to 1e6");
+    relight(&PICTURES, &out, &["--light", "lamp_shade=nan"]).ends_with(2).says("expected 0 to 1e6");
+    relight(&DATASET, &out, &[]).ends_with(2).says("holds no folder <scene>/");
+
+    let other = folder.path().join("pictures");
+    copy_folder(&PICTURES, &other);
+    let path = other.join("room/lights.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let write = |from: &str, to: &str| {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&path, text.replace(from, to)).unwrap();
+    };
+    write("mateval-fitted-lights/2", "mateval-fitted-lights/1");
+    relight(&other, &out, &[]).ends_with(2).says("mateval-fitted-lights/1");
+    write("lamp_shade", "sun");
+    relight(&other, &out, &[]).ends_with(2).says("its lights are not those of the scene");
+    write("\"room\"", "\"stage\"");
+    relight(&other, &out, &[]).ends_with(2).says("its lights are not those of the scene");
+    std::fs::write(&path, &text).unwrap();
+    let base_color = Picture::filled(8, 8, LinearRgb([0.5; 3]));
+    exr_io::write_linear(&other.join("room/base_color.exr"), &base_color, Precision::Float).unwrap();
+    relight(&other, &out, &[]).ends_with(2).says("it has 8x8 pixels, the photo 64x48");
+    assert!(!out.exists());
+}
+
 /// A scene without a photo, a photo of another size, a black one, and a place inside the dataset.
 #[test]
 fn bad_photos() {
@@ -113,7 +195,7 @@ fn bad_photos() {
     delight(&dataset, &out, 2).ends_with(2).says("rgb.exr").says("not as large as scene.json says");
     assert!(!out.exists());
 
-    write(&Picture::filled(96, 72, LinearRgb::default()));
+    write(&Picture::filled(64, 48, LinearRgb::default()));
     delight(&dataset, &out, 2).ends_with(0);
     let base_color = exr_io::read_linear(&out.join("room/base_color.exr")).unwrap();
     assert!(base_color.pixels().iter().flat_map(|pixel| pixel.0).all(|v| (0.0..=1.0).contains(&v)));

@@ -2,8 +2,9 @@
 //!
 //! `cargo bench -p mateval-baselines --bench delight -- DATASET [SCENE...]` prints for each scene the PSNR of base colour in the
 //! input view (linear values shown as sRGB, over valid pixels), as it is and with the best scale of each channel, of:
-//! the photo itself; the de-lit photo with the lights of a stage alone; with everything that may glow but without the
-//! photo as light cache; and as the command makes it. Seconds are CPU seconds of all threads. `DELIGHT_OUT` names a
+//! the photo itself; the photo divided by light that is fitted as if everything were grey; the de-lit photo with the
+//! lights of a stage alone; with everything that may glow but without the photo as light cache; and as the command makes
+//! it. Seconds are CPU seconds of all threads. `DELIGHT_OUT` names a
 //! folder for its pictures.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
@@ -16,6 +17,7 @@ use mateval_baselines::geometry::SceneGeometry;
 use mateval_image::exr_io::read_linear;
 use mateval_image::png_io::write_srgb;
 use mateval_image::{LinearRgb, Mask, Picture};
+use mateval_light::joint_fit::JointFitRules;
 use mateval_scene::open::Dataset;
 use mateval_scene::process_cpu::used;
 
@@ -26,7 +28,19 @@ fn main() {
         return;
     };
     let dataset = Dataset::open(&PathBuf::from(dataset)).unwrap();
+    // One colour for all parts: radiances are fitted as if everything were grey, then the photo is divided.
+    let grey = JointFitRules { color_prior: 1e6, usual_color: 0.5, ..JointFitRules::default() };
     let variants = [
+        (
+            "grey, divided",
+            DelightOptions {
+                fit: grey,
+                samples: [64; 3],
+                photo_cache: false,
+                most_rounds: 1,
+                ..DelightOptions::default()
+            },
+        ),
         ("stage lights", DelightOptions { lights: CandidateLights::Stage, ..DelightOptions::default() }),
         ("no photo cache", DelightOptions { photo_cache: false, ..DelightOptions::default() }),
         ("delight", DelightOptions::default()),

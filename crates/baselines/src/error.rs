@@ -32,6 +32,19 @@ pub enum BaselineError {
     /// The input picture is missing.
     #[error("'{}' does not exist: the scene has not been rendered; run `mateval prep render`", .0.display())]
     NoPhoto(PathBuf),
+    /// A folder without any de-lit photo of the dataset.
+    #[error("'{}' holds no folder <scene>/ for any scene of the dataset; expected the output of `mateval baseline delight`", .0.display())]
+    NothingDelit(PathBuf),
+    /// No scene has a light of this name.
+    #[error("'{}': no scene has a light named {}; expected names of its lights.json: {}", folder.display(), unknown.join(" or "), known.join(", "))]
+    NoLight {
+        /// The output of `mateval baseline delight`.
+        folder: PathBuf,
+        /// The names that were given.
+        unknown: Vec<String>,
+        /// The names of all lights, sorted.
+        known: Vec<String>,
+    },
     /// No built-in adapter and no file has this name.
     #[error("'{name}' is neither a built-in adapter nor a file; expected one of {known}, or a TOML file")]
     NoAdapter {

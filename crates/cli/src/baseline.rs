@@ -6,6 +6,7 @@ mod estimate;
 mod import;
 mod partfield;
 mod places;
+mod relight;
 mod texgen;
 
 use std::num::NonZero;
@@ -39,6 +40,8 @@ pub enum Command {
     /// Takes the light out of every photo: base colour from photo and geometry alone, as pictures that other baselines
     /// accept as an estimate.
     Delight(delight::DelightArgs),
+    /// Lights the rooms of de-lit photos anew: a page with a slider for each of the strongest lights.
+    Relight(relight::RelightArgs),
     /// Compares a method's pictures with the truth and reports which encoding their numbers fit; exit code 1 if it is
     /// not the adapter's.
     Encoding(encoding::EncodingArgs),
@@ -114,6 +117,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
             places.done(homogeneous::write_by_part(&places.open()?, &places.out, places.force, &source, set)?)
         }
         Command::Delight(args) => delight::run(args),
+        Command::Relight(args) => relight::run(args),
         Command::Encoding(args) => encoding::run(args),
         Command::Import(args) => import::run(args),
         Command::TexgenExport(args) => texgen::export(args),

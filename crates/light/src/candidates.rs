@@ -63,11 +63,10 @@ pub fn add_candidates(
     for (surface, owner) in owners.iter().enumerate() {
         surfaces_of.entry(*owner).or_default().push(SurfaceIndex(surface));
     }
-    let is_ceiling = |role: &Role| role.architecture_kind().is_some_and(|kind| kind.to_lowercase().contains("ceiling"));
     let mut ceilings = Vec::new();
     for (owner, surfaces) in surfaces_of {
         let instance = &scene.instances[owner];
-        if is_ceiling(&instance.role) {
+        if instance.role.is_ceiling() {
             ceilings.extend(surfaces);
         } else if matches!(instance.role, Role::LightFixture {}) || glows[owner] {
             room.lights.push(group(instance.id.as_str(), glowing(surfaces)));
@@ -125,6 +124,15 @@ fn sector_of_texel(x: usize, y: usize) -> usize {
     if y >= QUARTER { 0 } else { 1 + y * above / QUARTER * around + x * around / (4 * QUARTER) }
 }
 
+/// The azimuth of a sector of the sky in degrees, from and to (0 is -Z, 90 is +X), and its elevation.
+pub fn sky_extent_deg(sector: usize) -> [[f32; 2]; 2] {
+    let [around, above] = SKY_SECTORS;
+    let Some(place) = sector.checked_sub(1) else { return [[0.0, 360.0], [-90.0, 0.0]] };
+    let (column, row) = ((place % around) as f32, (place / around) as f32);
+    let [width, height] = [360.0 / around as f32, 90.0 / above as f32];
+    [[column * width, (column + 1.0) * width], [90.0 - (row + 1.0) * height, 90.0 - row * height]]
+}
+
 /// The sector that a unit vector points to; see [`Emission::Environment`].
 fn sky_sector([x, y, z]: [f32; 3]) -> usize {
     let turns = (libm::atan2f(x, -z) / TAU).rem_euclid(1.0);
@@ -155,7 +163,12 @@ mod tests {
             // Textures begin at the bottom.
             let uv = [texel(turns, 4 * QUARTER), 1.0 - texel(down, 2 * QUARTER)];
             for (number, picture) in sky.iter().enumerate() {
+                let [azimuth_deg, elevation_deg] = sky_extent_deg(number);
+                let holds = |[from, to]: [f32; 2], v: f64| (f64::from(from)..f64::from(to)).contains(&v.to_degrees());
+                let is_inside =
+                    holds(azimuth_deg, azimuth) && holds(elevation_deg, std::f64::consts::FRAC_PI_2 - polar);
                 let expected = if number == sky_sector(direction) { 1.0 } else { 0.0 };
+                assert_eq!(is_inside, expected > 0.0, "{turns} {down} sector {number}");
                 let found = picture.sample(uv)[0];
                 assert!((found - expected).abs() < 1e-4, "{turns} {down} sector {number}: {found}, not {expected}");
             }

@@ -10,6 +10,7 @@ mod arrays;
 mod camera;
 mod command;
 mod dataset;
+mod delight;
 mod failure;
 mod instance;
 mod lift;
@@ -34,6 +35,8 @@ mod _core {
     use crate::command::main;
     #[pymodule_export]
     use crate::dataset::Dataset;
+    #[pymodule_export]
+    use crate::delight::{Delit, delight};
     #[pymodule_export]
     use crate::instance::{Instance, Mesh, Part};
     #[pymodule_export]

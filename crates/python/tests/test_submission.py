@@ -67,6 +67,25 @@ def test_lift_decodes_integers_as_the_plain_adapter_does(root, dataset, scene, c
     compare_maps(written(tmp_path / "ours", dataset, scene, mateval.lift(scene, base_color=photo)), out)
 
 
+def test_delight_is_the_commands(root, dataset, scene, command, tmp_path):
+    delit = mateval.delight(scene)
+    pictures = tmp_path / "pictures"
+    command("baseline", "delight", "--dataset", root, "--out", pictures)
+    lights = json.loads((pictures / "room/lights.json").read_text())["lights"]
+    assert delit.radiances == {light["name"]: tuple(light["radiance"]) for light in lights}
+    out = tmp_path / "command"
+    command("baseline", "nn", "--dataset", root, "--out", out, "--estimate", "delight")
+    maps = mateval.lift(scene, base_color=delit.base_color, roughness=delit.roughness, metallic=delit.metallic)
+    compare_maps(written(tmp_path / "ours", dataset, scene, maps), out)
+    # The photo is made again where the base colour is well known.
+    known = scene.input.valid & (delit.confidence > 0.9)
+    made = delit.base_color * delit.shading + delit.gloss
+    assert known.mean() > 0.3 and np.allclose(made[known], scene.input.rgb[known], rtol=0.05, atol=0.01)
+    assert set(mateval.delight(scene, lights="stage").radiances) < set(delit.radiances)
+    with pytest.raises(ValueError, match="'room' or 'stage', found 'sun'"):
+        mateval.delight(scene, lights="sun")
+
+
 def test_lint_is_the_commands(root, dataset, nn, command):
     report = mateval.lint(nn, dataset)
     assert report.json == command("eval", "lint", nn, "--dataset", root, "--format", "json").stdout

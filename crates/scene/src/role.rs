@@ -42,6 +42,11 @@ impl Role {
         matches!(self, Self::Furniture {} | Self::LightFixture {})
     }
 
+    /// Whether the instance is a ceiling, by the source's type of mesh.
+    pub fn is_ceiling(&self) -> bool {
+        self.architecture_kind().is_some_and(|kind| kind.to_lowercase().contains("ceiling"))
+    }
+
     /// The source's type of mesh, where the instance belongs to the building.
     pub fn architecture_kind(&self) -> Option<&str> {
         match self {

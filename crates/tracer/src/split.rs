@@ -101,6 +101,8 @@ pub struct AssumedSurfaces<'a> {
     pub colors: &'a [[f32; 3]],
     /// The perceptual roughness of each surface.
     pub roughnesses: &'a [f32],
+    /// Whether each surface is a metal, whose light is gloss alone: it has its own colour for all paths.
+    pub metals: &'a [bool],
 }
 
 /// The light of a view, apart from the base colours of what it shows. One picture per light group, and one of the light
@@ -139,14 +141,15 @@ impl<'w> MaterialSource<'w, VARIANTS> for Split<'w> {
     }
 
     fn bsdf(self, place: &SurfaceHit, _: Vec2, wo: Vec3, scatterings: u32) -> Bsdf<'w, VARIANTS> {
+        let is_metal = self.assumed.metals[place.surface.0];
         let colors = match scatterings {
-            0 => [Vec3::ZERO, Vec3::ONE],
+            0 if !is_metal => [Vec3::ZERO, Vec3::ONE],
             _ => [Vec3::from_array(self.assumed.colors[place.surface.0]); VARIANTS],
         };
         let principled = Principled {
             base_color: colors[0],
             roughness: self.assumed.roughnesses[place.surface.0],
-            metallic: 0.0,
+            metallic: f32::from(u8::from(is_metal)),
             eta: eta_from_specular(SPECULAR),
             style: Principled::style(PrincipledFlavour::Blender, Some(self.tables)),
         };
@@ -162,8 +165,7 @@ impl<'w> MaterialSource<'w, VARIANTS> for Split<'w> {
 /// thread with the number of finished tiles and their total.
 ///
 /// The bytes are the same for any number of threads in the current rayon pool. Fails if a setting is out of range, or
-/// if
-/// `assumed` does not hold one colour and one roughness for each surface.
+/// if `assumed` does not hold one value of each kind for each surface.
 pub fn split_light(
     world: &World,
     cache: &PhotoCache<'_>,
@@ -174,7 +176,7 @@ pub fn split_light(
 ) -> Result<SplitLight, TracerError> {
     settings.check()?;
     let expected = world.scene().surfaces.len();
-    for found in [assumed.colors.len(), assumed.roughnesses.len()] {
+    for found in [assumed.colors.len(), assumed.roughnesses.len(), assumed.metals.len()] {
         if found != expected {
             return Err(RequestFault::OtherWorld { found, expected }.into());
         }
@@ -206,6 +208,7 @@ pub fn split_light(
                 }
             }
         }
+        drop(bases);
         progress(finished.fetch_add(1, Ordering::Relaxed) + 1, tiles.len());
     });
     let [diffuse, gloss] = bases.into_inner().unwrap_or_else(PoisonError::into_inner);

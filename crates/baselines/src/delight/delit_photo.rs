@@ -2,6 +2,7 @@
 
 use mateval_image::{LinearRgb, Mask, Picture};
 
+use super::possible_light::FittedLight;
 use crate::estimate::Estimate;
 
 /// A photo without its light. Pixels that are not valid are black; their roughness is 0.5 and their confidence 0.
@@ -20,8 +21,10 @@ pub struct DelitPhoto {
     pub gloss: Picture<LinearRgb>,
     /// How well the base colour is known, 0 to 1: a half where its standard error is 0.05.
     pub confidence: Picture<f32>,
-    /// The name and radiance of each possible light, linear Rec. 709, before exposure.
-    pub radiances: Vec<(String, [f64; 3])>,
+    /// The possible lights: candidates of the room first, then those of the stage.
+    pub lights: Vec<FittedLight>,
+    /// The photo, linear, before exposure.
+    pub photo: Picture<LinearRgb>,
     /// The pixels that are known.
     pub valid: Mask,
     /// Rounds of splitting and fitting.

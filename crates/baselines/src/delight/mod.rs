@@ -9,19 +9,27 @@
 //! or four times. Where noise or reflections hide the base colour, it is drawn towards that of the part. Flat parts
 //! that show what the photo shows elsewhere are mirrors.
 
+mod certainty;
 mod delit_photo;
 mod files;
+mod lights_file;
 mod mirrors;
 mod options;
 mod page;
+mod page_shell;
 mod part_room;
+mod part_surfaces;
 #[cfg(test)]
 mod planted_tests;
+mod possible_light;
+pub mod relight;
 mod roughness;
+mod round_light;
 mod rounds;
 mod surfaces;
 
 pub use delit_photo::DelitPhoto;
 pub use files::write;
 pub use options::{CandidateLights, DelightOptions};
+pub use possible_light::{FittedLight, LightSource, PossibleLight};
 pub use rounds::delight;

@@ -1,28 +1,24 @@
 //! A scene's parts as a room with possible lights, and the photo of it.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::DVec2;
 use mateval_image::exr_io::read_linear;
 use mateval_image::{LinearRgb, Mask, Normal, Picture};
 use mateval_light::candidates::{Candidate, add_candidates};
-use mateval_light::light_stage::{NamedLight, scene_lights};
+use mateval_light::light_stage::scene_lights;
 use mateval_light::rules::StageRules;
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::material::{ColorInput, Material, MaterialModel};
-use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
-use mateval_scene::{Camera, SceneError, glb};
+use mateval_scene::{Camera, SceneError};
 use mateval_tracer::aov::PixelHit;
 use mateval_tracer::{World, aov};
 use rayon::prelude::*;
 
 use super::options::CandidateLights;
+use super::part_surfaces::{NO_PART, PartSurfaces};
+use super::possible_light::PossibleLight;
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
-
-/// The pixel shows no part.
-pub(super) const NO_PART: u16 = u16::MAX;
 
 /// The least number of pixels that show that something glows, and how much: fewer may show edges alone.
 const LEAST_PIXELS: usize = 20;
@@ -31,8 +27,8 @@ const LEAST_PIXELS: usize = 20;
 /// photo.
 pub(super) struct PartRoom {
     pub(super) world: World,
-    /// The name of each light.
-    pub(super) lights: Vec<String>,
+    /// In the order of the world's light groups.
+    pub(super) lights: Vec<PossibleLight>,
     /// The radiance that the photo shows of each light, linear, before exposure.
     pub(super) shown: Vec<Option<[f64; 3]>>,
     pub(super) camera: Camera,
@@ -44,6 +40,8 @@ pub(super) struct PartRoom {
     pub(super) parts: Picture<u16>,
     /// World-space normals, towards the camera.
     pub(super) normals: Picture<Normal>,
+    /// The light, by its place in `lights`, whose emission each pixel shows.
+    pub(super) emission: Picture<Option<usize>>,
     /// The instance of each surface.
     pub(super) owners: Vec<usize>,
 }
@@ -51,69 +49,37 @@ pub(super) struct PartRoom {
 impl PartRoom {
     /// Reads the files that methods may see: geometry, `valid.png`, `part.png` and the photo.
     pub(super) fn read(geometry: &SceneGeometry<'_>, lights: CandidateLights) -> Result<Self, BaselineError> {
-        let (scene, folder) = (geometry.scene, &geometry.folder);
+        let scene = geometry.scene;
         let photo = photo(geometry)?;
-        let instance_at: BTreeMap<&str, usize> =
-            scene.instances.iter().enumerate().map(|(at, instance)| (instance.id.as_str(), at)).collect();
-        // Glass has no atlas; light passes it.
-        let nodes = glb::read(&folder.parts(None))?;
-        let unsupported = |what: &str| SceneError::Unsupported { path: folder.parts(None), what: what.to_owned() };
-        if !nodes.iter().map(|node| node.name.as_str()).eq(scene.parts.iter().map(|part| part.id.as_str())) {
-            return Err(unsupported("its nodes are not the parts of scene.json; run `mateval prep verify`").into());
-        }
-        let grey = Material {
-            name: String::new(),
-            model: MaterialModel::Diffuse { reflectance: ColorInput::Constant([0.5; 3]), alpha: None },
-            two_sided: true,
-            opacity: None,
-            bump: None,
-        };
-        let mut room = ReferenceScene { materials: vec![grey], ..ReferenceScene::default() };
-        let (mut owners, mut surface_of_part) = (Vec::new(), BTreeMap::new());
-        for (part, node) in scene.parts.iter().zip(nodes) {
-            let Some(&owner) = instance_at.get(part.instance.as_str()) else { continue };
-            if scene.instances[owner].atlas.is_none() {
-                continue;
-            }
-            let surface = u16::try_from(owners.len()).ok().filter(|surface| *surface != NO_PART);
-            let surface = surface.ok_or_else(|| unsupported("it has more parts than part.png can hold"))?;
-            surface_of_part.insert(part.index.0.get(), surface);
-            owners.push(owner);
-            room.surfaces.push(Surface { name: node.name, mesh: node.mesh, material: MaterialIndex(0) });
-        }
+        let PartSurfaces { mut room, owners, of_part } = PartSurfaces::read(geometry)?;
+        // Add what may glow, and a stage, which is made for the world of instances.
         let candidates = match lights {
             CandidateLights::Room => add_candidates(&mut room, scene, &owners, &glowing(geometry)),
             CandidateLights::Stage => Vec::new(),
         };
-        let mut names: Vec<String> = room.lights.iter().map(|light| light.name.clone()).collect();
-        let world = World::new(Arc::new(room))?;
-        // The stage is made for the world of instances.
-        let stage: Vec<NamedLight> = scene_lights(&StageRules::default(), scene, &geometry.world);
-        names.extend(stage.iter().map(|light| light.name.clone()));
+        let stage = scene_lights(&StageRules::default(), scene, &geometry.world);
+        let names = room.lights.iter().map(|light| light.name.clone());
+        let mut lights: Vec<PossibleLight> = names
+            .zip(&candidates)
+            .map(|(name, candidate)| PossibleLight::of_candidate(name, *candidate, &scene.instances))
+            .collect();
+        lights.extend(stage.iter().map(PossibleLight::of_stage));
         let stage: Vec<_> = stage.into_iter().map(|light| light.light).collect();
-        let world = world.with_stage(&stage)?;
+        let world = World::new(Arc::new(room))?.with_stage(&stage)?;
+        // Find what each pixel shows.
+        let parts = geometry.part_picture(None)?.map(|part| of_part.get(&part).copied().unwrap_or(NO_PART));
+        let (width, height) = (photo.width(), photo.height());
+        let valid = Mask::from_fn(width, height, |x, y| geometry.valid.get(x, y) && parts.get(x, y) != NO_PART);
         let camera = geometry.view.camera;
-        let parts = geometry.part_picture(None)?.map(|part| surface_of_part.get(&part).copied().unwrap_or(NO_PART));
-        let valid =
-            Mask::from_fn(photo.width(), photo.height(), |x, y| geometry.valid.get(x, y) && parts.get(x, y) != NO_PART);
         let hits = hits(&world, &camera);
         let normals = hits.map(|hit| Normal(hit.as_ref().map_or([0.0; 3], |hit| hit.normal.to_array())));
-        let shows = |candidate: Candidate, x: usize, y: usize| match hits.get(x, y) {
-            // Not through glass, which has pixels of its own.
-            Some(hit) => {
-                let owner = owners[hit.surface.0];
-                let is_seen = geometry.instances.get(x, y) == scene.instances[owner].index.0.get();
-                candidate == Candidate::Instance(owner) && is_seen && !geometry.valid.get(x, y)
-            }
-            None => {
-                let towards = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
-                candidate.is_seen_towards(towards.as_vec3().to_array())
-            }
-        };
-        let mut shown: Vec<_> =
-            candidates.into_iter().map(|candidate| mean(&photo, |x, y| shows(candidate, x, y))).collect();
-        shown.resize(names.len(), None);
-        Ok(Self { world, lights: names, shown, camera, photo, valid, parts, normals, owners })
+        let emission = Picture::from_fn(width, height, |x, y| {
+            let hit = hits.get(x, y);
+            let owner = hit.as_ref().map(|hit| owners[hit.surface.0]);
+            candidates.iter().position(|candidate| shows(geometry, *candidate, owner, [x, y]))
+        });
+        let shown = (0..lights.len()).map(|light| mean_of_pixels(&photo, &emission, light)).collect();
+        Ok(Self { world, lights, shown, camera, photo, valid, parts, normals, emission, owners })
     }
 }
 
@@ -125,7 +91,7 @@ fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineErr
         return Err(BaselineError::NoPhoto(path));
     }
     let photo = read_linear(&path)?;
-    if (photo.width(), photo.height()) != (geometry.valid.width(), geometry.valid.height()) {
+    if !photo.same_size(&geometry.valid) {
         let what = "it is not as large as scene.json says; run `mateval prep verify`".to_owned();
         return Err(SceneError::Unsupported { path, what }.into());
     }
@@ -135,14 +101,17 @@ fn photo(geometry: &SceneGeometry<'_>) -> Result<Picture<LinearRgb>, BaselineErr
 /// Whether each instance glows: it has an atlas, so that it is not glass, and most of its pixels in the input view are
 /// not valid.
 fn glowing(geometry: &SceneGeometry<'_>) -> Vec<bool> {
-    let scene = geometry.scene;
-    let mut counts: BTreeMap<u16, [usize; 2]> = BTreeMap::new();
+    let instances = &geometry.scene.instances;
+    let largest = instances.iter().map(|instance| instance.index.0.get()).max().unwrap_or(0);
+    let mut counts = vec![[0_usize; 2]; usize::from(largest) + 1];
     for (instance, valid) in geometry.instances.pixels().iter().zip(geometry.valid.pixels()) {
-        counts.entry(*instance).or_default()[usize::from(*valid)] += 1;
+        if let Some(count) = counts.get_mut(usize::from(*instance)) {
+            count[usize::from(*valid)] += 1;
+        }
     }
-    let glows =
-        |index: u16| counts.get(&index).is_some_and(|[invalid, valid]| invalid > valid && *invalid >= LEAST_PIXELS);
-    scene.instances.iter().map(|instance| instance.atlas.is_some() && glows(instance.index.0.get())).collect()
+    let glows = |[invalid, valid]: [usize; 2]| invalid > valid && invalid >= LEAST_PIXELS;
+    let counts = instances.iter().map(|instance| counts[usize::from(instance.index.0.get())]);
+    instances.iter().zip(counts).map(|(instance, count)| instance.atlas.is_some() && glows(count)).collect()
 }
 
 /// What the centre of each pixel shows.
@@ -156,12 +125,23 @@ fn hits(world: &World, camera: &Camera) -> Picture<Option<PixelHit>> {
     Picture::from_fn(width, height, |x, y| hits[y * width + x])
 }
 
-/// The mean of these pixels; none if there are too few.
-fn mean(photo: &Picture<LinearRgb>, which: impl Fn(usize, usize) -> bool) -> Option<[f64; 3]> {
-    let pixels = (0..photo.height()).flat_map(|y| (0..photo.width()).map(move |x| (x, y)));
+/// Whether a pixel shows the emission of a candidate. `owner` is the instance that its centre meets, glass apart; none
+/// for the world around.
+fn shows(geometry: &SceneGeometry<'_>, candidate: Candidate, owner: Option<usize>, [x, y]: [usize; 2]) -> bool {
+    let Some(owner) = owner else {
+        let towards = geometry.view.camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+        return candidate.is_seen_towards(towards.as_vec3().to_array());
+    };
+    // Not through glass, which has pixels of its own.
+    let is_seen = geometry.instances.get(x, y) == geometry.scene.instances[owner].index.0.get();
+    candidate == Candidate::Instance(owner) && is_seen && !geometry.valid.get(x, y)
+}
+
+/// The mean of the pixels that show a light; none if there are too few.
+fn mean_of_pixels(photo: &Picture<LinearRgb>, emission: &Picture<Option<usize>>, light: usize) -> Option<[f64; 3]> {
     let (mut sum, mut count) = ([0.0; 3], 0);
-    for (x, y) in pixels.filter(|(x, y)| which(*x, *y)) {
-        sum.iter_mut().zip(photo.get(x, y).0).for_each(|(sum, value)| *sum += f64::from(value));
+    for (pixel, _) in photo.pixels().iter().zip(emission.pixels()).filter(|(_, shown)| **shown == Some(light)) {
+        sum.iter_mut().zip(pixel.0).for_each(|(sum, value)| *sum += f64::from(value));
         count += 1;
     }
     (count >= LEAST_PIXELS).then(|| sum.map(|v| v / count as f64))

@@ -10,12 +10,16 @@ use mateval_scene::material::{
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
 use mateval_scene::{Camera, Intrinsics, TriangleMesh, splitmix64};
 use mateval_testkit::box_room;
-use mateval_tracer::{RenderSettings, World, aov, render};
+use mateval_tracer::{PhotoCache, RenderSettings, World, aov, render, split_light};
 
-use super::part_room::{NO_PART, PartRoom};
-use super::{DelightOptions, DelitPhoto, rounds};
+use super::part_room::PartRoom;
+use super::part_surfaces::NO_PART;
+use super::surfaces::{Surfaces, settings};
+use super::{DelightOptions, DelitPhoto, LightSource, PossibleLight, rounds};
 
-const SIZE: [u32; 2] = [112, 63];
+const SIZE: [u32; 2] = [96, 54];
+/// Lamps that bring less of the photo's light are not well known.
+const LEAST_SHARE: f64 = 0.05;
 
 /// Numbers in [0, 1) of a seed, one after the other.
 struct Numbers(u64, u64);
@@ -130,10 +134,25 @@ fn planted(seed: u64) -> Planted {
     let normals = Picture::from_fn(width, height, |x, y| Normal(hit(x, y).unwrap().normal.to_array()));
     let valid = Mask::from_fn(width, height, |x, y| !lamps.contains(&usize::from(parts.get(x, y))));
     let truth = Picture::from_fn(width, height, |x, y| LinearRgb(mean_color(&scene, &world, &camera, x, y)));
-    let lights = (0..lamps.len()).map(|k| format!("lamp_{k}")).collect();
+    let light = |k: usize| PossibleLight {
+        name: format!("lamp_{k}"),
+        source: LightSource::Instance { instance: lamps[k].to_string() },
+    };
+    let lights = (0..lamps.len()).map(light).collect();
     let owners = (0..scene.surfaces.len()).collect();
     Planted {
-        room: PartRoom { world, shown: vec![None; 3], lights, camera, photo, valid, parts, normals, owners },
+        room: PartRoom {
+            world,
+            shown: vec![None; 3],
+            lights,
+            camera,
+            emission: photo.map(|_| None),
+            photo,
+            valid,
+            parts,
+            normals,
+            owners,
+        },
         truth,
         radiances,
     }
@@ -150,7 +169,7 @@ fn mean_color(scene: &ReferenceScene, world: &World, camera: &Camera, x: usize, 
 }
 
 fn delit(planted: &Planted) -> DelitPhoto {
-    rounds::run(&planted.room, &DelightOptions { samples: [4, 8, 32], ..DelightOptions::default() }, &|_| ()).unwrap()
+    rounds::run(&planted.room, &DelightOptions { samples: [4, 4, 16], ..DelightOptions::default() }, &|_| ()).unwrap()
 }
 
 /// PSNR over valid pixels of sRGB values, each channel at the linear scale that fits the truth best.
@@ -182,6 +201,20 @@ fn gain(found: &DelitPhoto, planted: &Planted) -> f64 {
     aligned_psnr(&found.base_color, planted) - aligned_psnr(&planted.room.photo, planted)
 }
 
+/// The share of each lamp in the light of the photo, if all surfaces were grey.
+fn shares(planted: &Planted) -> Vec<f64> {
+    let room = &planted.room;
+    let nothing = room.valid.map(|_| false);
+    let cache = PhotoCache::new(&room.world, &room.camera, &room.photo, &nothing).unwrap();
+    let surfaces = Surfaces::unknown(room.owners.len());
+    let split = split_light(&room.world, &cache, &room.valid, surfaces.assumed(), &settings(8, 0), &|_, _| ()).unwrap();
+    let brought = |(picture, radiance): (&Picture<LinearRgb>, &[f32; 3])| {
+        f64::from(radiance.iter().sum::<f32>()) * picture.pixels().iter().map(|pixel| pixel.luminance()).sum::<f64>()
+    };
+    let brought: Vec<f64> = split.diffuse.pictures().iter().zip(&planted.radiances).map(brought).collect();
+    brought.iter().map(|one| one / brought.iter().sum::<f64>()).collect()
+}
+
 /// The base colour is at least 8 dB nearer to the truth than the photo is (the median), and no part is taken for a
 /// mirror. Radiances are less certain: lamps trade light with one another, and with the colours of what the photo does
 /// not show.
@@ -192,14 +225,19 @@ fn planted_rooms_are_delit() {
         let planted = planted(seed);
         let found = delit(&planted);
         gains.push(gain(&found, &planted));
-        for (k, radiance) in planted.radiances.iter().enumerate() {
-            let ratios = [0, 1, 2].map(|c| found.radiances[k].1[c] / f64::from(radiance[c]));
+        let shares = shares(&planted);
+        for (k, radiance) in planted.radiances.iter().enumerate().filter(|(k, _)| shares[*k] >= LEAST_SHARE) {
+            let ratios = [0, 1, 2].map(|c| found.lights[k].radiance[c] / f64::from(radiance[c]));
             errors.push((ratios.iter().sum::<f64>() / 3.0 - 1.0).abs());
         }
         assert!(found.metallic.pixels().iter().all(|metallic| *metallic == 0.0), "a false mirror in room {seed}");
     }
     assert!(median(gains.clone()) >= 8.0, "{gains:?}");
     assert!(median(errors.clone()) <= 0.4, "{errors:?}");
+    #[expect(clippy::print_stdout, reason = "temporary")]
+    {
+        println!("{} {}", median(gains.clone()), median(errors.clone()));
+    }
 }
 
 /// Lamps that the photo shows are taken as they are shown; the base colour is then no worse than with fitted ones.
@@ -210,7 +248,7 @@ fn shown_radiances_are_kept() {
     planted.room.shown = planted.radiances.iter().map(|radiance| Some(radiance.map(f64::from))).collect();
     let found = delit(&planted);
     for (k, radiance) in planted.radiances.iter().enumerate() {
-        let found = &found.radiances[k].1;
+        let found = &found.lights[k].radiance;
         let near = found.iter().zip(radiance).all(|(found, shown)| (found / f64::from(*shown) - 1.0).abs() < 0.1);
         assert!(near, "lamp {k}: {found:?} {radiance:?}");
     }
@@ -221,12 +259,12 @@ fn shown_radiances_are_kept() {
 /// A photo that shows no light, one that is far too bright, and one of which only the brightest values are known.
 #[test]
 fn bad_photos_give_finite_colours() {
-    let sound = planted(2);
+    let mut room = planted(2).room;
+    let sound = room.photo.clone();
     let photos: [(&str, &dyn Fn(f32) -> f32); 3] =
         [("black", &|_| 0.0), ("exposed a thousandfold", &|v| 1000.0 * v), ("clipped", &|v| v.min(0.2))];
     for (what, change) in photos {
-        let mut room = planted(2).room;
-        room.photo = sound.room.photo.map(|LinearRgb(rgb)| LinearRgb(rgb.map(change)));
+        room.photo = sound.map(|LinearRgb(rgb)| LinearRgb(rgb.map(change)));
         let found =
             rounds::run(&room, &DelightOptions { samples: [2; 3], ..DelightOptions::default() }, &|_| ()).unwrap();
         for ((color, rest), _) in { found.base_color.pixels().iter().zip(found.roughness.pixels()) }
@@ -237,9 +275,9 @@ fn bad_photos_give_finite_colours() {
             assert!((0.0..=1.0).contains(rest), "{what}: {rest}");
         }
         assert!(
-            found.radiances.iter().flat_map(|light| light.1).all(|v| v.is_finite() && v >= 0.0),
+            found.lights.iter().flat_map(|light| light.radiance).all(|v| v.is_finite() && v >= 0.0),
             "{what}: {:?}",
-            found.radiances
+            found.lights
         );
         assert!(found.confidence.pixels().iter().all(|v| (0.0..=1.0).contains(v)), "{what}");
     }

@@ -41,8 +41,8 @@ pub(super) fn choose(
     let (width, height) = (room.photo.width(), room.photo.height());
     let wanted = Mask::from_fn(width, height, |x, y| x % STEP == 0 && y % STEP == 0 && room.valid.get(x, y));
     let misfits_at = |roughness: f32| -> Result<BTreeMap<u16, f64>, BaselineError> {
-        let all =
-            Surfaces { colors: surfaces.colors.clone(), roughnesses: vec![roughness; surfaces.roughnesses.len()] };
+        let roughnesses = vec![roughness; surfaces.roughnesses.len()];
+        let all = Surfaces { colors: surfaces.colors.clone(), roughnesses, metals: surfaces.metals.clone() };
         let step = format!("roughness {roughness}");
         let split =
             split_light(&room.world, cache, &wanted, all.assumed(), &settings(SAMPLES, seed), &|done, total| {

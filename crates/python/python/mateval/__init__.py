@@ -15,7 +15,7 @@ integers. Lengths are metres, +Y is up.
 """
 
 from . import metrics
-from ._core import Camera, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, lift
+from ._core import Camera, Delit, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, delight, lift
 from .by_id import ById
 from .dataset import Dataset, open
 from .errors import Error, UnknownId, Withheld
@@ -25,6 +25,7 @@ __all__ = [
     "ById",
     "Camera",
     "Dataset",
+    "Delit",
     "Error",
     "Instance",
     "LintReport",
@@ -38,6 +39,7 @@ __all__ = [
     "UnknownId",
     "View",
     "Withheld",
+    "delight",
     "lift",
     "lint",
     "metrics",

@@ -15,6 +15,7 @@ from .by_id import ById
 __all__ = [
     "Camera",
     "Dataset",
+    "Delit",
     "Instance",
     "Maps",
     "Mesh",
@@ -23,6 +24,7 @@ __all__ = [
     "Submission",
     "Truth",
     "View",
+    "delight",
     "lift",
     "lint",
     "lpips",
@@ -189,6 +191,23 @@ class Maps:
     def seen(self) -> _Mask: ...
 
 @final
+class Delit:
+    @property
+    def base_color(self) -> _Floats: ...
+    @property
+    def roughness(self) -> _Floats: ...
+    @property
+    def metallic(self) -> _Floats: ...
+    @property
+    def shading(self) -> _Floats: ...
+    @property
+    def gloss(self) -> _Floats: ...
+    @property
+    def confidence(self) -> _Floats: ...
+    @property
+    def radiances(self) -> dict[str, tuple[float, float, float]]: ...
+
+@final
 class Submission:
     def __new__(
         cls,
@@ -222,6 +241,7 @@ class Submission:
         /,
     ) -> None: ...
 
+def delight(scene: Scene, *, lights: str = "room") -> Delit: ...
 def lift(
     scene: Scene,
     *,

@@ -28,9 +28,7 @@ enum Glow {
 fn glow(house: &FurnishedHouse, surface: usize) -> Glow {
     let placed = &house.placed[surface];
     match &placed.origin.role {
-        Role::Architecture { kind } if kind.to_lowercase().contains("ceiling") => {
-            Glow::Ceiling(placed.color.map(|v| v * CEILING))
-        }
+        role if role.is_ceiling() => Glow::Ceiling(placed.color.map(|v| v * CEILING)),
         Role::LightFixture {} => Glow::Lamp,
         Role::Architecture { .. } | Role::Furniture {} | Role::Other {} => Glow::No,
     }
