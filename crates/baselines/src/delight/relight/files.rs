@@ -115,7 +115,7 @@ fn factor(dimmed: &[Dimmed], name: &str) -> f64 {
 fn section(scene: &SceneFile, relit: &RelitPhoto, delit: &DelitPictures, factors: &[f64]) -> Shown {
     let exposure = scene.exposure as f32;
     let sliders = relit.strongest.iter().map(|lit| Slider {
-        name: delit.lights.lights[lit.light].light.name.clone(),
+        light: delit.lights.lights[lit.light].light.clone(),
         factor: factors[lit.light],
         picture: ScaledPicture::new(&lit.picture, exposure),
     });

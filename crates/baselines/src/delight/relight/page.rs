@@ -6,6 +6,7 @@ use mateval_image::jpeg_io::jpeg_bytes;
 use mateval_image::{LinearRgb, Picture};
 
 use super::super::page_shell::{figure, page};
+use super::super::possible_light::{LightSource, PossibleLight};
 
 /// Mixes the pictures of the lights.
 const MIX: &str = include_str!("mix_lights.js");
@@ -26,7 +27,7 @@ pub(super) struct Shown {
 
 /// One light's slider.
 pub(super) struct Slider {
-    pub(super) name: String,
+    pub(super) light: PossibleLight,
     /// Where it stands at first.
     pub(super) factor: f64,
     pub(super) picture: ScaledPicture,
@@ -73,10 +74,22 @@ fn section(Shown { id, size: [width, height], lights, rest }: &Shown) -> String 
         "<figcaption>The room lit anew</figcaption></figure></div>\n<div class=\"lights\">\n".to_owned(),
         rest.img("rest"),
     ]);
-    text.extend(lights.iter().map(|Slider { name, factor, picture }| {
+    text.extend(lights.iter().map(|Slider { light, factor, picture }| {
         let input = format!("<input type=\"range\" min=\"0\" max=\"2\" step=\"0.05\" value=\"{factor}\">");
-        format!("{}<label><span>{name}</span>{input}<output>{factor:.2}</output></label>\n", picture.img("light"))
+        let label = label(light);
+        format!("{}<label><span>{label}</span>{input}<output>{factor:.2}</output></label>\n", picture.img("light"))
     }));
     text.push_str("</div><button type=\"button\">All as fitted</button></section>\n");
     text
+}
+
+/// The light's name, and what shines where the name does not state it.
+fn label(PossibleLight { name, source }: &PossibleLight) -> String {
+    match source {
+        LightSource::Instance { .. } | LightSource::Ceilings {} | LightSource::World {} => name.clone(),
+        LightSource::Sky { azimuth_deg: [from, to], elevation_deg: [low, high] } => {
+            format!("{name}: sky, azimuth {from}° to {to}°, elevation {low}° to {high}°")
+        }
+        LightSource::Quad { .. } => format!("{name}: light stage"),
+    }
 }
