@@ -15,7 +15,7 @@ use super::sample::{files_below, json, write_source};
 /// The sample's room, rendered by the built-in tracer.
 static DATASET: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = kept_folder("delighting");
-    let recipe = write_source(&folder.join("source"), "resolution = [64, 48]\natlas_size = 64", &["room"]);
+    let recipe = write_source(&folder.join("source"), "resolution = [96, 72]\natlas_size = 64", &["room"]);
     run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
     run(&mut render(&folder.join("dataset"), 64)).ends_with(0);
     folder.join("dataset")
@@ -187,7 +187,7 @@ fn bad_lights() {
     std::fs::write(&path, &text).unwrap();
     let base_color = Picture::filled(8, 8, LinearRgb([0.5; 3]));
     exr_io::write_linear(&other.join("room/base_color.exr"), &base_color, Precision::Float).unwrap();
-    relight(&other, &out, &[]).ends_with(2).says("it has 8x8 pixels, the photo 64x48");
+    relight(&other, &out, &[]).ends_with(2).says("it has 8x8 pixels, the photo 96x72");
     assert!(!out.exists());
 }
 
@@ -207,7 +207,7 @@ fn bad_photos() {
     delight(&dataset, &out, 2).ends_with(2).says("rgb.exr").says("not as large as scene.json says");
     assert!(!out.exists());
 
-    write(&Picture::filled(64, 48, LinearRgb::default()));
+    write(&Picture::filled(96, 72, LinearRgb::default()));
     delight(&dataset, &out, 2).ends_with(0);
     let base_color = exr_io::read_linear(&out.join("room/base_color.exr")).unwrap();
     assert!(base_color.pixels().iter().flat_map(|pixel| pixel.0).all(|v| (0.0..=1.0).contains(&v)));

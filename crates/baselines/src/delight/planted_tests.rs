@@ -234,10 +234,6 @@ fn planted_rooms_are_delit() {
     }
     assert!(median(gains.clone()) >= 8.0, "{gains:?}");
     assert!(median(errors.clone()) <= 0.4, "{errors:?}");
-    #[expect(clippy::print_stdout, reason = "temporary")]
-    {
-        println!("{} {}", median(gains.clone()), median(errors.clone()));
-    }
 }
 
 /// Lamps that the photo shows are taken as they are shown; the base colour is then no worse than with fitted ones.
