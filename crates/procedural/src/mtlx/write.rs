@@ -82,6 +82,16 @@ fn write_material(out: &mut String, name: &str) {
 
 /// ` key="value"`, escaped; empty where there is no value.
 fn attribute(key: &str, value: Option<&str>) -> String {
-    let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
-    value.map_or(String::new(), |value| format!(" {key}=\"{}\"", escape(value)))
+    value.map_or(String::new(), |value| format!(" {key}=\"{}\"", value.chars().map(escaped).collect::<String>()))
+}
+
+/// A character of an attribute. Spaces other than ` ` would be read as ` `.
+fn escaped(character: char) -> String {
+    match character {
+        '&' => "&amp;".to_owned(),
+        '<' => "&lt;".to_owned(),
+        '"' => "&quot;".to_owned(),
+        '\n' | '\r' | '\t' => format!("&#{};", u32::from(character)),
+        other => other.to_string(),
+    }
 }

@@ -25,7 +25,7 @@ fn what_is_written_reads_back_as_the_same_graph() {
 #[test]
 fn text_in_attributes_is_escaped() {
     let mut graph = read(&text("", GREY, "grey")).unwrap();
-    graph.doc = Some("a < b & \"c\"".to_owned());
+    graph.doc = Some("a < b & \"c\"\n\t".to_owned());
     assert_eq!(read(&to_text(&graph)).unwrap(), graph);
 }
 
