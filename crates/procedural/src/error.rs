@@ -34,6 +34,14 @@ pub enum ProceduralError {
         /// The names of the parameters, with commas between them.
         known: String,
     },
+    /// A parameter that has a value of its own at every point.
+    #[error("parameter '{name}' of '{graph}' cannot be set: it is the extent of a pixel at every point")]
+    OfThePoint {
+        /// The graph.
+        graph: String,
+        /// The parameter.
+        name: String,
+    },
     /// A text is not a value of the parameter's type.
     #[error("parameter '{name}' of '{graph}': {reason}")]
     BadValue {
@@ -70,6 +78,11 @@ pub enum ProceduralError {
         /// The greatest number of pixels a side.
         most: usize,
     },
+    /// There is nothing to fit a graph to.
+    #[error(
+        "cannot fit a graph: expected points with finite places, colours from 0 up, and footprints and weights above 0"
+    )]
+    NoPoints,
     /// A graph has a value that is infinite or not a number.
     #[error("'{graph}' is not finite at ({u}, {v}) metres: its {output} is {value}; choose other parameters")]
     NotFinite {

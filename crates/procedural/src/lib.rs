@@ -8,6 +8,8 @@
 //! points at once. [`node`] lists the supported nodes with the defaults of their inputs, [`noise`] has the noises, and
 //! [`Settings`] hold the values of a graph's parameters.
 //!
+//! [`fit`] finds the graph and the settings that show what is seen of a part.
+//!
 //! A graph has the outputs `base_color` (linear), `roughness` and `metallic`. Its texture coordinates are metres. An
 //! input called `footprint` is set at every point to the extent of its pixel or texel, so that edges and lines are as
 //! blurred as the pixel needs.
@@ -15,6 +17,7 @@
 mod batch;
 mod error;
 pub mod finding;
+pub mod fit;
 pub mod graph;
 mod kernel;
 pub mod lanes;

@@ -1,7 +1,7 @@
 //! The values of a graph's parameters.
 
 use crate::error::ProceduralError;
-use crate::graph::Graph;
+use crate::graph::{FOOTPRINT, Graph};
 use crate::program::compile::first_slot;
 use crate::value::{Type, Value};
 
@@ -66,6 +66,9 @@ impl Settings {
     /// text is no value of its type and range.
     pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {
         let Some(at) = graph.parameter(name) else { return Err(unknown(graph, name)) };
+        if name == FOOTPRINT {
+            return Err(ProceduralError::OfThePoint { graph: graph.name.clone(), name: name.to_owned() });
+        }
         let parameter = &graph.parameters[at];
         let bad = |reason| ProceduralError::BadValue { graph: graph.name.clone(), name: name.to_owned(), reason };
         let value = Value::parse(parameter.value.kind(), text).map_err(bad)?;

@@ -4,6 +4,7 @@
     clippy::unwrap_used,
     reason = "tests unwrap; clippy exempts only functions marked as tests, not what they call"
 )]
+#![allow(clippy::print_stderr, reason = "measurements are printed")]
 
 mod suite {
     mod derivatives;
@@ -14,5 +15,6 @@ mod suite {
     mod library;
     mod nodes;
     mod pictures;
+    mod planted;
     mod settings;
 }

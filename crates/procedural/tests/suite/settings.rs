@@ -27,5 +27,6 @@ fn wrong_names_and_values_are_refused() {
     assert_eq!(refusal("ratio", "4.5"), "parameter 'ratio' of 'herringbone': expected a whole number, found '4.5'");
     assert!(refusal("color", "0.5").contains("expected 3 numbers separated by commas, found 1"));
     assert!(refusal("width", "nan").contains("expected a finite number"));
+    assert!(refusal("footprint", "0.1").contains("it is the extent of a pixel at every point"));
     assert_eq!(settings, before);
 }
