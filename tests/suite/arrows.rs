@@ -5,10 +5,11 @@ use std::collections::BTreeSet;
 use cargo_metadata::{DependencyKind, Metadata, MetadataCommand, Package};
 
 /// The crates of ours that each crate may use; names without `mateval-`.
-pub const ARROWS: [(&str, &[&str]); 17] = [
+pub const ARROWS: [(&str, &[&str]); 18] = [
     ("mateval-image", &[]),
     ("mateval-scene", &["image"]),
     ("mateval-metrics", &["image"]),
+    ("mateval-procedural", &[]),
     ("mateval-tracer", &["scene", "image"]),
     ("mateval-light", &["scene", "image", "tracer"]),
     ("mateval-sample", &["scene", "image"]),
@@ -29,6 +30,7 @@ pub const ARROWS: [(&str, &[&str]); 17] = [
             "metrics",
             "tracer",
             "light",
+            "procedural",
             "sample",
             "sources",
             "prep",

@@ -13,6 +13,7 @@ mod demo;
 mod eval;
 mod fetch;
 mod format;
+mod graph;
 mod open_dataset;
 mod outcome;
 mod output_file;
@@ -55,6 +56,9 @@ enum Command {
     /// Checks, scores and compares submissions.
     #[command(subcommand)]
     Eval(eval::Command),
+    /// Lists, checks and renders procedural materials: graphs of MaterialX nodes.
+    #[command(subcommand)]
+    Graph(graph::Command),
     /// Downloads LPIPS' weights and Blender, which are not part of the tool.
     Fetch(fetch::Args),
     /// Writes the JSON Schemas of the format's files.
@@ -96,6 +100,7 @@ fn carry_out(command: &Command) -> anyhow::Result<Outcome> {
         Command::Prep(command) => prep::run(command),
         Command::Baseline(command) => baseline::run(command),
         Command::Eval(command) => eval::run(command),
+        Command::Graph(command) => graph::run(command),
         Command::Fetch(args) => fetch::run(args),
         Command::Schema(args) => schema::run(args),
     }

@@ -29,6 +29,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     {
         keep(&corpus, target, name, &std::fs::read(examples.join(name))?)?;
     }
+    for entry in &mateval_procedural::library::LIBRARY {
+        keep(&corpus, "mtlx", entry.name, entry.text.as_bytes())?;
+    }
     maps(&corpus, work.path())?;
     archives(&corpus, work.path())?;
     geometry(&corpus, work.path(), &source)

@@ -1,0 +1,149 @@
+//! The evaluation of a program at batches of points, with derivatives in chosen parameters (forward mode).
+
+use crate::kernel::{OPERANDS, Outcome, run};
+use crate::lanes::{LANES, Lanes, Points};
+use crate::program::compile::{OUTPUTS, Program};
+use crate::program::op::Op;
+use crate::settings::Settings;
+
+/// Evaluates a program. Results that are the same at all points are computed once, when the settings are set;
+/// derivatives that are known to be zero are not computed at all.
+pub struct Evaluator<'p> {
+    program: &'p Program,
+    /// Values of parameters, by slot.
+    settings: Vec<f64>,
+    /// Whether each result differs between points.
+    varies: Vec<bool>,
+    /// The chosen slots that each result depends on, as places in the list of chosen ones, ascending.
+    depends: Vec<Vec<usize>>,
+    /// The place of each result's first derivative.
+    first: Vec<usize>,
+    values: Vec<Lanes>,
+    derivatives: Vec<Lanes>,
+    scratch: Box<Outcome>,
+}
+
+impl<'p> Evaluator<'p> {
+    /// An evaluator of a program at these settings, with derivatives in these slots of them.
+    pub fn new(program: &'p Program, settings: &Settings, chosen: &[usize]) -> Self {
+        let (mut varies, mut depends): (Vec<bool>, Vec<Vec<usize>>) = (Vec::new(), Vec::new());
+        for op in &program.ops {
+            varies.push(op.is_of_the_point() || op.inputs().iter().any(|input| varies[input.index()]));
+            depends.push(dependences(op, chosen, &depends));
+        }
+        let mut count = 0;
+        let places = depends.iter().map(|slots| {
+            count += slots.len();
+            count - slots.len()
+        });
+        let first = places.collect();
+        let mut evaluator = Self {
+            program,
+            settings: Vec::new(),
+            varies,
+            depends,
+            first,
+            values: vec![[0.0; LANES]; program.ops.len()],
+            derivatives: vec![[0.0; LANES]; count],
+            scratch: Box::new(Outcome::new()),
+        };
+        evaluator.set(settings);
+        evaluator
+    }
+
+    /// Changes the settings.
+    pub fn set(&mut self, settings: &Settings) {
+        self.settings.clear();
+        self.settings.extend_from_slice(settings.numbers());
+        for at in 0..self.program.ops.len() {
+            if !self.varies[at] {
+                self.step(at);
+            }
+        }
+    }
+
+    /// Evaluates the program at these points.
+    pub fn run(&mut self, points: &Points) {
+        for at in 0..self.program.ops.len() {
+            match self.program.ops[at] {
+                Op::PlaceU => self.values[at] = points.u,
+                Op::PlaceV => self.values[at] = points.v,
+                Op::Footprint => self.values[at] = points.footprint,
+                _ if self.varies[at] => self.step(at),
+                _ => {}
+            }
+        }
+    }
+
+    /// The values of an output's scalar, an index below [`OUTPUTS`].
+    pub fn value(&self, output: usize) -> &Lanes {
+        &self.values[self.program.outputs[output].index()]
+    }
+
+    /// The derivatives of an output's scalar in a chosen slot, by its place in the list; `None` where they are known to
+    /// be zero.
+    pub fn derivative(&self, output: usize, chosen: usize) -> Option<&Lanes> {
+        let at = self.program.outputs[output].index();
+        let place = self.depends[at].binary_search(&chosen).ok()?;
+        Some(&self.derivatives[self.first[at] + place])
+    }
+
+    /// All outputs at one point of the batch.
+    pub fn outputs(&self, lane: usize) -> [f64; OUTPUTS] {
+        std::array::from_fn(|output| self.value(output)[lane])
+    }
+
+    /// Carries out one instruction.
+    fn step(&mut self, at: usize) {
+        match self.program.ops[at] {
+            Op::Number(bits) => self.values[at] = [f64::from_bits(bits); LANES],
+            Op::Slot(slot) => {
+                self.values[at] = [self.settings[slot as usize]; LANES];
+                self.derivatives[self.first[at]..][..self.depends[at].len()].fill([1.0; LANES]);
+            }
+            ref op => {
+                let inputs = op.inputs();
+                let operands: [&Lanes; OPERANDS] =
+                    std::array::from_fn(|operand| &self.values[inputs[operand.min(inputs.len() - 1)].index()]);
+                run(op, operands, &self.settings, &mut self.scratch);
+                self.values[at] = self.scratch.value;
+                self.chain(at);
+            }
+        }
+    }
+
+    /// The chain rule: the derivatives of a result out of those of its operands.
+    fn chain(&mut self, at: usize) {
+        let (before, after) = self.derivatives.split_at_mut(self.first[at]);
+        for (slot, sum) in self.depends[at].iter().zip(after) {
+            *sum = [0.0; LANES];
+            for (operand, input) in self.program.ops[at].inputs().iter().enumerate() {
+                let Ok(place) = self.depends[input.index()].binary_search(slot) else { continue };
+                let of_operand = &before[self.first[input.index()] + place];
+                add_product(sum, &self.scratch.slopes[operand], of_operand);
+            }
+        }
+    }
+}
+
+/// Adds where the slope is not zero, so that an infinite derivative of what is not selected does not count.
+fn add_product(sum: &mut Lanes, slope: &Lanes, derivative: &Lanes) {
+    for lane in 0..LANES {
+        let product = slope[lane] * derivative[lane];
+        sum[lane] += if slope[lane] == 0.0 { 0.0 } else { product };
+    }
+}
+
+/// Which of the chosen slots a result depends on with a derivative that may differ from zero.
+fn dependences(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usize> {
+    if let Op::Slot(slot) = op {
+        return chosen.iter().position(|&other| other == *slot as usize).into_iter().collect();
+    }
+    if op.is_constant_by_parts() {
+        return Vec::new();
+    }
+    let mut all: Vec<usize> = op.inputs().iter().flat_map(|input| of_others[input.index()].iter().copied()).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}

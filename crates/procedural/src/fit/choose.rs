@@ -1,0 +1,120 @@
+//! The choice of a graph: every periodic graph is fitted, and the best one counts if it predicts points that no fit has
+//! seen better than a single colour does.
+
+use super::colors::{mean_square, project};
+use super::hypotheses::starts;
+use super::lm::polish;
+use super::model::Model;
+use super::pattern::Pattern;
+use super::periods::layout;
+use super::points::{Point, split, thinned};
+use super::smooth::flattened;
+use super::waves::{Wave, waves};
+use crate::error::ProceduralError;
+use crate::library::{LIBRARY, entry};
+use crate::settings::Settings;
+
+/// The graph of one colour.
+const PAINT: &str = "paint";
+
+/// Fewer points than this are one colour.
+pub const LEAST_POINTS: usize = 400;
+
+/// The error of a graph must be below this share of a single colour's.
+pub const MOST_ERROR: f64 = 0.98;
+
+/// By how much a graph's error must be lower for each number that it has more than another.
+const PRICE: f64 = 0.002;
+
+/// A graph with its settings.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The name of the built-in graph.
+    pub graph: &'static str,
+    /// The settings.
+    pub settings: Settings,
+    /// The weighted mean square of the difference of colours at the points that were held out.
+    pub error: f64,
+}
+
+impl Candidate {
+    /// What graphs are ordered by: of two that are as good, the one with fewer parameters is first.
+    fn rank(&self) -> f64 {
+        self.error * (1.0 + PRICE * self.settings.numbers().len() as f64)
+    }
+}
+
+/// The fit of a part.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// The graph that was chosen; `paint` where none is better than a colour.
+    pub chosen: Candidate,
+    /// The other graphs, best first.
+    pub others: Vec<Candidate>,
+}
+
+/// The graphs that are fitted.
+pub struct Fitter {
+    paint: Model,
+    patterns: Vec<Pattern>,
+}
+
+impl Fitter {
+    /// Prepares the periodic graphs of the library and `paint`.
+    pub fn new() -> Result<Self, ProceduralError> {
+        let mut patterns = Vec::new();
+        for entry in &LIBRARY {
+            if let Some(layout) = layout(entry.name) {
+                patterns.push(Pattern::new(entry.name, Model::new(entry.graph()?), layout));
+            }
+        }
+        let paint = entry(PAINT).expect("paint is a built-in graph").graph()?;
+        Ok(Self { paint: Model::new(paint), patterns })
+    }
+
+    /// Fits the graphs to points, of which unsound ones are left out. Fails where no point is sound.
+    pub fn fit(&self, points: &[Point]) -> Result<Fit, ProceduralError> {
+        let sound: Vec<Point> = points.iter().filter(|point| point.is_sound()).copied().collect();
+        if sound.is_empty() {
+            return Err(ProceduralError::NoPoints);
+        }
+        let sound = flattened(&sound);
+        let (seen, held_out) = split(&sound);
+        // Too few blocks to hold one out: all points judge, which only a single colour may pass.
+        let is_enough = seen.len() >= LEAST_POINTS && held_out.len() >= LEAST_POINTS / 8;
+        let judged = if is_enough { held_out } else { sound.clone() };
+        let paint = self.painted(if is_enough { &seen } else { &sound }, &judged);
+        let mut others = if is_enough { self.fitted(&seen, &judged) } else { Vec::new() };
+        others.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        let is_better = others.first().is_some_and(|best| best.error < MOST_ERROR * paint.error);
+        let chosen = if is_better { std::mem::replace(&mut others[0], paint) } else { paint };
+        others.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        Ok(Fit { chosen, others })
+    }
+
+    /// One colour.
+    fn painted(&self, seen: &[Point], judged: &[Point]) -> Candidate {
+        let mut settings = self.paint.start();
+        project(&self.paint, &mut settings, seen);
+        Candidate { graph: PAINT, error: mean_square(&self.paint, &settings, judged), settings }
+    }
+
+    /// The best fit of each pattern that has the waves of the points.
+    fn fitted(&self, seen: &[Point], judged: &[Point]) -> Vec<Candidate> {
+        let found = waves(&thinned(seen, 4096), 8);
+        self.patterns.iter().filter_map(|pattern| candidate(pattern, seen, judged, &found)).collect()
+    }
+}
+
+/// The best of a few starts, polished.
+fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[Wave]) -> Option<Candidate> {
+    let model = &pattern.model;
+    let (few, many) = (thinned(seen, 800), thinned(seen, 2048));
+    let polished = starts(pattern, seen, found, 5).into_iter().map(|mut start| {
+        polish(model, &mut start.settings, &few, 10);
+        (mean_square(model, &start.settings, &few), start.settings)
+    });
+    let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    polish(model, &mut settings, &many, 25);
+    Some(Candidate { graph: pattern.name, error: mean_square(model, &settings, judged), settings })
+}

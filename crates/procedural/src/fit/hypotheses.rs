@@ -1,0 +1,258 @@
+//! Starts of a fit: turn, sizes and shift of a graph, from the waves of what is seen.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use super::colors::project;
+use super::model::Model;
+use super::pattern::Pattern;
+use super::periods::Layout;
+use super::points::{Point, extent, thinned};
+use super::waves::{Signal, Wave};
+use crate::settings::Settings;
+
+/// A start and the mean square that remains when its colours are fitted.
+#[derive(Clone, Debug)]
+pub(super) struct Start {
+    pub(super) settings: Settings,
+    pub(super) error: f64,
+}
+
+/// The points at which starts are judged.
+const POINTS: usize = 512;
+
+/// The points at which a graph's waves are measured: fewer would be noisy by what else is in the pattern.
+const WAVE_POINTS: usize = 2048;
+
+/// The least share of the variance that a wave of the points must have in the graph too.
+const LEAST_SHARE: f64 = 0.01;
+
+/// The best starts, best first.
+pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: usize) -> Vec<Start> {
+    let (model, few, many) = (&pattern.model, thinned(points, POINTS), thinned(points, WAVE_POINTS));
+    let mut found: Vec<Start> = Vec::new();
+    let [width, height] = extent(points);
+    let resolution = 1.0 / width.max(height).max(1e-9);
+    for settings in turned_and_scaled(pattern, seen, resolution) {
+        for shift in shifts(model, &settings, &many, seen) {
+            let mut shifted = settings.clone();
+            model.set(&mut shifted, "t_u", shift[0]);
+            model.set(&mut shifted, "t_v", shift[1]);
+            let error = project(model, &mut shifted, &few);
+            found.push(Start { settings: shifted, error });
+        }
+    }
+    found.sort_by(|a, b| a.error.total_cmp(&b.error));
+    found.truncate(most);
+    found
+}
+
+fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<Settings> {
+    match pattern.layout {
+        Layout::Similar { length, .. } => {
+            let of = |(start, own): &(Settings, Vec<Wave>)| similar(&pattern.model, length, start, own, seen);
+            pattern.own.iter().flat_map(of).collect()
+        }
+        Layout::Axes { u, v, periods, shift } => axes(&pattern.model, [u, v], periods, shift, seen, resolution),
+    }
+}
+
+/// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the ratio
+/// of their periods the scale.
+fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[Wave]) -> Vec<Settings> {
+    let mut all = Vec::new();
+    for wave in seen.iter().take(5) {
+        for own in own {
+            for flip in [0.0, 180.0] {
+                let mut settings = start.clone();
+                model.set(&mut settings, "theta", degrees(wave.direction() - own.direction()) + flip);
+                scale_lengths(model, &mut settings, length, wave.period() / own.period());
+                all.push(settings);
+            }
+        }
+    }
+    all
+}
+
+/// The angle in degrees, from -90 to 90.
+fn degrees(angle: f64) -> f64 {
+    let turned = angle.to_degrees();
+    turned - 180.0 * (turned / 180.0).round()
+}
+
+/// Scales the length that the pattern is made of, and those of its lines.
+fn scale_lengths(model: &Model, settings: &mut Settings, length: &str, scale: f64) {
+    for name in [length, "gap", "joint"] {
+        if let Some(at) = model.slot(name) {
+            let number = settings.numbers()[at] * scale;
+            model.set(settings, name, number);
+        }
+    }
+}
+
+/// Every turn that the waves suggest, with every pair of periods along the turned axes, and every shift of rows.
+fn axes(
+    model: &Model,
+    names: [&str; 2],
+    per_length: f64,
+    shift: Option<&str>,
+    seen: &[Wave],
+    resolution: f64,
+) -> Vec<Settings> {
+    let mut all = Vec::new();
+    for turn in turns(seen) {
+        let [along_u, along_v] = [0.0, FRAC_PI_2].map(|quarter| periods(seen, turn + quarter, resolution));
+        for (&period_u, &period_v) in along_u.iter().flat_map(|u| along_v.iter().map(move |v| (u, v))) {
+            let mut settings = model.start();
+            model.set(&mut settings, "theta", turn.to_degrees());
+            model.set(&mut settings, names[0], period_u / per_length);
+            model.set(&mut settings, names[1], period_v / per_length);
+            let Some(name) = shift else {
+                all.push(settings);
+                continue;
+            };
+            for share in row_shifts(seen, turn, [period_u, period_v], resolution) {
+                let mut shifted = settings.clone();
+                model.set(&mut shifted, name, share);
+                all.push(shifted);
+            }
+        }
+    }
+    all
+}
+
+/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by s
+/// turn a wave along u by s periods a row.
+fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resolution: f64) -> Vec<f64> {
+    let (sin, cos) = libm::sincos(turn);
+    let mut all = vec![0.5];
+    for wave in seen {
+        let [fu, fv] = wave.frequency;
+        let (along, across) = (fu * cos + fv * sin, fv * cos - fu * sin);
+        if (along.abs() - 1.0 / period_u).abs() < 0.3 * resolution {
+            let rows = across * along.signum() * period_v;
+            let share = rows - rows.floor();
+            if all.iter().all(|other| (other - share).abs() > 0.04) {
+                all.push(share);
+            }
+        }
+    }
+    all.truncate(3);
+    all
+}
+
+/// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in radians.
+fn turns(seen: &[Wave]) -> Vec<f64> {
+    let strong: Vec<f64> = seen.iter().take(3).map(Wave::direction).collect();
+    let mut all = strong.clone();
+    for (at, first) in strong.iter().enumerate() {
+        all.extend(strong[at + 1..].iter().map(|second| 0.5 * (first + second)));
+    }
+    let both = all.iter().flat_map(|turn| [*turn, turn + FRAC_PI_2]);
+    let mut distinct: Vec<f64> = Vec::new();
+    for turn in both {
+        let apart =
+            |other: &f64| ((turn - other) / std::f64::consts::PI).round() * std::f64::consts::PI - (turn - other);
+        if !distinct.iter().any(|other| apart(other).abs() < 0.01) {
+            distinct.push(turn);
+        }
+    }
+    distinct
+}
+
+/// Periods along a direction of whose frequency the waves' components are multiples, the best explanations first.
+fn periods(seen: &[Wave], direction: f64, resolution: f64) -> Vec<f64> {
+    let (sin, cos) = libm::sincos(direction);
+    let along = |wave: &Wave| (wave.frequency[0] * cos + wave.frequency[1] * sin).abs();
+    let parts: Vec<(f64, f64)> =
+        seen.iter().map(|wave| (along(wave), wave.share)).filter(|(f, _)| *f > resolution).collect();
+    let divided = parts.iter().flat_map(|(f, _)| (1..=4).map(move |k| f / f64::from(k)));
+    let apart = parts.iter().flat_map(|(f, _)| parts.iter().map(move |(g, _)| (f - g).abs()));
+    let mut scored: Vec<(f64, f64)> = Vec::new();
+    for base in divided.chain(apart).filter(|base| *base > 1.5 * resolution) {
+        let is_multiple = |f: f64| (f - base * (f / base).round()).abs() < 0.2 * resolution;
+        let explained: f64 = parts.iter().filter(|(f, _)| is_multiple(*f)).map(|(_, share)| share).sum();
+        // A lower frequency has more multiples, which explain some waves by chance.
+        let score = explained * libm::pow(base / resolution, 0.1);
+        if !scored.iter().any(|(_, other)| (other / base - 1.0).abs() < 0.02) {
+            scored.push((score, base));
+        }
+    }
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
+    scored.truncate(5);
+    scored.into_iter().map(|(_, base)| 1.0 / base).collect()
+}
+
+/// Up to how many periods of a wave a shift is sought: the strongest wave may be that harmonic of the pattern.
+const HARMONICS: u32 = 6;
+
+/// The number of shifts that are kept.
+const SHIFTS: usize = 2;
+
+/// A wave of the points with the graph's amplitude at its frequency.
+struct Pair<'a> {
+    seen: &'a Wave,
+    own: [f64; 2],
+}
+
+impl Pair<'_> {
+    /// By how many periods the wave of the points is shifted against the graph's.
+    fn turns(&self) -> f64 {
+        let own = Wave { amplitude: self.own, ..*self.seen };
+        (own.phase() - self.seen.phase()) / TAU
+    }
+
+    /// The agreement of both once the graph is shifted.
+    fn agreement(&self, [u, v]: [f64; 2]) -> f64 {
+        let (sin, cos) = libm::sincos(TAU * (self.seen.frequency[0] * u + self.seen.frequency[1] * v));
+        let ([a, b], [c, d]) = (self.own, self.seen.amplitude);
+        (a * c + b * d) * cos + (b * c - a * d) * sin
+    }
+}
+
+/// The shifts at which the graph's phases agree best with those of the points. The strongest wave and the strongest one
+/// across it give the shifts that are tried, and all waves judge them. As colours may be swapped, so may the sign.
+/// None where the graph does not have the strongest wave.
+fn shifts(model: &Model, settings: &Settings, points: &[Point], seen: &[Wave]) -> Vec<[f64; 2]> {
+    let own = Signal::of(&model.shown(settings, points));
+    let variance = own.variance().max(1e-12);
+    let share = |[a, b]: [f64; 2]| 2.0 * (a * a + b * b) / variance;
+    let pairs: Vec<Pair> = seen.iter().map(|seen| Pair { seen, own: own.transform(seen.frequency) }).collect();
+    let Some(first) = pairs.first().filter(|first| share(first.own) > LEAST_SHARE) else { return Vec::new() };
+    let second = pairs[1..].iter().find(|pair| is_across(first.seen, pair.seen) && share(pair.own) > LEAST_SHARE);
+    let tried = second.map_or_else(|| along(first), |second| between(first, second));
+    let agreement = |shift: &[f64; 2]| pairs.iter().map(|pair| pair.agreement(*shift)).sum::<f64>().abs();
+    let mut judged: Vec<(f64, [f64; 2])> = tried.into_iter().map(|shift| (agreement(&shift), shift)).collect();
+    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
+    judged.truncate(SHIFTS);
+    judged.into_iter().map(|(_, shift)| shift).collect()
+}
+
+/// Whether the directions of two waves differ by more than 12 degrees.
+fn is_across(first: &Wave, second: &Wave) -> bool {
+    let ([fu, fv], [gu, gv]) = (first.frequency, second.frequency);
+    (fu * gv - fv * gu).abs() > 0.2 / (first.period() * second.period())
+}
+
+/// Half and whole periods.
+fn halves() -> impl Iterator<Item = f64> {
+    (0..2 * HARMONICS).map(|halves| 0.5 * f64::from(halves))
+}
+
+/// Shifts across stripes.
+fn along(first: &Pair) -> Vec<[f64; 2]> {
+    let [fu, fv] = first.seen.frequency;
+    let square = fu * fu + fv * fv;
+    halves().map(|add| (first.turns() + add) / square).map(|length| [length * fu, length * fv]).collect()
+}
+
+/// Shifts that turn two waves as far as those of the points.
+fn between(first: &Pair, second: &Pair) -> Vec<[f64; 2]> {
+    let ([fu, fv], [gu, gv]) = (first.seen.frequency, second.seen.frequency);
+    let determinant = fu * gv - fv * gu;
+    let pairs = halves().flat_map(|m| halves().map(move |n| (m, n)));
+    let shift = |(m, n): (f64, f64)| {
+        let (p, q) = (first.turns() + m, second.turns() + n);
+        [(p * gv - q * fv) / determinant, (q * fu - p * gu) / determinant]
+    };
+    pairs.map(shift).collect()
+}

@@ -1,0 +1,248 @@
+//! The strongest waves of a pattern that is known at scattered points: directions, periods and phases in closed form.
+//!
+//! The logarithm of the colour, without a cubic polynomial that takes up what shading is left, is splatted to a grid,
+//! whose Fourier transform has a peak near each wave. A peak is refined by the transform at the points themselves, the wave is
+//! subtracted, and the next one is sought (Högbom 1974, "CLEAN").
+
+use std::f64::consts::TAU;
+
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftPlanner};
+
+use super::points::{Point, extent, median};
+use super::smooth::{log_grey, smooth_part};
+
+/// Fewer points have no waves that could be told from chance.
+const LEAST_POINTS: usize = 50;
+
+/// A wave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wave {
+    /// Periods a metre along u and v; the first one that is not zero is positive.
+    pub frequency: [f64; 2],
+    /// The amplitude at phase zero: the mean of signal times `exp(-i TAU f . x)`.
+    pub amplitude: [f64; 2],
+    /// Its share of the signal's variance.
+    pub share: f64,
+}
+
+impl Wave {
+    /// Metres from crest to crest.
+    pub fn period(&self) -> f64 {
+        1.0 / libm::hypot(self.frequency[0], self.frequency[1])
+    }
+
+    /// The direction across the crests, in radians from u, above -pi/2 and up to pi/2.
+    pub fn direction(&self) -> f64 {
+        libm::atan2(self.frequency[1], self.frequency[0])
+    }
+
+    /// The phase.
+    pub(super) fn phase(&self) -> f64 {
+        libm::atan2(self.amplitude[1], self.amplitude[0])
+    }
+}
+
+/// A number at each point.
+pub(super) struct Signal {
+    places: Vec<[f64; 2]>,
+    weights: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Signal {
+    /// The logarithm of the points' brightness without its smooth part.
+    pub(super) fn of(points: &[Point]) -> Self {
+        let total: f64 = points.iter().map(|point| point.weight).sum();
+        let values = points.iter().zip(smooth_part(points)).map(|(point, smooth)| log_grey(point) - smooth);
+        Self {
+            places: points.iter().map(|point| [point.u, point.v]).collect(),
+            weights: points.iter().map(|point| point.weight / total).collect(),
+            values: values.collect(),
+        }
+    }
+
+    /// Its mean square.
+    pub(super) fn variance(&self) -> f64 {
+        self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value * value).sum()
+    }
+
+    /// The Fourier transform at a frequency.
+    pub(super) fn transform(&self, [fu, fv]: [f64; 2]) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        for ((place, value), weight) in self.places.iter().zip(&self.values).zip(&self.weights) {
+            let (sin, cos) = libm::sincos(-TAU * (fu * place[0] + fv * place[1]));
+            sum[0] += weight * value * cos;
+            sum[1] += weight * value * sin;
+        }
+        sum
+    }
+
+    fn power(&self, frequency: [f64; 2]) -> f64 {
+        let [re, im] = self.transform(frequency);
+        re * re + im * im
+    }
+
+    /// Takes a wave away.
+    fn subtract(&mut self, wave: &Wave) {
+        let [fu, fv] = wave.frequency;
+        for (place, value) in self.places.iter().zip(&mut self.values) {
+            let (sin, cos) = libm::sincos(TAU * (fu * place[0] + fv * place[1]));
+            *value -= 2.0 * (wave.amplitude[0] * cos - wave.amplitude[1] * sin);
+        }
+    }
+}
+
+/// Up to `most` waves, the strongest first. Fewer where the points are too few.
+pub fn waves(points: &[Point], most: usize) -> Vec<Wave> {
+    if points.len() < LEAST_POINTS {
+        return Vec::new();
+    }
+    let mut signal = Signal::of(points);
+    let variance = signal.variance();
+    let grid = Grid::around(points);
+    let mut found: Vec<Wave> = Vec::new();
+    for _ in 0..most {
+        let Some(frequency) = grid.strongest(&signal) else { break };
+        let frequency = refined(&signal, frequency, 0.25 / (grid.cell * grid.side as f64));
+        let amplitude = signal.transform(frequency);
+        let share = 2.0 * (amplitude[0] * amplitude[0] + amplitude[1] * amplitude[1]) / variance.max(1e-12);
+        let wave = Wave { frequency, amplitude, share };
+        signal.subtract(&wave);
+        found.push(wave);
+    }
+    found.sort_by(|a, b| b.share.total_cmp(&a.share));
+    found
+}
+
+/// A square grid over the points.
+struct Grid {
+    origin: [f64; 2],
+    cell: f64,
+    side: usize,
+    least_frequency: f64,
+}
+
+impl Grid {
+    const SIDES: [usize; 2] = [64, 512];
+
+    /// Cells of the size of a pixel, as far as the number of cells allows; twice as long as the points' extent, so that
+    /// frequencies are finer than the patch resolves.
+    fn around(points: &[Point]) -> Self {
+        let [width, height] = extent(points);
+        let length = width.max(height).max(1e-6);
+        let pixel = median(points.iter().map(|point| point.footprint).collect());
+        let wanted = 2.0 * length / pixel.max(1e-9);
+        let side = (wanted as usize).next_power_of_two().clamp(Self::SIDES[0], Self::SIDES[1]);
+        let least = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::MAX, f64::min);
+        let origin = [least(|point| point.u), least(|point| point.v)];
+        Self { origin, cell: 2.0 * length / side as f64, side, least_frequency: 1.5 / length }
+    }
+
+    /// The frequency of the greatest power that is neither too low nor close to what the grid cannot show.
+    fn strongest(&self, signal: &Signal) -> Option<[f64; 2]> {
+        let power = self.spectrum(signal);
+        let unit = 1.0 / (self.cell * self.side as f64);
+        let signed = |at: usize| if at > self.side / 2 { at as f64 - self.side as f64 } else { at as f64 };
+        let mut best = None;
+        for row in 0..=self.side / 2 {
+            for column in 0..self.side {
+                let frequency = [signed(column) * unit, signed(row) * unit];
+                let size = libm::hypot(frequency[0], frequency[1]);
+                let shown = size > self.least_frequency && size < 0.45 / self.cell;
+                let found = power[row * self.side + column];
+                if shown && best.is_none_or(|(most, _)| found > most) {
+                    best = Some((found, frequency));
+                }
+            }
+        }
+        best.map(|(_, frequency)| frequency)
+    }
+
+    fn spectrum(&self, signal: &Signal) -> Vec<f64> {
+        let side = self.side;
+        let mut cells = vec![Complex::new(0.0, 0.0); side * side];
+        for ((place, value), weight) in signal.places.iter().zip(&signal.values).zip(&signal.weights) {
+            let at = |axis: usize| (((place[axis] - self.origin[axis]) / self.cell) as usize).min(side - 1);
+            cells[at(1) * side + at(0)] += weight * value;
+        }
+        let fft = FftPlanner::new().plan_fft_forward(side);
+        transform_rows(&mut cells, &*fft);
+        transpose(&mut cells, side);
+        transform_rows(&mut cells, &*fft);
+        transpose(&mut cells, side);
+        cells.iter().map(|cell| cell.norm_sqr()).collect()
+    }
+}
+
+fn transform_rows(cells: &mut [Complex<f64>], fft: &dyn Fft<f64>) {
+    fft.process(cells);
+}
+
+fn transpose(cells: &mut [Complex<f64>], side: usize) {
+    for row in 0..side {
+        for column in 0..row {
+            cells.swap(row * side + column, column * side + row);
+        }
+    }
+}
+
+/// Climbs to the greatest power near a frequency by a pattern search whose step halves.
+fn refined(signal: &Signal, start: [f64; 2], mut step: f64) -> [f64; 2] {
+    let (mut best, mut most) = (start, signal.power(start));
+    for _ in 0..12 {
+        for [du, dv] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+            let tried = [best[0] + du * step, best[1] + dv * step];
+            let power = signal.power(tried);
+            if power > most {
+                (best, most) = (tried, power);
+            }
+        }
+        step *= 0.6;
+    }
+    upright(best)
+}
+
+/// The frequency or its opposite, whose direction is above -pi/2 and up to pi/2.
+fn upright([fu, fv]: [f64; 2]) -> [f64; 2] {
+    if fu < 0.0 || (fu == 0.0 && fv < 0.0) { [-fu, -fv] } else { [fu, fv] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stripes with noise and shading, seen at an angle: places are denser at the near end.
+    fn stripes(period: f64, degrees: f64) -> Vec<Point> {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
+        let point = |i: u32| {
+            let random = |k: i32| crate::noise::cell::cell(f64::from(i) + 0.5, f64::from(k) + 0.5);
+            let (s, t) = (random(0), random(1));
+            let (u, v) = ((s - 0.5) * (1.0 + t), 2.0 * t * t);
+            let stripe = if ((u * cos + v * sin) / period).rem_euclid(1.0) < 0.5 { 0.6 } else { 0.3 };
+            let shading = 1.0 + 0.4 * (u + 0.5 * v - 0.5);
+            let albedo = [stripe * shading * (1.0 + 0.2 * (random(2) - 0.5)); 3];
+            Point { u, v, footprint: 0.005, albedo, weight: 1.0 }
+        };
+        (0..3000).map(point).collect()
+    }
+
+    #[test]
+    fn period_and_direction_of_stripes_are_found() {
+        for (period, degrees) in [(0.2, 10.0), (0.11, -35.0), (0.05, 71.0), (0.3, 88.0)] {
+            let points = stripes(period, degrees);
+            let found = waves(&points, 4);
+            let best = found[0];
+            assert!((best.period() / period - 1.0).abs() < 0.01, "{period}: {}", best.period());
+            let off = (best.direction().to_degrees() - degrees + 90.0).rem_euclid(180.0) - 90.0;
+            assert!(off.abs() < 1.0, "{degrees}: {off}");
+            assert!(best.share > 0.4, "{}", best.share);
+        }
+        // The twin: noise has no wave.
+        let mut noise = stripes(0.2, 10.0);
+        for (i, point) in noise.iter_mut().enumerate() {
+            point.albedo = [0.3 + 0.3 * crate::noise::cell::cell(i as f64 + 0.5, 9.5); 3];
+        }
+        assert!(waves(&noise, 4)[0].share < 0.05);
+    }
+}

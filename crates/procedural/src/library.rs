@@ -1,0 +1,100 @@
+//! The built-in graphs: 28 `.mtlx` files, CC0, in the folder `library` of this crate.
+
+use crate::error::ProceduralError;
+use crate::graph::Graph;
+use crate::limits::Limits;
+use crate::mtlx::read_text;
+
+/// What kind of pattern a graph makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// One colour.
+    Flat,
+    /// Random, and alike in all directions.
+    Isotropic,
+    /// Random, with a direction.
+    Oriented,
+    /// Periodic in one direction.
+    Stripe,
+    /// Periodic in two directions.
+    Lattice,
+}
+
+impl Class {
+    /// The word in tables.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Isotropic => "isotropic",
+            Self::Oriented => "oriented",
+            Self::Stripe => "stripe",
+            Self::Lattice => "lattice",
+        }
+    }
+}
+
+/// A built-in graph.
+#[derive(Clone, Copy, Debug)]
+pub struct Entry {
+    /// The name.
+    pub name: &'static str,
+    /// The kind of pattern.
+    pub class: Class,
+    /// The `.mtlx` file.
+    pub text: &'static str,
+}
+
+macro_rules! entries {
+    ($($class:ident $name:literal),* $(,)?) => {
+        [$(Entry {
+            name: $name,
+            class: Class::$class,
+            text: include_str!(concat!("../library/", $name, ".mtlx")),
+        }),*]
+    };
+}
+
+/// All built-in graphs.
+pub const LIBRARY: [Entry; 28] = entries![
+    Flat "paint",
+    Isotropic "plaster",
+    Isotropic "roughcast",
+    Isotropic "concrete",
+    Isotropic "terrazzo",
+    Isotropic "granite",
+    Oriented "marble",
+    Oriented "travertine",
+    Oriented "veneer",
+    Lattice "plank",
+    Lattice "strip_parquet",
+    Lattice "herringbone",
+    Lattice "basket_parquet",
+    Lattice "tile",
+    Lattice "brick",
+    Lattice "hexagon",
+    Lattice "mosaic",
+    Lattice "checks",
+    Stripe "stripes",
+    Lattice "plaid",
+    Lattice "houndstooth",
+    Lattice "dots",
+    Lattice "trellis",
+    Lattice "weave",
+    Stripe "corduroy",
+    Isotropic "carpet",
+    Isotropic "leather",
+    Oriented "metal",
+];
+
+/// The entry of this name.
+pub fn entry(name: &str) -> Option<&'static Entry> {
+    LIBRARY.iter().find(|entry| entry.name == name)
+}
+
+impl Entry {
+    /// The graph. Fails only where the built-in file is faulty, which a test rules out.
+    pub fn graph(&self) -> Result<Graph, ProceduralError> {
+        read_text(self.name, self.text, &Limits::default())
+    }
+}

@@ -1,0 +1,130 @@
+//! The XML as a tree of plain elements, with its size and depth checked.
+
+use crate::finding::{Code, Findings};
+use crate::limits::Limits;
+use crate::value::shortened;
+
+/// One XML element.
+#[derive(Debug)]
+pub(super) struct Element {
+    /// The tag.
+    pub(super) tag: String,
+    /// The line, from 1.
+    pub(super) line: usize,
+    /// The attributes, in the order of the file.
+    attributes: Vec<(String, String)>,
+    /// The child elements.
+    pub(super) children: Vec<Element>,
+}
+
+impl Element {
+    /// The value of an attribute.
+    pub(super) fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+    }
+
+    /// The attribute `name`; empty where it is absent.
+    pub(super) fn name(&self) -> &str {
+        self.attribute("name").unwrap_or("")
+    }
+
+    /// The tag and the name, as findings print them.
+    pub(super) fn place(&self) -> String {
+        match self.name() {
+            "" => format!("<{}>", shortened(&self.tag)),
+            name => format!("{} '{}'", shortened(&self.tag), shortened(name)),
+        }
+    }
+
+    /// Adds a finding about this element.
+    pub(super) fn report(&self, findings: &mut Findings, code: Code, message: String) {
+        findings.add(code, self.line, self.place(), message);
+    }
+
+    /// Reports every attribute that is not in `known`, since it might change what the element means.
+    pub(super) fn check_attributes(&self, known: &[&str], findings: &mut Findings) {
+        for (key, _) in self.attributes.iter().filter(|(key, _)| !known.contains(&key.as_str())) {
+            let message = format!("the attribute '{}' is not supported", shortened(key));
+            self.report(findings, Code::Attribute, message);
+        }
+    }
+
+    /// Reports child elements.
+    pub(super) fn check_no_children(&self, findings: &mut Findings) {
+        for child in &self.children {
+            child.report(findings, Code::UnknownElement, format!("expected no elements within <{}>", self.tag));
+        }
+    }
+}
+
+/// The root element; `None`, with findings, where the text is not XML or exceeds a limit.
+pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Element> {
+    let options = roxmltree::ParsingOptions { nodes_limit: limits.xml_nodes, ..Default::default() };
+    let document = match roxmltree::Document::parse_with_options(text, options) {
+        Ok(document) => document,
+        Err(reason) => {
+            let line = line_of(&reason);
+            findings.add(Code::Xml, line, String::new(), format!("expected XML without a DTD: {}", explained(&reason)));
+            return None;
+        }
+    };
+    let builder = Builder { lines: line_starts(text), depth: limits.xml_depth };
+    let root = builder.element(document.root_element(), 1);
+    match root {
+        Ok(root) => Some(root),
+        Err(line) => {
+            let message = format!("expected elements nested at most {} deep, found deeper ones", limits.xml_depth);
+            findings.add(Code::Xml, line, String::new(), message);
+            None
+        }
+    }
+}
+
+/// The line of an error; 0 for a limit, which has none.
+fn line_of(reason: &roxmltree::Error) -> usize {
+    match reason {
+        roxmltree::Error::NodesLimitReached | roxmltree::Error::AttributesLimitReached => 0,
+        other => usize::try_from(other.pos().row).unwrap_or(0),
+    }
+}
+
+fn explained(reason: &roxmltree::Error) -> String {
+    match reason {
+        roxmltree::Error::NodesLimitReached => "it has too many elements".to_owned(),
+        other => shortened(&other.to_string()),
+    }
+}
+
+fn line_starts(text: &str) -> Vec<usize> {
+    let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+    std::iter::once(0).chain(ends).collect()
+}
+
+struct Builder {
+    lines: Vec<usize>,
+    depth: usize,
+}
+
+impl Builder {
+    /// The element as a tree, or the line at which it is too deep. The recursion ends at the limit.
+    fn element(&self, node: roxmltree::Node, depth: usize) -> Result<Element, usize> {
+        let line = self.lines.partition_point(|&start| start <= node.range().start);
+        if depth > self.depth {
+            return Err(line);
+        }
+        let attributes =
+            node.attributes().map(|a| (qualified(a.namespace(), a.name()), a.value().to_owned())).collect();
+        let children = node.children().filter(roxmltree::Node::is_element);
+        let children = children.map(|child| self.element(child, depth + 1)).collect::<Result<_, _>>()?;
+        let tag = qualified(node.tag_name().namespace(), node.tag_name().name());
+        Ok(Element { tag, line, attributes, children })
+    }
+}
+
+/// A name with its namespace before it, so that `xi:include` is no `include`.
+fn qualified(namespace: Option<&str>, name: &str) -> String {
+    match namespace {
+        Some(namespace) => format!("{namespace}:{name}"),
+        None => name.to_owned(),
+    }
+}

@@ -1,0 +1,95 @@
+//! The values of a graph's parameters.
+
+use crate::error::ProceduralError;
+use crate::graph::{FOOTPRINT, Graph};
+use crate::program::compile::first_slot;
+use crate::value::{Type, Value};
+
+/// One scalar of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slot {
+    /// The parameter's place in the graph.
+    pub parameter: usize,
+    /// The component.
+    pub component: usize,
+    /// Whether it is a real number, in which derivatives exist.
+    pub is_real: bool,
+    /// Its default.
+    pub value: f64,
+    /// Its least value.
+    pub least: Option<f64>,
+    /// Its greatest value.
+    pub most: Option<f64>,
+}
+
+/// The scalars of all parameters, in the order of the settings' numbers.
+pub fn slots(graph: &Graph) -> Vec<Slot> {
+    let of = |(at, parameter): (usize, &crate::graph::Parameter)| {
+        let end = |value: &Option<Value>, component: usize| value.map(|value| value.numbers()[component]);
+        let (value, least, most) = (parameter.value, parameter.least, parameter.most);
+        let is_real = value.kind() != Type::Integer;
+        (0..value.kind().width())
+            .map(|component| Slot {
+                parameter: at,
+                component,
+                is_real,
+                value: value.numbers()[component],
+                least: end(&least, component),
+                most: end(&most, component),
+            })
+            .collect::<Vec<_>>()
+    };
+    graph.parameters.iter().enumerate().flat_map(of).collect()
+}
+
+/// A value for every slot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings(Vec<f64>);
+
+impl Settings {
+    /// The defaults of a graph.
+    pub fn defaults(graph: &Graph) -> Self {
+        Self(graph.parameters.iter().flat_map(|parameter| parameter.value.numbers().iter().copied()).collect())
+    }
+
+    /// The numbers, in the order of [`slots`].
+    pub fn numbers(&self) -> &[f64] {
+        &self.0
+    }
+
+    /// The number of a slot, to be changed without a check of its range.
+    pub fn number_mut(&mut self, slot: usize) -> &mut f64 {
+        &mut self.0[slot]
+    }
+
+    /// Sets a parameter from text, as in `0.2` or `0.8, 0.7, 0.6`. Fails where the parameter does not exist, or the
+    /// text is no value of its type and range.
+    pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {
+        let Some(at) = graph.parameter(name) else { return Err(unknown(graph, name)) };
+        if name == FOOTPRINT {
+            return Err(ProceduralError::OfThePoint { graph: graph.name.clone(), name: name.to_owned() });
+        }
+        let parameter = &graph.parameters[at];
+        let bad = |reason| ProceduralError::BadValue { graph: graph.name.clone(), name: name.to_owned(), reason };
+        let value = Value::parse(parameter.value.kind(), text).map_err(bad)?;
+        let end = |end: Option<Value>, otherwise: f64| end.unwrap_or(Value::filled(Type::Vector3, otherwise));
+        let (least, most) = (end(parameter.least, f64::MIN), end(parameter.most, f64::MAX));
+        for ((&found, &least), &most) in value.numbers().iter().zip(least.numbers()).zip(most.numbers()) {
+            if !(least..=most).contains(&found) {
+                let (graph, name) = (graph.name.clone(), name.to_owned());
+                return Err(ProceduralError::OutOfRange { graph, name, least, most, found });
+            }
+        }
+        self.0[first_slot(graph, at)..][..value.numbers().len()].copy_from_slice(value.numbers());
+        Ok(())
+    }
+}
+
+fn unknown(graph: &Graph, name: &str) -> ProceduralError {
+    let known: Vec<&str> = graph.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+    ProceduralError::UnknownParameter {
+        graph: graph.name.clone(),
+        name: crate::value::shortened(name),
+        known: known.join(", "),
+    }
+}

@@ -1,0 +1,32 @@
+//! Parameters set from text.
+
+use mateval_procedural::Settings;
+use mateval_procedural::library::entry;
+use mateval_procedural::settings::slots;
+
+#[test]
+fn parameters_are_set_by_name() {
+    let graph = entry("brick").unwrap().graph().unwrap();
+    let mut settings = Settings::defaults(&graph);
+    settings.set(&graph, "joint_color", "0.1, 0.2,0.3").unwrap();
+    settings.set(&graph, "row_shift", "0.25").unwrap();
+    let set = slots(&graph).into_iter().zip(settings.numbers()).filter(|(slot, number)| slot.value != **number);
+    let set: Vec<_> = set.map(|(slot, number)| (graph.parameters[slot.parameter].name.clone(), *number)).collect();
+    let expected = [("row_shift", 0.25), ("joint_color", 0.1), ("joint_color", 0.2), ("joint_color", 0.3)];
+    assert_eq!(set, expected.map(|(name, number)| (name.to_owned(), number)));
+}
+
+#[test]
+fn wrong_names_and_values_are_refused() {
+    let graph = entry("herringbone").unwrap().graph().unwrap();
+    let mut settings = Settings::defaults(&graph);
+    let before = settings.clone();
+    let mut refusal = |name: &str, text: &str| settings.set(&graph, name, text).unwrap_err().to_string();
+    assert!(refusal("widht", "1").contains("has no parameter 'widht'; expected one of: theta, t_u, t_v, width"));
+    assert_eq!(refusal("width", "9"), "parameter 'width' of 'herringbone': expected 0.02 to 0.3, found 9");
+    assert_eq!(refusal("ratio", "4.5"), "parameter 'ratio' of 'herringbone': expected a whole number, found '4.5'");
+    assert!(refusal("color", "0.5").contains("expected 3 numbers separated by commas, found 1"));
+    assert!(refusal("width", "nan").contains("expected a finite number"));
+    assert!(refusal("footprint", "0.1").contains("it is the extent of a pixel at every point"));
+    assert_eq!(settings, before);
+}

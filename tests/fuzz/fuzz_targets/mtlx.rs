@@ -1,0 +1,17 @@
+#![no_main]
+//! Reads a graph, writes it and reads it again, and evaluates it with a derivative in its first parameter.
+
+use libfuzzer_sys::fuzz_target;
+use mateval_procedural::lanes::{LANES, Points};
+use mateval_procedural::limits::Limits;
+use mateval_procedural::mtlx::{read_text, to_text};
+use mateval_procedural::{Evaluator, Program, Settings};
+
+fuzz_target!(|text: &str| {
+    let Ok(graph) = read_text("fuzzed", text, &Limits::default()) else { return };
+    let again = read_text("written", &to_text(&graph), &Limits::default()).expect("what is written can be read");
+    assert!(again == graph, "what is written is the same graph");
+    let program = Program::new(&graph);
+    let mut evaluator = Evaluator::new(&program, &Settings::defaults(&graph), &[0]);
+    evaluator.run(&Points { u: [0.3; LANES], v: [-1e9; LANES], footprint: [0.001; LANES] });
+});

@@ -1,0 +1,21 @@
+#!/bin/sh
+# Compares the nodes and graphs of crates/procedural with MaterialX' own: its checks of files, its code generators, and
+# the OSL that it generates, evaluated in Blender's Cycles. Installs MaterialX into target/materialx. Arguments are
+# passed to the test runner.
+set -eu
+cd "$(dirname "$0")/.."
+# Installs Blender.
+tools/setup.sh
+tools/apt_install.sh python3-venv
+
+venv=target/materialx
+requirements=crates/procedural/tests/peers/requirements.txt
+if ! cmp -s "$requirements" "$venv/requirements.txt"; then
+    rm -rf "$venv"
+    python3.11 -m venv "$venv"
+    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
+    cp "$requirements" "$venv/requirements.txt"
+fi
+
+cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
+MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_MATERIALX_PYTHON="$PWD/$venv/bin/python" cargo test -p mateval-procedural --test peers -- --show-output "$@"
