@@ -38,8 +38,8 @@ const LEAST_SLOPE: f64 = 0.75;
 /// The least radiance that counts, as a share of the mean of what is compared, and the largest deviation of a logarithm.
 const DARKEST: f64 = 1e-4;
 const MOST_CONTRAST: f64 = 1.5;
-/// Pixels on each side over which slow changes are averaged.
-const SLOW_REACH: usize = 7;
+/// Pixels on each side over which slow changes are averaged, as a share of the photo's width.
+const SLOW_REACH: f64 = 0.035;
 /// Perceptual roughness values that are tried, and the rays of each pixel.
 const ROUGHNESSES: [f32; 4] = [0.02, 0.05, 0.1, 0.2];
 const RAYS: u32 = 8;
@@ -71,7 +71,8 @@ fn mirror(room: &PartRoom, cache: &PhotoCache<'_>, pixels: &[usize]) -> Option<M
             .par_iter()
             .filter_map(|&k| Some((k, [room.photo.pixels()[k], mirrored(room, cache, k, *roughness)?])))
             .collect();
-        let found = comparison(room.photo.width(), &pairs)?;
+        let reach = (SLOW_REACH * room.photo.width() as f64).round() as usize;
+        let found = comparison(room.photo.width(), reach, &pairs)?;
         let base_color = [0, 1, 2].map(|c| {
             let median = |which: usize| {
                 let mut values: Vec<f32> = pairs.iter().map(|(_, pair)| pair[which].0[c]).collect();
@@ -130,8 +131,9 @@ struct Comparison {
     slope: f64,
 }
 
-/// `pairs` holds pixels with their own radiance and the mirrored one.
-fn comparison(width: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Comparison> {
+/// `pairs` holds pixels, in their order, with their own radiance and the mirrored one. Slow changes are means over
+/// `reach` pixels on each side.
+fn comparison(width: usize, reach: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Comparison> {
     if pairs.len() < LEAST_SHOWN {
         return None;
     }
@@ -140,10 +142,11 @@ fn comparison(width: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Compari
         pairs.iter().flat_map(|(_, pair)| pair).map(|color| color.luminance()).sum::<f64>() / (2 * pairs.len()) as f64;
     let darkest = (DARKEST * mean).max(f64::MIN_POSITIVE);
     let log = |color: LinearRgb| libm::log(color.luminance().max(darkest));
-    let values: BTreeMap<usize, [f64; 2]> = pairs.iter().map(|(k, pair)| (*k, pair.map(log))).collect();
+    let values: Vec<(usize, [f64; 2])> = pairs.iter().map(|(k, pair)| (*k, pair.map(log))).collect();
+    let sums = RunningSums::new(width, &values);
     let mut square = [0.0_f64; 3];
-    for (&k, values_at) in &values {
-        let slow = slow(&values, width, k);
+    for (k, values_at) in &values {
+        let slow = sums.mean_around([k % width, k / width], reach);
         let [own, other] = [0, 1].map(|which| (values_at[which] - slow[which]).clamp(-MOST_CONTRAST, MOST_CONTRAST));
         square[0] += own * own;
         square[1] += own * other;
@@ -154,18 +157,43 @@ fn comparison(width: usize, pairs: &[(usize, [LinearRgb; 2])]) -> Option<Compari
     (correlation.is_finite() && slope.is_finite()).then_some(Comparison { correlation, slope })
 }
 
-/// The means over the pixels around `k` that are compared.
-fn slow(values: &BTreeMap<usize, [f64; 2]>, width: usize, k: usize) -> [f64; 2] {
-    let (x, y) = (k % width, k / width);
-    let (mut sum, mut count) = ([0.0; 2], 0.0);
-    for row in y.saturating_sub(SLOW_REACH)..=y + SLOW_REACH {
-        let columns = row * width + x.saturating_sub(SLOW_REACH)..=row * width + (x + SLOW_REACH).min(width - 1);
-        for (_, value) in values.range(columns) {
-            sum = [sum[0] + value[0], sum[1] + value[1]];
-            count += 1.0;
+/// Sums over all pixels to the left of and above a corner of pixels (a summed-area table: Crow, SIGGRAPH 1984): of two
+/// values, and of the number of pixels that have them.
+struct RunningSums {
+    /// Of pixels and of corners, one more in each row and column.
+    size: [usize; 2],
+    sums: Vec<[f64; 3]>,
+}
+
+impl RunningSums {
+    /// `values` holds pixels in their order.
+    fn new(width: usize, values: &[(usize, [f64; 2])]) -> Self {
+        let height = values.last().map_or(0, |(k, _)| k / width + 1);
+        let mut sums = vec![[0.0; 3]; (width + 1) * (height + 1)];
+        for (k, [a, b]) in values {
+            sums[(k / width + 1) * (width + 1) + k % width + 1] = [*a, *b, 1.0];
         }
+        for (at, step) in (0..sums.len()).map(|at| (at, 1)).chain((0..sums.len()).map(|at| (at, width + 1))) {
+            // Along rows, then along columns.
+            let is_first = if step == 1 { at % (width + 1) == 0 } else { at < step };
+            if !is_first {
+                let before = sums[at - step];
+                sums[at].iter_mut().zip(before).for_each(|(sum, before)| *sum += before);
+            }
+        }
+        Self { size: [width, height], sums }
     }
-    sum.map(|sum| sum / count)
+
+    /// The mean of each value over the pixels that have them, at most `reach` away in row and column.
+    fn mean_around(&self, [x, y]: [usize; 2], reach: usize) -> [f64; 2] {
+        let [width, height] = self.size;
+        let [left, right] = [x.saturating_sub(reach), (x + reach + 1).min(width)];
+        let [top, bottom] = [y.saturating_sub(reach), (y + reach + 1).min(height)];
+        let corner = |x: usize, y: usize| self.sums[y * (width + 1) + x];
+        let corners = [corner(right, bottom), corner(left, bottom), corner(right, top), corner(left, top)];
+        let [a, b, count] = [0, 1, 2].map(|of| corners[0][of] - corners[1][of] - corners[2][of] + corners[3][of]);
+        [a / count, b / count]
+    }
 }
 
 #[cfg(test)]
@@ -186,13 +214,27 @@ mod tests {
     }
 
     #[test]
+    fn running_sums_are_those_of_pixels() {
+        let values: Vec<(usize, [f64; 2])> =
+            (0..60).filter(|k| k % 7 != 3).map(|k| (k, [(k * k % 11) as f64, k as f64])).collect();
+        let sums = RunningSums::new(10, &values);
+        for (k, _) in &values {
+            let near = |other: usize| (other % 10).abs_diff(k % 10) <= 2 && (other / 10).abs_diff(k / 10) <= 2;
+            let around: Vec<[f64; 2]> = values.iter().filter(|(other, _)| near(*other)).map(|(_, v)| *v).collect();
+            let mean = [0, 1].map(|of| around.iter().map(|v| v[of]).sum::<f64>() / around.len() as f64);
+            let found = sums.mean_around([k % 10, k / 10], 2);
+            assert!(found.iter().zip(mean).all(|(found, mean)| (found - mean).abs() < 1e-9), "{k}: {found:?} {mean:?}");
+        }
+    }
+
+    #[test]
     fn a_mirror_differs_from_gloss_and_from_a_common_gradient() {
-        let mirror = comparison(40, &pairs(0.9, 0.01)).unwrap();
+        let mirror = comparison(40, 7, &pairs(0.9, 0.01)).unwrap();
         assert!(mirror.correlation > 0.95 && mirror.slope > 0.8, "{} {}", mirror.correlation, mirror.slope);
-        let gloss = comparison(40, &pairs(0.1, 0.0)).unwrap();
+        let gloss = comparison(40, 7, &pairs(0.1, 0.0)).unwrap();
         assert!(gloss.slope < LEAST_SLOPE, "{}", gloss.slope);
-        let matt = comparison(40, &pairs(0.0, 0.01)).unwrap();
+        let matt = comparison(40, 7, &pairs(0.0, 0.01)).unwrap();
         assert!(matt.correlation < LEAST_CORRELATION, "{}", matt.correlation);
-        assert!(comparison(40, &pairs(0.9, 0.0)[..LEAST_SHOWN - 1]).is_none());
+        assert!(comparison(40, 7, &pairs(0.9, 0.0)[..LEAST_SHOWN - 1]).is_none());
     }
 }
