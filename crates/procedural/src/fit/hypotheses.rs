@@ -57,8 +57,8 @@ fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<S
     }
 }
 
-/// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the ratio
-/// of their periods the scale.
+/// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the
+/// ratio of their periods the scale.
 fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[Wave]) -> Vec<Settings> {
     let mut all = Vec::new();
     for wave in seen.iter().take(5) {
@@ -121,8 +121,8 @@ fn axes(
     all
 }
 
-/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by s
-/// turn a wave along u by s periods a row.
+/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by
+/// s turn a wave along u by s periods a row.
 fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resolution: f64) -> Vec<f64> {
     let (sin, cos) = libm::sincos(turn);
     let mut all = vec![0.5];
@@ -141,7 +141,8 @@ fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resoluti
     all
 }
 
-/// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in radians.
+/// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in
+/// radians.
 fn turns(seen: &[Wave]) -> Vec<f64> {
     let strong: Vec<f64> = seen.iter().take(3).map(Wave::direction).collect();
     let mut all = strong.clone();

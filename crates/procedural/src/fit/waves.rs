@@ -1,8 +1,8 @@
 //! The strongest waves of a pattern that is known at scattered points: directions, periods and phases in closed form.
 //!
 //! The logarithm of the colour, without a cubic polynomial that takes up what shading is left, is splatted to a grid,
-//! whose Fourier transform has a peak near each wave. A peak is refined by the transform at the points themselves, the wave is
-//! subtracted, and the next one is sought (Högbom 1974, "CLEAN").
+//! whose Fourier transform has a peak near each wave. A peak is refined by the transform at the points themselves, the
+//! wave is subtracted, and the next one is sought (Högbom 1974, "CLEAN").
 
 use std::f64::consts::TAU;
 
