@@ -28,12 +28,13 @@ const LEAST_SHARE: f64 = 0.01;
 
 /// The best starts, best first.
 pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: usize) -> Vec<Start> {
-    let (model, few, many) = (&pattern.model, thinned(points, POINTS), thinned(points, WAVE_POINTS));
+    let (model, few) = (&pattern.model, thinned(points, POINTS));
+    let basis = Basis::new(thinned(points, WAVE_POINTS), seen);
     let mut found: Vec<Start> = Vec::new();
     let [width, height] = extent(points);
     let resolution = 1.0 / width.max(height).max(1e-9);
     for settings in turned_and_scaled(pattern, seen, resolution) {
-        for shift in shifts(model, &settings, &many, seen) {
+        for shift in shifts(model, &settings, &basis, seen) {
             let mut shifted = settings.clone();
             model.set(&mut shifted, "t_u", shift[0]);
             model.set(&mut shifted, "t_v", shift[1]);
@@ -56,8 +57,8 @@ fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<S
     }
 }
 
-/// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the ratio
-/// of their periods the scale.
+/// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the
+/// ratio of their periods the scale.
 fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[Wave]) -> Vec<Settings> {
     let mut all = Vec::new();
     for wave in seen.iter().take(5) {
@@ -120,8 +121,8 @@ fn axes(
     all
 }
 
-/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by s
-/// turn a wave along u by s periods a row.
+/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by
+/// s turn a wave along u by s periods a row.
 fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resolution: f64) -> Vec<f64> {
     let (sin, cos) = libm::sincos(turn);
     let mut all = vec![0.5];
@@ -140,7 +141,8 @@ fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resoluti
     all
 }
 
-/// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in radians.
+/// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in
+/// radians.
 fn turns(seen: &[Wave]) -> Vec<f64> {
     let strong: Vec<f64> = seen.iter().take(3).map(Wave::direction).collect();
     let mut all = strong.clone();
@@ -188,6 +190,19 @@ const HARMONICS: u32 = 6;
 /// The number of shifts that are kept.
 const SHIFTS: usize = 2;
 
+/// The points at which a graph's waves are measured, with `exp(-i TAU f . x)` there for each wave.
+struct Basis {
+    points: Vec<Point>,
+    turned: Vec<Vec<[f64; 2]>>,
+}
+
+impl Basis {
+    fn new(points: Vec<Point>, seen: &[Wave]) -> Self {
+        let turned = seen.iter().map(|wave| points.iter().map(|point| wave.turned([point.u, point.v])).collect());
+        Self { turned: turned.collect(), points }
+    }
+}
+
 /// A wave of the points with the graph's amplitude at its frequency.
 struct Pair<'a> {
     seen: &'a Wave,
@@ -212,11 +227,12 @@ impl Pair<'_> {
 /// The shifts at which the graph's phases agree best with those of the points. The strongest wave and the strongest one
 /// across it give the shifts that are tried, and all waves judge them. As colours may be swapped, so may the sign.
 /// None where the graph does not have the strongest wave.
-fn shifts(model: &Model, settings: &Settings, points: &[Point], seen: &[Wave]) -> Vec<[f64; 2]> {
-    let own = Signal::of(&model.shown(settings, points));
+fn shifts(model: &Model, settings: &Settings, basis: &Basis, seen: &[Wave]) -> Vec<[f64; 2]> {
+    let own = Signal::without_mean(&model.shown(settings, &basis.points));
     let variance = own.variance().max(1e-12);
     let share = |[a, b]: [f64; 2]| 2.0 * (a * a + b * b) / variance;
-    let pairs: Vec<Pair> = seen.iter().map(|seen| Pair { seen, own: own.transform(seen.frequency) }).collect();
+    let waves = seen.iter().zip(&basis.turned);
+    let pairs: Vec<Pair> = waves.map(|(seen, turned)| Pair { seen, own: own.along(turned) }).collect();
     let Some(first) = pairs.first().filter(|first| share(first.own) > LEAST_SHARE) else { return Vec::new() };
     let second = pairs[1..].iter().find(|pair| is_across(first.seen, pair.seen) && share(pair.own) > LEAST_SHARE);
     let tried = second.map_or_else(|| along(first), |second| between(first, second));

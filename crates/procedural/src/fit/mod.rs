@@ -1,10 +1,11 @@
 //! The fit of a periodic graph to what is seen of one part.
 //!
-//! In: colours at places of a part's surface, in metres ([`points::Point`]). Out: the graph that predicts held-out points
-//! best, with its settings, or `paint` where none is better than one colour ([`choose::Fitter`]).
+//! In: colours at places of a part's surface, in metres ([`points::Point`]). Out: the graph that predicts held-out
+//! points best, with its settings, or `paint` where none is better than one colour ([`choose::Fitter`]).
 //!
-//! The strongest waves of the colours ([`waves`]) suggest turns, periods and shifts of each graph; for each of these starts the
-//! graph's colours are a linear least squares problem; the best starts are polished by Levenberg-Marquardt steps.
+//! The strongest waves of the colours ([`waves`]) suggest turns, periods and shifts of each graph; for each of these
+//! starts the graph's colours are a linear least squares problem; the best starts are polished by Levenberg-Marquardt
+//! steps.
 //!
 //! Twelve graphs of the library are fitted, which `periods` lists. What is random, such as grain, veins and the tone of
 //! single tiles, is not: fitted graphs leave it out.

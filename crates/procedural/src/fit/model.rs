@@ -8,8 +8,8 @@ use crate::program::compile::Program;
 use crate::settings::{Settings, Slot, slots};
 use crate::value::Type;
 
-/// Parameters of what is random, whose phase cannot be fitted, and of what a colour does not show. They are not fitted; an
-/// amplitude among them is set to its least value.
+/// Parameters of what is random, whose phase cannot be fitted, and of what a colour does not show. They are not fitted;
+/// an amplitude among them is set to its least value.
 const NOT_FITTED: [&str; 10] = [
     "tone",
     "grain",

@@ -11,7 +11,8 @@ pub(super) fn log_grey(point: &Point) -> f64 {
     libm::log(point.grey() + FLOOR)
 }
 
-/// A cubic polynomial of the place that comes closest to [`log_grey`], at each point; zeros where the points are too few.
+/// A cubic polynomial of the place that comes closest to [`log_grey`], at each point; zeros where the points are too
+/// few.
 pub(super) fn smooth_part(points: &[Point]) -> Vec<f64> {
     let Some(first) = points.first() else { return Vec::new() };
     let [width, height] = extent(points);

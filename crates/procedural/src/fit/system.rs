@@ -25,8 +25,8 @@ impl Normal {
         }
     }
 
-    /// The least squares solution, after `ridge(unknown, diagonal)` is added to the diagonal; `None` where the system is
-    /// singular.
+    /// The least squares solution, after `ridge(unknown, diagonal)` is added to the diagonal; `None` where the system
+    /// is singular.
     pub(super) fn solve(&self, ridge: impl Fn(usize, f64) -> f64) -> Option<Vec<f64>> {
         let mut factor = self.rows.clone();
         for i in 0..factor.len() {

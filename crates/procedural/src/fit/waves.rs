@@ -1,8 +1,8 @@
 //! The strongest waves of a pattern that is known at scattered points: directions, periods and phases in closed form.
 //!
 //! The logarithm of the colour, without a cubic polynomial that takes up what shading is left, is splatted to a grid,
-//! whose Fourier transform has a peak near each wave. A peak is refined by the transform at the points themselves, the wave is
-//! subtracted, and the next one is sought (Högbom 1974, "CLEAN").
+//! whose Fourier transform has a peak near each wave. A peak is refined by the transform at the points themselves, the
+//! wave is subtracted, and the next one is sought (Högbom 1974, "CLEAN").
 
 use std::f64::consts::TAU;
 
@@ -37,6 +37,12 @@ impl Wave {
         libm::atan2(self.frequency[1], self.frequency[0])
     }
 
+    /// `exp(-i TAU f . x)` at a place.
+    pub(super) fn turned(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(-TAU * (self.frequency[0] * u + self.frequency[1] * v));
+        [cos, sin]
+    }
+
     /// The phase.
     pub(super) fn phase(&self) -> f64 {
         libm::atan2(self.amplitude[1], self.amplitude[0])
@@ -53,12 +59,24 @@ pub(super) struct Signal {
 impl Signal {
     /// The logarithm of the points' brightness without its smooth part.
     pub(super) fn of(points: &[Point]) -> Self {
-        let total: f64 = points.iter().map(|point| point.weight).sum();
         let values = points.iter().zip(smooth_part(points)).map(|(point, smooth)| log_grey(point) - smooth);
+        Self::new(points, values.collect())
+    }
+
+    /// The logarithm of the points' brightness without its mean: for points without light.
+    pub(super) fn without_mean(points: &[Point]) -> Self {
+        let mut signal = Self::new(points, points.iter().map(log_grey).collect());
+        let mean: f64 = signal.values.iter().zip(&signal.weights).map(|(value, weight)| weight * value).sum();
+        signal.values.iter_mut().for_each(|value| *value -= mean);
+        signal
+    }
+
+    fn new(points: &[Point], values: Vec<f64>) -> Self {
+        let total: f64 = points.iter().map(|point| point.weight).sum();
         Self {
             places: points.iter().map(|point| [point.u, point.v]).collect(),
             weights: points.iter().map(|point| point.weight / total).collect(),
-            values: values.collect(),
+            values,
         }
     }
 
@@ -67,15 +85,20 @@ impl Signal {
         self.values.iter().zip(&self.weights).map(|(value, weight)| weight * value * value).sum()
     }
 
-    /// The Fourier transform at a frequency.
-    pub(super) fn transform(&self, [fu, fv]: [f64; 2]) -> [f64; 2] {
+    /// The Fourier transform, given `exp(-i TAU f . x)` at each point.
+    pub(super) fn along(&self, turned: &[[f64; 2]]) -> [f64; 2] {
         let mut sum = [0.0; 2];
-        for ((place, value), weight) in self.places.iter().zip(&self.values).zip(&self.weights) {
-            let (sin, cos) = libm::sincos(-TAU * (fu * place[0] + fv * place[1]));
+        for (([cos, sin], value), weight) in turned.iter().zip(&self.values).zip(&self.weights) {
             sum[0] += weight * value * cos;
             sum[1] += weight * value * sin;
         }
         sum
+    }
+
+    /// The Fourier transform at a frequency.
+    fn transform(&self, frequency: [f64; 2]) -> [f64; 2] {
+        let wave = Wave { frequency, amplitude: [0.0; 2], share: 0.0 };
+        self.along(&self.places.iter().map(|place| wave.turned(*place)).collect::<Vec<_>>())
     }
 
     fn power(&self, frequency: [f64; 2]) -> f64 {

@@ -10,7 +10,8 @@ const VECTORS: [Type; 2] = [Vector2, Vector3];
 const REAL: [Type; 3] = [Float, Vector2, Vector3];
 const WIDE: [Type; 3] = [Color3, Vector2, Vector3];
 
-/// The variants of a node. The first one that fits the types of a file is meant. The function is a table, hence its length.
+/// The variants of a node. The first one that fits the types of a file is meant. The function is a table, hence its
+/// length.
 pub fn signatures(kind: Kind) -> Vec<Signature> {
     use Kind as K;
     match kind {

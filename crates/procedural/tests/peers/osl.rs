@@ -11,8 +11,8 @@ use super::python::{with_blender, with_materialx};
 /// The number of places at which graphs are evaluated.
 pub const PLACES: usize = 4096;
 
-/// The values of an input: at place k, `((k * step + start) % modulus) * scale + offset`. All are dyadic numbers, so that
-/// single precision holds them exactly.
+/// The values of an input: at place k, `((k * step + start) % modulus) * scale + offset`. All are dyadic numbers, so
+/// that single precision holds them exactly.
 #[derive(Clone, Debug)]
 pub struct Input {
     /// The name of a float parameter of the graph, or `place_u`, `place_v`.

@@ -54,8 +54,8 @@ fn random(point: usize, number: u32) -> f64 {
     cell(point as f64 + 0.5, f64::from(number) + 0.5)
 }
 
-/// Colours of a patch that recedes: its far end is narrower in the picture, so it has fewer points, of greater footprint.
-/// Light falls by a quarter to either side.
+/// Colours of a patch that recedes: its far end is narrower in the picture, so it has fewer points, of greater
+/// footprint. Light falls by a quarter to either side.
 fn seen(graph: &Graph, settings: &Settings, side: f64, count: usize) -> Vec<Point> {
     let program = Program::new(graph);
     let mut evaluator = Evaluator::new(&program, settings, &[]);
