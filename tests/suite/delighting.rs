@@ -64,11 +64,13 @@ fn the_page_shows_its_pictures() {
 /// PSNR over valid pixels of linear values, each channel times the factor that fits best if `is_aligned`.
 fn psnr(found: &Picture<LinearRgb>, truth: &Picture<LinearRgb>, is_aligned: bool) -> f64 {
     let valid = png_io::read_mask(&DATASET.join("scenes/room/views/input/valid.png")).unwrap();
-    let pairs: Vec<([f64; 3], [f64; 3])> = { found.pixels().iter().zip(truth.pixels()).zip(valid.pixels()) }
+    /// The colours of a pixel: found and true.
+    type Pair = ([f64; 3], [f64; 3]);
+    let pairs: Vec<Pair> = { found.pixels().iter().zip(truth.pixels()).zip(valid.pixels()) }
         .filter(|(_, valid)| **valid)
         .map(|((found, truth), _)| (found.0.map(|v| f64::from(v.clamp(0.0, 1.0))), truth.0.map(f64::from)))
         .collect();
-    let sum = |term: &dyn Fn(&([f64; 3], [f64; 3])) -> f64| pairs.iter().map(term).sum::<f64>();
+    let sum = |term: &dyn Fn(&Pair) -> f64| pairs.iter().map(term).sum::<f64>();
     let squares = [0, 1, 2].map(|c| {
         let scale = if is_aligned { sum(&|(p, gt)| p[c] * gt[c]) / sum(&|(p, _)| p[c] * p[c]) } else { 1.0 };
         sum(&|(p, gt)| (scale * p[c] - gt[c]).powi(2))

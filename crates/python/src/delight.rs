@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use mateval_baselines::BaselineError;
-use mateval_baselines::delight::{self, CandidateLights, DelightOptions, DelitPhoto};
+use mateval_baselines::delight as baseline;
+use mateval_baselines::delight::{CandidateLights, DelightOptions, DelitPhoto};
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_image::{LinearRgb, Picture};
 use numpy::{PyArray2, PyArray3};
@@ -53,7 +54,7 @@ pub fn delight(py: Python<'_>, scene: &Scene, lights: &str) -> PyResult<Delit> {
     let source = Arc::clone(&scene.source);
     let delit = run_long(py, move |progress| -> Result<DelitPhoto, BaselineError> {
         let geometry = SceneGeometry::read(source.folder(), source.file())?;
-        delight::delight(&geometry, &options, progress)
+        baseline::delight(&geometry, &options, progress)
     })?;
     into_python(py, &delit.map_err(failed)?)
 }

@@ -29,7 +29,7 @@ impl DelitPictures {
         let path = folder.join("lights.json");
         let lights: LightsFile = json::read_format(&path, LIGHTS_FORMAT)?;
         let share = |v: f32| v.clamp(0.0, 1.0);
-        let scalar = |name: &str| read_scalar(&folder.join(name)).map(|picture| picture.map(|v| share(v)));
+        let scalar = |name: &str| read_scalar(&folder.join(name)).map(|picture| picture.map(share));
         Ok(Self {
             base_color: read_linear(&folder.join("base_color.exr"))?.map(|color| LinearRgb(color.0.map(share))),
             roughness: scalar("roughness.exr")?,

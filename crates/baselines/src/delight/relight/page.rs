@@ -59,7 +59,7 @@ impl ScaledPicture {
 pub(super) fn html(scenes: &[Shown]) -> String {
     let introduction = "Each slider dims one light, from off to twice as bright as it was fitted.";
     let mut sections: String = scenes.iter().map(section).collect();
-    write!(sections, "<script>{MIX}</script>\n").expect("writing to a String cannot fail");
+    writeln!(sections, "<script>{MIX}</script>").expect("writing to a String cannot fail");
     page("Rooms lit anew", introduction, &sections)
 }
 
