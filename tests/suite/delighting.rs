@@ -143,7 +143,10 @@ fn a_room_is_lit_anew() {
     assert!((fitted - 1.0).abs() < 0.15, "{fitted}");
     let without_lamp = brightness("without", &["--light", "lamp_shade=0"]);
     assert!(without_lamp < 0.98 * fitted, "{without_lamp} {fitted}");
-    let twice = brightness("twice", &["--light", "lamp_shade=3", "--light", "lamp_shade=2"]);
+    let twice = brightness("twice", &["--light", "lamp_shade=5", "--light", "lamp_shade=2"]);
+    brightness("fivefold", &["--light", "lamp_shade=5"]);
+    let page = |name: &str| std::fs::read_to_string(folder.path().join(name).join("index.html")).unwrap();
+    assert!(page("fivefold").contains("max=\"5\" step=\"any\" value=\"5\""));
     assert!(((twice - fitted) / (fitted - without_lamp) - 1.0).abs() < 0.01, "{twice} {fitted} {without_lamp}");
     let lights = json(&PICTURES.join("room/lights.json"));
     let all: Vec<String> =
@@ -151,7 +154,7 @@ fn a_room_is_lit_anew() {
     let words: Vec<&str> = all.iter().flat_map(|light| ["--light", light]).collect();
     assert_eq!(brightness("dark", &words), 0.0);
 
-    let html = std::fs::read_to_string(folder.path().join("without/index.html")).unwrap();
+    let html = page("without");
     assert!(html.contains("value=\"0\"") && html.contains("lamp_shade") && !html.contains("http"));
     assert_eq!(html.matches("data-light=").count(), html.matches("type=\"range\"").count());
     for picture in ["photo.png", "relit.png"] {

@@ -47,8 +47,8 @@ pub(super) fn standard_errors(room: &PartRoom, halves: &LightHalves, light: &Rou
     })
 }
 
-/// Base colours that are not well known nearer to the colour of their part: the most likely ones, if the colours of a
-/// part deviate from its own by [`PART_DEVIATION`].
+/// Moves uncertain base colours towards the colour of their part: to the most likely ones, if the colours of a part
+/// deviate from its own by [`PART_DEVIATION`].
 pub(super) fn towards_parts(
     room: &PartRoom,
     base_color: &Picture<LinearRgb>,

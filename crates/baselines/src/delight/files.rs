@@ -19,8 +19,8 @@ use crate::geometry::SceneGeometry;
 use crate::submission::check_new_place;
 
 /// De-lights the photo of every scene. `out` receives `index.html` and for each scene a folder with `base_color.exr`,
-/// `roughness.exr`, `metallic.exr`, `shading.exr`, `gloss.exr`, `confidence.exr`, the same as PNG for the page, and
-/// `lights.json`. Returns the number of scenes.
+/// `roughness.exr`, `metallic.exr`, `shading.exr`, `gloss.exr`, `confidence.exr`, the same as PNG for the page with
+/// `photo.png`, and `lights.json`. Returns the number of scenes.
 pub fn write(
     dataset: &Dataset,
     out: &Path,

@@ -18,3 +18,10 @@ pub(super) struct LightsFile {
     /// Candidates of the room first, then the lights of the stage.
     pub(super) lights: Vec<FittedLight>,
 }
+
+impl LightsFile {
+    /// The names of the lights.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.lights.iter().map(|fitted| fitted.light.name.as_str())
+    }
+}

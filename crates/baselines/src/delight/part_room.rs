@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 use super::options::CandidateLights;
 use super::part_surfaces::{NO_PART, PartSurfaces};
-use super::possible_light::PossibleLight;
+use super::possible_light::{PossibleLight, make_names_distinct};
 use crate::error::BaselineError;
 use crate::geometry::SceneGeometry;
 
@@ -64,6 +64,7 @@ impl PartRoom {
             .map(|(name, candidate)| PossibleLight::of_candidate(name, *candidate, &scene.instances))
             .collect();
         lights.extend(stage.iter().map(PossibleLight::of_stage));
+        make_names_distinct(&mut lights);
         let stage: Vec<_> = stage.into_iter().map(|light| light.light).collect();
         let world = World::new(Arc::new(room))?.with_stage(&stage)?;
         // Find what each pixel shows.

@@ -1,5 +1,7 @@
 //! Lights that may shine in a room, and the radiance that was fitted to each.
 
+use std::collections::BTreeMap;
+
 use mateval_light::candidates::{Candidate, sky_extent_deg};
 use mateval_light::light_stage::NamedLight;
 use mateval_scene::dataset::Instance;
@@ -8,7 +10,8 @@ use serde::{Deserialize, Serialize};
 /// A light that may shine, of radiance 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PossibleLight {
-    /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage.
+    /// The id of the instance, `ceilings`, `world`, `world_<sector>`, or the name of the light of the stage; unique in its
+    /// scene.
     pub name: String,
     /// What shines.
     pub source: LightSource,
@@ -73,5 +76,31 @@ impl PossibleLight {
         let order = if mesh.triangles[0] == [0, 1, 2] { [0, 1, 2, 3] } else { [0, 3, 2, 1] };
         let corners_m = order.map(|corner| mesh.positions[corner].to_array()).to_vec();
         Self { name: light.name.clone(), source: LightSource::Quad { corners_m } }
+    }
+}
+
+/// Numbers the lights that share a name with an earlier one: an instance may be called `camera`, as is a light of the
+/// stage. The second `camera` becomes `camera#2`, which no id can be.
+pub(super) fn make_names_distinct(lights: &mut [PossibleLight]) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for light in lights {
+        let count = counts.entry(light.name.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            light.name = format!("{}#{count}", light.name);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_distinct() {
+        let light = |name: &str| PossibleLight { name: name.to_owned(), source: LightSource::World {} };
+        let mut lights = ["camera", "world", "camera", "camera"].map(light);
+        make_names_distinct(&mut lights);
+        assert_eq!(lights.map(|light| light.name), ["camera", "world", "camera#2", "camera#3"]);
     }
 }

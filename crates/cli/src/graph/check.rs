@@ -30,8 +30,9 @@ pub fn run(args: &CheckArgs) -> anyhow::Result<Outcome> {
     print(&match args.format {
         Format::Text => checked.iter().map(|(file, findings)| text(file, findings)).collect(),
         Format::Json => {
-            let files =
-                checked.iter().map(|(file, findings)| serde_json::json!({ "file": file, "findings": findings }));
+            let files = checked.iter().map(
+                |(file, findings)| serde_json::json!({ "file": file.display().to_string(), "findings": findings }),
+            );
             let files: Vec<_> = files.collect();
             json::to_text(&serde_json::json!({ "format": "mateval-graph-check/1", "tool": TOOL, "files": files }))
         }

@@ -48,7 +48,7 @@ fn graphs(format: Format) -> anyhow::Result<()> {
                 serde_json::json!({
                     "name": entry.name,
                     "class": entry.class,
-                    "doc": doc(graph),
+                    "doc": graph.doc,
                     "parameters": graph.parameters.iter().map(as_json).collect::<Vec<_>>(),
                 })
             });
@@ -64,8 +64,10 @@ fn parameters(word: &Path, format: Format) -> anyhow::Result<()> {
         Format::Text => {
             let line = |parameter: &Parameter| {
                 let range = match (&parameter.least, &parameter.most) {
-                    (Some(least), Some(most)) => format!("{} to {}", least.numbers()[0], most.numbers()[0]),
-                    _ => "any".to_owned(),
+                    (Some(least), Some(most)) => format!("{least} to {most}"),
+                    (Some(least), None) => format!("from {least}"),
+                    (None, Some(most)) => format!("up to {most}"),
+                    (None, None) => "any".to_owned(),
                 };
                 let (kind, value) = (parameter.value.kind().word(), parameter.value.to_string());
                 let doc = parameter.doc.as_deref().unwrap_or_default();

@@ -33,8 +33,8 @@ pub struct RenderArgs {
     force: bool,
 }
 
-fn assignment(word: &str) -> Result<(String, String), String> {
-    let (name, value) = word.split_once('=').ok_or("expected NAME=VALUE")?;
+fn assignment(word: &str) -> anyhow::Result<(String, String)> {
+    let (name, value) = word.split_once('=').context("expected NAME=VALUE")?;
     Ok((name.trim().to_owned(), value.to_owned()))
 }
 

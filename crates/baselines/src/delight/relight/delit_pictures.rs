@@ -23,11 +23,14 @@ pub(super) struct DelitPictures {
     folder: PathBuf,
 }
 
+/// Reads the lights alone.
+pub(super) fn read_lights(folder: &Path) -> Result<LightsFile, BaselineError> {
+    Ok(json::read_format(&folder.join("lights.json"), LIGHTS_FORMAT)?)
+}
+
 impl DelitPictures {
-    /// Reads a scene's folder. Values are brought into 0 to 1.
-    pub(super) fn read(folder: &Path) -> Result<Self, BaselineError> {
-        let path = folder.join("lights.json");
-        let lights: LightsFile = json::read_format(&path, LIGHTS_FORMAT)?;
+    /// Reads the pictures of a scene's folder. Values are brought into 0 to 1.
+    pub(super) fn read(folder: &Path, lights: LightsFile) -> Result<Self, BaselineError> {
         let share = |v: f32| v.clamp(0.0, 1.0);
         let scalar = |name: &str| read_scalar(&folder.join(name)).map(|picture| picture.map(share));
         Ok(Self {
@@ -37,11 +40,6 @@ impl DelitPictures {
             lights,
             folder: folder.to_owned(),
         })
-    }
-
-    /// The names of the lights.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
-        self.lights.lights.iter().map(|fitted| fitted.light.name.as_str())
     }
 
     /// Fails unless the pictures and lights are those of `room`.
@@ -59,7 +57,7 @@ impl DelitPictures {
         if let Some((file, found)) = sizes.into_iter().find(|(_, found)| *found != size) {
             return other(file, format!("it has {}x{} pixels, the photo {}x{}", found[0], found[1], size[0], size[1]));
         }
-        if !self.names().eq(room.lights.iter().map(|light| light.name.as_str())) {
+        if !self.lights.names().eq(room.lights.iter().map(|light| light.name.as_str())) {
             return other("lights.json", "its lights are not those of the scene".to_owned());
         }
         if self.lights.lights.iter().flat_map(|fitted| fitted.radiance).any(|v| !(0.0..=1e30).contains(&v)) {

@@ -12,8 +12,9 @@ use mateval_scene::work_folder::WorkFolder;
 use mateval_scene::{Progress, Report, SceneError};
 
 use super::super::files::exposed;
+use super::super::lights_file::LightsFile;
 use super::super::part_room::PartRoom;
-use super::delit_pictures::DelitPictures;
+use super::delit_pictures::{DelitPictures, read_lights};
 use super::page::{ScaledPicture, Shown, Slider, html};
 use super::relit_photo::{RelitPhoto, relight};
 use crate::error::BaselineError;
@@ -34,7 +35,7 @@ pub struct Dimmed {
 pub struct RelightOptions {
     /// The lights that are dimmed; of two entries of one name, the last one counts.
     pub dimmed: Vec<Dimmed>,
-    /// Paths per pixel.
+    /// Paths per pixel, in two halves: an odd number is rounded down.
     pub samples: u32,
 }
 
@@ -60,19 +61,21 @@ pub fn write(
     check_names(pictures, &scenes, &options.dimmed)?;
     let work = WorkFolder::start(out)?;
     let mut shown = Vec::new();
-    for (at, (scene, delit)) in scenes.iter().enumerate() {
-        progress(Report::part(&format!("scene {}", scene.id), at, scenes.len()));
+    let count = scenes.len();
+    for (at, (scene, lights)) in scenes.into_iter().enumerate() {
+        progress(Report::part(&format!("scene {}", scene.id), at, count));
+        let delit = DelitPictures::read(&pictures.join(scene.id.as_str()), lights)?;
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
         let room = PartRoom::read(&geometry, delit.lights.candidates)?;
-        let factors: Vec<f64> = delit.names().map(|name| factor(&options.dimmed, name)).collect();
-        let relit = relight(&room, delit, &factors, options.samples, progress)?;
+        let factors: Vec<f64> = delit.lights.names().map(|name| factor(&options.dimmed, name)).collect();
+        let relit = relight(&room, &delit, &factors, options.samples, progress)?;
         let folder = work.path().join(scene.id.as_str());
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
         let exposure = scene.exposure as f32;
         write_linear(&folder.join("relit.exr"), &relit.whole, Precision::Float)?;
         write_srgb(&folder.join("relit.png"), &exposed(&relit.whole, exposure))?;
         write_srgb(&folder.join("photo.png"), &exposed(&room.photo, exposure))?;
-        shown.push(section(scene, &relit, delit, &factors));
+        shown.push(section(scene, &relit, &delit, &factors));
     }
     let index = work.path().join("index.html");
     std::fs::write(&index, html(&shown)).map_err(SceneError::io("write", &index))?;
@@ -80,21 +83,17 @@ pub fn write(
     Ok(shown.len())
 }
 
-/// The scenes of the dataset that were de-lit.
-fn scenes<'a>(dataset: &'a Dataset, pictures: &Path) -> Result<Vec<(&'a SceneFile, DelitPictures)>, BaselineError> {
+/// The scenes of the dataset that were de-lit, with their lights.
+fn scenes<'a>(dataset: &'a Dataset, pictures: &Path) -> Result<Vec<(&'a SceneFile, LightsFile)>, BaselineError> {
     let folder = |scene: &SceneFile| pictures.join(scene.id.as_str());
     let delit = dataset.scenes.iter().filter(|scene| folder(scene).is_dir());
     let scenes: Vec<_> =
-        delit.map(|scene| Ok((scene, DelitPictures::read(&folder(scene))?))).collect::<Result<_, BaselineError>>()?;
+        delit.map(|scene| Ok((scene, read_lights(&folder(scene))?))).collect::<Result<_, BaselineError>>()?;
     if scenes.is_empty() { Err(BaselineError::NothingDelit(pictures.to_owned())) } else { Ok(scenes) }
 }
 
-fn check_names(
-    pictures: &Path,
-    scenes: &[(&SceneFile, DelitPictures)],
-    dimmed: &[Dimmed],
-) -> Result<(), BaselineError> {
-    let known: BTreeSet<&str> = scenes.iter().flat_map(|(_, delit)| delit.names()).collect();
+fn check_names(pictures: &Path, scenes: &[(&SceneFile, LightsFile)], dimmed: &[Dimmed]) -> Result<(), BaselineError> {
+    let known: BTreeSet<&str> = scenes.iter().flat_map(|(_, lights)| lights.names()).collect();
     let unknown: Vec<String> = dimmed
         .iter()
         .filter(|dimmed| !known.contains(dimmed.name.as_str()))

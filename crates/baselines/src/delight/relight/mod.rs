@@ -2,8 +2,8 @@
 //!
 //! In: the public geometry of a scene, its photo, and the pictures and lights that [`super::write`] has written. Out:
 //! the room under all lights, and under each of the strongest alone. Light that reaches a place by way of other
-//! surfaces is traced with the colours of their parts; nothing is read from the photo but the glow of lamps and what is
-//! seen through windows.
+//! surfaces is traced with the colours of their parts; nothing is read from the photo but the glow of lamps, what is
+//! seen through windows, and pixels without a known surface, such as glass.
 
 mod delit_pictures;
 mod files;

@@ -11,8 +11,9 @@ use super::super::possible_light::{LightSource, PossibleLight};
 /// Mixes the pictures of the lights.
 const MIX: &str = include_str!("mix_lights.js");
 const QUALITY: u8 = 90;
-/// The largest value that a picture of the page holds, times exposure; 1 is white.
-const BRIGHTEST: f32 = 4.0;
+/// The largest value that a picture of the page holds, times exposure; 1 is white. Brighter pixels stay white until their
+/// light is dimmed to an eighth.
+const BRIGHTEST: f32 = 8.0;
 
 /// A scene on the page.
 pub(super) struct Shown {
@@ -57,7 +58,7 @@ impl ScaledPicture {
 
 /// The page. Ids and names of lights contain no characters that are special in HTML.
 pub(super) fn html(scenes: &[Shown]) -> String {
-    let introduction = "Each slider dims one light, from off to twice as bright as it was fitted.";
+    let introduction = "Each slider multiplies the radiance of one light; 1 is as it was fitted.";
     let mut sections: String = scenes.iter().map(section).collect();
     writeln!(sections, "<script>{MIX}</script>").expect("writing to a String cannot fail");
     page("Rooms lit anew", introduction, &sections)
@@ -75,11 +76,12 @@ fn section(Shown { id, size: [width, height], lights, rest }: &Shown) -> String 
         rest.img("rest"),
     ]);
     text.extend(lights.iter().map(|Slider { light, factor, picture }| {
-        let input = format!("<input type=\"range\" min=\"0\" max=\"2\" step=\"0.05\" value=\"{factor}\">");
+        let most = factor.max(2.0);
+        let input = format!("<input type=\"range\" min=\"0\" max=\"{most}\" step=\"any\" value=\"{factor}\">");
         let label = label(light);
         format!("{}<label><span>{label}</span>{input}<output>{factor:.2}</output></label>\n", picture.img("light"))
     }));
-    text.push_str("</div><button type=\"button\">All as fitted</button></section>\n");
+    text.push_str("</div><button type=\"button\">All sliders to 1</button></section>\n");
     text
 }
 
