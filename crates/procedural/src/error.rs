@@ -17,7 +17,7 @@ pub enum ProceduralError {
         source: std::io::Error,
     },
     /// A file is not a graph that can be evaluated.
-    #[error("'{name}' is not a graph that can be evaluated: {} findings, of which the first is: {}", findings.len(), findings[0])]
+    #[error("'{name}' is not a graph that can be evaluated: {}: {}", counted(findings.len()), findings[0])]
     Invalid {
         /// The file.
         name: String,
@@ -97,4 +97,8 @@ pub enum ProceduralError {
         /// The value.
         value: f64,
     },
+}
+
+fn counted(findings: usize) -> String {
+    if findings == 1 { "1 finding".to_owned() } else { format!("{findings} findings, of which the first is") }
 }
