@@ -128,8 +128,8 @@ fn interface_of<'a>(root: &'a Element, graph: &'a Element, findings: &mut Findin
     found
 }
 
-/// The inputs of a nodedef are named like the nodes and outputs of its graph, in which they are used. Reports names that
-/// they share, inputs of the graph itself, and children of the nodedef that are neither inputs nor outputs.
+/// The writer puts the inputs of a nodedef beside the nodes and outputs of its graph, so that their names must differ.
+/// Also reports inputs of the graph itself, and children of the nodedef that are neither inputs nor outputs.
 fn check_nodedef(nodedef: &Element, graph: &Element, findings: &mut Findings) {
     let mut used = BTreeSet::new();
     for child in &graph.children {

@@ -179,8 +179,13 @@ fn other_texture_coordinates_are_refused() {
 /// The inputs of a nodedef become parameters of the graph, and are written as such.
 #[test]
 fn inputs_of_a_nodedef_are_checked() {
-    let good = text("", r#"<dot name="d" type="color3"><input name="in" type="color3" interfacename="tint" /></dot>"#, "d")
-        .replace("<nodegraph", "<nodedef name=\"ND_test\"><input name=\"tint\" type=\"color3\" value=\"1, 1, 1\" /><input name=\"size\" type=\"float\" value=\"1\" /><output name=\"roughness\" type=\"float\" /></nodedef>\n  <nodegraph nodedef=\"ND_test\"");
+    let node = r#"<dot name="d" type="color3"><input name="in" type="color3" interfacename="tint" /></dot>"#;
+    let nodedef = concat!(
+        r#"<nodedef name="ND_test"><input name="tint" type="color3" value="1, 1, 1" />"#,
+        r#"<input name="size" type="float" value="1" /><output name="roughness" type="float" /></nodedef>"#,
+        "\n  <nodegraph nodedef='ND_test'"
+    );
+    let good = text("", node, "d").replace("<nodegraph", nodedef);
     let size = r#"<input name="size""#;
     let names = "expected a name made of letters, digits and underscores [attribute]";
     let cases = [
