@@ -28,8 +28,8 @@ impl<'p> Evaluator<'p> {
     pub fn new(program: &'p Program, settings: &Settings, chosen: &[usize]) -> Self {
         let (mut varies, mut depends): (Vec<bool>, Vec<Vec<usize>>) = (Vec::new(), Vec::new());
         for op in &program.ops {
-            varies.push(op.is_of_the_point() || op.inputs().iter().any(|input| varies[input.index()]));
-            depends.push(dependences(op, chosen, &depends));
+            varies.push(op.reads_the_point() || op.inputs().iter().any(|input| varies[input.index()]));
+            depends.push(dependencies(op, chosen, &depends));
         }
         let mut count = 0;
         let places = depends.iter().map(|slots| {
@@ -135,11 +135,11 @@ fn add_product(sum: &mut Lanes, slope: &Lanes, derivative: &Lanes) {
 }
 
 /// Which of the chosen slots a result depends on with a derivative that may differ from zero.
-fn dependences(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usize> {
+fn dependencies(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usize> {
     if let Op::Slot(slot) = op {
         return chosen.iter().position(|&other| other == *slot as usize).into_iter().collect();
     }
-    if op.is_constant_by_parts() {
+    if op.is_piecewise_constant() {
         return Vec::new();
     }
     let mut all: Vec<usize> = op.inputs().iter().flat_map(|input| of_others[input.index()].iter().copied()).collect();

@@ -17,7 +17,7 @@ pub enum ProceduralError {
         source: std::io::Error,
     },
     /// A file is not a graph that can be evaluated.
-    #[error("'{name}' is not a graph that can be evaluated: {} findings, of which the first is: {}", findings.len(), findings[0])]
+    #[error("'{name}' is not a graph that can be evaluated: {}: {}", counted(findings.len()), findings[0])]
     Invalid {
         /// The file.
         name: String,
@@ -36,7 +36,7 @@ pub enum ProceduralError {
     },
     /// A parameter that has a value of its own at every point.
     #[error("parameter '{name}' of '{graph}' cannot be set: it is the extent of a pixel at every point")]
-    OfThePoint {
+    SetAtEveryPoint {
         /// The graph.
         graph: String,
         /// The parameter.
@@ -53,16 +53,16 @@ pub enum ProceduralError {
         reason: ValueError,
     },
     /// A value is out of the parameter's range.
-    #[error("parameter '{name}' of '{graph}': expected {least} to {most}, found {found}")]
+    #[error("parameter '{name}' of '{graph}': expected {}, found {found}", range(*least, *most))]
     OutOfRange {
         /// The graph.
         graph: String,
         /// The parameter.
         name: String,
-        /// The least value of the component.
-        least: f64,
-        /// The greatest value of the component.
-        most: f64,
+        /// The least value of the component, if it has one.
+        least: Option<f64>,
+        /// The greatest value of the component, if it has one.
+        most: Option<f64>,
         /// The value.
         found: f64,
     },
@@ -97,4 +97,17 @@ pub enum ProceduralError {
         /// The value.
         value: f64,
     },
+}
+
+fn counted(findings: usize) -> String {
+    if findings == 1 { "1 finding".to_owned() } else { format!("{findings} findings, of which the first is") }
+}
+
+fn range(least: Option<f64>, most: Option<f64>) -> String {
+    match (least, most) {
+        (Some(least), Some(most)) => format!("{least} to {most}"),
+        (Some(least), None) => format!("at least {least}"),
+        (None, Some(most)) => format!("at most {most}"),
+        (None, None) => "any number".to_owned(),
+    }
 }

@@ -1,10 +1,9 @@
 //! Findings: faults of a `.mtlx` file, each with the name and the line of its element.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// The kind of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Code {
     /// The text is not XML, or the XML exceeds a limit.
     Xml,
@@ -49,6 +48,12 @@ impl Code {
             Self::Output => "output",
             Self::TooMany => "too_many",
         }
+    }
+}
+
+impl Serialize for Code {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
     }
 }
 

@@ -6,8 +6,7 @@ use crate::limits::Limits;
 use crate::mtlx::read_text;
 
 /// What kind of pattern a graph makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// One colour.
     Flat,
@@ -22,7 +21,7 @@ pub enum Class {
 }
 
 impl Class {
-    /// The word in tables.
+    /// The word in tables and reports.
     pub fn word(self) -> &'static str {
         match self {
             Self::Flat => "flat",
@@ -31,6 +30,12 @@ impl Class {
             Self::Stripe => "stripe",
             Self::Lattice => "lattice",
         }
+    }
+}
+
+impl serde::Serialize for Class {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.word())
     }
 }
 

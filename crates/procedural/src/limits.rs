@@ -7,6 +7,10 @@ pub struct Limits {
     pub bytes: usize,
     /// Elements, texts and comments of the XML.
     pub xml_nodes: u32,
+    /// Attributes of an element. Each is compared with all earlier ones of its element.
+    pub attributes: usize,
+    /// Namespaces of the XML. An element that declares one copies all those of its parent.
+    pub namespaces: usize,
     /// Depth of nested elements. The elements that are supported nest four deep.
     pub xml_depth: usize,
     /// Nodes of the graph.
@@ -19,7 +23,16 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { bytes: 4 << 20, xml_nodes: 1 << 16, xml_depth: 8, nodes: 2048, parameters: 256, findings: 200 }
+        Self {
+            bytes: 4 << 20,
+            xml_nodes: 1 << 16,
+            attributes: 64,
+            namespaces: 16,
+            xml_depth: 8,
+            nodes: 2048,
+            parameters: 256,
+            findings: 200,
+        }
     }
 }
 

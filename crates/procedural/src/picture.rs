@@ -8,8 +8,8 @@ use crate::lanes::{LANES, Points};
 use crate::program::compile::{OUTPUTS, Program};
 use crate::settings::Settings;
 
-/// The most pixels a side.
-pub const MOST_PIXELS: usize = 8192;
+/// The most pixels a side: a picture of them takes 0.7 GB.
+pub const MOST_PIXELS: usize = 4096;
 
 /// A square of the domain, whose lower left corner is the origin. Its footprint is the side of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +30,8 @@ pub struct Pixel {
 }
 
 impl Square {
-    /// A square of this side in metres and in pixels. Fails where one is 0 or too great.
+    /// A square of this side in metres and in pixels. Fails unless the size is finite and above 0, and the
+    /// resolution is 1 to [`MOST_PIXELS`].
     pub fn new(size_metres: f64, resolution: usize) -> Result<Self, ProceduralError> {
         let fits = size_metres.is_finite() && size_metres > 0.0 && (1..=MOST_PIXELS).contains(&resolution);
         let refused = ProceduralError::PictureSize { size_metres, resolution, most: MOST_PIXELS };
@@ -55,27 +56,32 @@ impl Square {
 /// not finite.
 pub fn render(program: &Program, settings: &Settings, square: Square) -> Result<Vec<Pixel>, ProceduralError> {
     let prepare = || Evaluator::new(program, settings, &[]);
-    let rows = (0..square.resolution).into_par_iter().map_init(prepare, |evaluator, row| {
-        let batches = (0..square.resolution).step_by(LANES);
-        let pixels = batches.map(|first| batch(evaluator, program, square, row, first));
-        pixels.collect::<Result<Vec<_>, _>>().map(|batches| batches.concat())
-    });
-    let rows: Vec<Result<Vec<Pixel>, ProceduralError>> = rows.collect();
+    let black = Pixel { base_color: [0.0; 3], roughness: 0.0, metallic: 0.0 };
+    let mut pixels = vec![black; square.resolution * square.resolution];
+    let rows = pixels.par_chunks_mut(square.resolution).enumerate();
+    let rows = rows.map_init(prepare, |evaluator, (row, pixels)| fill(pixels, evaluator, program, square, row));
+    let rows: Vec<Result<(), ProceduralError>> = rows.collect();
     // The first row that fails, on any number of threads.
-    Ok(rows.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
+    rows.into_iter().collect::<Result<(), _>>()?;
+    Ok(pixels)
 }
 
-fn batch(
+/// Evaluates a row of pixels.
+fn fill(
+    pixels: &mut [Pixel],
     evaluator: &mut Evaluator,
     program: &Program,
     square: Square,
     row: usize,
-    first: usize,
-) -> Result<Vec<Pixel>, ProceduralError> {
-    let points = square.points(row, first);
-    evaluator.run(&points);
-    let used = LANES.min(square.resolution - first);
-    (0..used).map(|lane| pixel(program, evaluator.outputs(lane), points.u[lane], points.v[lane])).collect()
+) -> Result<(), ProceduralError> {
+    for (at, batch) in pixels.chunks_mut(LANES).enumerate() {
+        let points = square.points(row, at * LANES);
+        evaluator.run(&points);
+        for (lane, place) in batch.iter_mut().enumerate() {
+            *place = pixel(program, evaluator.outputs(lane), points.u[lane], points.v[lane])?;
+        }
+    }
+    Ok(())
 }
 
 fn pixel(program: &Program, outputs: [f64; OUTPUTS], u: f64, v: f64) -> Result<Pixel, ProceduralError> {

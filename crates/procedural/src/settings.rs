@@ -67,15 +67,15 @@ impl Settings {
     pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {
         let Some(at) = graph.parameter(name) else { return Err(unknown(graph, name)) };
         if name == FOOTPRINT {
-            return Err(ProceduralError::OfThePoint { graph: graph.name.clone(), name: name.to_owned() });
+            return Err(ProceduralError::SetAtEveryPoint { graph: graph.name.clone(), name: name.to_owned() });
         }
         let parameter = &graph.parameters[at];
         let bad = |reason| ProceduralError::BadValue { graph: graph.name.clone(), name: name.to_owned(), reason };
         let value = Value::parse(parameter.value.kind(), text).map_err(bad)?;
-        let end = |end: Option<Value>, otherwise: f64| end.unwrap_or(Value::filled(Type::Vector3, otherwise));
-        let (least, most) = (end(parameter.least, f64::MIN), end(parameter.most, f64::MAX));
-        for ((&found, &least), &most) in value.numbers().iter().zip(least.numbers()).zip(most.numbers()) {
-            if !(least..=most).contains(&found) {
+        let end = |end: &Option<Value>, component: usize| end.map(|end| end.numbers()[component]);
+        for (component, &found) in value.numbers().iter().enumerate() {
+            let (least, most) = (end(&parameter.least, component), end(&parameter.most, component));
+            if least.is_some_and(|least| found < least) || most.is_some_and(|most| found > most) {
                 let (graph, name) = (graph.name.clone(), name.to_owned());
                 return Err(ProceduralError::OutOfRange { graph, name, least, most, found });
             }

@@ -1,5 +1,8 @@
-//! The choice of a graph: every periodic graph is fitted, and the best one counts if it predicts points that no fit has
-//! seen better than a single colour does.
+//! The choice of a graph: the twelve periodic graphs that `periods` lists are fitted, and the best one counts if it
+//! predicts held-out points better than a single colour does.
+//!
+//! Held-out points take no part in the fit of a graph. They do take part in that of the cubic polynomial whose shading
+//! is taken away before: it is fitted to all points, so that both groups are divided by the same light.
 
 use super::colors::{mean_square, project};
 use super::hypotheses::starts;
@@ -60,7 +63,7 @@ pub struct Fitter {
 }
 
 impl Fitter {
-    /// Prepares the periodic graphs of the library and `paint`.
+    /// Prepares the twelve periodic graphs and `paint`.
     pub fn new() -> Result<Self, ProceduralError> {
         let mut patterns = Vec::new();
         for entry in &LIBRARY {
@@ -80,7 +83,7 @@ impl Fitter {
         }
         let sound = flattened(&sound);
         let (seen, held_out) = split(&sound);
-        // Too few blocks to hold one out: all points judge, which only a single colour may pass.
+        // Too few points to hold some out: only the single colour is fitted, to all of them.
         let is_enough = seen.len() >= LEAST_POINTS && held_out.len() >= LEAST_POINTS / 8;
         let judged = if is_enough { held_out } else { sound.clone() };
         let paint = self.painted(if is_enough { &seen } else { &sound }, &judged);

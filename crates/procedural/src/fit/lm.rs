@@ -1,6 +1,5 @@
 //! Levenberg-Marquardt steps of a graph's shape and colours together, with Huber's loss.
 
-use super::colors::mean_square;
 use super::model::Model;
 use super::points::Point;
 use super::system::Normal;
@@ -13,14 +12,14 @@ const HUBER: f64 = 0.15;
 pub(super) fn polish(model: &Model, settings: &mut Settings, points: &[Point], steps: usize) {
     let colors = model.colors.iter().flat_map(|first| (0..3).map(move |channel| first + channel));
     let chosen: Vec<usize> = model.shape.iter().copied().chain(colors).collect();
-    let (mut damping, mut error) = (1e-3, mean_square(model, settings, points));
+    let (mut damping, mut error) = (1e-3, mean_loss(model, settings, points));
     for _ in 0..steps {
         let normal = equations(model, settings, &chosen, points);
         let before = error;
         for _ in 0..5 {
             let Some(step) = normal.solve(|_, diagonal| damping * diagonal + 1e-9) else { return };
             let tried = stepped(model, settings, &chosen, &step);
-            let found = mean_square(model, &tried, points);
+            let found = mean_loss(model, &tried, points);
             if found < error {
                 (*settings, error) = (tried, found);
                 damping = (damping / 5.0).max(1e-8);
@@ -32,6 +31,23 @@ pub(super) fn polish(model: &Model, settings: &mut Settings, points: &[Point], s
             return;
         }
     }
+}
+
+/// The weighted mean of Huber's loss of the differences between model and points, without its factor of a half.
+fn mean_loss(model: &Model, settings: &Settings, points: &[Point]) -> f64 {
+    let (mut sum, mut total) = (0.0, 0.0);
+    for (point, shown) in points.iter().zip(model.shown(settings, points)) {
+        let loss: f64 = point.albedo.iter().zip(shown.albedo).map(|(a, b)| huber(a - b)).sum();
+        sum += point.weight * loss / 3.0;
+        total += point.weight;
+    }
+    sum / total
+}
+
+/// Twice Huber's loss: the square of small differences; linear in large ones, with the same slope where they meet.
+fn huber(difference: f64) -> f64 {
+    let size = difference.abs();
+    if size > HUBER { HUBER * (2.0 * size - HUBER) } else { size * size }
 }
 
 fn equations(model: &Model, settings: &Settings, chosen: &[usize], points: &[Point]) -> Normal {
@@ -52,4 +68,20 @@ fn stepped(model: &Model, settings: &Settings, chosen: &[usize], step: &[f64]) -
         *number = (*number + step).clamp(slot.least.unwrap_or(f64::MIN), slot.most.unwrap_or(f64::MAX));
     }
     tried
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The weights of the equations are those of the loss: its slope over twice the difference.
+    #[test]
+    fn the_loss_and_its_slope_are_continuous() {
+        assert_eq!([huber(0.1), huber(-0.1)], [0.1 * 0.1; 2]);
+        for difference in [0.05, HUBER - 1e-4, HUBER + 1e-4, 0.9] {
+            let slope = (huber(difference + 1e-6) - huber(difference - 1e-6)) / 2e-6;
+            let robust = if difference > HUBER { HUBER / difference } else { 1.0 };
+            assert!((slope - 2.0 * robust * difference).abs() < 1e-6, "{difference}: {slope}");
+        }
+    }
 }

@@ -7,8 +7,8 @@
 //! starts the graph's colours are a linear least squares problem; the best starts are polished by Levenberg-Marquardt
 //! steps.
 //!
-//! Twelve graphs of the library are fitted, which `periods` lists. What is random, such as grain, veins and the tone of
-//! single tiles, is not: fitted graphs leave it out.
+//! Twelve periodic graphs are fitted, which `periods` lists. Others, such as planks and parquet, are not. Neither is what
+//! is random, such as grain, veins and the tone of single tiles: fitted graphs leave it out.
 
 pub mod choose;
 mod colors;

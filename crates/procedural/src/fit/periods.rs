@@ -9,7 +9,7 @@ pub(super) enum Layout {
     Axes { u: &'static str, v: &'static str, periods: f64, shift: Option<&'static str> },
 }
 
-/// The layout of a built-in graph; `None` for those that are not periodic.
+/// The layout of a built-in graph; `None` for those that are not fitted.
 pub(super) fn layout(graph: &str) -> Option<Layout> {
     let similar = |length, whole| Some(Layout::Similar { length, whole });
     let axes = |u, v, periods| Some(Layout::Axes { u, v, periods, shift: None });

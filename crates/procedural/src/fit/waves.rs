@@ -6,13 +6,13 @@
 
 use std::f64::consts::TAU;
 
+use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
 
 use super::points::{Point, extent, median};
 use super::smooth::{log_grey, smooth_part};
 
-/// Fewer points have no waves that could be told from chance.
+/// Fewer points cannot distinguish a wave from chance.
 const LEAST_POINTS: usize = 50;
 
 /// A wave.
@@ -156,7 +156,8 @@ impl Grid {
         let length = width.max(height).max(1e-6);
         let pixel = median(points.iter().map(|point| point.footprint).collect());
         let wanted = 2.0 * length / pixel.max(1e-9);
-        let side = (wanted as usize).next_power_of_two().clamp(Self::SIDES[0], Self::SIDES[1]);
+        // The bound comes first: the next power of two of a great number does not exist.
+        let side = (wanted.min(Self::SIDES[1] as f64) as usize).next_power_of_two().max(Self::SIDES[0]);
         let least = |of: fn(&Point) -> f64| points.iter().map(of).fold(f64::MAX, f64::min);
         let origin = [least(|point| point.u), least(|point| point.v)];
         Self { origin, cell: 2.0 * length / side as f64, side, least_frequency: 1.5 / length }
@@ -190,16 +191,13 @@ impl Grid {
             cells[at(1) * side + at(0)] += weight * value;
         }
         let fft = FftPlanner::new().plan_fft_forward(side);
-        transform_rows(&mut cells, &*fft);
+        // Every row of the cells is transformed, then every column.
+        fft.process(&mut cells);
         transpose(&mut cells, side);
-        transform_rows(&mut cells, &*fft);
+        fft.process(&mut cells);
         transpose(&mut cells, side);
         cells.iter().map(|cell| cell.norm_sqr()).collect()
     }
-}
-
-fn transform_rows(cells: &mut [Complex<f64>], fft: &dyn Fft<f64>) {
-    fft.process(cells);
 }
 
 fn transpose(cells: &mut [Complex<f64>], side: usize) {
@@ -267,5 +265,18 @@ mod tests {
             point.albedo = [0.3 + 0.3 * crate::noise::cell::cell(i as f64 + 0.5, 9.5); 3];
         }
         assert!(waves(&noise, 4)[0].share < 0.05);
+    }
+
+    #[test]
+    fn grids_are_bounded_however_far_apart_the_points_are() {
+        let mut points = stripes(0.2, 10.0);
+        assert_eq!(Grid::around(&points).side, 512);
+        for far in [1e15, f64::MAX] {
+            points[0].u = far;
+            assert_eq!(Grid::around(&points).side, 512, "{far}");
+        }
+        // The twin: large pixels make a small grid.
+        points.iter_mut().for_each(|point| *point = Point { u: point.v, footprint: 1.0, ..*point });
+        assert_eq!(Grid::around(&points).side, 64);
     }
 }

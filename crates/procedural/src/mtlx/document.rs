@@ -52,13 +52,18 @@ impl Element {
     /// Reports child elements.
     pub(super) fn check_no_children(&self, findings: &mut Findings) {
         for child in &self.children {
-            child.report(findings, Code::UnknownElement, format!("expected no elements within <{}>", self.tag));
+            child.report(
+                findings,
+                Code::UnknownElement,
+                format!("expected no elements within <{}>", shortened(&self.tag)),
+            );
         }
     }
 }
 
 /// The root element; `None`, with findings, where the text is not XML or exceeds a limit.
 pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Element> {
+    check_crowding(text, limits, findings)?;
     let options = roxmltree::ParsingOptions { nodes_limit: limits.xml_nodes, ..Default::default() };
     let document = match roxmltree::Document::parse_with_options(text, options) {
         Ok(document) => document,
@@ -78,6 +83,31 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
             None
         }
     }
+}
+
+/// Refuses text on which the parser would take time that grows with the square of its length.
+fn check_crowding(text: &str, limits: &Limits, findings: &mut Findings) -> Option<()> {
+    if text.matches("xmlns").count() > limits.namespaces {
+        let message = format!("expected at most {} namespaces, found more", limits.namespaces);
+        findings.add(Code::Xml, 0, String::new(), message);
+        return None;
+    }
+    let mut line = 1;
+    // Values of attributes hold no `<`, so that a piece holds all attributes of an element.
+    for piece in text.split('<') {
+        if most_attributes(piece) > limits.attributes {
+            let message = format!("expected at most {} attributes of an element, found more", limits.attributes);
+            findings.add(Code::Xml, line, String::new(), message);
+            return None;
+        }
+        line += piece.matches('\n').count();
+    }
+    Some(())
+}
+
+/// An upper bound of the attributes in a piece of XML: equals signs before quotes.
+fn most_attributes(piece: &str) -> usize {
+    piece.split('=').skip(1).filter(|value| value.trim_start().starts_with(['"', '\''])).count()
 }
 
 /// The line of an error; 0 for a limit, which has none.

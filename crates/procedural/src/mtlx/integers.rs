@@ -18,7 +18,8 @@ pub(super) fn fault(
         Kind::Fractal2d => (f64::from(MOST_OCTAVES), true),
         Kind::WorleyNoise2d => (1.0, true),
         Kind::Extract => (signature.inputs[0].kind.width() as f64 - 1.0, false),
-        Kind::Texcoord => (1.0, false),
+        // Only the first set of texture coordinates is evaluated.
+        Kind::Texcoord => (0.0, false),
         _ => return None,
     };
     let (least_found, most_found) = match source {
@@ -28,7 +29,12 @@ pub(super) fn fault(
         Source::Parameter(_) | Source::Node { .. } => return Some(format!("{input}: expected a constant")),
     };
     let fits = least_found >= 0.0 && most_found <= most;
-    (!fits).then(|| format!("{input}: expected 0 to {most}, found {least_found} to {most_found}"))
+    (!fits).then(|| format!("{input}: expected {}, found {}", span(0.0, most), span(least_found, most_found)))
+}
+
+/// A range in words; one number where the ends are the same.
+fn span(least: f64, most: f64) -> String {
+    if least == most { least.to_string() } else { format!("{least} to {most}") }
 }
 
 /// The range of a parameter; without end where none is given.

@@ -1,6 +1,8 @@
 //! The material that a graph feeds in programs that read `.mtlx`: a `standard_surface` whose inputs are the graph's
 //! outputs. It is checked, since other inputs would change the look without changing what is evaluated here.
 
+use std::collections::BTreeSet;
+
 use super::document::Element;
 use crate::finding::{Code, Findings};
 use crate::graph::Output;
@@ -16,10 +18,12 @@ pub(super) fn surface_input(output: Output) -> &'static str {
 
 /// Reports shaders and materials that show anything but the graph's outputs.
 pub(super) fn check(root: &Element, graph: &str, findings: &mut Findings) {
+    let surfaces = root.children.iter().filter(|child| child.tag == "standard_surface");
+    let surfaces: BTreeSet<&str> = surfaces.map(Element::name).collect();
     for element in &root.children {
         match element.tag.as_str() {
             "standard_surface" => check_surface(element, graph, findings),
-            "surfacematerial" => check_material(element, root, findings),
+            "surfacematerial" => check_material(element, &surfaces, findings),
             _ => {}
         }
     }
@@ -46,14 +50,13 @@ fn check_surface(surface: &Element, graph: &str, findings: &mut Findings) {
     }
 }
 
-fn check_material(material: &Element, root: &Element, findings: &mut Findings) {
+fn check_material(material: &Element, surfaces: &BTreeSet<&str>, findings: &mut Findings) {
     material.check_attributes(&["name", "type", "doc", "xpos", "ypos"], findings);
     for input in &material.children {
         input.check_no_children(findings);
         input.check_attributes(&["name", "type", "nodename"], findings);
         let surface = input.attribute("nodename").unwrap_or("");
-        let exists = root.children.iter().any(|child| child.tag == "standard_surface" && child.name() == surface);
-        if input.tag != "input" || input.name() != "surfaceshader" || !exists {
+        if input.tag != "input" || input.name() != "surfaceshader" || !surfaces.contains(surface) {
             let message = "expected the input surfaceshader, connected to a standard_surface".to_owned();
             input.report(findings, Code::Connection, message);
         }

@@ -1,6 +1,6 @@
 //! The nodes and outputs of a graph: their types, inputs and connections.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::Element;
 use super::integers;
@@ -94,13 +94,16 @@ fn typed_name(input: &Element, name: &str) -> String {
 /// The inputs that matter. Reports other child elements, and inputs of one name.
 fn wanted_inputs<'a>(element: &'a Element, kind: Kind, findings: &mut Findings) -> Vec<(&'a Element, &'a str)> {
     let mut inputs: Vec<(&Element, &str)> = Vec::new();
+    let mut seen = BTreeSet::new();
     for child in &element.children {
         let name = child.name();
         if child.tag != "input" {
             child.report(findings, Code::UnknownElement, "expected <input>".to_owned());
-        } else if inputs.iter().any(|(_, other)| *other == name) {
+        } else if is_ignored_input(kind, name) {
+            continue;
+        } else if !seen.insert(name) {
             child.report(findings, Code::DuplicateName, format!("{} has this input twice", element.place()));
-        } else if !is_ignored_input(kind, name) {
+        } else {
             inputs.push((child, name));
         }
     }

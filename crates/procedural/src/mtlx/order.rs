@@ -1,6 +1,6 @@
 //! Nodes in an order in which each follows those that it depends on.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::document::Element;
 use crate::finding::{Code, Findings};
@@ -78,9 +78,10 @@ fn report_cycles(
         }
     }
     let outside: BTreeSet<usize> = before.iter().copied().chain(peel(&reversed)).collect();
+    // The first element of each name.
+    let named: BTreeMap<&str, &Element> = graph.children.iter().rev().map(|child| (child.name(), child)).collect();
     for (_, node) in nodes.iter().enumerate().filter(|(at, _)| !outside.contains(at)) {
-        let element = graph.children.iter().find(|child| child.name() == node.name);
-        let element = element.unwrap_or(graph);
+        let element = named.get(node.name.as_str()).copied().unwrap_or(graph);
         element.report(findings, Code::Cycle, "this node depends on itself".to_owned());
     }
 }

@@ -19,14 +19,19 @@ pub fn read_file(path: &Path, limits: &Limits) -> Result<Graph, ProceduralError>
     let mut bytes = Vec::new();
     file.take(limits.bytes as u64 + 1).read_to_end(&mut bytes).map_err(io)?;
     let name = path.display().to_string();
+    if bytes.len() > limits.bytes {
+        return Err(refused(name, format!("expected at most {} bytes, found more", limits.bytes)));
+    }
     match String::from_utf8(bytes) {
         Ok(text) => read_text(&name, &text, limits),
-        Err(_) => {
-            let message = "expected UTF-8 text".to_owned();
-            let finding = Finding { line: 0, element: String::new(), code: Code::Xml, message };
-            Err(ProceduralError::Invalid { name, findings: vec![finding] })
-        }
+        Err(_) => Err(refused(name, "expected UTF-8 text".to_owned())),
     }
+}
+
+/// The error about a file that is refused as a whole.
+fn refused(name: String, message: String) -> ProceduralError {
+    let finding = Finding { line: 0, element: String::new(), code: Code::Xml, message };
+    ProceduralError::Invalid { name, findings: vec![finding] }
 }
 
 /// Reads the text of a file called `name`. Fails with everything that is wrong with it.
@@ -52,13 +57,17 @@ fn read(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Graph> {
     check_names(&root, findings);
     check_names(element, findings);
     let interface = interface_of(&root, element, findings);
+    if !std::ptr::eq(interface, element) {
+        check_names(interface, findings);
+        check_nodedef(interface, element, findings);
+    }
 
     let parameters = parameters::read(interface, limits, findings);
     let (nodes, outputs) = nodes::read(element, &parameters, limits, findings);
     material::check(&root, element.name(), findings);
     let (nodes, outputs) = order::sorted(nodes, outputs, element, findings)?;
     let name = element.name();
-    let name = name.strip_prefix("NG_").unwrap_or(name).to_owned();
+    let name = name.strip_prefix("NG_").filter(|rest| !rest.is_empty()).unwrap_or(name).to_owned();
     Some(Graph { name, doc: element.attribute("doc").map(str::to_owned), parameters, nodes, outputs })
 }
 
@@ -117,6 +126,28 @@ fn interface_of<'a>(root: &'a Element, graph: &'a Element, findings: &mut Findin
         graph.report(findings, Code::Connection, message);
     }
     found
+}
+
+/// The writer puts the inputs of a nodedef beside the nodes and outputs of its graph, so that their names must differ.
+/// Also reports inputs of the graph itself, and children of the nodedef that are neither inputs nor outputs.
+fn check_nodedef(nodedef: &Element, graph: &Element, findings: &mut Findings) {
+    let mut used = BTreeSet::new();
+    for child in &graph.children {
+        if child.tag == "input" {
+            let message = format!("expected the inputs within {}", nodedef.place());
+            child.report(findings, Code::UnknownElement, message);
+        } else {
+            used.insert(child.name());
+        }
+    }
+    for child in &nodedef.children {
+        if child.tag != "input" && child.tag != "output" {
+            child.report(findings, Code::UnknownElement, "expected <input> or <output>".to_owned());
+        } else if child.tag == "input" && used.contains(child.name()) {
+            let message = format!("another element within {} has this name", graph.place());
+            child.report(findings, Code::DuplicateName, message);
+        }
+    }
 }
 
 /// Names are made of letters, digits and underscores, and those of one parent differ.

@@ -44,13 +44,8 @@ impl Program {
     }
 
     /// The number of instructions.
-    pub fn len(&self) -> usize {
+    pub fn instruction_count(&self) -> usize {
         self.ops.len()
-    }
-
-    /// Whether there are no instructions, which is never so.
-    pub fn is_empty(&self) -> bool {
-        self.ops.is_empty()
     }
 }
 

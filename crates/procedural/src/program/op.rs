@@ -123,12 +123,12 @@ impl Op {
     }
 
     /// Whether the result depends on the point itself, not only through its operands.
-    pub fn is_of_the_point(&self) -> bool {
+    pub fn reads_the_point(&self) -> bool {
         matches!(self, Self::PlaceU | Self::PlaceV | Self::Footprint)
     }
 
     /// Whether the result is constant but for jumps, so that its derivatives are zero.
-    pub fn is_constant_by_parts(&self) -> bool {
+    pub fn is_piecewise_constant(&self) -> bool {
         matches!(self, Self::Cell(_) | Self::Unary(Unary::Sign | Unary::Floor | Unary::Ceil | Unary::Round, _))
     }
 }

@@ -147,10 +147,7 @@ fn selectors_are_whole_numbers_in_range() {
     };
     assert_eq!(findings(&octaves(r#"interfacename="n""#)), [""; 0]);
     let too_many = octaves(r#"value="1000000000""#);
-    assert_eq!(
-        findings(&too_many),
-        ["line 5: fractal2d 'f': octaves: expected 0 to 16, found 1000000000 to 1000000000 [value]"]
-    );
+    assert_eq!(findings(&too_many), ["line 5: fractal2d 'f': octaves: expected 0 to 16, found 1000000000 [value]"]);
     let unbounded = octaves(r#"interfacename="n""#).replace(r#" uimax="6""#, "");
     assert_eq!(findings(&unbounded), ["line 5: fractal2d 'f': octaves: expected 0 to 16, found 1 to inf [value]"]);
 
@@ -163,8 +160,71 @@ fn selectors_are_whole_numbers_in_range() {
         findings(&text("", &nodes, "c"))
     };
     assert_eq!(extract(1), [""; 0]);
-    assert_eq!(extract(2), ["line 5: extract 'e': index: expected 0 to 1, found 2 to 2 [value]"]);
+    assert_eq!(extract(2), ["line 5: extract 'e': index: expected 0 to 1, found 2 [value]"]);
     assert_eq!(extract(-1).len(), 1);
+}
+
+/// Only the first set of texture coordinates is evaluated.
+#[test]
+fn other_texture_coordinates_are_refused() {
+    let good = text(
+        "",
+        r#"<texcoord name="uv" type="vector2"><input name="index" type="integer" value="0" /></texcoord>
+           <convert name="c" type="color3"><input name="in" type="vector2" nodename="uv" /></convert>"#,
+        "c",
+    );
+    refused(&good, r#"value="0""#, r#"value="1""#, "line 5: texcoord 'uv': index: expected 0, found 1 [value]");
+}
+
+/// The inputs of a nodedef become parameters of the graph, and are written as such.
+#[test]
+fn inputs_of_a_nodedef_are_checked() {
+    let node = r#"<dot name="d" type="color3"><input name="in" type="color3" interfacename="tint" /></dot>"#;
+    let nodedef = concat!(
+        r#"<nodedef name="ND_test"><input name="tint" type="color3" value="1, 1, 1" />"#,
+        r#"<input name="size" type="float" value="1" /><output name="roughness" type="float" /></nodedef>"#,
+        "\n  <nodegraph nodedef='ND_test'"
+    );
+    let good = text("", node, "d").replace("<nodegraph", nodedef);
+    let size = r#"<input name="size""#;
+    let names = "expected a name made of letters, digits and underscores [attribute]";
+    let cases = [
+        (size, "<input", format!("line 3: <input>: {names}")),
+        (size, "<input name='a\"b'", format!("line 3: input 'a\"b': {names}")),
+        (
+            size,
+            r#"<input name="tint""#,
+            "line 3: input 'tint': another element within nodedef 'ND_test' has this name [duplicate_name]".to_owned(),
+        ),
+        (
+            size,
+            r#"<input name="half""#,
+            "line 3: input 'half': another element within nodegraph 'NG_test' has this name [duplicate_name]"
+                .to_owned(),
+        ),
+        (
+            r#"<dot name="d""#,
+            r#"<input name="x" type="float" value="1" /><dot name="d""#,
+            "line 6: input 'x': expected the inputs within nodedef 'ND_test' [unknown_element]".to_owned(),
+        ),
+        (
+            "<output",
+            r#"<dot name="x" /><output"#,
+            "line 3: dot 'x': expected <input> or <output> [unknown_element]".to_owned(),
+        ),
+    ];
+    for (from, to, finding) in cases {
+        refused(&good, from, to, &finding);
+    }
+}
+
+/// The prefix of graphs is cut off names, but not from one that is nothing else.
+#[test]
+fn no_graph_has_an_empty_name() {
+    let graph = read(&text("", GREY, "grey").replace("NG_test", "NG_")).unwrap();
+    assert_eq!(graph.name, "NG_");
+    assert_eq!(read(&mateval_procedural::mtlx::to_text(&graph)).unwrap(), graph);
+    assert_eq!(read(&text("", GREY, "grey")).unwrap().name, "test");
 }
 
 /// A shader that would show something else than what is evaluated is refused.
@@ -214,6 +274,62 @@ fn a_million_nodes_and_great_depth_are_refused_early() {
     assert_eq!(found, ["line 5: expected elements nested at most 8 deep, found deeper ones [xml]"]);
     let long = format!("<!--{}-->", "x".repeat(5 << 20));
     assert!(findings(&long)[0].contains("expected at most 4194304 bytes"));
+}
+
+/// Text on which a parser would take minutes.
+#[test]
+fn crowds_of_attributes_and_namespaces_are_refused_early() {
+    let start = std::time::Instant::now();
+    let attributes = |count: usize| (0..count).map(|at| format!(" a{at} =\n'>'")).collect::<String>();
+    let crowd = |count: usize| text("", &format!("{GREY}<dot{} />", attributes(count)), "grey");
+    let refusal = ["line 5: expected at most 64 attributes of an element, found more [xml]"];
+    assert_eq!(findings(&crowd(300_000)), refusal);
+    assert_eq!(findings(&crowd(65)), refusal);
+    let spaces: String = (0..60_000).map(|at| format!("<a xmlns:b{at}=''>")).collect();
+    assert_eq!(
+        findings(&text("", &format!("{GREY}{spaces}"), "grey")),
+        ["expected at most 16 namespaces, found more [xml]"]
+    );
+    // Names that are compared with all others.
+    let inputs: String = (0..60_000).map(|at| format!("<input name='i{at}'/>")).collect();
+    assert!(findings(&text("", &format!("{GREY}<dot name='d' type='float'>{inputs}</dot>"), "grey")).len() > 200);
+    let surfaces = "<standard_surface name='s'/>".repeat(30_000);
+    let uses = "<input nodename='t'/>".repeat(30_000);
+    let shown = format!("{surfaces}<surfacematerial name='m'>{uses}</surfacematerial></materialx>");
+    assert!(findings(&text("", GREY, "grey").replace("</materialx>", &shown)).len() > 200);
+    assert!(start.elapsed().as_secs() < 20, "{:?}", start.elapsed());
+    // The twins: 64 attributes are parsed, and equals signs elsewhere are none.
+    assert!(
+        findings(&crowd(64))
+            .iter()
+            .all(|found| found.contains("[attribute]") || found.contains("'dot'") || found.contains("<dot>"))
+    );
+    assert_eq!(findings(&text("", &format!("<!--{}-->{GREY}", "=".repeat(100)), "grey")), [""; 0]);
+}
+
+#[test]
+fn long_tags_are_cut_in_messages() {
+    let tag = "x".repeat(100_000);
+    let node = format!("<constant name='grey' type='color3'/><{tag}><input><{tag}/></input></{tag}>");
+    let node =
+        node + &format!("<dot name='d' type='float'><input name='in' type='float' value='1'><{tag}/></input></dot>");
+    let surface = format!("<standard_surface name='SR'><{tag}><{tag}/></{tag}></standard_surface></materialx>");
+    let found = findings(&text("", &node, "grey").replace("</materialx>", &surface));
+    assert!(found.len() >= 4, "{found:?}");
+    assert!(found.iter().all(|found| found.len() < 300), "{found:?}");
+}
+
+#[test]
+fn long_files_are_refused_whatever_they_hold() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let refusal = |bytes: &[u8]| {
+        std::fs::write(file.path(), bytes).unwrap();
+        mateval_procedural::mtlx::read_file(file.path(), &Limits::default()).unwrap_err().to_string()
+    };
+    // A letter of two bytes is cut at the limit.
+    let long = refusal(format!("a{}", "ä".repeat(3 << 20)).as_bytes());
+    assert!(long.ends_with("1 finding: expected at most 4194304 bytes, found more [xml]"), "{long}");
+    assert!(refusal(b"<materialx a='\xff'>").contains("expected UTF-8 text"));
 }
 
 /// More faults than anyone reads are counted.

@@ -82,10 +82,14 @@ fn point(evaluator: &Evaluator, places: &Points, lane: usize, number: usize, sid
     Point { u, v, footprint: places.footprint[lane], albedo, weight: 1.0 }
 }
 
-fn number(graph: &Graph, settings: &Settings, name: &str) -> f64 {
+/// The first slot of a parameter.
+fn slot(graph: &Graph, name: &str) -> usize {
     let parameter = graph.parameter(name).unwrap();
-    let first: usize = graph.parameters[..parameter].iter().map(|p| p.value.numbers().len()).sum();
-    settings.numbers()[first]
+    graph.parameters[..parameter].iter().map(|p| p.value.numbers().len()).sum()
+}
+
+fn number(graph: &Graph, settings: &Settings, name: &str) -> f64 {
+    settings.numbers()[slot(graph, name)]
 }
 
 /// The greatest relative error of the periods. A pattern that is turned by a quarter has them in the other order.
@@ -151,7 +155,8 @@ fn outcome(fitter: &Fitter, (name, periods, set, side): Planted) -> Outcome {
     // The twin: the same fit, shifted by a third of the shortest period.
     let mut shifted = fit.chosen.clone();
     let shortest = periods.iter().map(|name| number(&graph, &settings, name)).fold(f64::MAX, f64::min);
-    *shifted.settings.number_mut(1) += shortest / 3.0;
+    let chosen = entry(fit.chosen.graph).unwrap().graph().unwrap();
+    *shifted.settings.number_mut(slot(&chosen, "t_u")) += shortest / 3.0;
     assert!(psnr(&graph, &settings, &shifted, side) < found - 6.0, "{name}");
     let (psnr, graph) = (found, fit.chosen.graph);
     eprintln!("{name}: {graph}, {psnr:.1} dB, period off by {:.2} %, turn by {turn:.2} degrees", 100.0 * period);

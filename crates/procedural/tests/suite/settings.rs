@@ -4,6 +4,8 @@ use mateval_procedural::Settings;
 use mateval_procedural::library::entry;
 use mateval_procedural::settings::slots;
 
+use super::graphs::{read, text};
+
 #[test]
 fn parameters_are_set_by_name() {
     let graph = entry("brick").unwrap().graph().unwrap();
@@ -29,4 +31,24 @@ fn wrong_names_and_values_are_refused() {
     assert!(refusal("width", "nan").contains("expected a finite number"));
     assert!(refusal("footprint", "0.1").contains("it is the extent of a pixel at every point"));
     assert_eq!(settings, before);
+}
+
+/// A range may have one end only.
+#[test]
+fn ranges_are_named_by_the_ends_that_they_have() {
+    let grey = r#"<constant name="grey" type="color3" />"#;
+    let refusal = |range: &str, value: &str| {
+        let graph =
+            read(&text(&format!(r#"<input name="a" type="float" value="0.5" {range} />"#), grey, "grey")).unwrap();
+        Settings::defaults(&graph).set(&graph, "a", value).err().map(|error| error.to_string())
+    };
+    for (range, value, expected) in [
+        (r#"uimin="0""#, "-1", "at least 0"),
+        (r#"uimax="1""#, "2", "at most 1"),
+        (r#"uimin="0" uimax="1""#, "2", "0 to 1"),
+    ] {
+        let message = format!("parameter 'a' of 'test': expected {expected}, found {value}");
+        assert_eq!(refusal(range, value), Some(message));
+        assert_eq!(refusal("", value), None);
+    }
 }
