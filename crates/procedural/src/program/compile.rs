@@ -42,11 +42,6 @@ impl Program {
             outputs: outputs.try_into().expect("a checked graph has outputs of three, one and one components"),
         }
     }
-
-    /// The number of instructions.
-    pub fn instruction_count(&self) -> usize {
-        self.ops.len()
-    }
 }
 
 /// Which nodes the outputs depend on.
