@@ -16,13 +16,7 @@ if ! [ -d "$data/3d-front" ]; then
 fi
 
 venv=target/peers_score
-requirements=tests/peers/requirements_score.txt
-if ! cmp -s "$requirements" "$venv/requirements.txt"; then
-    rm -rf "$venv"
-    python3.11 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
-    cp "$requirements" "$venv/requirements.txt"
-fi
+tools/venv.sh python3.11 "$venv" tests/peers/requirements_score.txt
 
 rooms=target/whole_room
 recipe=crates/eval/benches/whole_room/recipe.toml

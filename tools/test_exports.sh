@@ -6,12 +6,6 @@ cd "$(dirname "$0")/.."
 tools/apt_install.sh python3-venv
 
 venv=target/exports
-requirements=crates/export/tests/readers/requirements.txt
-if ! cmp -s "$requirements" "$venv/requirements.txt"; then
-    rm -rf "$venv"
-    python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
-    cp "$requirements" "$venv/requirements.txt"
-fi
+tools/venv.sh python3 "$venv" crates/export/tests/readers/requirements.txt
 
 MATEVAL_EXPORT_PYTHON="$PWD/$venv/bin/python" cargo test -p mateval-export --test readers -- --show-output "$@"

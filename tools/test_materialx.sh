@@ -9,13 +9,7 @@ tools/setup.sh
 tools/apt_install.sh python3-venv
 
 venv=target/materialx
-requirements=crates/procedural/tests/peers/requirements.txt
-if ! cmp -s "$requirements" "$venv/requirements.txt"; then
-    rm -rf "$venv"
-    python3.11 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
-    cp "$requirements" "$venv/requirements.txt"
-fi
+tools/venv.sh python3.11 "$venv" crates/procedural/tests/peers/requirements.txt
 
 cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
 MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_MATERIALX_PYTHON="$PWD/$venv/bin/python" cargo test -p mateval-procedural --test peers -- --show-output "$@"

@@ -9,13 +9,7 @@ tools/setup.sh
 tools/apt_install.sh libatomic1 libllvm19 python3-venv
 
 venv=target/peers
-requirements=tests/peers/requirements.txt
-if ! cmp -s "$requirements" "$venv/requirements.txt"; then
-    rm -rf "$venv"
-    python3.11 -m venv "$venv"
-    "$venv/bin/pip" install --quiet --disable-pip-version-check -r "$requirements"
-    cp "$requirements" "$venv/requirements.txt"
-fi
+tools/venv.sh python3.11 "$venv" tests/peers/requirements.txt
 
 cache="${MATEVAL_CACHE:-${XDG_CACHE_HOME:-$HOME/.cache}/mateval}"
 MATEVAL_PEERS_BLENDER="$cache/blender/bin/python" MATEVAL_PEERS_PYTHON="$PWD/$venv/bin/python" cargo test --workspace --test peers -- --show-output "$@"

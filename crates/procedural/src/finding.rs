@@ -60,10 +60,10 @@ impl Serialize for Code {
 /// One fault. Findings sort by line, element, code and message.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub struct Finding {
-    /// The line, from 1; 0 where the fault concerns the whole file.
-    pub line: usize,
-    /// The element, as in `noise2d 'grain'`; empty where the fault concerns the whole file.
-    pub element: String,
+    /// The line, from 1; none where the fault concerns the whole file.
+    pub line: Option<usize>,
+    /// The element, as in `noise2d 'grain'`; none where the fault concerns no element.
+    pub element: Option<String>,
     /// The kind of fault.
     pub code: Code,
     /// What was expected and what was found.
@@ -72,11 +72,11 @@ pub struct Finding {
 
 impl std::fmt::Display for Finding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.line > 0 {
-            write!(f, "line {}: ", self.line)?;
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
         }
-        if !self.element.is_empty() {
-            write!(f, "{}: ", self.element)?;
+        if let Some(element) = &self.element {
+            write!(f, "{element}: ")?;
         }
         write!(f, "{} [{}]", self.message, self.code.word())
     }
@@ -97,7 +97,7 @@ impl Findings {
     }
 
     /// Adds a finding, or counts it where there are too many.
-    pub(crate) fn add(&mut self, code: Code, line: usize, element: String, message: String) {
+    pub(crate) fn add(&mut self, code: Code, line: Option<usize>, element: Option<String>, message: String) {
         if self.found.len() < self.most {
             self.found.push(Finding { line, element, code, message });
         } else {
@@ -115,7 +115,7 @@ impl Findings {
         self.found.sort();
         if self.more > 0 {
             let message = format!("{} more findings are not listed", self.more);
-            self.found.push(Finding { line: 0, element: String::new(), code: Code::TooMany, message });
+            self.found.push(Finding { line: None, element: None, code: Code::TooMany, message });
         }
         self.found
     }

@@ -22,6 +22,13 @@ pub struct Slot {
     pub most: Option<f64>,
 }
 
+impl Slot {
+    /// The number of its range that is nearest to this one.
+    pub(crate) fn clamped(&self, number: f64) -> f64 {
+        number.max(self.least.unwrap_or(number)).min(self.most.unwrap_or(f64::INFINITY))
+    }
+}
+
 /// The scalars of all parameters, in the order of the settings' numbers.
 pub fn slots(graph: &Graph) -> Vec<Slot> {
     let of = |(at, parameter): (usize, &crate::graph::Parameter)| {
@@ -72,11 +79,10 @@ impl Settings {
         let parameter = &graph.parameters[at];
         let bad = |reason| ProceduralError::BadValue { graph: graph.name.clone(), name: name.to_owned(), reason };
         let value = Value::parse(parameter.value.kind(), text).map_err(bad)?;
-        let end = |end: &Option<Value>, component: usize| end.map(|end| end.numbers()[component]);
-        for (component, &found) in value.numbers().iter().enumerate() {
-            let (least, most) = (end(&parameter.least, component), end(&parameter.most, component));
-            if least.is_some_and(|least| found < least) || most.is_some_and(|most| found > most) {
-                let (graph, name) = (graph.name.clone(), name.to_owned());
+        let slots = slots(graph);
+        for (slot, &found) in slots.iter().filter(|slot| slot.parameter == at).zip(value.numbers()) {
+            if slot.clamped(found) != found {
+                let (graph, name, least, most) = (graph.name.clone(), name.to_owned(), slot.least, slot.most);
                 return Err(ProceduralError::OutOfRange { graph, name, least, most, found });
             }
         }

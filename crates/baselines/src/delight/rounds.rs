@@ -21,6 +21,7 @@ use crate::geometry::SceneGeometry;
 
 /// The change of a part's colour below which it is settled.
 const SETTLED: f32 = 0.01;
+
 /// De-lights the photo of a scene. Fails where the public files of the scene or its photo cannot be read. The bytes are
 /// the same on any number of threads.
 pub fn delight(

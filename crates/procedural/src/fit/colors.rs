@@ -37,12 +37,17 @@ pub(super) fn project(model: &Model, settings: &mut Settings, points: &[Point]) 
     mean_square(model, settings, points)
 }
 
-/// The weighted mean square of the difference between model and points.
+/// The weighted mean square of the differences between model and points.
 pub(super) fn mean_square(model: &Model, settings: &Settings, points: &[Point]) -> f64 {
+    mean_loss(model, settings, points, |difference| difference * difference)
+}
+
+/// The weighted mean of a loss of the differences between model and points.
+pub(super) fn mean_loss(model: &Model, settings: &Settings, points: &[Point], loss: fn(f64) -> f64) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for (point, shown) in points.iter().zip(model.shown(settings, points)) {
-        let square: f64 = point.albedo.iter().zip(shown.albedo).map(|(a, b)| (a - b) * (a - b)).sum();
-        sum += point.weight * square / 3.0;
+        let of_channels: f64 = point.albedo.iter().zip(shown.albedo).map(|(a, b)| loss(a - b)).sum();
+        sum += point.weight * of_channels / 3.0;
         total += point.weight;
     }
     sum / total

@@ -1,5 +1,6 @@
 //! Levenberg-Marquardt steps of a graph's shape and colours together, with Huber's loss.
 
+use super::colors::mean_loss;
 use super::model::Model;
 use super::points::Point;
 use super::system::Normal;
@@ -12,14 +13,14 @@ const HUBER: f64 = 0.15;
 pub(super) fn polish(model: &Model, settings: &mut Settings, points: &[Point], steps: usize) {
     let colors = model.colors.iter().flat_map(|first| (0..3).map(move |channel| first + channel));
     let chosen: Vec<usize> = model.shape.iter().copied().chain(colors).collect();
-    let (mut damping, mut error) = (1e-3, mean_loss(model, settings, points));
+    let (mut damping, mut error) = (1e-3, mean_loss(model, settings, points, huber));
     for _ in 0..steps {
         let normal = equations(model, settings, &chosen, points);
         let before = error;
         for _ in 0..5 {
             let Some(step) = normal.solve(|_, diagonal| damping * diagonal + 1e-9) else { return };
             let tried = stepped(model, settings, &chosen, &step);
-            let found = mean_loss(model, &tried, points);
+            let found = mean_loss(model, &tried, points, huber);
             if found < error {
                 (*settings, error) = (tried, found);
                 damping = (damping / 5.0).max(1e-8);
@@ -31,17 +32,6 @@ pub(super) fn polish(model: &Model, settings: &mut Settings, points: &[Point], s
             return;
         }
     }
-}
-
-/// The weighted mean of Huber's loss of the differences between model and points, without its factor of a half.
-fn mean_loss(model: &Model, settings: &Settings, points: &[Point]) -> f64 {
-    let (mut sum, mut total) = (0.0, 0.0);
-    for (point, shown) in points.iter().zip(model.shown(settings, points)) {
-        let loss: f64 = point.albedo.iter().zip(shown.albedo).map(|(a, b)| huber(a - b)).sum();
-        sum += point.weight * loss / 3.0;
-        total += point.weight;
-    }
-    sum / total
 }
 
 /// Twice Huber's loss: the square of small differences; linear in large ones, with the same slope where they meet.
@@ -63,9 +53,8 @@ fn equations(model: &Model, settings: &Settings, chosen: &[usize], points: &[Poi
 fn stepped(model: &Model, settings: &Settings, chosen: &[usize], step: &[f64]) -> Settings {
     let mut tried = settings.clone();
     for (&at, step) in chosen.iter().zip(step) {
-        let slot = &model.slots[at];
         let number = tried.number_mut(at);
-        *number = (*number + step).clamp(slot.least.unwrap_or(f64::MIN), slot.most.unwrap_or(f64::MAX));
+        *number = model.slots[at].clamped(*number + step);
     }
     tried
 }

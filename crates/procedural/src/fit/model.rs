@@ -8,23 +8,11 @@ use crate::program::compile::Program;
 use crate::settings::{Settings, Slot, slots};
 use crate::value::Type;
 
-/// Parameters of what is random, whose phase cannot be fitted, and of what a colour does not show. They are not fitted;
-/// an amplitude among them is set to its least value.
-const NOT_FITTED: [&str; 10] = [
-    "tone",
-    "grain",
-    "pile",
-    "clouds",
-    "edge_wear",
-    "depth_tone",
-    "ring_period",
-    "softness",
-    "surface_roughness",
-    FOOTPRINT,
-];
-
-/// The amplitudes of what is random.
+/// The amplitudes of what is random, whose phase cannot be fitted. They are set to their least values.
 const AMPLITUDES: [&str; 5] = ["tone", "grain", "pile", "clouds", "edge_wear"];
+
+/// Other parameters that are not fitted: what belongs to something random, or is not seen in a colour.
+const KEPT: [&str; 5] = ["depth_tone", "ring_period", "softness", "surface_roughness", FOOTPRINT];
 
 /// A graph with what is needed to fit it.
 pub(super) struct Model {
@@ -44,7 +32,8 @@ impl Model {
         let name = |slot: &Slot| graph.parameters[slot.parameter].name.as_str();
         let all = slots.iter().enumerate();
         let colors = all.clone().filter(|(_, slot)| kind(slot) == Type::Color3 && slot.component == 0);
-        let fitted = |slot: &Slot| !NOT_FITTED.contains(&name(slot)) || is_a_rib(&graph.name, name(slot));
+        let kept = |name: &str| AMPLITUDES.contains(&name) || KEPT.contains(&name);
+        let fitted = |slot: &Slot| !kept(name(slot)) || is_a_rib(&graph.name, name(slot));
         let shape = all.clone().filter(|(_, slot)| kind(slot) == Type::Float && fitted(slot));
         let (colors, shape) = (colors.map(|(at, _)| at).collect(), shape.map(|(at, _)| at).collect());
         Self { program: Program::new(&graph), graph, slots, colors, shape }
@@ -70,8 +59,7 @@ impl Model {
     /// Sets a parameter of one number, within its range.
     pub(super) fn set(&self, settings: &mut Settings, name: &str, number: f64) {
         if let Some(at) = self.slot(name) {
-            let slot = &self.slots[at];
-            *settings.number_mut(at) = number.clamp(slot.least.unwrap_or(f64::MIN), slot.most.unwrap_or(f64::MAX));
+            *settings.number_mut(at) = self.slots[at].clamped(number);
         }
     }
 

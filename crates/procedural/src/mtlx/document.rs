@@ -38,7 +38,7 @@ impl Element {
 
     /// Adds a finding about this element.
     pub(super) fn report(&self, findings: &mut Findings, code: Code, message: String) {
-        findings.add(code, self.line, self.place(), message);
+        findings.add(code, Some(self.line), Some(self.place()), message);
     }
 
     /// Reports every attribute that is not in `known`, since it might change what the element means.
@@ -69,7 +69,7 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
         Ok(document) => document,
         Err(reason) => {
             let line = line_of(&reason);
-            findings.add(Code::Xml, line, String::new(), format!("expected XML without a DTD: {}", explained(&reason)));
+            findings.add(Code::Xml, line, None, format!("expected XML without a DTD: {}", explained(&reason)));
             return None;
         }
     };
@@ -79,7 +79,7 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
         Ok(root) => Some(root),
         Err(line) => {
             let message = format!("expected elements nested at most {} deep, found deeper ones", limits.xml_depth);
-            findings.add(Code::Xml, line, String::new(), message);
+            findings.add(Code::Xml, Some(line), None, message);
             None
         }
     }
@@ -89,7 +89,7 @@ pub(super) fn parse(text: &str, limits: &Limits, findings: &mut Findings) -> Opt
 fn check_crowding(text: &str, limits: &Limits, findings: &mut Findings) -> Option<()> {
     if text.matches("xmlns").count() > limits.namespaces {
         let message = format!("expected at most {} namespaces, found more", limits.namespaces);
-        findings.add(Code::Xml, 0, String::new(), message);
+        findings.add(Code::Xml, None, None, message);
         return None;
     }
     let mut line = 1;
@@ -97,7 +97,7 @@ fn check_crowding(text: &str, limits: &Limits, findings: &mut Findings) -> Optio
     for piece in text.split('<') {
         if most_attributes(piece) > limits.attributes {
             let message = format!("expected at most {} attributes of an element, found more", limits.attributes);
-            findings.add(Code::Xml, line, String::new(), message);
+            findings.add(Code::Xml, Some(line), None, message);
             return None;
         }
         line += piece.matches('\n').count();
@@ -110,11 +110,11 @@ fn most_attributes(piece: &str) -> usize {
     piece.split('=').skip(1).filter(|value| value.trim_start().starts_with(['"', '\''])).count()
 }
 
-/// The line of an error; 0 for a limit, which has none.
-fn line_of(reason: &roxmltree::Error) -> usize {
+/// The line of an error; none for a limit.
+fn line_of(reason: &roxmltree::Error) -> Option<usize> {
     match reason {
-        roxmltree::Error::NodesLimitReached | roxmltree::Error::AttributesLimitReached => 0,
-        other => usize::try_from(other.pos().row).unwrap_or(0),
+        roxmltree::Error::NodesLimitReached | roxmltree::Error::AttributesLimitReached => None,
+        other => usize::try_from(other.pos().row).ok(),
     }
 }
 

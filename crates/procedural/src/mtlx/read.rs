@@ -30,7 +30,7 @@ pub fn read_file(path: &Path, limits: &Limits) -> Result<Graph, ProceduralError>
 
 /// The error about a file that is refused as a whole.
 fn refused(name: String, message: String) -> ProceduralError {
-    let finding = Finding { line: 0, element: String::new(), code: Code::Xml, message };
+    let finding = Finding { line: None, element: None, code: Code::Xml, message };
     ProceduralError::Invalid { name, findings: vec![finding] }
 }
 
@@ -48,7 +48,7 @@ pub fn read_text(name: &str, text: &str, limits: &Limits) -> Result<Graph, Proce
 fn read(text: &str, limits: &Limits, findings: &mut Findings) -> Option<Graph> {
     if text.len() > limits.bytes {
         let message = format!("expected at most {} bytes, found {}", limits.bytes, text.len());
-        findings.add(Code::Xml, 0, String::new(), message);
+        findings.add(Code::Xml, None, None, message);
         return None;
     }
     let root = document::parse(text, limits, findings)?;

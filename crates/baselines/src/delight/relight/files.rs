@@ -5,7 +5,6 @@ use std::path::Path;
 
 use mateval_image::exr_io::{Precision, write_linear};
 use mateval_image::png_io::write_srgb;
-use mateval_image::{LinearRgb, Picture};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::WorkFolder;
@@ -122,13 +121,6 @@ fn section(scene: &SceneFile, relit: &RelitPhoto, delit: &DelitPictures, factors
         id: scene.id.to_string(),
         size: [relit.whole.width(), relit.whole.height()],
         lights: sliders.collect(),
-        rest: ScaledPicture::new(&sum(&relit.others, &relit.unknown), exposure),
+        rest: ScaledPicture::new(&relit.rest, exposure),
     }
-}
-
-fn sum(a: &Picture<LinearRgb>, b: &Picture<LinearRgb>) -> Picture<LinearRgb> {
-    Picture::from_fn(a.width(), a.height(), |x, y| {
-        let [a, b] = [a, b].map(|picture| picture.get(x, y).0);
-        LinearRgb([0, 1, 2].map(|c| a[c] + b[c]))
-    })
 }

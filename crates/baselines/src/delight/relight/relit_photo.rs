@@ -25,10 +25,9 @@ pub(super) struct LitPicture {
 pub(super) struct RelitPhoto {
     /// The lights that bring most to the valid pixels, as they were fitted; the strongest first.
     pub(super) strongest: Vec<LitPicture>,
-    /// The sum of the other lights, each times its factor.
-    pub(super) others: Picture<LinearRgb>,
-    /// Pixels that show neither a known surface nor the emission of a light, such as glass: the photo's.
-    pub(super) unknown: Picture<LinearRgb>,
+    /// The sum of the other lights, each times its factor; and the photo where a pixel shows neither a known surface nor
+    /// the emission of a light, such as glass.
+    pub(super) rest: Picture<LinearRgb>,
     /// The room with each light times its factor.
     pub(super) whole: Picture<LinearRgb>,
 }
@@ -57,14 +56,10 @@ pub(super) fn relight(
     };
     let alone = |light: usize| picture_of(&|other| f64::from(u8::from(other == light)));
     let others = picture_of(&|light| if strongest.contains(&light) { 0.0 } else { factors[light] })?;
-    let unknown = lit.unknown();
     let dimmed = picture_of(&|light| factors[light])?;
-    let whole = Picture::from_fn(unknown.width(), unknown.height(), |x, y| {
-        let [a, b] = [&dimmed, &unknown].map(|picture| picture.get(x, y).0);
-        LinearRgb([0, 1, 2].map(|c| a[c] + b[c]))
-    });
     let strongest = strongest.into_iter().map(|light| Ok(LitPicture { light, picture: alone(light)? }));
-    Ok(RelitPhoto { strongest: strongest.collect::<Result<_, BaselineError>>()?, others, unknown, whole })
+    let strongest = strongest.collect::<Result<_, BaselineError>>()?;
+    Ok(RelitPhoto { strongest, rest: lit.with_unknown(&others), whole: lit.with_unknown(&dimmed) })
 }
 
 /// Two independent halves of the room's light, each light at radiance 1. Nothing is read from the photo.
@@ -124,12 +119,12 @@ impl LitRoom<'_> {
         }))
     }
 
-    /// The photo where nothing else is known.
-    fn unknown(&self) -> Picture<LinearRgb> {
+    /// A picture of known pixels, completed by the photo.
+    fn with_unknown(&self, known: &Picture<LinearRgb>) -> Picture<LinearRgb> {
         let room = self.room;
-        Picture::from_fn(room.photo.width(), room.photo.height(), |x, y| {
+        Picture::from_fn(known.width(), known.height(), |x, y| {
             let is_known = room.valid.get(x, y) || room.emission.get(x, y).is_some();
-            if is_known { LinearRgb::default() } else { room.photo.get(x, y) }
+            if is_known { known.get(x, y) } else { room.photo.get(x, y) }
         })
     }
 }
