@@ -35,6 +35,7 @@ mod suite {
     mod partial;
     mod partial_board;
     mod planted;
+    mod procedural;
     mod publish;
     mod real_scenes;
     mod recentred;

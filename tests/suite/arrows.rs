@@ -17,7 +17,7 @@ pub const ARROWS: [(&str, &[&str]); 18] = [
     ("mateval-prep", &["sources", "sample", "scene", "image", "tracer"]),
     ("mateval-audit", &["prep", "scene", "image", "metrics", "tracer"]),
     ("mateval-export", &["scene", "image"]),
-    ("mateval-baselines", &["scene", "image", "tracer", "light"]),
+    ("mateval-baselines", &["scene", "image", "tracer", "light", "procedural"]),
     ("mateval-submission", &["scene", "image", "tracer"]),
     ("mateval-eval", &["submission", "light", "metrics", "tracer", "scene", "image"]),
     ("mateval-report", &["eval", "submission", "metrics", "scene", "image"]),

@@ -50,7 +50,7 @@ fn main() {
         let geometry = SceneGeometry::read(folder.clone(), scene).unwrap();
         let truth = read_linear(&folder.truth_view(&geometry.view.id).join("albedo.exr")).unwrap();
         println!("{}", scene.id);
-        let photo = EstimateSource::Input.read(&dataset, scene).unwrap().base_color.unwrap();
+        let photo = EstimateSource::Input.read(&dataset, scene, &|_| ()).unwrap().base_color.unwrap();
         line("photo", &photo, &truth, &geometry.valid, "");
         for (name, options) in &variants {
             let before = used().unwrap_or_default().as_secs_f64();

@@ -86,7 +86,7 @@ fn room(dataset: &Dataset, scene: &SceneFile) -> ([f64; 6], Option<Step>) {
     let folder = tempfile::tempdir().unwrap();
     let (geometry, estimate) = timed(&mut seconds[0], || {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene).unwrap();
-        (geometry, EstimateSource::Truth.read(dataset, scene).unwrap())
+        (geometry, EstimateSource::Truth.read(dataset, scene, &|_| ()).unwrap())
     });
     let (seen, points) = timed(&mut seconds[1], || {
         let seen = seen_pixels(&geometry, &estimate).unwrap();

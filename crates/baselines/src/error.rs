@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use mateval_procedural::ProceduralError;
+
 use crate::import::error::ImportError;
 
 /// Why a baseline could not be made.
@@ -26,6 +28,25 @@ pub enum BaselineError {
     /// `--force` would remove a folder that is no submission.
     #[error("'{}' exists and holds no submission.json, so it is not replaced; choose another --out", .0.display())]
     NotASubmission(PathBuf),
+    /// `--force` would remove a folder that is no report.
+    #[error("'{}' exists and holds no report.json, so it is not replaced; remove it, or choose another --out", .0.display())]
+    NotAReport(PathBuf),
+    /// A folder of graphs holds none, or too many.
+    #[error("'{}' holds {found} .mtlx files; expected 1 to {most}", folder.display())]
+    GraphCount {
+        /// The folder.
+        folder: PathBuf,
+        /// The number of its `.mtlx` files.
+        found: usize,
+        /// The largest number.
+        most: usize,
+    },
+    /// Graphs that cannot be used.
+    #[error("{}", lines(.0))]
+    BadGraphs(Vec<ProceduralError>),
+    /// Graphs could not be fitted.
+    #[error(transparent)]
+    Procedural(#[from] ProceduralError),
     /// A scene has no input view.
     #[error("'{}' has no view 'input'; run `mateval prep verify`", .0.display())]
     NoInputView(PathBuf),
@@ -203,6 +224,11 @@ fn best(residual_m: Option<f64>) -> String {
         Some(residual_m) => format!("the best leaves {residual_m:.4} m (root mean square)"),
         None => "no box has the right proportions".to_owned(),
     }
+}
+
+/// One line for each fault.
+fn lines(faults: &[ProceduralError]) -> String {
+    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
 fn list(paths: &[PathBuf]) -> String {

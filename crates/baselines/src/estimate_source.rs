@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use mateval_image::LinearRgb;
 use mateval_image::exr_io::{read_linear, read_scalar};
+use mateval_scene::Progress;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::open::Dataset;
@@ -12,7 +13,7 @@ use mateval_scene::stored_encoding::StoredEncoding;
 use mateval_scene::submission::Map;
 
 use crate::adapter::Adapter;
-use crate::delight::{DelightOptions, delight};
+use crate::delight::{CandidateLights, DelightOptions, delight};
 use crate::error::BaselineError;
 use crate::estimate::Estimate;
 use crate::geometry::{SceneGeometry, input_view};
@@ -25,8 +26,8 @@ pub enum EstimateSource {
     Truth,
     /// The input picture as base colour: the estimate of a method that does nothing.
     Input,
-    /// The input picture without its light, as [`crate::delight`] finds it.
-    Delight,
+    /// The input picture without its light, as [`crate::delight`] finds it with these lights.
+    Delight(CandidateLights),
     /// A method's pictures.
     Files {
         /// The folder that the adapter's paths are relative to.
@@ -42,7 +43,12 @@ impl EstimateSource {
         match self {
             Self::Truth => "the truth of the input view".to_owned(),
             Self::Input => "the input picture itself".to_owned(),
-            Self::Delight => "the input picture without its light (`mateval baseline delight`)".to_owned(),
+            Self::Delight(CandidateLights::Room) => {
+                "the input picture without its light (`mateval baseline delight`)".to_owned()
+            }
+            Self::Delight(CandidateLights::Stage) => {
+                "the input picture without its light (`mateval baseline delight --lights stage`)".to_owned()
+            }
             Self::Files { folder, adapter } => {
                 let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
                 let placement = match adapter.placement {
@@ -63,7 +69,7 @@ impl EstimateSource {
     /// The encodings that the adapter of a method's pictures assumes, because its authors do not state them.
     pub fn assumed_encodings(&self) -> BTreeMap<Map, StoredEncoding> {
         match self {
-            Self::Truth | Self::Input | Self::Delight => BTreeMap::new(),
+            Self::Truth | Self::Input | Self::Delight(_) => BTreeMap::new(),
             Self::Files { adapter, .. } => adapter.assumed_encodings(),
         }
     }
@@ -73,20 +79,27 @@ impl EstimateSource {
         match self {
             Self::Truth => "gt",
             Self::Input => "input",
-            Self::Delight => "delight",
+            Self::Delight(CandidateLights::Room) => "delight",
+            Self::Delight(CandidateLights::Stage) => "delight-stage",
             Self::Files { adapter, .. } => &adapter.name,
         }
     }
 
     /// Reads the estimate of one scene. Its pictures have one size, which need not be the view's.
-    pub fn read(&self, dataset: &Dataset, scene: &SceneFile) -> Result<Estimate, BaselineError> {
+    pub fn read(
+        &self,
+        dataset: &Dataset,
+        scene: &SceneFile,
+        progress: Progress<'_>,
+    ) -> Result<Estimate, BaselineError> {
         let folder = dataset.folder(&scene.id);
         match self {
             Self::Truth => truth(&folder, input_view(&folder, scene)?)?.of_one_size(folder.path(), scene.id.as_str()),
             Self::Input => photo(&folder, input_view(&folder, scene)?, scene.exposure as f32),
-            Self::Delight => {
+            Self::Delight(lights) => {
                 let geometry = SceneGeometry::read(folder, scene)?;
-                Ok(delight(&geometry, &DelightOptions::default(), &|_| ())?.estimate())
+                let options = DelightOptions { lights: *lights, ..DelightOptions::default() };
+                Ok(delight(&geometry, &options, progress)?.estimate())
             }
             Self::Files { folder, adapter } => adapter.read(folder, scene.id.as_str()),
         }

@@ -3,10 +3,11 @@
 //! IM2CAD (Izadinia et al., CVPR 2017) colours furniture in this way, per instance; procedural methods fall back to it
 //! per part.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_scene::PartSetId;
 use mateval_scene::open::Dataset;
+use mateval_scene::{PartSetId, Progress};
 
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, Values};
@@ -15,7 +16,8 @@ use crate::geometry::SceneGeometry;
 use crate::maps::Maps;
 use crate::median::{Medians, median};
 use crate::nn::seen_pixels;
-use crate::part_colors::{PartColors, parts_of};
+use crate::part_colors::PartColors;
+use crate::part_triangles::PartTriangles;
 use crate::submission::{self, Method};
 
 const UNSEEN: &str = "what is not seen takes the median of its category in the picture, else base colour 0.5 (linear)";
@@ -26,13 +28,14 @@ pub fn write_by_instance(
     out: &Path,
     force: bool,
     source: &EstimateSource,
+    progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
     let description = format!("the median of {} under each instance's mask; {UNSEEN}", source.description(dataset));
     let assumed_encodings = source.assumed_encodings();
     let method = Method { name: name("median", source), description, assumed_encodings };
-    submission::write_scenes(dataset, out, force, &method, &|_| (), |scene, folder| {
+    submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        let estimate = source.read(dataset, scene)?;
+        let estimate = source.read(dataset, scene, progress)?;
         let medians = Medians::new(&geometry, &seen_pixels(&geometry, &estimate)?, &estimate);
         let mut written = 0;
         for (at, instance) in scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some()) {
@@ -52,6 +55,7 @@ pub fn write_by_part(
     force: bool,
     source: &EstimateSource,
     set: Option<&PartSetId>,
+    progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
     let parts = set.map_or("the source's own parts".to_owned(), |set| format!("the parts '{set}'"));
     let description = format!(
@@ -61,9 +65,9 @@ pub fn write_by_part(
     let stem = set.map_or("median-part".to_owned(), |set| format!("median-part-{set}"));
     let assumed_encodings = source.assumed_encodings();
     let method = Method { name: name(&stem, source), description, assumed_encodings };
-    submission::write_scenes(dataset, out, force, &method, &|_| (), |scene, folder| {
+    submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        let estimate = source.read(dataset, scene)?;
+        let estimate = source.read(dataset, scene, progress)?;
         let parts = colors_of_parts(&geometry, set, &estimate)?;
         let mut written = 0;
         for (at, instance) in scene.instances.iter().enumerate() {
@@ -85,25 +89,26 @@ fn name(stem: &str, source: &EstimateSource) -> String {
 }
 
 /// The median of each part, or that of its instance where the part is not seen.
-fn colors_of_parts(
-    geometry: &SceneGeometry<'_>,
+fn colors_of_parts<'a>(
+    geometry: &SceneGeometry<'a>,
     set: Option<&PartSetId>,
     estimate: &Estimate,
-) -> Result<PartColors, BaselineError> {
-    let parts = parts_of(geometry, set)?;
+) -> Result<PartColors<'a>, BaselineError> {
+    let triangles = PartTriangles::read(geometry, set)?;
     let picture = geometry.part_picture(set)?;
     let seen = seen_pixels(geometry, estimate)?;
     let medians = Medians::new(geometry, &seen, estimate);
-    let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); parts.len()];
+    let mut pixels: Vec<Vec<Values>> = vec![Vec::new(); triangles.parts.len()];
+    let place_of: BTreeMap<u16, usize> =
+        triangles.parts.iter().enumerate().map(|(at, part)| (part.index.0.get(), at)).collect();
     for (x, y, _) in seen.shown_pixels() {
         let (x_of_view, y_of_view) = seen.view_pixel(x, y);
-        let index = picture.get(x_of_view, y_of_view);
-        if let Some(at) = parts.iter().position(|part| part.index.0.get() == index) {
+        if let Some(&at) = place_of.get(&picture.get(x_of_view, y_of_view)) {
             pixels[at].push(estimate.at(x, y));
         }
     }
-    PartColors::new(geometry, set, |part, instance| {
+    Ok(PartColors::new(triangles, |part, instance| {
         let pixels = &mut pixels[part];
         Some(if pixels.is_empty() { medians.of(geometry, instance) } else { median(pixels) })
-    })
+    }))
 }

@@ -84,7 +84,7 @@ pub fn write_scene(
     progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
     let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-    let estimate = source.read(dataset, scene)?;
+    let estimate = source.read(dataset, scene, progress)?;
     let seen = seen_pixels(&geometry, &estimate)?;
     lift_scene(&geometry, &estimate, &seen, options, progress, |instance, lifted, medians| {
         let maps = match lifted {

@@ -61,7 +61,7 @@ pub fn write_scenes(
     force: bool,
     method: &Method,
     progress: Progress<'_>,
-    write_scene: impl Fn(&SceneFile, &Path) -> Result<usize, BaselineError>,
+    mut write_scene: impl FnMut(&SceneFile, &Path) -> Result<usize, BaselineError>,
 ) -> Result<usize, BaselineError> {
     check_out(dataset, out, force)?;
     let work = WorkFolder::start(out)?;

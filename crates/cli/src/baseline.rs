@@ -6,6 +6,7 @@ mod estimate;
 mod import;
 mod partfield;
 mod places;
+mod procedural;
 mod relight;
 mod texgen;
 
@@ -37,6 +38,8 @@ pub enum Command {
     Median(MedianArgs),
     /// One colour per part: the median of an estimate inside the part's mask.
     MedianPart(MedianPartArgs),
+    /// A procedural graph per part, fitted to an estimate: patterns continue where the input view shows nothing.
+    Procedural(procedural::ProceduralArgs),
     /// Takes the light out of every photo: base colour from photo and geometry alone, as pictures that other baselines
     /// accept as an estimate.
     Delight(delight::DelightArgs),
@@ -109,13 +112,20 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
-            places.done(homogeneous::write_by_instance(&places.open()?, &places.out, places.force, &source)?)
+            let dataset = places.open()?;
+            places.done(with_progress(|progress| {
+                homogeneous::write_by_instance(&dataset, &places.out, places.force, &source, progress)
+            })?)
         }
         Command::MedianPart(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
             let set = args.part_set.as_ref();
-            places.done(homogeneous::write_by_part(&places.open()?, &places.out, places.force, &source, set)?)
+            let dataset = places.open()?;
+            places.done(with_progress(|progress| {
+                homogeneous::write_by_part(&dataset, &places.out, places.force, &source, set, progress)
+            })?)
         }
+        Command::Procedural(args) => procedural::run(args),
         Command::Delight(args) => delight::run(args),
         Command::Relight(args) => relight::run(args),
         Command::Encoding(args) => encoding::run(args),

@@ -11,6 +11,7 @@ use mateval_eval::result::ResultFile;
 use mateval_prep::render::RendererKind;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use mateval_scene::open::Dataset;
+use mateval_scene::work_folder;
 
 use crate::baseline;
 use crate::eval::leaderboard::{self, LeaderboardArgs};
@@ -23,7 +24,7 @@ use crate::prep::render::{self, RenderArgs, RendererArgs};
 /// The protocol whose numbers are printed.
 const PROTOCOL: &str = "mateval-2";
 
-/// A baseline of the demo; its name is that of the subcommand of `baseline`.
+/// A baseline of the demo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum DemoBaseline {
     /// The ground truth, baked to the atlases.
@@ -32,18 +33,41 @@ enum DemoBaseline {
     Nn,
     /// One colour per instance: its median in the input picture.
     Median,
+    /// A procedural graph per part, fitted to the de-lit photo.
+    Procedural,
+    /// The de-lit photo where it shows a surface, the part's graph elsewhere.
+    ProceduralKeepSeen,
     /// Base colour 0.5 everywhere.
     Grey,
 }
 
 impl DemoBaseline {
+    /// The name of its folder.
     fn name(self) -> &'static str {
         match self {
             Self::Gt => "gt",
             Self::Nn => "nn",
             Self::Median => "median",
+            Self::Procedural => "procedural",
+            Self::ProceduralKeepSeen => "procedural-keep-seen",
             Self::Grey => "grey",
         }
+    }
+
+    /// Whether it starts from the de-lit photos.
+    fn needs_delit(self) -> bool {
+        matches!(self, Self::Procedural | Self::ProceduralKeepSeen)
+    }
+
+    /// The subcommand of `baseline` with its options, other than its places.
+    fn words(self, delit: &Path) -> Vec<OsString> {
+        let subcommand = if self.needs_delit() { "procedural" } else { self.name() };
+        let mut words = vec![OsString::from(subcommand)];
+        if self.needs_delit() {
+            words.extend([path_option("estimate", delit), "--adapter=delight".into()]);
+        }
+        words.extend((self == Self::ProceduralKeepSeen).then(|| OsString::from("--keep-seen")));
+        words
     }
 }
 
@@ -58,10 +82,10 @@ pub struct Args {
     samples: Option<u32>,
     #[command(flatten)]
     by: RendererArgs,
-    /// Baselines to make and score [default: gt, nn, grey; with --full also median].
+    /// Baselines to make and score [default: gt, nn, grey; with --full all].
     #[arg(long, value_enum, value_delimiter = ',')]
     baselines: Vec<DemoBaseline>,
-    /// Views of 320x240 pixels in place of 160x120, one more baseline, and every table.
+    /// Views of 320x240 pixels in place of 160x120, three more baselines, and every table.
     #[arg(long)]
     full: bool,
     /// Replace what an earlier demo wrote.
@@ -83,11 +107,11 @@ impl Args {
     }
 
     fn baselines(&self) -> Vec<DemoBaseline> {
-        use DemoBaseline::{Grey, Gt, Median, Nn};
+        use DemoBaseline::{Grey, Gt, Median, Nn, Procedural, ProceduralKeepSeen};
         match (self.baselines.is_empty(), self.full) {
             (false, _) => self.baselines.clone(),
             (true, false) => vec![Gt, Nn, Grey],
-            (true, true) => vec![Gt, Nn, Median, Grey],
+            (true, true) => vec![Gt, Nn, Median, Procedural, ProceduralKeepSeen, Grey],
         }
     }
 }
@@ -130,6 +154,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     say("4/6 baselines");
     let submissions = out.join("submissions");
     std::fs::create_dir_all(&submissions).with_context(|| format!("cannot create '{}'", submissions.display()))?;
+    // De-lit photos are never replaced by their own command; these are the demo's.
+    work_folder::remove(&out.join("delit"))?;
     for baseline in &plan.baselines {
         baseline::run(baseline)?;
     }
@@ -153,10 +179,15 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
         let paths = paths.iter().map(|path| path.as_os_str().to_owned());
         options.into_iter().chain(force).chain([separator]).chain(paths).collect()
     };
+    let delit = args.out.join("delit");
     let baseline = |baseline: &DemoBaseline| {
         let places = vec![path_option("dataset", &dataset), path_option("out", &submission(baseline))];
-        parse_subcommand(&[vec![OsString::from(baseline.name())], words(places, &[])].concat())
+        parse_subcommand(&[baseline.words(&delit), words(places, &[])].concat())
     };
+    let delight = baselines
+        .iter()
+        .any(|baseline| baseline.needs_delit())
+        .then(|| parse_subcommand(&["delight".into(), path_option("dataset", &dataset), path_option("out", &delit)]));
     let score_words = words(vec![path_option("dataset", &dataset), path_option("out", &results)], &submissions);
     let score: ScoreArgs = parse_args(&score_words)?;
     let board = board(&baselines, score.result_paths());
@@ -172,7 +203,7 @@ fn plan(args: &Args) -> anyhow::Result<Plan> {
     Ok(Plan {
         build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
         render,
-        baselines: baselines.iter().map(baseline).collect::<anyhow::Result<_>>()?,
+        baselines: delight.into_iter().chain(baselines.iter().map(baseline)).collect::<anyhow::Result<_>>()?,
         leaderboard: parse_args(&words(shown, &board.results))?,
         score,
         board,

@@ -69,6 +69,18 @@ impl Settings {
         &mut self.0[slot]
     }
 
+    /// A graph of this name that has these values as its defaults. A value that its parameter cannot have, such as NaN,
+    /// leaves the default.
+    pub fn as_defaults(&self, graph: &Graph, name: &str) -> Graph {
+        let mut named = Graph { name: name.to_owned(), ..graph.clone() };
+        for (at, parameter) in named.parameters.iter_mut().enumerate() {
+            let kind = parameter.value.kind();
+            let numbers = &self.0[first_slot(graph, at)..][..kind.width()];
+            parameter.value = Value::of_numbers(kind, numbers).unwrap_or(parameter.value);
+        }
+        named
+    }
+
     /// Sets a parameter from text, as in `0.2` or `0.8, 0.7, 0.6`. Fails where the parameter does not exist, or the
     /// text is no value of its type and range.
     pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {

@@ -89,6 +89,15 @@ impl Value {
         Self { kind, numbers: [number; 3] }
     }
 
+    /// A value of this type and these numbers, of which there are as many as the type is wide; `None` where one is not
+    /// finite, or not whole in an integer.
+    pub(crate) fn of_numbers(kind: Type, found: &[f64]) -> Option<Self> {
+        let mut numbers = [0.0; 3];
+        numbers[..kind.width()].copy_from_slice(found);
+        let is_sound = |x: &f64| x.is_finite() && (kind != Type::Integer || x.fract() == 0.0);
+        found.iter().all(is_sound).then_some(Self { kind, numbers })
+    }
+
     /// Reads numbers separated by commas, as in `.mtlx` files.
     pub fn parse(kind: Type, text: &str) -> Result<Self, ValueError> {
         let found = text.split(',').count();

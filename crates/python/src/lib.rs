@@ -19,6 +19,7 @@ mod map_input;
 mod metrics;
 mod picture_file;
 mod pool;
+mod procedural;
 mod reports;
 mod scene;
 mod scene_source;
@@ -43,6 +44,8 @@ mod _core {
     use crate::lift::{Maps, lift};
     #[pymodule_export]
     use crate::metrics::{lpips, psnr, ssim};
+    #[pymodule_export]
+    use crate::procedural::procedural;
     #[pymodule_export]
     use crate::reports::{lint, score};
     #[pymodule_export]

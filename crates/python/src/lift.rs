@@ -35,14 +35,14 @@ pub struct Maps {
     roughness: Option<Py<PyArray2<u8>>>,
     /// Metallic times 255: (side, side), uint8; None where the estimate has none.
     metallic: Option<Py<PyArray2<u8>>>,
-    /// Whether the input view shows each texel: (side, side), bool.
-    seen: Py<PyArray2<bool>>,
+    /// Whether the input view shows each texel: (side, side), bool; None from procedural without keep_seen.
+    seen: Option<Py<PyArray2<bool>>>,
 }
 
 /// The maps of an instance before Python gets them.
-struct Lifted {
-    maps: maps::Maps,
-    seen: Mask,
+pub(crate) struct MadeMaps {
+    pub(crate) maps: maps::Maps,
+    pub(crate) seen: Option<Mask>,
 }
 
 /// Lifts an estimate of the input view to the atlases of all instances that have one: seen texels get the estimate, the
@@ -74,15 +74,24 @@ pub fn lift<'py>(
     let options = options(neighbours, normal_weight, any_instance, atlas_size)?;
     let source = Arc::clone(&scene.source);
     let all = run_long(py, move |progress| lifted(&source, &estimate, &options, progress))?.map_err(failed)?;
+    by_id(py, scene, all)
+}
+
+/// The maps by the id of the instance.
+pub(crate) fn by_id<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    all: BTreeMap<usize, MadeMaps>,
+) -> PyResult<Bound<'py, PyDict>> {
     let by_id = PyDict::new(py);
-    for (instance, lifted) in all {
-        by_id.set_item(scene.source.file().instances[instance].id.as_str(), lifted.into_python(py)?)?;
+    for (instance, made) in all {
+        by_id.set_item(scene.source.file().instances[instance].id.as_str(), made.into_python(py)?)?;
     }
     Ok(by_id)
 }
 
 /// An estimate of pictures of one size.
-fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Estimate> {
+pub(crate) fn estimate(given: [(&'static str, Option<Bound<'_, PyAny>>); 3]) -> PyResult<Estimate> {
     let read = |(name, array): &(&'static str, Option<Bound<'_, PyAny>>)| {
         array.as_ref().map(|array| MapInput::new(name, array)).transpose()
     };
@@ -122,31 +131,31 @@ fn lifted(
     estimate: &Estimate,
     options: &NnOptions,
     progress: Progress<'_>,
-) -> Result<BTreeMap<usize, Lifted>, BaselineError> {
+) -> Result<BTreeMap<usize, MadeMaps>, BaselineError> {
     let geometry = SceneGeometry::read(source.folder(), source.file())?;
     let seen = seen_pixels(&geometry, estimate)?;
     let all = Mutex::new(BTreeMap::new());
     lift_scene(&geometry, estimate, &seen, options, progress, |instance, lifted, medians| {
         let given = estimate.given_maps();
-        let lifted = match lifted {
+        let made = match lifted {
             Some(lifted) => {
                 let side = lifted.whole.texels.width();
-                let seen = Picture::new(side, side, lifted.seen)?;
-                Lifted { maps: maps::Maps::of_atlas(&lifted.whole, given), seen }
+                let seen = Some(Picture::new(side, side, lifted.seen)?);
+                MadeMaps { maps: maps::Maps::of_atlas(&lifted.whole, given), seen }
             }
             None => {
                 let side = *MAP_SIZES.start();
                 let maps = maps::Maps::constant(medians.of(&geometry, instance), given);
-                Lifted { maps, seen: Picture::filled(side, side, false) }
+                MadeMaps { maps, seen: Some(Picture::filled(side, side, false)) }
             }
         };
-        all.lock().unwrap_or_else(PoisonError::into_inner).insert(instance, lifted);
+        all.lock().unwrap_or_else(PoisonError::into_inner).insert(instance, made);
         Ok(())
     })?;
     Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
-impl Lifted {
+impl MadeMaps {
     fn into_python(self, py: Python<'_>) -> PyResult<Maps> {
         let colours = |picture: &Picture<[u8; 3]>| PyResult::Ok(triples(py, picture, |rgb| rgb)?.unbind());
         let numbers = |picture: &Picture<u8>| PyResult::Ok(plane(py, picture)?.unbind());
@@ -154,7 +163,7 @@ impl Lifted {
             base_color: self.maps.base_color.as_ref().map(colours).transpose()?,
             roughness: self.maps.roughness.as_ref().map(numbers).transpose()?,
             metallic: self.maps.metallic.as_ref().map(numbers).transpose()?,
-            seen: plane(py, &self.seen)?.unbind(),
+            seen: self.seen.as_ref().map(|seen| PyResult::Ok(plane(py, seen)?.unbind())).transpose()?,
         })
     }
 }

@@ -86,6 +86,24 @@ def test_delight_is_the_commands(root, dataset, scene, command, tmp_path):
         mateval.delight(scene, lights="sun")
 
 
+def test_procedural_is_the_commands(root, dataset, scene, command, tmp_path):
+    truth = scene.input.truth
+    estimate = {"base_color": truth.albedo, "roughness": truth.roughness, "metallic": truth.metallic}
+    for keep_seen in (False, True):
+        maps = mateval.procedural(scene, keep_seen=keep_seen, detail=0.5, **estimate)
+        assert all((found.seen is not None) == keep_seen for found in maps.values())
+        out = tmp_path / f"command{keep_seen}"
+        words = ["--keep-seen"] if keep_seen else []
+        command("baseline", "procedural", "--dataset", root, "--out", out, "--estimate", "gt", "--detail", "0.5", *words)
+        compare_maps(written(tmp_path / f"ours{keep_seen}", dataset, scene, maps), out)
+    with pytest.raises(ValueError, match="detail: expected 0 to 1, found 2"):
+        mateval.procedural(scene, detail=2, **estimate)
+    with pytest.raises(ValueError, match="expected base_color, roughness or metallic"):
+        mateval.procedural(scene)
+    with pytest.raises(mateval.Error, match="no part set 'none'"):
+        mateval.procedural(scene, part_set="none", **estimate)
+
+
 def test_lint_is_the_commands(root, dataset, nn, command):
     report = mateval.lint(nn, dataset)
     assert report.json == command("eval", "lint", nn, "--dataset", root, "--format", "json").stdout

@@ -16,7 +16,6 @@ mod lights_file;
 mod mirrors;
 mod options;
 mod page;
-mod page_shell;
 mod part_room;
 mod part_surfaces;
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::page_shell::{figure, page};
 use super::possible_light::FittedLight;
+use crate::page_shell::{figure, page};
 
 /// A scene on the page.
 pub(super) struct Shown {

@@ -12,7 +12,8 @@ use crate::error::BaselineError;
 use crate::estimate::{GivenMaps, Values};
 use crate::geometry::SceneGeometry;
 use crate::median::DEFAULT;
-use crate::part_colors::{PartColors, parts_of};
+use crate::part_colors::PartColors;
+use crate::part_triangles::PartTriangles;
 
 /// A uniform material.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,13 +45,14 @@ impl FlatMaterial {
 }
 
 /// Reads the file. The error lists every wrong entry.
-pub fn read(
+pub fn read<'a>(
     path: &Path,
-    geometry: &SceneGeometry<'_>,
+    geometry: &SceneGeometry<'a>,
     set: Option<&PartSetId>,
-) -> Result<(PartColors, GivenMaps), BaselineError> {
+) -> Result<(PartColors<'a>, GivenMaps), BaselineError> {
     let materials: FlatMaterials = json::read(path)?;
-    let parts = parts_of(geometry, set)?;
+    let triangles = PartTriangles::read(geometry, set)?;
+    let parts = triangles.parts;
     let instances = geometry.scene.instances.iter().map(|instance| instance.id.as_str());
     let known: BTreeSet<&str> = parts.iter().map(|part| part.id.as_str()).chain(instances).collect();
     let unknown = materials.keys().filter(|id| !known.contains(id.as_str()));
@@ -61,11 +63,11 @@ pub fn read(
     if !faults.is_empty() {
         return Err(BaselineError::BadImport { path: path.to_owned(), source: ImportError::Materials(faults) });
     }
-    let colors = PartColors::new(geometry, set, |part, instance| {
+    let colors = PartColors::new(triangles, |part, instance| {
         let own = materials.get(parts[part].id.as_str());
         let material = own.or_else(|| materials.get(geometry.scene.instances[instance].id.as_str()));
         material.map(FlatMaterial::values)
-    })?;
+    });
     let any = |has: fn(&FlatMaterial) -> bool| materials.values().any(has);
     let given = GivenMaps {
         base_color: true,

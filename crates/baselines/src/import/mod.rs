@@ -33,7 +33,8 @@ use crate::estimate::GivenMaps;
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel};
 use crate::maps::Maps;
-use crate::part_colors::{PartColors, parts_of};
+use crate::part_colors::PartColors;
+use crate::part_triangles::parts_of;
 use crate::submission::{self, Method};
 use correspondence::Correspondence;
 use donor::Donor;
@@ -140,7 +141,7 @@ struct Sources<'a> {
     /// The file of each instance that has its own, and the frame of that file's mesh, by the instance's index.
     frames: BTreeMap<usize, (String, Frame)>,
     /// The file of one material per part, its colours and the maps that it gives.
-    parts: Option<(String, PartColors, GivenMaps)>,
+    parts: Option<(String, PartColors<'a>, GivenMaps)>,
 }
 
 /// A mesh of a whole scene.
@@ -196,7 +197,7 @@ impl ImportedAtlas {
 impl<'a> Sources<'a> {
     fn read(
         files: &'a ImportFolder,
-        geometry: &SceneGeometry<'_>,
+        geometry: &SceneGeometry<'a>,
         options: &'a ImportOptions,
     ) -> Result<Self, BaselineError> {
         let scene = &geometry.scene.id;

@@ -43,7 +43,7 @@ pub fn export(
     let (mut lines, mut count) = (String::new(), 0);
     for scene in &dataset.scenes {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        let estimate = source.read(dataset, scene)?;
+        let estimate = source.read(dataset, scene, progress)?;
         if estimate.base_color.is_none() {
             return Err(BaselineError::NoColor(scene.id.to_string()));
         }

@@ -49,7 +49,7 @@ pub fn import(
     let method = Method { name: format!("texgen-{}", source.name()), description, assumed_encodings };
     let instances = submission::write_scenes(dataset, out, force, &method, progress, |scene, folder| {
         let geometry = SceneGeometry::read(dataset.folder(&scene.id), scene)?;
-        let estimate = source.read(dataset, scene)?;
+        let estimate = source.read(dataset, scene, progress)?;
         if estimate.base_color.is_none() {
             return Err(BaselineError::NoColor(scene.id.to_string()));
         }

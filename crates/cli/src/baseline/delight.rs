@@ -17,22 +17,29 @@ pub struct DelightArgs {
     lights: Lights,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum Lights {
+/// Which lights may shine while a photo is de-lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Lights {
     /// Light fixtures, ceilings, what is seen to glow, the world around, and the lights of a stage.
     Room,
     /// The lights of a stage alone, as in PSDR-Room.
     Stage,
 }
 
+impl Lights {
+    /// The same as an option of the baseline.
+    pub fn candidates(self) -> CandidateLights {
+        match self {
+            Self::Room => CandidateLights::Room,
+            Self::Stage => CandidateLights::Stage,
+        }
+    }
+}
+
 /// Writes the pictures.
 pub fn run(args: &DelightArgs) -> anyhow::Result<Outcome> {
     let dataset = args.places.open()?;
-    let lights = match args.lights {
-        Lights::Room => CandidateLights::Room,
-        Lights::Stage => CandidateLights::Stage,
-    };
-    let options = DelightOptions { lights, ..DelightOptions::default() };
+    let options = DelightOptions { lights: args.lights.candidates(), ..DelightOptions::default() };
     let out = &args.places.out;
     let count = with_progress(|progress| delight::write(&dataset, out, &options, progress))?;
     let shown = out.display();

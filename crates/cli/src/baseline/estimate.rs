@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use mateval_baselines::adapter::Adapter;
+use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 
 /// An estimate and the format of its files.
@@ -11,7 +12,7 @@ use mateval_baselines::estimate_source::EstimateSource;
 pub struct EstimateArgs {
     /// Estimate of base colour, roughness and metallic in the input view: `gt` (the ground truth), `input` (the input
     /// picture as base colour), `delight` (the input picture without its light), or a folder of a method's pictures
-    /// [default: gt for nn and texgen-export, input for median and median-part].
+    /// [default: gt for nn and texgen-export, input for median and median-part, delight for procedural].
     #[arg(long, value_name = "gt|input|delight|FOLDER")]
     estimate: Option<PathBuf>,
     /// Names and encodings of the folder's files: colorful-shading, crefnet, delight, diffusion-renderer, dnf-intrinsic,
@@ -34,7 +35,7 @@ impl EstimateArgs {
             (None, None) => default,
             (Some("gt"), None) => EstimateSource::Truth,
             (Some("input"), None) => EstimateSource::Input,
-            (Some("delight"), None) => EstimateSource::Delight,
+            (Some("delight"), None) => EstimateSource::Delight(CandidateLights::Room),
             (Some("gt" | "input" | "delight") | None, Some(_)) => {
                 bail!("--adapter describes the files of a folder; give --estimate FOLDER")
             }

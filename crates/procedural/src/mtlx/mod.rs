@@ -10,4 +10,4 @@ mod read;
 mod write;
 
 pub use read::{read_file, read_text};
-pub use write::to_text;
+pub use write::{to_text, to_text_of_all};

@@ -8,19 +8,29 @@ use crate::value::{Type, Value};
 
 /// The graph as the text of a `.mtlx` file, with a `standard_surface` and a material that show it.
 pub fn to_text(graph: &Graph) -> String {
+    to_text_of_all(std::slice::from_ref(graph))
+}
+
+/// Several graphs, whose names differ, as the text of one `.mtlx` file, with a `standard_surface` and a material for
+/// each. The reader accepts files of one graph alone.
+pub fn to_text_of_all(graphs: &[Graph]) -> String {
     let mut out = String::from("<?xml version=\"1.0\"?>\n<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n");
+    graphs.iter().for_each(|graph| write_graph(&mut out, graph));
+    out.push_str("</materialx>\n");
+    out
+}
+
+fn write_graph(out: &mut String, graph: &Graph) {
     let doc = attribute("doc", graph.doc.as_deref());
     let _ = writeln!(out, "  <nodegraph name=\"NG_{}\"{doc}>", graph.name);
-    graph.parameters.iter().for_each(|parameter| write_parameter(&mut out, parameter));
-    graph.nodes.iter().for_each(|node| write_node(&mut out, graph, node));
+    graph.parameters.iter().for_each(|parameter| write_parameter(out, parameter));
+    graph.nodes.iter().for_each(|node| write_node(out, graph, node));
     for (output, source) in Output::ALL.into_iter().zip(&graph.outputs) {
         let connection = connection(graph, source);
         let _ = writeln!(out, "    <output {} {connection} />", named(output.word(), output.kind()));
     }
     out.push_str("  </nodegraph>\n");
-    write_material(&mut out, &graph.name);
-    out.push_str("</materialx>\n");
-    out
+    write_material(out, &graph.name);
 }
 
 fn write_parameter(out: &mut String, parameter: &Parameter) {

@@ -3,8 +3,9 @@
 use std::ffi::OsStr;
 use std::path::PathBuf;
 
+use mateval_procedural::Settings;
 use mateval_procedural::library::LIBRARY;
-use mateval_procedural::mtlx::to_text;
+use mateval_procedural::mtlx::{to_text, to_text_of_all};
 use serde_json::Value;
 
 use super::python::with_materialx;
@@ -35,6 +36,22 @@ fn all_files_are_valid_and_have_shaders_in_three_languages() {
             assert!(lengths.len() == 4 && lengths.iter().all(|length| length.as_u64() > Some(300)), "{report}");
         }
     }
+}
+
+/// One file that holds graphs of different settings under names of their own.
+#[test]
+fn a_file_of_all_graphs_is_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    let named = LIBRARY.iter().enumerate().map(|(at, entry)| {
+        let graph = entry.graph().unwrap();
+        Settings::defaults(&graph).as_defaults(&graph, &format!("part_{at}"))
+    });
+    let file = folder.path().join("materials.mtlx");
+    std::fs::write(&file, to_text_of_all(&named.collect::<Vec<_>>())).unwrap();
+    let reports = check(&[file]);
+    assert_eq!(reports[0]["faults"], "", "{reports:?}");
+    // Three outputs and a material each.
+    assert_eq!(reports[0]["shaders"]["osl"].as_array().unwrap().len(), 4 * LIBRARY.len());
 }
 
 /// The twin: a file whose nodes do not fit together.

@@ -2,6 +2,7 @@
 
 use mateval_procedural::Settings;
 use mateval_procedural::library::entry;
+use mateval_procedural::mtlx::to_text;
 use mateval_procedural::settings::slots;
 
 use super::graphs::{read, text};
@@ -51,4 +52,22 @@ fn ranges_are_named_by_the_ends_that_they_have() {
         assert_eq!(refusal(range, value), Some(message));
         assert_eq!(refusal("", value), None);
     }
+}
+
+/// A graph that carries its settings reads back with them; what no parameter can have leaves the default.
+#[test]
+fn settings_become_defaults() {
+    let graph = entry("herringbone").unwrap().graph().unwrap();
+    let mut settings = Settings::defaults(&graph);
+    for (name, text) in [("width", "0.123"), ("ratio", "5"), ("color", "0.1, 0.2, 0.3")] {
+        settings.set(&graph, name, text).unwrap();
+    }
+    let own = settings.as_defaults(&graph, "floor");
+    assert_eq!((own.name.as_str(), Settings::defaults(&own)), ("floor", settings.clone()));
+    assert_eq!(read(&to_text(&own)).unwrap(), own);
+    assert_ne!(Settings::defaults(&graph), settings);
+    let place = slots(&graph).iter().position(|slot| slot.parameter == graph.parameter("width").unwrap()).unwrap();
+    *settings.number_mut(place) = f64::NAN;
+    let kept = Settings::defaults(&settings.as_defaults(&graph, "floor"));
+    assert_eq!(kept.numbers()[place], Settings::defaults(&graph).numbers()[place]);
 }

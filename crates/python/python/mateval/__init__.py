@@ -15,7 +15,7 @@ integers. Lengths are metres, +Y is up.
 """
 
 from . import metrics
-from ._core import Camera, Delit, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, delight, lift
+from ._core import Camera, Delit, Instance, Maps, Mesh, Part, Scene, Submission, Truth, View, delight, lift, procedural
 from .by_id import ById
 from .dataset import Dataset, open
 from .errors import Error, UnknownId, Withheld
@@ -44,5 +44,6 @@ __all__ = [
     "lint",
     "metrics",
     "open",
+    "procedural",
     "score",
 ]

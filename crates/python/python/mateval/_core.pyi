@@ -29,6 +29,7 @@ __all__ = [
     "lint",
     "lpips",
     "main",
+    "procedural",
     "psnr",
     "score",
     "ssim",
@@ -188,7 +189,7 @@ class Maps:
     @property
     def metallic(self) -> Optional[_Bytes]: ...
     @property
-    def seen(self) -> _Mask: ...
+    def seen(self) -> Optional[_Mask]: ...
 
 @final
 class Delit:
@@ -252,6 +253,16 @@ def lift(
     normal_weight: float = 0.0,
     any_instance: bool = False,
     atlas_size: Optional[int] = None,
+) -> dict[str, Maps]: ...
+def procedural(
+    scene: Scene,
+    *,
+    base_color: Optional[_Input] = None,
+    roughness: Optional[_Input] = None,
+    metallic: Optional[_Input] = None,
+    part_set: Optional[str] = None,
+    keep_seen: bool = False,
+    detail: float = 1.0,
 ) -> dict[str, Maps]: ...
 def lint(submission: _Path, dataset: Dataset) -> tuple[str, str]: ...
 def score(

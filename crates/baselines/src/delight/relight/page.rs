@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use mateval_image::jpeg_io::jpeg_bytes;
 use mateval_image::{LinearRgb, Picture};
 
-use super::super::page_shell::{figure, page};
 use super::super::possible_light::{LightSource, PossibleLight};
+use crate::page_shell::{figure, page};
 
 /// Mixes the pictures of the lights.
 const MIX: &str = include_str!("mix_lights.js");

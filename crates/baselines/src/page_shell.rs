@@ -1,4 +1,4 @@
-//! What the pages of de-lit photos have in common.
+//! What the HTML pages of baselines have in common.
 
 /// Light and dark, in one column on narrow screens.
 const STYLE: &str = "\
@@ -18,7 +18,7 @@ th:first-child,td:first-child{text-align:left}\
 .lights output{text-align:right}";
 
 /// A page of this title and content.
-pub(super) fn page(title: &str, introduction: &str, content: &str) -> String {
+pub(crate) fn page(title: &str, introduction: &str, content: &str) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{title}</title>\
          <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><style>{STYLE}</style></head><body>\
@@ -27,6 +27,6 @@ pub(super) fn page(title: &str, introduction: &str, content: &str) -> String {
 }
 
 /// A picture with its caption, which is also its description.
-pub(super) fn figure(address: &str, scene: &str, caption: &str) -> String {
+pub(crate) fn figure(address: &str, scene: &str, caption: &str) -> String {
     format!("<figure><img src=\"{address}\" alt=\"{caption}, {scene}\"><figcaption>{caption}</figcaption></figure>\n")
 }

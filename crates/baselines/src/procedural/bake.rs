@@ -1,0 +1,115 @@
+//! Bakes the materials of parts into the atlases of their instances.
+
+use glam::DVec2;
+use mateval_image::Picture;
+use mateval_scene::TriangleMesh;
+use mateval_scene::submission::MAP_SIZES;
+use mateval_scene::uv_atlas::UvAtlas;
+use rayon::prelude::*;
+
+use super::part_material::PartMaterial;
+use super::scene_materials::SceneMaterials;
+use crate::estimate::{Estimate, GivenMaps, Values};
+use crate::geometry::SceneGeometry;
+use crate::lift::{PartialAtlas, Texel, lift, place_of, texel_size_m};
+use crate::maps::Maps;
+use crate::seen::SeenPixels;
+
+/// Texels that are evaluated together.
+const TEXELS: usize = 4096;
+
+/// An instance's maps.
+pub struct Baked {
+    /// The maps, with filled gutters.
+    pub maps: Maps,
+    /// Whether the input view shows each texel, row by row; empty where seen texels are not kept.
+    pub seen: Vec<bool>,
+}
+
+/// Bakes one instance, by its place in the scene, to an atlas of the dataset's own size. With `keep_seen` texels that the
+/// input view shows hold the estimate.
+pub(super) fn bake(
+    materials: &SceneMaterials<'_>,
+    geometry: &SceneGeometry<'_>,
+    estimate: &Estimate,
+    seen: &SeenPixels,
+    keep_seen: bool,
+    instance: usize,
+) -> Baked {
+    let size =
+        geometry.scene.instances[instance].atlas.as_ref().map_or(*MAP_SIZES.start(), |atlas| atlas.size as usize);
+    let mut known = match keep_seen {
+        true => lift(geometry, seen, estimate, instance, size),
+        false => unknown(geometry.mesh(instance), size),
+    };
+    let is_seen = |texel: &Texel| matches!(texel, Texel::Seen(_));
+    let seen = if keep_seen { known.texels.pixels().iter().map(is_seen).collect() } else { Vec::new() };
+    let baker = Baker { of_part: &materials.of_part, given: materials.given };
+    baker.fill_unseen(geometry.mesh(instance), materials.triangles.of(instance), &mut known);
+    // A graph has a roughness and a metallic of its own.
+    let has_graph = materials.has_graph(instance);
+    let given = GivenMaps {
+        base_color: true,
+        roughness: materials.given.roughness || has_graph,
+        metallic: materials.given.metallic || has_graph,
+    };
+    Baked { maps: Maps::of_atlas(&known, given), seen }
+}
+
+/// An atlas of which nothing is known.
+fn unknown(mesh: &TriangleMesh, size: usize) -> PartialAtlas {
+    let atlas = UvAtlas::new(mesh, size);
+    let texels =
+        Picture::from_fn(size, size, |x, y| if atlas.owner(x, y).is_some() { Texel::Unseen } else { Texel::Unused });
+    PartialAtlas { atlas, texels }
+}
+
+/// The materials of a scene, part by part, and the maps that its estimate gives.
+struct Baker<'a> {
+    of_part: &'a [PartMaterial],
+    given: GivenMaps,
+}
+
+impl Baker<'_> {
+    /// Gives all texels that are `Unseen` the material of their part. `parts` holds the part of each of the mesh's
+    /// triangles. Texels of no part stay as they are.
+    fn fill_unseen(&self, mesh: &TriangleMesh, parts: &[Option<usize>], known: &mut PartialAtlas) {
+        let atlas = &known.atlas;
+        let size = atlas.size();
+        let mut of_part: Vec<Vec<(usize, usize)>> = vec![Vec::new(); self.of_part.len()];
+        for (at, texel) in known.texels.pixels().iter().enumerate() {
+            let Some((triangle, _)) = atlas.owner(at % size, at / size) else { continue };
+            if let (Texel::Unseen, Some(part)) = (texel, parts[triangle]) {
+                of_part[part].push((at, triangle));
+            }
+        }
+        for (material, texels) in self.of_part.iter().zip(of_part) {
+            let values: Vec<Vec<Values>> =
+                texels.par_chunks(TEXELS).map(|texels| self.values(material, atlas, mesh, texels)).collect();
+            for ((at, _), values) in texels.into_iter().zip(values.into_iter().flatten()) {
+                known.texels.pixels_mut()[at] = Texel::Seen(values);
+            }
+        }
+    }
+
+    /// The material at texels, each given by its place in the atlas and its triangle.
+    fn values(
+        &self,
+        material: &PartMaterial,
+        atlas: &UvAtlas,
+        mesh: &TriangleMesh,
+        texels: &[(usize, usize)],
+    ) -> Vec<Values> {
+        let (Some(frame), Some(_)) = (material.frame, &material.graph) else {
+            return vec![material.values; texels.len()];
+        };
+        let size = atlas.size();
+        let place = |&(at, triangle): &(usize, usize)| {
+            let centre = DVec2::new((at % size) as f64 + 0.5, (at / size) as f64 + 0.5);
+            let position = place_of(atlas, mesh, triangle, centre);
+            let [u, v] = frame.place(frame.chart(mesh.geometric_normal(triangle)), position);
+            [u, v, texel_size_m(atlas, mesh, triangle)]
+        };
+        material.at(&texels.iter().map(place).collect::<Vec<_>>(), self.given)
+    }
+}
