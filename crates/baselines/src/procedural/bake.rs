@@ -8,6 +8,7 @@ use mateval_scene::uv_atlas::UvAtlas;
 use rayon::prelude::*;
 
 use super::part_material::PartMaterial;
+use super::residuals::Residuals;
 use super::scene_materials::SceneMaterials;
 use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::SceneGeometry;
@@ -44,7 +45,7 @@ pub(super) fn bake(
     };
     let is_seen = |texel: &Texel| matches!(texel, Texel::Seen(_));
     let seen = if keep_seen { known.texels.pixels().iter().map(is_seen).collect() } else { Vec::new() };
-    let baker = Baker { of_part: &materials.of_part, given: materials.given };
+    let baker = Baker { of_part: &materials.of_part, residuals: &materials.residuals, given: materials.given };
     baker.fill_unseen(geometry.mesh(instance), materials.triangles.of(instance), &mut known);
     // A graph has a roughness and a metallic of its own.
     let has_graph = materials.has_graph(instance);
@@ -67,6 +68,8 @@ fn unknown(mesh: &TriangleMesh, size: usize) -> PartialAtlas {
 /// The materials of a scene, part by part, and the maps that its estimate gives.
 struct Baker<'a> {
     of_part: &'a [PartMaterial],
+    /// What is added to each; empty where materials stay as they are.
+    residuals: &'a [Residuals],
     given: GivenMaps,
 }
 
@@ -83,33 +86,46 @@ impl Baker<'_> {
                 of_part[part].push((at, triangle));
             }
         }
-        for (material, texels) in self.of_part.iter().zip(of_part) {
+        for (part, texels) in of_part.into_iter().enumerate() {
             let values: Vec<Vec<Values>> =
-                texels.par_chunks(TEXELS).map(|texels| self.values(material, atlas, mesh, texels)).collect();
+                texels.par_chunks(TEXELS).map(|texels| self.values(part, atlas, mesh, texels)).collect();
             for ((at, _), values) in texels.into_iter().zip(values.into_iter().flatten()) {
                 known.texels.pixels_mut()[at] = Texel::Seen(values);
             }
         }
     }
 
-    /// The material at texels, each given by its place in the atlas and its triangle.
+    /// The material of a part at texels, each given by its place in the atlas and its triangle.
     fn values(
         &self,
-        material: &PartMaterial,
+        part: usize,
         atlas: &UvAtlas,
         mesh: &TriangleMesh,
         texels: &[(usize, usize)],
     ) -> Vec<Values> {
-        let (Some(frame), Some(_)) = (material.frame, &material.graph) else {
-            return vec![material.values; texels.len()];
-        };
+        let material = &self.of_part[part];
         let size = atlas.size();
-        let place = |&(at, triangle): &(usize, usize)| {
+        let position = |&(at, triangle): &(usize, usize)| {
             let centre = DVec2::new((at % size) as f64 + 0.5, (at / size) as f64 + 0.5);
-            let position = place_of(atlas, mesh, triangle, centre);
-            let [u, v] = frame.place(frame.chart(mesh.geometric_normal(triangle)), position);
-            [u, v, texel_size_m(atlas, mesh, triangle)]
+            place_of(atlas, mesh, triangle, centre)
         };
-        material.at(&texels.iter().map(place).collect::<Vec<_>>(), self.given)
+        let mut values = match (material.frame, &material.graph) {
+            (Some(frame), Some(_)) => {
+                let place = |texel: &(usize, usize)| {
+                    let triangle = texel.1;
+                    let [u, v] = frame.place(frame.chart(mesh.geometric_normal(triangle)), position(texel));
+                    [u, v, texel_size_m(atlas, mesh, triangle)]
+                };
+                material.at(&texels.iter().map(place).collect::<Vec<_>>(), self.given)
+            }
+            _ => vec![material.values; texels.len()],
+        };
+        if let Some(residuals) = self.residuals.get(part) {
+            for (values, texel) in values.iter_mut().zip(texels) {
+                let residual = residuals.at(position(texel));
+                values.iter_mut().zip(residual).for_each(|(value, more)| *value = (*value + more).clamp(0.0, 1.0));
+            }
+        }
+        values
     }
 }

@@ -29,6 +29,7 @@ mod part_material;
 mod part_samples;
 mod pictures;
 mod report_file;
+mod residuals;
 mod scene_materials;
 
 pub use bake::Baked;

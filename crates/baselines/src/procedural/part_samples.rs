@@ -21,6 +21,8 @@ pub(super) struct Sample {
     pub(super) pixel: [usize; 2],
     /// The side of the part's box that it shows.
     pub(super) chart: Chart,
+    /// The place in world space.
+    pub(super) position: DVec3,
     /// The estimate.
     pub(super) values: Values,
     /// The same as a point of the unfolded box.
@@ -92,8 +94,9 @@ fn sample(frame: &PartFrame, seen: &SeenPixels, viewer: DVec3, point: &SeenPoint
     // The root of the pixel's area on the surface.
     let footprint = to_viewer.length() / seen.camera.intrinsics.fx / cosine.sqrt();
     let albedo = [values[0], values[1], values[2]].map(f64::from);
-    let point_of = Point { u, v, footprint, albedo, weight: 1.0 };
-    Some(Sample { pixel: [point.pixel.0, point.pixel.1], chart, values, point: point_of })
+    let pixel = [point.pixel.0, point.pixel.1];
+    let position = point.place;
+    Some(Sample { pixel, chart, position, values, point: Point { u, v, footprint, albedo, weight: 1.0 } })
 }
 
 /// The middle of the box around all instances.

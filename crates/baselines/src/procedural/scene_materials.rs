@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::options::ProceduralOptions;
 use super::part_material::PartMaterial;
 use super::part_samples::PartSamples;
+use super::residuals::Residuals;
 use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps};
 use crate::geometry::SceneGeometry;
@@ -22,6 +23,8 @@ pub(super) struct SceneMaterials<'a> {
     pub(super) triangles: PartTriangles<'a>,
     pub(super) samples: Vec<PartSamples>,
     pub(super) of_part: Vec<PartMaterial>,
+    /// By how much the estimate differs from each part's material; empty unless seen texels are kept.
+    pub(super) residuals: Vec<Residuals>,
     /// The maps that the estimate gives.
     pub(super) given: GivenMaps,
 }
@@ -50,7 +53,11 @@ impl<'a> SceneMaterials<'a> {
             material
         };
         let of_part = samples_of_parts.par_iter().enumerate().map(fitted).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self { triangles, samples: samples_of_parts, of_part, given: estimate.given_maps() })
+        let (samples, given) = (samples_of_parts, estimate.given_maps());
+        let residuals = |(samples, material)| Residuals::new(samples, material, given);
+        let residuals =
+            if options.keep_seen { samples.iter().zip(&of_part).map(residuals).collect() } else { Vec::new() };
+        Ok(Self { triangles, samples, of_part, residuals, given })
     }
 
     /// Whether any part of an instance has a graph.

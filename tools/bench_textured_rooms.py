@@ -1,0 +1,164 @@
+#!/usr/bin/env python3
+"""Compares the procedural baseline with others on rooms whose textures are drawn at random.
+
+The rooms are the sample's, with new textures for floor, wallpaper, sofa and furniture: built-in graphs of random colours
+and sizes, which repeat as the sample's own do. All baselines start from the same estimate. Prints a line for each room
+and how often `procedural` is better than `median-part`, and `procedural --keep-seen` better than `nn`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import shutil
+import subprocess
+from pathlib import Path
+
+# For each texture of the sample the side of its square in metres, and graphs with the parameters that are set: a whole
+# number n stands for the side over n.
+TEXTURES = {
+    "planks": (
+        1.2,
+        [
+            ("tile", {"size_u": (3, 8), "size_v": (3, 8)}),
+            ("checks", {"size_u": (2, 6, 2), "size_v": (2, 6, 2)}),
+            ("plank", {"width": (6, 14), "length": (1, 2)}),
+            ("brick", {"size_u": (3, 6), "size_v": (6, 16, 2)}),
+            ("mosaic", {"size": (24, 48)}),
+            ("terrazzo", {}),
+            ("carpet", {}),
+        ],
+    ),
+    "wallpaper": (
+        0.5,
+        [
+            ("stripes", {"period": (2, 6)}),
+            ("dots", {"pitch_u": (3, 8), "pitch_v": (3, 8)}),
+            ("trellis", {"pitch_u": (2, 4), "pitch_v": (2, 4)}),
+            ("plaid", {"period_u": (2, 4), "period_v": (2, 4)}),
+            ("plaster", {}),
+            ("brick", {"size_u": (2, 3), "size_v": (4, 8, 2)}),
+        ],
+    ),
+    "fabric": (
+        0.3,
+        [
+            ("stripes", {"period": (3, 8)}),
+            ("plaid", {"period_u": (2, 4), "period_v": (2, 4)}),
+            ("checks", {"size_u": (4, 8, 2), "size_v": (4, 8, 2)}),
+            ("leather", {}),
+            ("carpet", {}),
+        ],
+    ),
+    "wood": (0.8, [("veneer", {}), ("plank", {"width": (6, 12), "length": (1, 1)}), ("marble", {}), ("paint", {})]),
+}
+
+METHODS = ["median-part", "nn", "procedural", "keep-seen"]
+
+
+def main() -> None:
+    """Makes rooms, submissions and scores below a folder, and prints the comparison."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path, help="folder for everything; must not exist yet")
+    parser.add_argument("--mateval", default="target/release/mateval", help="the command")
+    parser.add_argument("--rooms", type=int, default=10)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--estimate", choices=["gt", "delight"], default="gt", help="what all baselines start from")
+    parser.add_argument("--resolution", type=int, nargs=2, default=[240, 180], metavar=("WIDTH", "HEIGHT"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True)
+    mateval = Command(program=args.mateval)
+    rooms = write_rooms(mateval=mateval, out=args.out, rooms=args.rooms, seed=args.seed, size=args.resolution)
+    dataset = args.out / "dataset"
+    mateval.run("prep", "build", args.out / "recipe.toml", "--source", args.out / "source", "--out", dataset)
+    estimate = ["--estimate", "gt"]
+    if args.estimate == "delight":
+        mateval.run("prep", "render", dataset, "--renderer", "builtin", "--samples", "64")
+        mateval.run("baseline", "delight", "--dataset", dataset, "--out", args.out / "delit")
+        estimate = ["--estimate", args.out / "delit", "--adapter", "delight"]
+    for method in METHODS:
+        words = ["procedural", "--keep-seen"] if method == "keep-seen" else [method]
+        mateval.run("baseline", *words, *estimate, "--dataset", dataset, "--out", args.out / method)
+    submissions = [args.out / method for method in METHODS]
+    mateval.run("eval", "score", *submissions, "--dataset", dataset, "--out", args.out / "results")
+    report(out=args.out, rooms=rooms)
+
+
+class Command:
+    """The command `mateval`, whose output is shown only where it fails."""
+
+    def __init__(self, *, program: str) -> None:
+        self.program = program
+
+    def run(self, *words: object) -> str:
+        """Runs a subcommand and returns what it prints."""
+        done = subprocess.run([self.program, *map(str, words)], capture_output=True, text=True)
+        if done.returncode:
+            raise SystemExit(f"{' '.join(map(str, words))}: exit code {done.returncode}\n{done.stderr[-2000:]}")
+        return done.stdout
+
+
+def write_rooms(*, mateval: Command, out: Path, rooms: int, seed: int, size: list[int]) -> dict[str, str]:
+    """Writes the rooms' sources and the recipe. Returns the graphs of each room by its id."""
+    draw = random.Random(seed)
+    mateval.run("sample", out / "source")
+    recipe = f'name = "textured"\nresolution = [{size[0]}, {size[1]}]\n'
+    graphs = {}
+    for number in range(rooms):
+        room = f"room{number}"
+        shutil.copytree(out / "source/room", out / "source" / room)
+        chosen = []
+        for texture, (side, options) in TEXTURES.items():
+            graph, sizes = draw.choice(options)
+            words = [f"--set={name}={value}" for name, value in drawn(mateval=mateval, graph=graph, side=side, sizes=sizes, draw=draw)]
+            picture = out / "source" / room / "textures" / f"{texture}.png"
+            mateval.run("graph", "render", graph, *words, "--size", side, "--resolution", 1024, "--out", picture, "--force")
+            chosen.append(graph)
+        graphs[room] = ", ".join(chosen)
+        recipe += f'\n[[scene]]\nid = "{room}"\nbitterli = "{room}/scene.xml"\n'
+    (out / "recipe.toml").write_text(recipe)
+    return graphs
+
+
+def drawn(*, mateval: Command, graph: str, side: float, sizes: dict, draw: random.Random) -> list[tuple[str, str]]:
+    """Values of a graph's parameters: sizes that divide the side, and colours."""
+    values = [(name, str(side / draw.randrange(low, high + 1, *step))) for name, (low, high, *step) in sizes.items()]
+    for line in mateval.run("graph", "list", graph).splitlines():
+        words = line.split()
+        if len(words) > 1 and words[1] == "color3":
+            grey = draw.uniform(0.05, 0.75)
+            values.append((words[0], ",".join(str(min(1.0, grey * draw.uniform(0.7, 1.3))) for _ in range(3))))
+    return values
+
+
+def report(*, out: Path, rooms: dict[str, str]) -> None:
+    """Prints the scores and the counts."""
+    results = {}
+    for method in METHODS:
+        file = json.loads((out / "results" / f"{method}.json").read_text())
+        results[method] = file["protocols"]["mateval-2"]["scenes"]
+    wins = {"LPIPS": 0, "PSNR": 0, "unobserved PSNR": 0, "unobserved LPIPS": 0}
+    print("PSNR in dB and LPIPS of novel views: median-part, procedural; of unobserved regions: nn, keep-seen")
+    for room, graphs in rooms.items():
+        of = {method: results[method][room] for method in METHODS}
+        flat, graph, near, kept = (of[method] for method in METHODS[:1] + METHODS[2:3] + METHODS[1:2] + METHODS[3:])
+        psnr, lpips = "albedo.novel.psnr", "albedo.novel.lpips_alex"
+        far_psnr, far_lpips = "albedo.unobserved.psnr", "albedo.unobserved.lpips_alex"
+        wins["LPIPS"] += graph[lpips] < flat[lpips]
+        wins["PSNR"] += graph[psnr] > flat[psnr] - 0.2
+        wins["unobserved PSNR"] += kept[far_psnr] >= near[far_psnr] + 1
+        wins["unobserved LPIPS"] += kept[far_lpips] <= near[far_lpips]
+        print(
+            f"{room}: {flat[psnr]:.2f} {graph[psnr]:.2f}, {flat[lpips]:.3f} {graph[lpips]:.3f}; "
+            f"{near[far_psnr]:.2f} {kept[far_psnr]:.2f}, {near[far_lpips]:.3f} {kept[far_lpips]:.3f}  ({graphs})"
+        )
+    print(
+        f"of {len(rooms)} rooms: LPIPS lower than median-part in {wins['LPIPS']}, PSNR no more than 0.2 dB lower in "
+        f"{wins['PSNR']}; keep-seen at least 1 dB above nn where nothing is observed in {wins['unobserved PSNR']}, LPIPS "
+        f"not higher in {wins['unobserved LPIPS']}"
+    )
+
+
+if __name__ == "__main__":
+    main()
