@@ -1,4 +1,5 @@
-//! Derivatives by base colours compared with Mitsuba's path replay backpropagation (`prb`; Vicini et al., SIGGRAPH 2021).
+//! Derivatives by base colours compared with Mitsuba's path replay backpropagation (`prb`; Vicini et al., SIGGRAPH
+//! 2021).
 
 use std::path::Path;
 use std::sync::Arc;

@@ -3,7 +3,7 @@
 //! `bench/room` of the shared data, or the number of triangles of a generated room.
 //!
 //! 256x256 pixels, 4 samples, default settings, blocks of 8x8 pixels, and one grid of 512x512 texels for the largest
-//! surface with uv. `mateval_tracer` aims at 1.2 or less.
+//! surface with uv. The design allows a factor of 1.2.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 #[path = "support/room.rs"]

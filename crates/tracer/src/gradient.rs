@@ -1,9 +1,9 @@
 //! The gradient of a loss of a picture by the texels of base colours.
 //!
-//! In: a world with its own materials, a camera, and the derivative of the loss by each pixel. Out: a [`TexelGradient`],
-//! the derivative of the loss by each texel of the surfaces' base colours, from one render whose paths keep
-//! their history (Nimier-David et al., "Radiative Backpropagation", SIGGRAPH 2020; Vicini et al., "Path Replay
-//! Backpropagation", SIGGRAPH 2021).
+//! In: a world with its own materials, a camera, and the derivative of the loss by each pixel. Out: a
+//! [`TexelGradient`], the derivative of the loss by each texel of the surfaces' base colours, from one render whose
+//! paths keep their history (Nimier-David et al., "Radiative Backpropagation", SIGGRAPH 2020; Vicini et al., "Path
+//! Replay Backpropagation", SIGGRAPH 2021).
 //!
 //! The picture enters a loss such as the squared error twice, in its derivative by the pixel and in the pixel's own
 //! derivative. The gradient has the right expectation if both come from different seeds: render with one, and pass the
@@ -23,8 +23,8 @@ use crate::world::World;
 pub struct TexelGradient {
     /// The picture of the same paths, in linear radiance; [`crate::render()`] makes the same up to rounding.
     pub picture: Picture<LinearRgb>,
-    /// For each surface with a grid, the derivative of the loss by the linear base colour of each texel, row by row from
-    /// the top left as in a texture.
+    /// For each surface with a grid, the derivative of the loss by the linear base colour of each texel, row by row
+    /// from the top left as in a texture.
     pub texels: Vec<Option<Picture<LinearRgb>>>,
 }
 
@@ -42,8 +42,8 @@ const TEXEL_BYTES: u64 = 3 * (size_of::<f64>() + size_of::<f32>()) as u64;
 ///
 /// The bytes are the same for any number of threads in the current rayon pool. Fails if a setting is out of range, if
 /// `residual` has another size than the view or holds a number that is not finite, if there is not one grid entry per
-/// surface, if a grid is empty or its surface has no uv, if the world has stage lights, or if the derivatives would take
-/// more than 1 GiB.
+/// surface, if a grid is empty or its surface has no uv, if the world has stage lights, or if the derivatives would
+/// take more than 1 GiB.
 pub fn gradient(
     world: &World,
     camera: &Camera,

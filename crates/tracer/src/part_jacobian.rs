@@ -1,10 +1,10 @@
 //! How a picture changes with the base colours of surfaces: one derivative for each block of pixels, surface and
 //! channel.
 //!
-//! In: a world with its own materials, a camera, the size of blocks. Out: a [`PartJacobian`], from one render
-//! whose paths keep their history. The derivatives are exact for the light that the paths gather: nothing that a path
-//! decides depends on base colours, so that a render of the same seed is a smooth function of them. Their expectation is
-//! the derivative of the light of the scene (Nimier-David et al., "Radiative Backpropagation", SIGGRAPH 2020; Vicini et
+//! In: a world with its own materials, a camera, the size of blocks. Out: a [`PartJacobian`], from one render whose
+//! paths keep their history. The derivatives are exact for the light that the paths gather: nothing that a path decides
+//! depends on base colours, so that a render of the same seed is a smooth function of them. Their expectation is the
+//! derivative of the light of the scene (Nimier-David et al., "Radiative Backpropagation", SIGGRAPH 2020; Vicini et
 //! al., "Path Replay Backpropagation", SIGGRAPH 2021).
 
 use mateval_image::{LinearRgb, Picture};

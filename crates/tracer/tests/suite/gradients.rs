@@ -43,7 +43,8 @@ fn texels() -> Vec<[f32; 3]> {
     (0..12_u16).map(|k| [3 + 5 * k % 7, 2 + 3 * k % 8, 9 - k % 6].map(|v| f32::from(v) / 12.0)).collect()
 }
 
-/// A room with every kind of base colour and a mirror, two lamps, and light from outside that enters past a missing wall.
+/// A room with every kind of base colour and a mirror, two lamps, and light from outside that enters past a missing
+/// wall.
 fn scene() -> ReferenceScene {
     use PrincipledFlavour::{Blender, Mitsuba};
     let texture = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
@@ -157,8 +158,8 @@ fn blocks_of(jacobian: &PartJacobian, surface: usize) -> [f64; 12] {
     std::array::from_fn(|k| f64::from(jacobian.at([k / 3 % 2, k / 6], SurfaceIndex(surface))[k % 3]))
 }
 
-/// The largest relative distance between two lists of derivatives. Those below a tenth of the largest count as that tenth:
-/// differences of pixels, which are rounded to `f32`, are no more exact.
+/// The largest relative distance between two lists of derivatives. Those below a tenth of the largest count as that
+/// tenth: differences of pixels, which are rounded to `f32`, are no more exact.
 fn distance(found: &[f64], expected: &[f64]) -> f64 {
     let largest = expected.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
     assert!(largest > 0.0, "nothing to compare");
@@ -166,8 +167,8 @@ fn distance(found: &[f64], expected: &[f64]) -> f64 {
     found.iter().zip(expected).map(relative).fold(0.0, f64::max)
 }
 
-/// Derivatives of all blocks by all parts are the differences of renders of the same seed to 1e-4. The twins, of another
-/// seed and of direct light alone, are not.
+/// Derivatives of all blocks by all parts are the differences of renders of the same seed to 1e-4. The twins, of
+/// another seed and of direct light alone, are not.
 #[test]
 fn derivatives_by_parts_are_differences_of_renders() {
     let found = jacobian(&settings());
@@ -211,8 +212,8 @@ fn by_texels(settings: &RenderSettings) -> Picture<LinearRgb> {
     found.texels[PAINTED].clone().unwrap()
 }
 
-/// The gradient by each texel is the difference of renders to 1e-4. The twins, of another seed and of direct light alone,
-/// are not.
+/// The gradient by each texel is the difference of renders to 1e-4. The twins, of another seed and of direct light
+/// alone, are not.
 #[test]
 fn gradients_by_texels_are_differences_of_renders() {
     let of_texel = |texel: usize, step: f32| {
