@@ -22,10 +22,12 @@ pub mod png_header;
 pub mod png_io;
 pub mod store;
 pub mod temporary;
+pub mod texel_grid;
 pub mod texture;
 pub mod texture_io;
 pub mod transfer;
 
 pub use error::ImageError;
 pub use picture::{LUMINANCE, LinearRgb, Mask, Normal, Picture, SrgbRgb};
-pub use texture::{Texels, Texture, Wrap};
+pub use texel_grid::{TexelGrid, Wrap};
+pub use texture::{Texels, Texture};

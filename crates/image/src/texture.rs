@@ -1,23 +1,10 @@
-//! A texture, whose texels are kept as they were stored and decoded at each lookup.
-//!
-//! uv (0, 0) is the lower left corner of the picture and v grows upwards, as in OBJ; glTF's v is one minus this v.
-//! Lookups are bilinear between texel centres, which lie at half-integers.
+//! A texture, whose texels are kept as they were stored and decoded at each lookup. Lookups are bilinear, by the uv of
+//! [`crate::texel_grid`].
 
 use std::sync::Arc;
 
+use crate::texel_grid::{TexelGrid, Wrap};
 use crate::transfer::{linear_from_srgb_byte, linear_from_srgb_word};
-
-/// How lookups continue outside 0..1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Wrap {
-    /// The picture is repeated.
-    #[default]
-    Repeat,
-    /// The nearest border texel is used.
-    Clamp,
-    /// The picture is repeated, mirrored every other time.
-    Mirror,
-}
 
 /// Texels, row by row from the top left. Bytes keep large atlases small.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +46,7 @@ impl Texels {
     }
 }
 
-/// A picture for lookups by uv, with the conventions of this module.
+/// A picture for lookups by uv.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     width: usize,
@@ -153,7 +140,7 @@ impl Texture {
     /// The addresses of the two rows of texels that [`Self::sample`] reads at `uv`, for prefetching.
     #[inline]
     pub fn addresses(&self, uv: [f32; 2]) -> [*const u8; 2] {
-        let [(x, ..), (upper, lower, _)] = self.footprint(uv);
+        let [(x, ..), (upper, lower, _)] = self.grid().footprint(uv);
         // Computing this from the number of bytes would take a division, longer than everything else here.
         let size = match self.texels.as_ref() {
             Texels::Grey8(_) => 1,
@@ -172,7 +159,7 @@ impl Texture {
 
     #[inline(always)]
     fn bilinear(&self, uv: [f32; 2], texel: impl Fn(usize) -> [f32; 3]) -> [f32; 3] {
-        let [(x0, x1, fx), (y0, y1, fy)] = self.footprint(uv);
+        let [(x0, x1, fx), (y0, y1, fy)] = self.grid().footprint(uv);
         let (upper, lower) = (y0 * self.width, y1 * self.width);
         let (a, b) = (texel(upper + x0), texel(upper + x1));
         let (c, d) = (texel(lower + x0), texel(lower + x1));
@@ -183,46 +170,10 @@ impl Texture {
         })
     }
 
-    /// The two columns and the two rows around `uv`, with the weight of the second of each.
+    /// The grid of its texels.
     #[inline(always)]
-    fn footprint(&self, uv: [f32; 2]) -> [(usize, usize, f32); 2] {
-        // Beyond 1e9 neighbouring texels have the same f32 coordinate.
-        let sane = |v: f32| if v.abs() < 1e9 { v } else { 0.0 };
-        let x = sane(uv[0]) * self.width as f32 - 0.5;
-        let y = (1.0 - sane(uv[1])) * self.height as f32 - 0.5;
-        [self.neighbours(x, self.width), self.neighbours(y, self.height)]
-    }
-
-    #[inline(always)]
-    fn neighbours(&self, position: f32, size: usize) -> (usize, usize, f32) {
-        // Rounds down without `floor`, which is a function call on the baseline x86-64 processor. i64 holds every f32
-        // that a uv can give here; the cast saturates beyond.
-        let towards_zero = position as i64;
-        let index = towards_zero.saturating_sub(i64::from((towards_zero as f32) > position));
-        (self.wrapped(index, size), self.wrapped(index.saturating_add(1), size), position - index as f32)
-    }
-
-    #[inline(always)]
-    fn wrapped(&self, index: i64, size: usize) -> usize {
-        let size = size as i64;
-        if (0..size).contains(&index) {
-            return index as usize;
-        }
-        self.wrapped_from_outside(index, size)
-    }
-
-    fn wrapped_from_outside(&self, index: i64, size: i64) -> usize {
-        let inside = match self.wrap {
-            // Powers of two are the common case, and a division takes ten times as long.
-            Wrap::Repeat if size & (size - 1) == 0 => index & (size - 1),
-            Wrap::Repeat => index.rem_euclid(size),
-            Wrap::Clamp => index.clamp(0, size - 1),
-            Wrap::Mirror => {
-                let turn = index.rem_euclid(2 * size);
-                if turn < size { turn } else { 2 * size - 1 - turn }
-            }
-        };
-        inside as usize
+    pub fn grid(&self) -> TexelGrid {
+        TexelGrid { width: self.width, height: self.height, wrap: self.wrap }
     }
 }
 

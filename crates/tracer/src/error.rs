@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use glam::Vec3;
-use mateval_scene::reference::{LightIndex, MaterialIndex, SurfaceIndex};
+use mateval_scene::reference::{LightIndex, SurfaceIndex};
+
+pub use crate::scene_fault::{LightFault, MaterialFault, SceneFault, SurfaceFault};
 
 /// Why something cannot be traced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,161 +18,6 @@ pub enum TracerError {
     /// Everything is sound, but exceeds a limit: ask for less, or raise the limit where the caller sets it.
     #[error("unsupported: {0}")]
     Unsupported(#[from] ExceededLimit),
-}
-
-/// A part of a scene that contradicts itself or the rest of the scene.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SceneFault {
-    /// A surface.
-    #[error("surface {}{}: {fault}", surface.0, quoted(name))]
-    Surface {
-        /// Its place in the scene.
-        surface: SurfaceIndex,
-        /// Its name, where the meshes come with names.
-        name: Option<String>,
-        /// The fault.
-        fault: SurfaceFault,
-    },
-    /// A material.
-    #[error("material {} '{name}': {fault}", material.0)]
-    Material {
-        /// Its place in the scene.
-        material: MaterialIndex,
-        /// Its name.
-        name: String,
-        /// The fault.
-        fault: MaterialFault,
-    },
-    /// A group of lights.
-    #[error("light {} '{name}': {fault}", light.0)]
-    Light {
-        /// Its place in the scene.
-        light: LightIndex,
-        /// Its name.
-        name: String,
-        /// The fault.
-        fault: LightFault,
-    },
-}
-
-/// What is wrong with a surface.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SurfaceFault {
-    /// It names a material that does not exist.
-    #[error("material {material} does not exist; the scene has {count} materials")]
-    MissingMaterial {
-        /// The material named.
-        material: usize,
-        /// How many materials the scene has.
-        count: usize,
-    },
-    /// A coordinate is not finite or too large for `f32` to resolve a metre.
-    #[error("vertex {vertex} is at {position}, expected within {limit:e} m of the origin along each axis")]
-    Position {
-        /// The vertex.
-        vertex: usize,
-        /// Its position, in metres.
-        position: Vec3,
-        /// The largest coordinate, in metres.
-        limit: f32,
-    },
-    /// A triangle names a vertex that does not exist.
-    #[error("triangle {triangle} names vertices {vertices:?}, expected indices below {count}")]
-    MissingVertex {
-        /// The triangle.
-        triangle: usize,
-        /// The vertices named.
-        vertices: [u32; 3],
-        /// How many vertices the mesh has.
-        count: usize,
-    },
-    /// The number of normals or uvs differs from the number of vertices.
-    #[error("{found} {attribute}, expected one for each of {expected} vertices")]
-    AttributeCount {
-        /// Which array: "normals" or "uvs".
-        attribute: &'static str,
-        /// Its length.
-        found: usize,
-        /// The number of vertices.
-        expected: usize,
-    },
-    /// A normal or a uv is not finite.
-    #[error("the {attribute} hold a value at vertex {vertex} that is not finite")]
-    AttributeNotFinite {
-        /// Which array: "normals" or "uvs".
-        attribute: &'static str,
-        /// The first vertex concerned.
-        vertex: usize,
-    },
-}
-
-/// What is wrong with a material.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MaterialFault {
-    /// A constant is not finite.
-    #[error("value {0}, expected a finite one")]
-    NotFinite(f32),
-    /// An index of refraction is not a finite number above 0.
-    #[error("index of refraction {0}, expected a finite one above 0")]
-    IndexOfRefraction(f32),
-    /// It names a texture that does not exist.
-    #[error("texture {texture} does not exist; the scene has {count} textures")]
-    MissingTexture {
-        /// The texture named.
-        texture: usize,
-        /// How many textures the scene has.
-        count: usize,
-    },
-    /// It names a channel that textures do not have.
-    #[error("texture channel {0}, expected 0, 1 or 2")]
-    MissingChannel(usize),
-}
-
-/// What is wrong with a light, of the scene or of a stage.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum LightFault {
-    /// Its radiance is negative or not finite.
-    #[error("radiance {0:?}, expected finite values of at least 0")]
-    Radiance([f32; 3]),
-    /// It names a texture that does not exist.
-    #[error("texture {texture} does not exist; the scene has {count} textures")]
-    MissingTexture {
-        /// The texture named.
-        texture: usize,
-        /// How many textures the scene has.
-        count: usize,
-    },
-    /// It names a surface that does not exist.
-    #[error("surface {surface} does not exist; the scene has {count} surfaces")]
-    MissingSurface {
-        /// The surface named.
-        surface: usize,
-        /// How many surfaces the scene has.
-        count: usize,
-    },
-    /// One of its surfaces emits for another light already.
-    #[error("surface {0} emits twice, expected one light per surface")]
-    SharedSurface(usize),
-    /// The transform of its map's uv is not finite.
-    #[error("the uv transform of its map is {0:?}, expected finite values")]
-    MapTransform([[f32; 3]; 2]),
-    /// A texel of its map is negative or not finite.
-    #[error("texture {texture} holds the value {value}, expected finite values of at least 0")]
-    MapValue {
-        /// The texture.
-        texture: usize,
-        /// The first such value.
-        value: f32,
-    },
-    /// The scale of its environment map is negative or not finite.
-    #[error("scale {0} of its environment map, expected a finite one of at least 0")]
-    EnvironmentScale(f32),
-    /// The rotation of its environment map is not finite.
-    #[error("rotation {0:?} of its environment map, expected finite values")]
-    EnvironmentRotation([[f32; 3]; 3]),
-    /// A light of a stage has no triangles.
-    #[error("its mesh has no triangles, expected at least one")]
-    NoTriangles,
 }
 
 /// An argument that contradicts another, or the world it is used with.
@@ -321,12 +167,48 @@ pub enum RequestFault {
         /// How many there are.
         count: usize,
     },
-    /// Pictures of one light basis differ in size.
-    #[error("a picture of {}x{} in a light basis of {}x{}", found[0], found[1], expected[0], expected[1])]
+    /// Derivatives of a world with stage lights.
+    #[error("derivatives by base colours in a world with stage lights, expected the scene's own lights alone")]
+    StageDerivatives,
+    /// Blocks of pixels without pixels.
+    #[error("blocks of {0} x {0} pixels, expected at least 1 x 1")]
+    BlockSize(usize),
+    /// The derivative of a loss by a pixel is not finite.
+    #[error("the residual of the pixel in column {}, row {} is not finite", pixel[0], pixel[1])]
+    Residual {
+        /// Column and row of the first such pixel.
+        pixel: [usize; 2],
+    },
+    /// The number of grids differs from the number of surfaces.
+    #[error("{found} texel grids, expected one entry for each of {expected} surfaces")]
+    GridCount {
+        /// How many entries there are, missing grids included.
+        found: usize,
+        /// How many surfaces the world has.
+        expected: usize,
+    },
+    /// A grid of texels has no texels.
+    #[error("surface {} '{name}': a grid without texels", surface.0)]
+    EmptyGrid {
+        /// The surface.
+        surface: SurfaceIndex,
+        /// Its name.
+        name: String,
+    },
+    /// A surface has a grid of texels, but its mesh has no uv.
+    #[error("surface {} '{name}': a texel grid for a mesh without uv", surface.0)]
+    MissingUv {
+        /// The surface.
+        surface: SurfaceIndex,
+        /// Its name.
+        name: String,
+    },
+    /// Pictures of one light basis differ in size, or a picture differs from the view that it belongs to.
+    #[error("a picture of {}x{}, expected {}x{}", found[0], found[1], expected[0], expected[1])]
     PictureSize {
         /// Width and height of the first picture that differs.
         found: [usize; 2],
-        /// Width and height of the basis.
+        /// Width and height of the basis or view.
         expected: [usize; 2],
     },
 }
@@ -357,8 +239,27 @@ pub enum ExceededLimit {
         /// Bytes allowed.
         allowed: u64,
     },
-}
-
-fn quoted(name: &Option<String>) -> String {
-    name.as_ref().map_or_else(String::new, |name| format!(" '{name}'"))
+    /// The derivatives of blocks of pixels by base colours take more memory than is allowed.
+    #[error(
+        "derivatives of {}x{} blocks by {surfaces} base colours take {bytes} bytes, and {allowed} are allowed; \
+         use larger blocks", blocks[0], blocks[1]
+    )]
+    JacobianBytes {
+        /// Columns and rows of blocks.
+        blocks: [usize; 2],
+        /// Surfaces of the world.
+        surfaces: usize,
+        /// Bytes that the derivatives take.
+        bytes: u64,
+        /// Bytes allowed.
+        allowed: u64,
+    },
+    /// The derivatives of a loss by texels take more memory than is allowed.
+    #[error("derivatives by texels take {bytes} bytes, and {allowed} are allowed; use smaller grids, or fewer")]
+    TexelBytes {
+        /// Bytes that the derivatives take.
+        bytes: u64,
+        /// Bytes allowed.
+        allowed: u64,
+    },
 }

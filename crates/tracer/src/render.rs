@@ -109,12 +109,7 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
     let mut tracer = PathTracer::<_, 1>::new(world, OwnMaterials(world), *settings);
     let mut sums = vec![[0.0_f64; 3]; tile.pixels().count()];
     for index in 0..settings.samples {
-        let starts = tile.pixels().map(|[x, y]| {
-            let sampler = Sampler::new(settings.seed, [x as u32, y as u32], index);
-            let [dx, dy, ..] = sampler.set(0);
-            let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
-            (sampler, Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
-        });
+        let starts = tile.pixels().map(|pixel| camera_start(camera, settings.seed, pixel, index));
         tracer.trace(starts, |pixel, _, [value]| {
             for (channel, value) in sums[pixel].iter_mut().zip(value.to_array()) {
                 *channel += f64::from(value);
@@ -125,6 +120,14 @@ fn develop_tile(world: &World, camera: &Camera, settings: &RenderSettings, tile:
         *sum = sum.map(|channel| channel / f64::from(settings.samples));
     }
     (sums, tracer.counts)
+}
+
+/// The start of path `index` of a pixel: its random numbers and its ray.
+pub(crate) fn camera_start(camera: &Camera, seed: u64, [x, y]: [usize; 2], index: u32) -> (Sampler, Ray) {
+    let sampler = Sampler::new(seed, [x as u32, y as u32], index);
+    let [dx, dy, ..] = sampler.set(0);
+    let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
+    (sampler, Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
 }
 
 /// Sums the counts of all tiles, for one of the variants that share the paths.

@@ -29,9 +29,8 @@ use crate::film::{self, Tile};
 use crate::light_basis::LightBasis;
 use crate::material_source::MaterialSource;
 use crate::path::PathTracer;
-use crate::ray::Ray;
+use crate::render::camera_start;
 use crate::repaint::SPECULAR;
-use crate::sampler::Sampler;
 use crate::settings::RenderSettings;
 use crate::surface_hit::SurfaceHit;
 use crate::world::World;
@@ -232,12 +231,7 @@ fn develop_tile(
     let mut sums = vec![vec![[[0.0_f64; 3]; VARIANTS]; tile.pixels().count()]; pictures];
     let wanted: Vec<(usize, [usize; 2])> = tile.pixels().enumerate().filter(|(_, [x, y])| wanted.get(*x, *y)).collect();
     for index in 0..settings.samples {
-        let starts = wanted.iter().map(|&(_, [x, y])| {
-            let sampler = Sampler::new(settings.seed, [x as u32, y as u32], index);
-            let [dx, dy, ..] = sampler.set(0);
-            let place = DVec2::new(x as f64 + f64::from(dx), y as f64 + f64::from(dy));
-            (sampler, Ray::endless(camera.position().as_vec3(), camera.direction(place).as_vec3()))
-        });
+        let starts = wanted.iter().map(|&(_, pixel)| camera_start(camera, settings.seed, pixel, index));
         tracer.trace(starts, |start, light, values| {
             let sums = &mut sums[light.0][wanted[start].0];
             for (sum, value) in sums.iter_mut().zip(values) {

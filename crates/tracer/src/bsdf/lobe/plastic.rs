@@ -45,13 +45,29 @@ impl Plastic<'_> {
     }
 
     fn base_value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        self.base / (Vec3::ONE - self.returned()) * self.base_share(wo, wi)
+    }
+
+    /// The derivative of the value by the colour of the base, per channel.
+    pub(crate) fn slope(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let left = Vec3::ONE - self.returned();
+        let by_color = if self.nonlinear { (left * left).recip() } else { left.recip() };
+        by_color * self.base_share(wo, wi)
+    }
+
+    /// The fraction of the light from the base that the coat reflects back and the base scatters again.
+    fn returned(&self) -> Vec3 {
         let inside = match self.coat {
             Coat::Smooth { inside } => inside,
             Coat::Rough { alpha, table, .. } => table.reflected_inside(alpha),
         };
-        let returned = if self.nonlinear { self.base * inside } else { Vec3::splat(inside) };
+        if self.nonlinear { self.base * inside } else { Vec3::splat(inside) }
+    }
+
+    /// What a white base would scatter once, with the cosine.
+    fn base_share(&self, wo: Vec3, wi: Vec3) -> f32 {
         let through = self.transmitted(wo.z) * self.transmitted(wi.z) / (self.eta * self.eta);
-        self.base / (Vec3::ONE - returned) * (through * FRAC_1_PI * wi.z)
+        through * FRAC_1_PI * wi.z
     }
 
     /// The base, and the coat if it is rough.
