@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Compares the procedural baseline with others on rooms whose textures are drawn at random.
 
-The rooms are the sample's, with new textures for floor, wallpaper, sofa and furniture: built-in graphs of random colours
-and sizes, which repeat as the sample's own do. All baselines start from the same estimate. Prints a line for each room
-and how often `procedural` is better than `median-part`, and `procedural --keep-seen` better than `nn`.
+The rooms are the sample's, with new textures for floor, wallpaper, sofa and furniture: built-in graphs of random
+colours and sizes, which repeat as the sample's own do. All baselines start from the same estimate. Prints a line for
+each room and how often `procedural` is better than `median-part`, and `procedural --keep-seen` better than `nn`; then
+what parts cost that are split and merged at random, as a network's may be.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import argparse
 import json
 import random
 import shutil
+import struct
 import subprocess
 from pathlib import Path
 
@@ -54,7 +56,14 @@ TEXTURES = {
     "wood": (0.8, [("veneer", {}), ("plank", {"width": (6, 12), "length": (1, 1)}), ("marble", {}), ("paint", {})]),
 }
 
-METHODS = ["median-part", "nn", "procedural", "keep-seen"]
+# The words of `mateval baseline` for each submission.
+METHODS = {
+    "median-part": ["median-part"],
+    "nn": ["nn"],
+    "procedural": ["procedural"],
+    "keep-seen": ["procedural", "--keep-seen"],
+    "spoiled-parts": ["procedural", "--part-set", "spoiled"],
+}
 
 
 def main() -> None:
@@ -71,14 +80,16 @@ def main() -> None:
     mateval = Command(program=args.mateval)
     rooms = write_rooms(mateval=mateval, out=args.out, rooms=args.rooms, seed=args.seed, size=args.resolution)
     dataset = args.out / "dataset"
-    mateval.run("prep", "build", args.out / "recipe.toml", "--source", args.out / "source", "--out", dataset)
+    build = ["prep", "build", args.out / "recipe.toml", "--source", args.out / "source", "--out"]
+    mateval.run(*build, args.out / "without-labels")
+    spoil_parts(out=args.out, rooms=rooms, seed=args.seed)
+    mateval.run(*build, dataset)
     estimate = ["--estimate", "gt"]
     if args.estimate == "delight":
         mateval.run("prep", "render", dataset, "--renderer", "builtin", "--samples", "64")
         mateval.run("baseline", "delight", "--dataset", dataset, "--out", args.out / "delit")
         estimate = ["--estimate", args.out / "delit", "--adapter", "delight"]
-    for method in METHODS:
-        words = ["procedural", "--keep-seen"] if method == "keep-seen" else [method]
+    for method, words in METHODS.items():
         mateval.run("baseline", *words, *estimate, "--dataset", dataset, "--out", args.out / method)
     submissions = [args.out / method for method in METHODS]
     mateval.run("eval", "score", *submissions, "--dataset", dataset, "--out", args.out / "results")
@@ -111,14 +122,36 @@ def write_rooms(*, mateval: Command, out: Path, rooms: int, seed: int, size: lis
         chosen = []
         for texture, (side, options) in TEXTURES.items():
             graph, sizes = draw.choice(options)
-            words = [f"--set={name}={value}" for name, value in drawn(mateval=mateval, graph=graph, side=side, sizes=sizes, draw=draw)]
+            values = drawn(mateval=mateval, graph=graph, side=side, sizes=sizes, draw=draw)
+            words = [f"--set={name}={value}" for name, value in values]
+            words += ["--size", side, "--resolution", 1024, "--force"]
             picture = out / "source" / room / "textures" / f"{texture}.png"
-            mateval.run("graph", "render", graph, *words, "--size", side, "--resolution", 1024, "--out", picture, "--force")
+            mateval.run("graph", "render", graph, *words, "--out", picture)
             chosen.append(graph)
         graphs[room] = ", ".join(chosen)
         recipe += f'\n[[scene]]\nid = "{room}"\nbitterli = "{room}/scene.xml"\n'
     (out / "recipe.toml").write_text(recipe)
     return graphs
+
+
+def spoil_parts(*, out: Path, rooms: dict[str, str], seed: int) -> None:
+    """Writes labels for each room: an instance is one part, or two of half its triangles."""
+    draw = random.Random(seed)
+    for room in rooms:
+        scene = json.loads((out / "without-labels/scenes" / room / "scene.json").read_text())
+        folder = out / "source" / room / "labels"
+        folder.mkdir()
+        for instance in scene["instances"]:
+            count = instance["triangles"]
+            half = draw.choice([0, count // 2])
+            labels = [int(triangle < half) for triangle in range(count)]
+            header = f"{{'descr': '<i8', 'fortran_order': False, 'shape': ({count},), }}"
+            header += " " * (-(len(header) + 11) % 64) + "\n"
+            start = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header.encode()
+            (folder / f"{instance['id']}.npy").write_bytes(start + struct.pack(f"<{count}q", *labels))
+    recipe = out / "recipe.toml"
+    text = recipe.read_text()
+    recipe.write_text(text.replace("scene.xml\"\n", "scene.xml\"\npart_labels = { spoiled = \"labels\" }\n"))
 
 
 def drawn(*, mateval: Command, graph: str, side: float, sizes: dict, draw: random.Random) -> list[tuple[str, str]]:
@@ -139,10 +172,13 @@ def report(*, out: Path, rooms: dict[str, str]) -> None:
         file = json.loads((out / "results" / f"{method}.json").read_text())
         results[method] = file["protocols"]["mateval-2"]["scenes"]
     wins = {"LPIPS": 0, "PSNR": 0, "unobserved PSNR": 0, "unobserved LPIPS": 0}
+    losses: dict[str, list[float]] = {"PSNR": [], "LPIPS": []}
     print("PSNR in dB and LPIPS of novel views: median-part, procedural; of unobserved regions: nn, keep-seen")
     for room, graphs in rooms.items():
         of = {method: results[method][room] for method in METHODS}
-        flat, graph, near, kept = (of[method] for method in METHODS[:1] + METHODS[2:3] + METHODS[1:2] + METHODS[3:])
+        flat, near, graph, kept, spoiled = (of[method] for method in METHODS)
+        losses["PSNR"].append(graph["albedo.novel.psnr"] - spoiled["albedo.novel.psnr"])
+        losses["LPIPS"].append(spoiled["albedo.novel.lpips_alex"] - graph["albedo.novel.lpips_alex"])
         psnr, lpips = "albedo.novel.psnr", "albedo.novel.lpips_alex"
         far_psnr, far_lpips = "albedo.unobserved.psnr", "albedo.unobserved.lpips_alex"
         wins["LPIPS"] += graph[lpips] < flat[lpips]
@@ -158,6 +194,8 @@ def report(*, out: Path, rooms: dict[str, str]) -> None:
         f"{wins['PSNR']}; keep-seen at least 1 dB above nn where nothing is observed in {wins['unobserved PSNR']}, LPIPS "
         f"not higher in {wins['unobserved LPIPS']}"
     )
+    psnr_loss, lpips_loss = (sum(values) / len(values) for values in losses.values())
+    print(f"spoiled parts cost {psnr_loss:.2f} dB and {lpips_loss:.3f} in LPIPS, in the mean over novel views")
 
 
 if __name__ == "__main__":
