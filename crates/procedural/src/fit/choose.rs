@@ -4,6 +4,8 @@
 //! Held-out points take no part in the fit of a graph. They do take part in that of the cubic polynomial whose shading
 //! is taken away before: it is fitted to all points, so that both groups are divided by the same light.
 
+use super::candidate::Candidate;
+use super::category::log_odds;
 use super::colors::{mean_square, project};
 use super::hypotheses::starts;
 use super::lm::polish;
@@ -14,8 +16,8 @@ use super::points::{Point, split, thinned};
 use super::smooth::flattened;
 use super::waves::{Wave, waves};
 use crate::error::ProceduralError;
-use crate::library::{LIBRARY, entry};
-use crate::settings::Settings;
+use crate::graph::Graph;
+use crate::library::{Class, LIBRARY, entry};
 
 /// The graph of one colour.
 const PAINT: &str = "paint";
@@ -29,23 +31,8 @@ pub const MOST_ERROR: f64 = 0.98;
 /// By how much a graph's error must be lower for each number that it has more than another.
 const PRICE: f64 = 0.002;
 
-/// A graph with its settings.
-#[derive(Clone, Debug)]
-pub struct Candidate {
-    /// The name of the built-in graph.
-    pub graph: &'static str,
-    /// The settings.
-    pub settings: Settings,
-    /// The weighted mean square of the difference of colours at the points that were held out.
-    pub error: f64,
-}
-
-impl Candidate {
-    /// What graphs are ordered by: of two that are as good, the one with fewer parameters is first.
-    fn rank(&self) -> f64 {
-        self.error * (1.0 + PRICE * self.settings.numbers().len() as f64)
-    }
-}
+/// By how much a graph's error may be higher for each unit of log-odds in its favour.
+const PRIOR: f64 = 0.02;
 
 /// The fit of a part.
 #[derive(Clone, Debug)]
@@ -60,6 +47,7 @@ pub struct Fit {
 pub struct Fitter {
     paint: Model,
     patterns: Vec<Pattern>,
+    textures: Vec<Model>,
 }
 
 impl Fitter {
@@ -68,15 +56,22 @@ impl Fitter {
         let mut patterns = Vec::new();
         for entry in &LIBRARY {
             if let Some(layout) = layout(entry.name) {
-                patterns.push(Pattern::new(entry.name, Model::new(entry.graph()?), layout));
+                patterns.push(Pattern::new(Model::new(entry.graph()?, Some(entry.class)), layout));
             }
         }
         let paint = entry(PAINT).expect("paint is a built-in graph").graph()?;
-        Ok(Self { paint: Model::new(paint), patterns })
+        Ok(Self { paint: Model::new(paint, Some(Class::Flat)), patterns, textures: Vec::new() })
     }
 
-    /// Fits the graphs to points, of which unsound ones are left out. Fails where no point is sound.
-    pub fn fit(&self, points: &[Point]) -> Result<Fit, ProceduralError> {
+    /// Adds a user's graphs, which are fitted by the names of their parameters.
+    pub fn with_graphs(mut self, graphs: Vec<Graph>) -> Self {
+        self.textures.extend(graphs.into_iter().map(|graph| Model::new(graph, None)));
+        self
+    }
+
+    /// Fits the graphs to points, of which unsound ones are left out. The category, such as `floor` or `sofa`, makes
+    /// some graphs more likely; unknown ones change nothing. Fails where no point is sound.
+    pub fn fit(&self, points: &[Point], category: Option<&str>) -> Result<Fit, ProceduralError> {
         let sound: Vec<Point> = points.iter().filter(|point| point.is_sound()).copied().collect();
         if sound.is_empty() {
             return Err(ProceduralError::NoPoints);
@@ -88,10 +83,10 @@ impl Fitter {
         let judged = if is_enough { held_out } else { sound.clone() };
         let paint = self.painted(if is_enough { &seen } else { &sound }, &judged);
         let mut others = if is_enough { self.fitted(&seen, &judged) } else { Vec::new() };
-        others.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        others.sort_by(|a, b| rank(a, category).total_cmp(&rank(b, category)));
         let is_better = others.first().is_some_and(|best| best.error < MOST_ERROR * paint.error);
         let chosen = if is_better { std::mem::replace(&mut others[0], paint) } else { paint };
-        others.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        others.sort_by(|a, b| rank(a, category).total_cmp(&rank(b, category)));
         Ok(Fit { chosen, others })
     }
 
@@ -99,7 +94,7 @@ impl Fitter {
     fn painted(&self, seen: &[Point], judged: &[Point]) -> Candidate {
         let mut settings = self.paint.start();
         project(&self.paint, &mut settings, seen);
-        Candidate { graph: PAINT, error: mean_square(&self.paint, &settings, judged), settings }
+        self.paint.candidate(settings, judged)
     }
 
     /// The best fit of each pattern that has the waves of the points.
@@ -107,6 +102,12 @@ impl Fitter {
         let found = waves(&thinned(seen, 4096), 8);
         self.patterns.iter().filter_map(|pattern| candidate(pattern, seen, judged, &found)).collect()
     }
+}
+
+/// What graphs are ordered by: of two that are as good, the one with fewer parameters or of the likelier kind is first.
+fn rank(candidate: &Candidate, category: Option<&str>) -> f64 {
+    let odds = log_odds(category, &candidate.graph.name);
+    candidate.error * (1.0 + PRICE * candidate.settings.numbers().len() as f64 - PRIOR * odds)
 }
 
 /// The best of a few starts, polished.
@@ -119,5 +120,5 @@ fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[Wave]
     });
     let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
     polish(model, &mut settings, &many, 25);
-    Some(Candidate { graph: pattern.name, error: mean_square(model, &settings, judged), settings })
+    Some(model.candidate(settings, judged))
 }

@@ -10,6 +10,8 @@
 //! Twelve periodic graphs are fitted, which `periods` lists. Others, such as planks and parquet, are not. Neither is what
 //! is random, such as grain, veins and the tone of single tiles: fitted graphs leave it out.
 
+pub mod candidate;
+mod category;
 pub mod choose;
 mod colors;
 mod hypotheses;
@@ -18,6 +20,7 @@ mod model;
 mod pattern;
 mod periods;
 pub mod points;
+pub mod roles;
 mod smooth;
 mod system;
 pub mod waves;

@@ -1,22 +1,22 @@
 //! A graph as a model of colours at points.
 
+use std::sync::Arc;
+
+use super::candidate::Candidate;
+use super::colors::mean_square;
 use super::points::Point;
+use super::roles::{Role, role};
 use crate::batch::Evaluator;
-use crate::graph::{FOOTPRINT, Graph};
+use crate::graph::Graph;
 use crate::lanes::{LANES, Points};
+use crate::library::Class;
 use crate::program::compile::Program;
 use crate::settings::{Settings, Slot, slots};
-use crate::value::Type;
-
-/// The amplitudes of what is random, whose phase cannot be fitted. They are set to their least values.
-const AMPLITUDES: [&str; 5] = ["tone", "grain", "pile", "clouds", "edge_wear"];
-
-/// Other parameters that are not fitted: what belongs to something random, or is not seen in a colour.
-const KEPT: [&str; 5] = ["depth_tone", "ring_period", "softness", "surface_roughness", FOOTPRINT];
 
 /// A graph with what is needed to fit it.
 pub(super) struct Model {
-    pub(super) graph: Graph,
+    pub(super) graph: Arc<Graph>,
+    pub(super) class: Option<Class>,
     program: Program,
     pub(super) slots: Vec<Slot>,
     /// The slots of the first channel of each colour.
@@ -26,28 +26,32 @@ pub(super) struct Model {
 }
 
 impl Model {
-    pub(super) fn new(graph: Graph) -> Self {
+    pub(super) fn new(graph: Graph, class: Option<Class>) -> Self {
         let slots = slots(&graph);
-        let kind = |slot: &Slot| graph.parameters[slot.parameter].value.kind();
-        let name = |slot: &Slot| graph.parameters[slot.parameter].name.as_str();
-        let all = slots.iter().enumerate();
-        let colors = all.clone().filter(|(_, slot)| kind(slot) == Type::Color3 && slot.component == 0);
-        let kept = |name: &str| AMPLITUDES.contains(&name) || KEPT.contains(&name);
-        let fitted = |slot: &Slot| !kept(name(slot)) || is_a_rib(&graph.name, name(slot));
-        let shape = all.clone().filter(|(_, slot)| kind(slot) == Type::Float && fitted(slot));
-        let (colors, shape) = (colors.map(|(at, _)| at).collect(), shape.map(|(at, _)| at).collect());
-        Self { program: Program::new(&graph), graph, slots, colors, shape }
+        let of = |wanted: &[Role]| -> Vec<usize> {
+            let is_wanted = |slot: &Slot| slot.component == 0 && wanted.contains(&role(&graph, slot.parameter));
+            slots.iter().enumerate().filter(|(_, slot)| is_wanted(slot)).map(|(at, _)| at).collect()
+        };
+        let colors = of(&[Role::Color, Role::RandomColor]);
+        let shape = of(&[Role::Turn, Role::Shift, Role::Shape]);
+        Self { program: Program::new(&graph), graph: Arc::new(graph), class, slots, colors, shape }
     }
 
     /// The defaults without what is random.
     pub(super) fn start(&self) -> Settings {
         let mut settings = Settings::defaults(&self.graph);
         for (at, slot) in self.slots.iter().enumerate() {
-            if AMPLITUDES.contains(&self.graph.parameters[slot.parameter].name.as_str()) {
+            if role(&self.graph, slot.parameter) == Role::Amplitude {
                 *settings.number_mut(at) = slot.least.unwrap_or(slot.value);
             }
         }
         settings
+    }
+
+    /// The candidate of these settings; its statistics are not compared.
+    pub(super) fn candidate(&self, settings: Settings, judged: &[Point]) -> Candidate {
+        let error = mean_square(self, &settings, judged);
+        Candidate { graph: Arc::clone(&self.graph), class: self.class, settings, error, distance: 0.0 }
     }
 
     /// The first slot of a parameter.
@@ -100,11 +104,6 @@ impl Model {
         }
         shown
     }
-}
-
-/// Ribs and threads are nothing but their tone.
-fn is_a_rib(graph: &str, parameter: &str) -> bool {
-    matches!((graph, parameter), ("corduroy" | "weave", "depth_tone"))
 }
 
 fn lanes(batch: &[Point]) -> Points {

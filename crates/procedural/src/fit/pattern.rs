@@ -12,7 +12,6 @@ const WAVES: usize = 8;
 
 /// A graph that is ready to be fitted.
 pub(super) struct Pattern {
-    pub(super) name: &'static str,
     pub(super) model: Model,
     pub(super) layout: Layout,
     /// For a pattern of one length: for each value of its whole number, settings without a turn and their waves.
@@ -20,12 +19,12 @@ pub(super) struct Pattern {
 }
 
 impl Pattern {
-    pub(super) fn new(name: &'static str, model: Model, layout: Layout) -> Self {
+    pub(super) fn new(model: Model, layout: Layout) -> Self {
         let own = match layout {
             Layout::Similar { length, whole } => own(&model, length, whole),
             Layout::Axes { .. } => Vec::new(),
         };
-        Self { name, model, layout, own }
+        Self { model, layout, own }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Fits of graphs to points that graphs have made: at an angle, with light that is left, and noise.
 
-use mateval_procedural::fit::choose::{Candidate, Fit, Fitter};
+use mateval_procedural::fit::candidate::Candidate;
+use mateval_procedural::fit::choose::{Fit, Fitter};
 use mateval_procedural::fit::points::Point;
 use mateval_procedural::lanes::{LANES, Points};
 use mateval_procedural::library::{Class, entry};
@@ -110,7 +111,7 @@ fn turn_error(graph: &Graph, found: &Settings, planted: &Settings) -> f64 {
 }
 
 fn find<'a>(fit: &'a Fit, graph: &str) -> Option<&'a Candidate> {
-    std::iter::once(&fit.chosen).chain(&fit.others).find(|candidate| candidate.graph == graph)
+    std::iter::once(&fit.chosen).chain(&fit.others).find(|candidate| candidate.graph.name == graph)
 }
 
 /// What a fit of a planted pattern gave.
@@ -124,7 +125,6 @@ struct Outcome {
 /// The peak signal-to-noise ratio of the fitted colours against the planted ones, without light and noise, in decibels.
 /// The light that is left has an unknown mean, so one gain for all points is taken out.
 fn psnr(planted: &Graph, settings: &Settings, chosen: &Candidate, side: f64) -> f64 {
-    let fitted = entry(chosen.graph).unwrap().graph().unwrap();
     let colors = |graph: &Graph, settings: &Settings| -> Vec<f64> {
         let program = Program::new(graph);
         let mut evaluator = Evaluator::new(&program, settings, &[]);
@@ -136,7 +136,7 @@ fn psnr(planted: &Graph, settings: &Settings, chosen: &Candidate, side: f64) -> 
         }
         all
     };
-    let (found, planted) = (colors(&fitted, &chosen.settings), colors(planted, settings));
+    let (found, planted) = (colors(&chosen.graph, &chosen.settings), colors(planted, settings));
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let gain = dot(&found, &planted) / dot(&found, &found);
     let mean_square = found.iter().zip(&planted).map(|(a, b)| (gain * a - b).powi(2)).sum::<f64>() / found.len() as f64;
@@ -147,7 +147,7 @@ fn outcome(fitter: &Fitter, (name, periods, set, side): Planted) -> Outcome {
     let planted = entry(name).unwrap();
     let graph = planted.graph().unwrap();
     let settings = settings_of(&graph, set);
-    let fit = fitter.fit(&seen(&graph, &settings, side, 4096)).unwrap();
+    let fit = fitter.fit(&seen(&graph, &settings, side, 4096), None).unwrap();
     let own = find(&fit, name).unwrap();
     let period = period_error(&graph, periods, &own.settings, &settings);
     let turn = turn_error(&graph, &own.settings, &settings);
@@ -155,13 +155,13 @@ fn outcome(fitter: &Fitter, (name, periods, set, side): Planted) -> Outcome {
     // The twin: the same fit, shifted by a third of the shortest period.
     let mut shifted = fit.chosen.clone();
     let shortest = periods.iter().map(|name| number(&graph, &settings, name)).fold(f64::MAX, f64::min);
-    let chosen = entry(fit.chosen.graph).unwrap().graph().unwrap();
-    *shifted.settings.number_mut(slot(&chosen, "t_u")) += shortest / 3.0;
+    let chosen = &fit.chosen.graph;
+    *shifted.settings.number_mut(slot(chosen, "t_u")) += shortest / 3.0;
     assert!(psnr(&graph, &settings, &shifted, side) < found - 6.0, "{name}");
-    let (psnr, graph) = (found, fit.chosen.graph);
+    let (psnr, graph) = (found, fit.chosen.graph.name.as_str());
     eprintln!("{name}: {graph}, {psnr:.1} dB, period off by {:.2} %, turn by {turn:.2} degrees", 100.0 * period);
     Outcome {
-        is_right_class: entry(graph).unwrap().class == planted.class,
+        is_right_class: fit.chosen.class == Some(planted.class),
         is_right_graph: graph == name,
         is_in_place: period < 0.01 && turn < 1.0,
         psnr,
@@ -187,8 +187,8 @@ fn noise_is_paint() {
     let graph = entry("paint").unwrap().graph().unwrap();
     let settings = settings_of(&graph, &[("color", "0.3, 0.4, 0.2")]);
     let points = seen(&graph, &settings, 2.0, 4096);
-    let fit = fitter.fit(&points).unwrap();
-    assert_eq!((fit.chosen.graph, entry(fit.chosen.graph).unwrap().class), ("paint", Class::Flat));
+    let fit = fitter.fit(&points, None).unwrap();
+    assert_eq!((fit.chosen.graph.name.as_str(), fit.chosen.class), ("paint", Some(Class::Flat)));
     let color = &fit.chosen.settings.numbers()[graph.parameters.iter().position(|p| p.name == "color").unwrap()..][..3];
     for (found, planted) in color.iter().zip([0.3, 0.4, 0.2]) {
         assert!((found / planted - 1.0).abs() < 0.1, "{color:?}");
@@ -201,9 +201,9 @@ fn few_points_are_paint_and_none_are_an_error() {
     let graph = entry("stripes").unwrap().graph().unwrap();
     let settings = settings_of(&graph, &[]);
     let points = seen(&graph, &settings, 1.0, 320);
-    assert_eq!(fitter.fit(&points).unwrap().chosen.graph, "paint");
+    assert_eq!(fitter.fit(&points, None).unwrap().chosen.graph.name, "paint");
     let unsound: Vec<Point> = points.iter().map(|point| Point { weight: f64::NAN, ..*point }).collect();
-    assert!(matches!(fitter.fit(&unsound), Err(ProceduralError::NoPoints)));
+    assert!(matches!(fitter.fit(&unsound, None), Err(ProceduralError::NoPoints)));
 }
 
 /// The same points give the same bits; unsound ones among them change nothing.
@@ -213,13 +213,13 @@ fn fits_are_repeatable() {
     let graph = entry("checks").unwrap().graph().unwrap();
     let settings = settings_of(&graph, &[("theta", "15")]);
     let mut points = seen(&graph, &settings, 1.5, 1024);
-    let first = fitter.fit(&points).unwrap();
+    let first = fitter.fit(&points, None).unwrap();
     points.insert(100, Point { u: f64::INFINITY, ..points[0] });
-    let second = Fitter::new().unwrap().fit(&points).unwrap();
-    assert_eq!((first.chosen.graph, &first.chosen.settings), (second.chosen.graph, &second.chosen.settings));
+    let second = Fitter::new().unwrap().fit(&points, None).unwrap();
+    assert_eq!((&first.chosen.graph, &first.chosen.settings), (&second.chosen.graph, &second.chosen.settings));
     assert_eq!(first.chosen.error.to_bits(), second.chosen.error.to_bits());
     assert!(first.others.windows(2).all(|pair| pair[0].error <= 1.05 * pair[1].error), "others are sorted");
     // The twin: a point more is another fit.
     points.push(Point { albedo: [0.9; 3], ..points[0] });
-    assert_ne!(fitter.fit(&points).unwrap().chosen.error, first.chosen.error);
+    assert_ne!(fitter.fit(&points, None).unwrap().chosen.error, first.chosen.error);
 }

@@ -1,0 +1,135 @@
+//! A graph with the settings that a fit gave it: what a fit returns and what textures are made of.
+
+use std::sync::Arc;
+
+use super::roles::{Role, role};
+use crate::batch::Evaluator;
+use crate::graph::Graph;
+use crate::lanes::{LANES, Points};
+use crate::library::Class;
+use crate::noise::cell::cell;
+use crate::program::compile::{OUTPUTS, Program};
+use crate::settings::{Settings, slots};
+
+/// The number of places at which the mean colour of a pattern is measured.
+const MEAN_PLACES: u32 = 4096;
+
+/// The side of the square over which they are scattered, in metres.
+const MEAN_SIDE: f64 = 8.0;
+
+/// A graph with its settings.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The graph.
+    pub graph: Arc<Graph>,
+    /// The kind of pattern of a built-in graph; `None` for a user's.
+    pub class: Option<Class>,
+    /// The settings, what is random included.
+    pub settings: Settings,
+    /// The weighted mean square of the difference of colours at the points that were held out, for the predictable part
+    /// of the pattern ([`Candidate::with_detail`] of 0).
+    pub error: f64,
+    /// How far the statistics of the pattern are from those of the points; 0 for the same.
+    pub distance: f64,
+}
+
+impl Candidate {
+    /// The candidate with its randomness scaled: 1 keeps it, 0 removes it. Amplitudes of what is random shrink to their
+    /// least values and colours that are scattered at random to their mean. The mean colour of the pattern stays, and so
+    /// do the fibres of `carpet`, a tenth of its brightness, which have no parameter.
+    pub fn with_detail(&self, detail: f64) -> Self {
+        let detail = detail.clamp(0.0, 1.0);
+        let mut scaled = self.clone();
+        let mean = self.mean();
+        let slots = slots(&self.graph);
+        for (at, slot) in slots.iter().enumerate() {
+            let anchor = match role(&self.graph, slot.parameter) {
+                Role::Amplitude => slot.least.unwrap_or(0.0),
+                Role::RandomColor => mean[slot.component],
+                _ => continue,
+            };
+            let number = scaled.settings.number_mut(at);
+            *number = anchor + detail * (*number - anchor);
+        }
+        let after = scaled.mean();
+        for (at, slot) in slots.iter().enumerate() {
+            if matches!(role(&self.graph, slot.parameter), Role::Color | Role::RandomColor)
+                && after[slot.component] > 0.0
+            {
+                let number = scaled.settings.number_mut(at);
+                *number = slot.clamped(*number * mean[slot.component] / after[slot.component]);
+            }
+        }
+        scaled
+    }
+
+    /// Base colour (linear red, green, blue), roughness and metallic at places `[u, v, footprint]`, all in metres.
+    pub fn evaluate(&self, places: &[[f64; 3]]) -> Vec<[f64; OUTPUTS]> {
+        let program = Program::new(&self.graph);
+        let mut evaluator = Evaluator::new(&program, &self.settings, &[]);
+        let mut all = Vec::with_capacity(places.len());
+        for batch in places.chunks(LANES) {
+            let at = |axis: usize| std::array::from_fn(|lane| batch[lane.min(batch.len() - 1)][axis]);
+            evaluator.run(&Points { u: at(0), v: at(1), footprint: at(2) });
+            all.extend((0..batch.len()).map(|lane| evaluator.outputs(lane)));
+        }
+        all
+    }
+
+    /// The mean colour over a large square.
+    fn mean(&self) -> [f64; 3] {
+        let random = |i: u32, axis: f64| MEAN_SIDE * cell(f64::from(i) + 0.5, axis);
+        let places: Vec<[f64; 3]> = (0..MEAN_PLACES).map(|i| [random(i, 20.5), random(i, 21.5), 0.0]).collect();
+        let shown = self.evaluate(&places);
+        std::array::from_fn(|channel| shown.iter().map(|out| out[channel]).sum::<f64>() / f64::from(MEAN_PLACES))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::entry;
+
+    fn candidate(name: &str) -> Candidate {
+        let entry = entry(name).unwrap();
+        let graph = Arc::new(entry.graph().unwrap());
+        let settings = Settings::defaults(&graph);
+        Candidate { graph, class: Some(entry.class), settings, error: 0.0, distance: 0.0 }
+    }
+
+    fn spread(candidate: &Candidate) -> f64 {
+        let places: Vec<[f64; 3]> = (0..1000).map(|i| [0.0137 * f64::from(i), 0.0071 * f64::from(i), 0.0]).collect();
+        let grey: Vec<f64> = candidate.evaluate(&places).iter().map(|out| out[..3].iter().sum::<f64>() / 3.0).collect();
+        let mean = grey.iter().sum::<f64>() / 1000.0;
+        (grey.iter().map(|grey| (grey - mean).powi(2)).sum::<f64>() / 1000.0).sqrt() / mean
+    }
+
+    #[test]
+    fn detail_scales_randomness_and_keeps_the_mean() {
+        for name in ["plaster", "granite", "carpet", "veneer", "leather", "roughcast", "marble", "terrazzo", "metal"] {
+            let full = candidate(name);
+            let [half, none] = [0.5, 0.0].map(|detail| full.with_detail(detail));
+            let [a, b, c] = [&full, &half, &none].map(spread);
+            assert!(a > 0.02 && b < a && b > 0.2 * a, "{name}: {a} {b}");
+            let most = if name == "carpet" { 0.12 } else { 0.02 };
+            assert!(c < most && c < 0.4 * a, "{name}: {a} {c}");
+            for (before, after) in full.mean().iter().zip(none.mean()) {
+                assert!((before / after - 1.0).abs() < 0.02, "{name}");
+            }
+        }
+        // The twin: a periodic pattern is not random.
+        let checks = candidate("checks");
+        assert_eq!(spread(&checks), spread(&checks.with_detail(0.0)));
+    }
+
+    #[test]
+    fn places_are_evaluated_one_by_one_or_together() {
+        let plank = candidate("plank");
+        let places: Vec<[f64; 3]> = (0..150).map(|i| [0.01 * f64::from(i), 0.3, 0.002]).collect();
+        let together = plank.evaluate(&places);
+        assert_eq!(together.len(), 150);
+        assert_eq!(together[140], plank.evaluate(&places[140..141])[0]);
+        assert_ne!(together[140], together[10]);
+        assert!(plank.evaluate(&[]).is_empty());
+    }
+}
