@@ -4,6 +4,11 @@
 //! Prints a line for each graph: how often class and graph are right, how often turn and periods are in place, decibels
 //! without and with what is random (medians), the mean colour's error, CPU seconds a fit, and the graphs that were
 //! chosen instead.
+//!
+//! Found with 3 draws of each (84): class right in 87 %, graph in 71 %; of the 17 periodic graphs class 94 %, graph 79 %,
+//! in place 69 %, and 36.8 dB without what is random. The aims are 95 %, 85 % and 95 %, and 30 dB. The paper's way on the
+//! same periodic crops: class 77 %, graph 60 %, in place 0 %, 21.6 dB. Weakest are plaster, whose contrast is below the
+//! noise, concrete, veneer and metal, plank and parquet, and bricks of multiples of their length.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a bench prints
 
 #[path = "../tests/planting/mod.rs"]

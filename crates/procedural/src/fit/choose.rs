@@ -52,6 +52,9 @@ const CELLS: f64 = 1.0;
 /// The weight of the distance of statistics.
 const STATISTICS: f64 = 0.25;
 
+/// The distance of statistics from which on more of it hardly counts.
+const FAR: f64 = 2.0;
+
 /// The price of each number that a graph has.
 const PRICE: f64 = 0.01;
 
@@ -68,10 +71,10 @@ const ROUNDS: usize = 4;
 const PERIODIC: usize = 6;
 
 /// How many graphs without a period are refined.
-const RANDOM: usize = 7;
+const RANDOM: usize = 6;
 
 /// How many of those are refined from two starts.
-const TWICE: usize = 3;
+const TWICE: usize = 2;
 
 /// The fit of a part. What is random in a graph has its look and not its place, so that a texture of variance s^2 adds s^2
 /// to the mean square of the differences from what is seen; [`Candidate::with_detail`] removes as much as is wanted.
@@ -224,8 +227,14 @@ impl Fitter {
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
     let pixels = PIXELS * libm::log(candidate.error / of_paint.max(1e-12) + 1e-3);
     let price = PRICE * candidate.settings.numbers().len() as f64;
-    pixels + CELLS * candidate.cells + STATISTICS * candidate.distance + price
+    pixels + CELLS * candidate.cells + STATISTICS * compressed(candidate.distance) + price
         - PRIOR * log_odds(category, &candidate.graph.name)
+}
+
+/// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than how
+/// far off a few statistics are.
+fn compressed(distance: f64) -> f64 {
+    if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
 }
 
 /// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
