@@ -3,7 +3,7 @@
 use crate::kernel::{OPERANDS, Outcome, run};
 use crate::lanes::{LANES, Lanes, Points};
 use crate::program::compile::{OUTPUTS, Program};
-use crate::program::op::Op;
+use crate::program::op::{Binary, Op};
 use crate::settings::Settings;
 
 /// Evaluates a program. Results that are the same at all points are computed once, when the settings are set;
@@ -14,6 +14,8 @@ pub struct Evaluator<'p> {
     settings: Vec<f64>,
     /// Whether each result differs between points.
     varies: Vec<bool>,
+    /// Whether each result has to be computed at every point: it varies, and is not only multiplied by 0.
+    runs: Vec<bool>,
     /// The chosen slots that each result depends on, as places in the list of chosen ones, ascending.
     depends: Vec<Vec<usize>>,
     /// The place of each result's first derivative.
@@ -40,6 +42,7 @@ impl<'p> Evaluator<'p> {
         let mut evaluator = Self {
             program,
             settings: Vec::new(),
+            runs: varies.clone(),
             varies,
             depends,
             first,
@@ -60,6 +63,35 @@ impl<'p> Evaluator<'p> {
                 self.step(at);
             }
         }
+        self.prune();
+    }
+
+    /// Finds what has to be computed at every point. Noise whose amplitude is 0 is not.
+    fn prune(&mut self) {
+        self.runs.fill(false);
+        for output in self.program.outputs {
+            self.runs[output.index()] = true;
+        }
+        for at in (0..self.program.ops.len()).rev() {
+            if !self.runs[at] || !self.varies[at] {
+                self.runs[at] = false;
+                continue;
+            }
+            let op = &self.program.ops[at];
+            if self.is_multiplied_by_zero(op) {
+                self.runs[at] = false;
+                self.values[at] = [0.0; LANES];
+                self.derivatives[self.first[at]..][..self.depends[at].len()].fill([0.0; LANES]);
+                continue;
+            }
+            op.inputs().iter().for_each(|input| self.runs[input.index()] = true);
+        }
+    }
+
+    /// Whether an instruction is a product of which one operand is 0 everywhere, whatever the chosen slots are.
+    fn is_multiplied_by_zero(&self, op: &Op) -> bool {
+        let is_zero = |at: usize| !self.varies[at] && self.depends[at].is_empty() && self.values[at][0] == 0.0;
+        matches!(op, Op::Binary(Binary::Mul, _)) && op.inputs().iter().any(|input| is_zero(input.index()))
     }
 
     /// Evaluates the program at these points.
@@ -69,7 +101,7 @@ impl<'p> Evaluator<'p> {
                 Op::PlaceU => self.values[at] = points.u,
                 Op::PlaceV => self.values[at] = points.v,
                 Op::Footprint => self.values[at] = points.footprint,
-                _ if self.varies[at] => self.step(at),
+                _ if self.runs[at] => self.step(at),
                 _ => {}
             }
         }
@@ -146,4 +178,47 @@ fn dependencies(op: &Op, chosen: &[usize], of_others: &[Vec<usize>]) -> Vec<usiz
     all.sort_unstable();
     all.dedup();
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::library::entry;
+
+    fn points() -> Points {
+        let along = |step: f64| std::array::from_fn(|lane| step * lane as f64);
+        Points { u: along(0.013), v: along(0.007), footprint: [0.001; LANES] }
+    }
+
+    /// What is only multiplied by 0 is left out, which changes neither values nor derivatives.
+    #[test]
+    fn noise_of_no_amplitude_is_not_computed() {
+        let graph = entry("plank").unwrap().graph().unwrap();
+        let program = Program::new(&graph);
+        let mut settings = Settings::defaults(&graph);
+        let first = |name: &str| crate::program::compile::first_slot(&graph, graph.parameter(name).unwrap());
+        let (grain, width) = (first("grain"), first("width"));
+        let all = Evaluator::new(&program, &settings, &[]).runs.iter().filter(|runs| **runs).count();
+        *settings.number_mut(grain) = 1e-12;
+        let mut nearly = Evaluator::new(&program, &settings, &[width]);
+        *settings.number_mut(grain) = 0.0;
+        let mut without = Evaluator::new(&program, &settings, &[width]);
+        assert!(without.runs.iter().filter(|runs| **runs).count() < all - 10);
+        nearly.run(&points());
+        without.run(&points());
+        for lane in 0..LANES {
+            assert!((nearly.value(0)[lane] - without.value(0)[lane]).abs() < 1e-9);
+            let [a, b] = [&nearly, &without].map(|evaluator| evaluator.derivative(0, 0).unwrap()[lane]);
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        // The twin: where the amplitude's own derivative is wanted, the noise is needed.
+        let mut of_grain = Evaluator::new(&program, &settings, &[grain]);
+        of_grain.run(&points());
+        assert!(of_grain.derivative(0, 0).unwrap().iter().any(|slope| slope.abs() > 0.01));
+        // Settings that are changed later count.
+        *settings.number_mut(grain) = 0.3;
+        without.set(&settings);
+        without.run(&points());
+        assert!((0..LANES).any(|lane| (nearly.value(0)[lane] - without.value(0)[lane]).abs() > 0.01));
+    }
 }

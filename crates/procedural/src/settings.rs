@@ -81,6 +81,11 @@ impl Settings {
         named
     }
 
+    /// All numbers, to be changed without a check of their ranges.
+    pub(crate) fn numbers_mut(&mut self) -> &mut [f64] {
+        &mut self.0
+    }
+
     /// Sets a parameter from text, as in `0.2` or `0.8, 0.7, 0.6`. Fails where the parameter does not exist, or the
     /// text is no value of its type and range.
     pub fn set(&mut self, graph: &Graph, name: &str, text: &str) -> Result<(), ProceduralError> {

@@ -6,6 +6,8 @@
 )]
 #![allow(clippy::print_stderr, reason = "measurements are printed")]
 
+mod planting;
+
 mod suite {
     mod derivatives;
     mod files;

@@ -96,13 +96,7 @@ impl Baker<'_> {
     }
 
     /// The material of a part at texels, each given by its place in the atlas and its triangle.
-    fn values(
-        &self,
-        part: usize,
-        atlas: &UvAtlas,
-        mesh: &TriangleMesh,
-        texels: &[(usize, usize)],
-    ) -> Vec<Values> {
+    fn values(&self, part: usize, atlas: &UvAtlas, mesh: &TriangleMesh, texels: &[(usize, usize)]) -> Vec<Values> {
         let material = &self.of_part[part];
         let size = atlas.size();
         let position = |&(at, triangle): &(usize, usize)| {

@@ -2,6 +2,9 @@
 
 use std::sync::Arc;
 
+use super::colors::mean_square;
+use super::model::Model;
+use super::points::Point;
 use super::roles::{Role, role};
 use crate::batch::Evaluator;
 use crate::graph::Graph;
@@ -29,14 +32,23 @@ pub struct Candidate {
     /// The weighted mean square of the difference of colours at the points that were held out, for the predictable part
     /// of the pattern ([`Candidate::with_detail`] of 0).
     pub error: f64,
+    /// The logarithm of how much less the points of a cell differ than those of the same cells elsewhere; 0 where the
+    /// graph has no cells.
+    pub cells: f64,
     /// How far the statistics of the pattern are from those of the points; 0 for the same.
     pub distance: f64,
 }
 
 impl Candidate {
+    /// The candidate of these settings, judged by these points; its statistics are not compared.
+    pub(super) fn judged(model: &Model, settings: Settings, judged: &[Point]) -> Self {
+        let error = mean_square(model, &settings, judged);
+        Self { graph: Arc::clone(&model.graph), class: model.class, settings, error, cells: 0.0, distance: 0.0 }
+    }
+
     /// The candidate with its randomness scaled: 1 keeps it, 0 removes it. Amplitudes of what is random shrink to their
-    /// least values and colours that are scattered at random to their mean. The mean colour of the pattern stays, and so
-    /// do the fibres of `carpet`, a tenth of its brightness, which have no parameter.
+    /// least values and colours that are scattered at random to their mean. The mean colour of the pattern stays, and
+    /// so do the fibres of `carpet`, a tenth of its brightness, which have no parameter.
     pub fn with_detail(&self, detail: f64) -> Self {
         let detail = detail.clamp(0.0, 1.0);
         let mut scaled = self.clone();
@@ -94,7 +106,7 @@ mod tests {
         let entry = entry(name).unwrap();
         let graph = Arc::new(entry.graph().unwrap());
         let settings = Settings::defaults(&graph);
-        Candidate { graph, class: Some(entry.class), settings, error: 0.0, distance: 0.0 }
+        Candidate { graph, class: Some(entry.class), settings, error: 0.0, cells: 0.0, distance: 0.0 }
     }
 
     fn spread(candidate: &Candidate) -> f64 {

@@ -1,23 +1,35 @@
-//! The choice of a graph: the twelve periodic graphs that `periods` lists are fitted, and the best one counts if it
-//! predicts held-out points better than a single colour does.
+//! The choice of a graph: all graphs are fitted, and the best one counts if it is better than a single colour.
 //!
-//! Held-out points take no part in the fit of a graph. They do take part in that of the cubic polynomial whose shading
-//! is taken away before: it is fitted to all points, so that both groups are divided by the same light.
+//! Three things decide. Pixels: how much better than a single colour the predictable part of a graph, such as joints
+//! and stripes, shows points that were held out. Cells: how much more alike the points of a tile or a board are than
+//! those of the same cells elsewhere. Statistics: how likely those of what is seen are among those of the graph, its
+//! randomness included. Graphs without a period predict no pixels, so only their statistics speak for them.
+//!
+//! Held-out points take no part in the fit of what is periodic. They do take part in statistics, which are fitted by
+//! few numbers, and in the cubic polynomial whose shading is taken away before: it is fitted to all points, so that
+//! both groups are divided by the same light.
+
+use std::sync::Arc;
 
 use super::candidate::Candidate;
 use super::category::log_odds;
+use super::cells::{cell_error, excess, without_tones};
 use super::colors::{mean_square, project};
-use super::hypotheses::starts;
+use super::hypotheses::{Start, starts};
 use super::lm::polish;
 use super::model::Model;
+use super::octaves::better;
 use super::pattern::Pattern;
 use super::periods::layout;
 use super::points::{Point, split, thinned};
+use super::roles::Role;
 use super::smooth::flattened;
-use super::waves::{Wave, waves};
+use super::texture::{Colors, Sight, Texture};
+use super::waves::{Wave, lines, waves};
 use crate::error::ProceduralError;
 use crate::graph::Graph;
 use crate::library::{Class, LIBRARY, entry};
+use crate::settings::Settings;
 
 /// The graph of one colour.
 const PAINT: &str = "paint";
@@ -25,19 +37,51 @@ const PAINT: &str = "paint";
 /// Fewer points than this are one colour.
 pub const LEAST_POINTS: usize = 400;
 
-/// The error of a graph must be below this share of a single colour's.
-pub const MOST_ERROR: f64 = 0.98;
+/// By how much the score of a graph must be below that of a single colour.
+const LEAST_GAIN: f64 = 0.05;
 
-/// By how much it must be lower at least: less than what storing colours as bytes changes is no pattern.
-const LEAST_GAIN: f64 = 2e-6;
+/// Points whose mean square difference from one colour is below this are one colour: storing colours as bytes changes as
+/// much.
+const LEAST_VARIANCE: f64 = 2e-6;
 
-/// By how much a graph's error must be lower for each number that it has more than another.
-const PRICE: f64 = 0.002;
+/// The most error of what is predictable in a graph, in those of a single colour.
+const MOST_ERROR: f64 = 1.01;
 
-/// By how much a graph's error may be higher for each unit of log-odds in its favour.
+/// The weight of the logarithm of the error.
+const PIXELS: f64 = 1.0;
+
+/// The weight of how much alike the points of a cell are.
+const CELLS: f64 = 1.0;
+
+/// The weight of the distance of statistics.
+const STATISTICS: f64 = 0.25;
+
+/// The distance of statistics from which on more of it hardly counts.
+const FAR: f64 = 2.0;
+
+/// The price of each number that a graph has.
+const PRICE: f64 = 0.01;
+
+/// The worth of each unit of log-odds in a graph's favour.
 const PRIOR: f64 = 0.02;
 
-/// The fit of a part.
+/// By how much a start has to be better than nothing.
+const LEAST_PROMISE: f64 = 0.015;
+
+/// How often tones are taken away and sizes are reconsidered.
+const ROUNDS: usize = 4;
+
+/// How many periodic graphs are compared in their statistics.
+const PERIODIC: usize = 6;
+
+/// How many graphs without a period are refined.
+const RANDOM: usize = 6;
+
+/// How many of those are refined from two starts.
+const TWICE: usize = 2;
+
+/// The fit of a part. What is random in a graph has its look and not its place, so that a texture of variance s^2 adds s^2
+/// to the mean square of the differences from what is seen; [`Candidate::with_detail`] removes as much as is wanted.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// The graph that was chosen; `paint` where none is better than a colour.
@@ -54,22 +98,36 @@ pub struct Fitter {
 }
 
 impl Fitter {
-    /// Prepares the twelve periodic graphs and `paint`.
+    /// Prepares the built-in graphs.
     pub fn new() -> Result<Self, ProceduralError> {
-        let mut patterns = Vec::new();
-        for entry in &LIBRARY {
-            if let Some(layout) = layout(entry.name) {
-                patterns.push(Pattern::new(Model::new(entry.graph()?, Some(entry.class)), layout));
+        let (mut patterns, mut textures) = (Vec::new(), Vec::new());
+        for entry in LIBRARY.iter().filter(|entry| entry.name != PAINT) {
+            let model = || Ok::<_, ProceduralError>(Model::new(entry.graph()?, Some(entry.class)));
+            let layout = layout(entry.name);
+            // Concrete is in panels, or without joints.
+            if entry.class == Class::Isotropic || layout.is_none() {
+                textures.push(model()?);
+            }
+            if let Some(layout) = layout {
+                patterns.push(Pattern::new(model()?, layout));
             }
         }
         let paint = entry(PAINT).expect("paint is a built-in graph").graph()?;
-        Ok(Self { paint: Model::new(paint, Some(Class::Flat)), patterns, textures: Vec::new() })
+        Ok(Self { paint: Model::new(paint, Some(Class::Flat)), patterns, textures })
     }
 
-    /// Adds a user's graphs, which are fitted by the names of their parameters.
+    /// Adds a user's graphs, which are fitted by the names of their parameters ([`super::roles`]) and by statistics only:
+    /// nothing is known of their periods.
     pub fn with_graphs(mut self, graphs: Vec<Graph>) -> Self {
         self.textures.extend(graphs.into_iter().map(|graph| Model::new(graph, None)));
         self
+    }
+
+    /// All graphs, each once.
+    pub(super) fn models(&self) -> impl Iterator<Item = &Model> {
+        let periodic = self.patterns.iter().map(|pattern| &pattern.model);
+        let is_new = |model: &&Model| self.patterns.iter().all(|pattern| pattern.model.graph.name != model.graph.name);
+        std::iter::once(&self.paint).chain(periodic).chain(self.textures.iter().filter(is_new))
     }
 
     /// Fits the graphs to points, of which unsound ones are left out. The category, such as `floor` or `sofa`, makes
@@ -84,13 +142,24 @@ impl Fitter {
         // Too few points to hold some out: only the single colour is fitted, to all of them.
         let is_enough = seen.len() >= LEAST_POINTS && held_out.len() >= LEAST_POINTS / 8;
         let judged = if is_enough { held_out } else { sound.clone() };
-        let paint = self.painted(if is_enough { &seen } else { &sound }, &judged);
-        let mut others = if is_enough { self.fitted(&seen, &judged) } else { Vec::new() };
-        others.sort_by(|a, b| rank(a, category).total_cmp(&rank(b, category)));
-        let most = (MOST_ERROR * paint.error).min(paint.error - LEAST_GAIN);
-        let is_better = others.first().is_some_and(|best| best.error < most);
-        let chosen = if is_better { std::mem::replace(&mut others[0], paint) } else { paint };
-        others.sort_by(|a, b| rank(a, category).total_cmp(&rank(b, category)));
+        let mut paint = self.painted(if is_enough { &seen } else { &sound }, &judged);
+        if !is_enough || paint.error < LEAST_VARIANCE {
+            return Ok(Fit { chosen: paint, others: Vec::new() });
+        }
+        let sight = Sight::new(&sound);
+        paint.distance = sight.judged(&self.paint, &paint.settings);
+        let mut others = self.fitted(&seen, &judged, &sight);
+        others.extend(self.textured(&sight, paint.error));
+        // A user's graph may have values that are not numbers, which are no less than anything.
+        others.retain(|other| other.error <= MOST_ERROR * paint.error && other.distance.is_finite());
+        let score = |candidate: &Candidate| score(candidate, paint.error, category);
+        others.sort_by(|a, b| score(a).total_cmp(&score(b)));
+        let is_better = others.first().is_some_and(|best| score(best) < score(&paint) - LEAST_GAIN);
+        let chosen = if is_better { others.remove(0) } else { paint.clone() };
+        if is_better {
+            let place = others.partition_point(|other| score(other) <= score(&paint));
+            others.insert(place, paint.clone());
+        }
         Ok(Fit { chosen, others })
     }
 
@@ -98,31 +167,128 @@ impl Fitter {
     fn painted(&self, seen: &[Point], judged: &[Point]) -> Candidate {
         let mut settings = self.paint.start();
         project(&self.paint, &mut settings, seen);
-        self.paint.candidate(settings, judged)
+        Candidate::judged(&self.paint, settings, judged)
     }
 
-    /// The best fit of each pattern that has the waves of the points.
-    fn fitted(&self, seen: &[Point], judged: &[Point]) -> Vec<Candidate> {
-        let found = waves(&thinned(seen, 4096), 8);
-        self.patterns.iter().filter_map(|pattern| candidate(pattern, seen, judged, &found)).collect()
+    /// The best fit of each pattern that has the waves of the points; the best ones also with what is random in them.
+    fn fitted(&self, seen: &[Point], judged: &[Point], sight: &Sight) -> Vec<Candidate> {
+        let few = thinned(seen, 4096);
+        let strong = waves(&few, 8);
+        // The joints of cells stand out against waves of similar period, not by their power.
+        let sharp = lines(&few, 8);
+        let both = [strong.as_slice(), &sharp];
+        let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
+        let fitted = |pattern: &Pattern| candidate(pattern, seen, judged, of(pattern));
+        let mut all: Vec<(&Model, Candidate)> =
+            self.patterns.iter().filter_map(|pattern| Some((&pattern.model, fitted(pattern)?))).collect();
+        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
+        all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
+        all.truncate(PERIODIC);
+        for (model, candidate) in &mut all {
+            let is_scattered = !model.of_role(Role::RandomColor).is_empty();
+            let colors = if is_scattered { Colors::Ranked } else { Colors::Kept };
+            let mut settings = candidate.settings.clone();
+            if is_scattered {
+                model.reset(&mut settings, Role::RandomColor);
+            }
+            let start = sight.with_amplitudes(model, settings, colors);
+            let roles = [Role::Amplitude, Role::RandomSize];
+            candidate.settings = sight.searched(model, start, &roles, colors).settings;
+            candidate.distance = sight.judged(model, &candidate.settings);
+        }
+        all.into_iter().map(|(_, candidate)| candidate).collect()
+    }
+
+    /// The fits of the graphs without a period that come closest in their statistics. As their phase is random, no more
+    /// than their mean colour can be predicted.
+    fn textured(&self, sight: &Sight, error: f64) -> Vec<Candidate> {
+        let mut starts: Vec<(&Model, Vec<Texture>)> =
+            self.textures.iter().map(|model| (model, sight.starts(model))).filter(|(_, all)| !all.is_empty()).collect();
+        starts.sort_by(|a, b| a.1[0].distance.total_cmp(&b.1[0].distance));
+        starts.truncate(RANDOM);
+        let fitted = starts.into_iter().enumerate().map(|(place, (model, starts))| {
+            // Nothing is known of the layout of a user's graph.
+            let roles = [Role::RandomSize, Role::Amplitude, Role::Turn, Role::Shape];
+            let roles = match model.class {
+                Some(Class::Isotropic) => &roles[..2],
+                Some(_) => &roles[..3],
+                None => &roles,
+            };
+            // The most promising ones are searched from two places.
+            let tried = starts.into_iter().take(if place < TWICE { 2 } else { 1 });
+            let searched = tried.map(|start| sight.searched(model, start, roles, Colors::Ranked));
+            let best = searched.min_by(|a, b| a.distance.total_cmp(&b.distance));
+            let settings = best.expect("graphs without a start were left out").settings;
+            let distance = sight.judged(model, &settings);
+            Candidate { graph: Arc::clone(&model.graph), class: model.class, settings, error, cells: 0.0, distance }
+        });
+        fitted.collect()
     }
 }
 
-/// What graphs are ordered by: of two that are as good, the one with fewer parameters or of the likelier kind is first.
-fn rank(candidate: &Candidate, category: Option<&str>) -> f64 {
-    let odds = log_odds(category, &candidate.graph.name);
-    candidate.error * (1.0 + PRICE * candidate.settings.numbers().len() as f64 - PRIOR * odds)
+/// What graphs are ordered by, the least first: by how much what can be predicted reduces the error of a single colour,
+/// how far statistics are, how many numbers a graph has, and whether things of the category are often made of it.
+fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
+    let pixels = PIXELS * libm::log(candidate.error / of_paint.max(1e-12) + 1e-3);
+    let price = PRICE * candidate.settings.numbers().len() as f64;
+    pixels + CELLS * candidate.cells + STATISTICS * compressed(candidate.distance) + price
+        - PRIOR * log_odds(category, &candidate.graph.name)
 }
 
-/// The best of a few starts, polished.
-fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[Wave]) -> Option<Candidate> {
+/// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than how
+/// far off a few statistics are.
+fn compressed(distance: f64) -> f64 {
+    if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
+}
+
+/// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
+fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wave]]) -> Option<Candidate> {
     let model = &pattern.model;
-    let (few, many) = (thinned(seen, 800), thinned(seen, 2048));
-    let polished = starts(pattern, seen, found, 5).into_iter().map(|mut start| {
-        polish(model, &mut start.settings, &few, 10);
-        (mean_square(model, &start.settings, &few), start.settings)
+    let (few, many) = (thinned(seen, 700), thinned(seen, 2048));
+    let most = 4 / found.len();
+    let starts: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
+    if !starts.iter().any(|start| is_promising(model, start, &few)) {
+        return None;
+    }
+    let polished = starts.into_iter().map(|mut start| {
+        let toneless = without_tones(model, &start.settings, &few);
+        polish(model, &mut start.settings, &toneless, 8);
+        let error = mean_square(model, &start.settings, &without_tones(model, &start.settings, &few));
+        (cell_error(model, &start.settings, &many).unwrap_or(error), start.settings)
     });
     let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    polish(model, &mut settings, &many, 25);
-    Some(model.candidate(settings, judged))
+    let few = thinned(seen, 500);
+    for round in 0..if model.tone.is_some() { ROUNDS } else { 1 } {
+        let toneless = without_tones(model, &settings, &many);
+        polish(model, &mut settings, &toneless, 20);
+        let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &few) } else { None };
+        match resized {
+            Some(resized) => settings = resized,
+            None if round > 0 => break,
+            None => {}
+        }
+    }
+    if is_a_tile(model, &settings) {
+        return None;
+    }
+    let mut candidate = Candidate::judged(model, settings, judged);
+    candidate.cells = excess(model, &candidate.settings, &many);
+    Some(candidate)
+}
+
+/// Whether a start is better than one colour, or its cells than the same ones elsewhere: others are not worth a search.
+fn is_promising(model: &Model, start: &Start, few: &[Point]) -> bool {
+    if model.tone.is_some() {
+        return excess(model, &start.settings, few) < -LEAST_PROMISE;
+    }
+    let count = few.len() as f64;
+    let mean: [f64; 3] = std::array::from_fn(|c| few.iter().map(|point| point.albedo[c]).sum::<f64>() / count);
+    let square = |point: &Point| (0..3).map(|c| (point.albedo[c] - mean[c]).powi(2)).sum::<f64>() / 3.0;
+    mean_square(model, &start.settings, few) < (1.0 - LEAST_PROMISE) * few.iter().map(square).sum::<f64>() / count
+}
+
+/// Bricks that are not shifted from row to row are tiles.
+fn is_a_tile(model: &Model, settings: &Settings) -> bool {
+    let shift = model.slot("row_shift").filter(|_| model.slot("edge_wear").is_some()).map(|at| settings.numbers()[at]);
+    shift.is_some_and(|shift| (shift - shift.round()).abs() < 0.03)
 }

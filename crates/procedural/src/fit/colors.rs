@@ -7,7 +7,7 @@ use super::system::Normal;
 use crate::settings::Settings;
 
 /// The colours that a surface may have.
-const RANGE: [f64; 2] = [0.01, 1.0];
+pub(super) const RANGE: [f64; 2] = [0.01, 1.0];
 
 /// How much each colour is pulled to the mean colour, relative to the weight of all points.
 const PULL: f64 = 1e-4;

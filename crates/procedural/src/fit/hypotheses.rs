@@ -1,7 +1,8 @@
 //! Starts of a fit: turn, sizes and shift of a graph, from the waves of what is seen.
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use super::cells::cell_error;
 use super::colors::project;
 use super::model::Model;
 use super::pattern::Pattern;
@@ -18,10 +19,10 @@ pub(super) struct Start {
 }
 
 /// The points at which starts are judged.
-const POINTS: usize = 512;
+const POINTS: usize = 640;
 
 /// The points at which a graph's waves are measured: fewer would be noisy by what else is in the pattern.
-const WAVE_POINTS: usize = 2048;
+const WAVE_POINTS: usize = 1280;
 
 /// The least share of the variance that a wave of the points must have in the graph too.
 const LEAST_SHARE: f64 = 0.01;
@@ -34,17 +35,27 @@ pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: u
     let [width, height] = extent(points);
     let resolution = 1.0 / width.max(height).max(1e-9);
     for settings in turned_and_scaled(pattern, seen, resolution) {
-        for shift in shifts(model, &settings, &basis, seen) {
+        let shifts = match pattern.layout {
+            Layout::Rows { width, .. } => across_rows(model, &settings, width),
+            _ => shifts(model, &settings, &basis, seen),
+        };
+        let at_shift = |[u, v]: [f64; 2]| {
             let mut shifted = settings.clone();
-            model.set(&mut shifted, "t_u", shift[0]);
-            model.set(&mut shifted, "t_v", shift[1]);
-            let error = project(model, &mut shifted, &few);
-            found.push(Start { settings: shifted, error });
-        }
+            model.set(&mut shifted, "t_u", u);
+            model.set(&mut shifted, "t_v", v);
+            judged(model, shifted, &few)
+        };
+        found.extend(shifts.into_iter().map(at_shift).min_by(|a, b| a.error.total_cmp(&b.error)));
     }
     found.sort_by(|a, b| a.error.total_cmp(&b.error));
     found.truncate(most);
     found
+}
+
+/// A start by the error of its cells, if it has any; otherwise by that of its colours.
+fn judged(model: &Model, mut settings: Settings, few: &[Point]) -> Start {
+    let error = cell_error(model, &settings, few).unwrap_or_else(|| project(model, &mut settings, few));
+    Start { settings, error }
 }
 
 fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<Settings> {
@@ -53,6 +64,7 @@ fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<S
             let of = |(start, own): &(Settings, Vec<Wave>)| similar(&pattern.model, length, start, own, seen);
             pattern.own.iter().flat_map(of).collect()
         }
+        Layout::Rows { width, length, whole } => rows(&pattern.model, [width, length], whole, seen, resolution),
         Layout::Axes { u, v, periods, shift } => axes(&pattern.model, [u, v], periods, shift, seen, resolution),
     }
 }
@@ -72,6 +84,41 @@ fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[
         }
     }
     all
+}
+
+/// Rows along every turn that the waves suggest, of every width across it.
+fn rows(
+    model: &Model,
+    [width, length]: [&str; 2],
+    whole: Option<(&str, i32, i32)>,
+    seen: &[Wave],
+    resolution: f64,
+) -> Vec<Settings> {
+    let start = model.start();
+    let [width_at, length_at] = [width, length].map(|name| model.slot(name).map_or(1.0, |at| start.numbers()[at]));
+    let mut all = Vec::new();
+    for turn in seen.iter().take(4).map(|wave| wave.direction() - FRAC_PI_2) {
+        for period in periods(seen, turn + FRAC_PI_2, resolution) {
+            for number in whole.map_or(0..=0, |(_, least, most)| least..=most) {
+                let mut settings = start.clone();
+                model.set(&mut settings, "theta", turn.to_degrees());
+                // Only every few rows may have a gap.
+                let rows = f64::from(number.max(1));
+                model.set(&mut settings, width, period / rows);
+                model.set(&mut settings, length, period / rows * length_at / width_at);
+                whole.iter().for_each(|(name, ..)| model.set(&mut settings, name, f64::from(number)));
+                all.push(settings);
+            }
+        }
+    }
+    all
+}
+
+/// Shifts across rows, in sixths of a row.
+fn across_rows(model: &Model, settings: &Settings, width: &str) -> Vec<[f64; 2]> {
+    let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
+    let (sin, cos) = libm::sincos(number("theta").to_radians());
+    (0..6).map(|k| number(width) * f64::from(k) / 6.0).map(|shift| [-sin * shift, cos * shift]).collect()
 }
 
 /// The angle in degrees, from -90 to 90.
@@ -100,7 +147,9 @@ fn axes(
     resolution: f64,
 ) -> Vec<Settings> {
     let mut all = Vec::new();
-    for turn in turns(seen) {
+    // Where the axes are alike, a quarter turn swaps their periods, all pairs of which are tried.
+    let are_alike = shift.is_none() && names[0].starts_with("size") || names[0].starts_with("panel");
+    for turn in turns(seen, if are_alike { FRAC_PI_2 } else { PI }) {
         let [along_u, along_v] = [0.0, FRAC_PI_2].map(|quarter| periods(seen, turn + quarter, resolution));
         for (&period_u, &period_v) in along_u.iter().flat_map(|u| along_v.iter().map(move |v| (u, v))) {
             let mut settings = model.start();
@@ -142,8 +191,8 @@ fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resoluti
 }
 
 /// Directions of the strongest waves and of the bisectors of their pairs, and those at right angles to them, in
-/// radians.
-fn turns(seen: &[Wave]) -> Vec<f64> {
+/// radians, as far as they differ by other than multiples of `repeat`.
+fn turns(seen: &[Wave], repeat: f64) -> Vec<f64> {
     let strong: Vec<f64> = seen.iter().take(3).map(Wave::direction).collect();
     let mut all = strong.clone();
     for (at, first) in strong.iter().enumerate() {
@@ -152,8 +201,7 @@ fn turns(seen: &[Wave]) -> Vec<f64> {
     let both = all.iter().flat_map(|turn| [*turn, turn + FRAC_PI_2]);
     let mut distinct: Vec<f64> = Vec::new();
     for turn in both {
-        let apart =
-            |other: &f64| ((turn - other) / std::f64::consts::PI).round() * std::f64::consts::PI - (turn - other);
+        let apart = |other: &f64| ((turn - other) / repeat).round() * repeat - (turn - other);
         if !distinct.iter().any(|other| apart(other).abs() < 0.01) {
             distinct.push(turn);
         }
@@ -180,7 +228,7 @@ fn periods(seen: &[Wave], direction: f64, resolution: f64) -> Vec<f64> {
         }
     }
     scored.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
-    scored.truncate(5);
+    scored.truncate(4);
     scored.into_iter().map(|(_, base)| 1.0 / base).collect()
 }
 
@@ -233,9 +281,13 @@ fn shifts(model: &Model, settings: &Settings, basis: &Basis, seen: &[Wave]) -> V
     let share = |[a, b]: [f64; 2]| 2.0 * (a * a + b * b) / variance;
     let waves = seen.iter().zip(&basis.turned);
     let pairs: Vec<Pair> = waves.map(|(seen, turned)| Pair { seen, own: own.along(turned) }).collect();
-    let Some(first) = pairs.first().filter(|first| share(first.own) > LEAST_SHARE) else { return Vec::new() };
-    let second = pairs[1..].iter().find(|pair| is_across(first.seen, pair.seen) && share(pair.own) > LEAST_SHARE);
-    let tried = second.map_or_else(|| along(first), |second| between(first, second));
+    // The joints of cells have many harmonics, the first of which need not be the strongest.
+    let strong = if model.tone.is_some() { 4 } else { 1 };
+    let Some(first) = pairs.iter().take(strong).find(|first| share(first.own) > LEAST_SHARE) else { return Vec::new() };
+    let second = pairs.iter().find(|pair| is_across(first.seen, pair.seen) && share(pair.own) > LEAST_SHARE);
+    // Blocks repeat after several of their widths.
+    let harmonics = if model.slots.iter().any(|slot| !slot.is_real) { 2 * HARMONICS } else { HARMONICS };
+    let tried = second.map_or_else(|| along(first), |second| between(first, second, harmonics));
     let agreement = |shift: &[f64; 2]| pairs.iter().map(|pair| pair.agreement(*shift)).sum::<f64>().abs();
     let mut judged: Vec<(f64, [f64; 2])> = tried.into_iter().map(|shift| (agreement(&shift), shift)).collect();
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -250,22 +302,22 @@ fn is_across(first: &Wave, second: &Wave) -> bool {
 }
 
 /// Half and whole periods.
-fn halves() -> impl Iterator<Item = f64> {
-    (0..2 * HARMONICS).map(|halves| 0.5 * f64::from(halves))
+fn halves(harmonics: u32) -> impl Iterator<Item = f64> {
+    (0..2 * harmonics).map(|halves| 0.5 * f64::from(halves))
 }
 
 /// Shifts across stripes.
 fn along(first: &Pair) -> Vec<[f64; 2]> {
     let [fu, fv] = first.seen.frequency;
     let square = fu * fu + fv * fv;
-    halves().map(|add| (first.turns() + add) / square).map(|length| [length * fu, length * fv]).collect()
+    halves(HARMONICS).map(|add| (first.turns() + add) / square).map(|length| [length * fu, length * fv]).collect()
 }
 
 /// Shifts that turn two waves as far as those of the points.
-fn between(first: &Pair, second: &Pair) -> Vec<[f64; 2]> {
+fn between(first: &Pair, second: &Pair, harmonics: u32) -> Vec<[f64; 2]> {
     let ([fu, fv], [gu, gv]) = (first.seen.frequency, second.seen.frequency);
     let determinant = fu * gv - fv * gu;
-    let pairs = halves().flat_map(|m| halves().map(move |n| (m, n)));
+    let pairs = halves(harmonics).flat_map(|m| halves(harmonics).map(move |n| (m, n)));
     let shift = |(m, n): (f64, f64)| {
         let (p, q) = (first.turns() + m, second.turns() + n);
         [(p * gv - q * fv) / determinant, (q * fu - p * gu) / determinant]

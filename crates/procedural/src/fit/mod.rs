@@ -1,26 +1,40 @@
-//! The fit of a periodic graph to what is seen of one part.
+//! The fit of graphs to what is seen of one part.
 //!
-//! In: colours at places of a part's surface, in metres ([`points::Point`]). Out: the graph that predicts held-out
-//! points best, with its settings, or `paint` where none is better than one colour ([`choose::Fitter`]).
+//! In: colours at places of a part's surface, in metres ([`points::Point`]), and perhaps the category of the thing.
+//! Out: the graph that explains them best, with its settings, or `paint` where none is better than one colour
+//! ([`choose::Fitter`]). A [`candidate::Candidate`] shows its colours anywhere, with as much of what is random as
+//! wanted.
 //!
-//! The strongest waves of the colours ([`waves`]) suggest turns, periods and shifts of each graph; for each of these
-//! starts the graph's colours are a linear least squares problem; the best starts are polished by Levenberg-Marquardt
-//! steps.
+//! 1. Shading that is left is taken away, and a quarter of the points is held out.
+//! 2. Periodic graphs: the strongest waves of the colours ([`waves`]), and those that stand out against waves of similar
+//!    period, suggest turns, periods and shifts. For each of these starts the graph's colours are a linear least
+//!    squares problem, and cells such as tiles have a free tone each; the best starts are polished by
+//!    Levenberg-Marquardt steps. Sizes are then compared with their multiples and fractions.
+//! 3. What is random, in all graphs: sizes, amplitudes and scattered colours are those whose statistics, from the same
+//!    points and footprints, come closest to those seen: structure functions over distances and directions, their
+//!    sparseness and asymmetry, quantiles and chromaticity. Its phase cannot be known.
+//! 4. The choice.
 //!
-//! Twelve periodic graphs are fitted, which `periods` lists. Others, such as planks and parquet, are not. Neither is what
-//! is random, such as grain, veins and the tone of single tiles: fitted graphs leave it out.
+//! [`paper`] fits as PSDR-Room does, to be compared with.
 
 pub mod candidate;
 mod category;
+mod cells;
 pub mod choose;
 mod colors;
 mod hypotheses;
 mod lm;
 mod model;
+mod octaves;
+mod pairs;
+pub mod paper;
 mod pattern;
 mod periods;
 pub mod points;
+mod ranked;
 pub mod roles;
 mod smooth;
+mod statistics;
 mod system;
+mod texture;
 pub mod waves;

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use super::candidate::Candidate;
-use super::colors::mean_square;
 use super::points::Point;
 use super::roles::{Role, role};
 use crate::batch::Evaluator;
@@ -12,6 +10,15 @@ use crate::lanes::{LANES, Points};
 use crate::library::Class;
 use crate::program::compile::Program;
 use crate::settings::{Settings, Slot, slots};
+
+/// The parameters of cells that have a tone of their own.
+#[derive(Clone, Debug)]
+pub(super) struct Tone {
+    /// The slot of the spread of the tones.
+    pub(super) slot: usize,
+    /// The first slots of the cells' colours.
+    pub(super) colors: Vec<usize>,
+}
 
 /// A graph with what is needed to fit it.
 pub(super) struct Model {
@@ -23,6 +30,8 @@ pub(super) struct Model {
     pub(super) colors: Vec<usize>,
     /// The slots of lengths, shares and the place of the pattern.
     pub(super) shape: Vec<usize>,
+    /// The tones of a periodic pattern of cells.
+    pub(super) tone: Option<Tone>,
 }
 
 impl Model {
@@ -34,24 +43,34 @@ impl Model {
         };
         let colors = of(&[Role::Color, Role::RandomColor]);
         let shape = of(&[Role::Turn, Role::Shift, Role::Shape]);
-        Self { program: Program::new(&graph), graph: Arc::new(graph), class, slots, colors, shape }
+        let program = Program::new(&graph);
+        let mut model = Self { program, graph: Arc::new(graph), class, slots, colors, shape, tone: None };
+        if class == Some(Class::Lattice) && model.graph.name != "weave" {
+            let is_of_cells = |at: &usize| {
+                let name = &model.graph.parameters[model.slots[*at].parameter].name;
+                !name.starts_with("joint") && !name.starts_with("gap")
+            };
+            let colors = model.colors.iter().copied().filter(is_of_cells).collect();
+            model.tone = model.slot("tone").map(|slot| Tone { slot, colors });
+        }
+        model
     }
 
     /// The defaults without what is random.
     pub(super) fn start(&self) -> Settings {
         let mut settings = Settings::defaults(&self.graph);
+        // Colours that are scattered at random begin as one.
+        let random = self.of_role(Role::RandomColor);
+        for channel in 0..3 {
+            let sum: f64 = random.iter().map(|at| settings.numbers()[at + channel]).sum();
+            random.iter().for_each(|at| *settings.number_mut(at + channel) = sum / random.len() as f64);
+        }
         for (at, slot) in self.slots.iter().enumerate() {
             if role(&self.graph, slot.parameter) == Role::Amplitude {
                 *settings.number_mut(at) = slot.least.unwrap_or(slot.value);
             }
         }
         settings
-    }
-
-    /// The candidate of these settings; its statistics are not compared.
-    pub(super) fn candidate(&self, settings: Settings, judged: &[Point]) -> Candidate {
-        let error = mean_square(self, &settings, judged);
-        Candidate { graph: Arc::clone(&self.graph), class: self.class, settings, error, distance: 0.0 }
     }
 
     /// The first slot of a parameter.
@@ -89,6 +108,44 @@ impl Model {
                 }
             }
         }
+    }
+
+    /// The first slots of the parameters of a role.
+    pub(super) fn of_role(&self, wanted: Role) -> Vec<usize> {
+        let is_wanted = |slot: &Slot| slot.component == 0 && role(&self.graph, slot.parameter) == wanted;
+        self.slots.iter().enumerate().filter(|(_, slot)| is_wanted(slot)).map(|(at, _)| at).collect()
+    }
+
+    /// Sets the parameters of a role to their defaults.
+    pub(super) fn reset(&self, settings: &mut Settings, wanted: Role) {
+        for (at, slot) in self.slots.iter().enumerate().filter(|(_, slot)| role(&self.graph, slot.parameter) == wanted)
+        {
+            *settings.number_mut(at) = slot.value;
+        }
+    }
+
+    /// Whether a slot is a length in metres.
+    pub(super) fn is_length(&self, at: usize) -> bool {
+        self.graph.parameters[self.slots[at].parameter].doc.as_ref().is_some_and(|doc| doc.contains("in metres"))
+    }
+
+    /// How much of each colour is at each point: the derivatives of the first channel.
+    pub(super) fn masks(&self, settings: &Settings, points: &[Point]) -> Vec<Vec<f64>> {
+        self.slopes(settings, &self.colors, points)
+    }
+
+    /// The derivatives of the first channel at each point, where all colours are so dark that none is clamped.
+    pub(super) fn slopes(&self, settings: &Settings, chosen: &[usize], points: &[Point]) -> Vec<Vec<f64>> {
+        let mut grey = settings.clone();
+        self.colors.iter().for_each(|at| grey.numbers_mut()[*at..at + 3].fill(0.3));
+        let mut evaluator = Evaluator::new(&self.program, &grey, chosen);
+        let mut all = Vec::with_capacity(points.len());
+        for batch in points.chunks(LANES) {
+            evaluator.run(&lanes(batch));
+            let slope = |lane: usize, at: usize| evaluator.derivative(0, at).map_or(0.0, |slopes| slopes[lane]);
+            all.extend((0..batch.len()).map(|lane| (0..chosen.len()).map(|at| slope(lane, at)).collect()));
+        }
+        all
     }
 
     /// The points with the model's colours.

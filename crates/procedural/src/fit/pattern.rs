@@ -22,7 +22,7 @@ impl Pattern {
     pub(super) fn new(model: Model, layout: Layout) -> Self {
         let own = match layout {
             Layout::Similar { length, whole } => own(&model, length, whole),
-            Layout::Axes { .. } => Vec::new(),
+            Layout::Axes { .. } | Layout::Rows { .. } => Vec::new(),
         };
         Self { model, layout, own }
     }
@@ -31,7 +31,9 @@ impl Pattern {
 fn own(model: &Model, length: &str, whole: Option<(&str, i32, i32)>) -> Vec<(Settings, Vec<Wave>)> {
     let mut start = model.start();
     model.set(&mut start, "theta", 0.0);
-    let side = 20.0 * model.slot(length).map_or(1.0, |at| start.numbers()[at]);
+    // Squares of strips have lines that are closer than their side.
+    let across = if whole.is_some_and(|(name, ..)| name == "strips") { 6.0 } else { 20.0 };
+    let side = across * model.slot(length).map_or(1.0, |at| start.numbers()[at]);
     let with_waves = |settings: Settings| {
         let found = waves(&model.shown(&settings, &scattered(side)), WAVES);
         (settings, found)
@@ -50,7 +52,7 @@ fn scattered(side: f64) -> Vec<Point> {
     let place = |i: u32| Point {
         u: side * cell(f64::from(i) + 0.5, 0.5),
         v: side * cell(f64::from(i) + 0.5, 1.5),
-        footprint: side / 120.0,
+        footprint: side / 160.0,
         albedo: [0.0; 3],
         weight: 1.0,
     };

@@ -4,7 +4,7 @@ use super::points::{Point, extent};
 use super::system::Normal;
 
 /// Keeps the logarithm of black finite.
-const FLOOR: f64 = 0.01;
+pub(super) const FLOOR: f64 = 0.01;
 
 /// The logarithm of a point's brightness.
 pub(super) fn log_grey(point: &Point) -> f64 {
@@ -14,14 +14,19 @@ pub(super) fn log_grey(point: &Point) -> f64 {
 /// A cubic polynomial of the place that comes closest to [`log_grey`], at each point; zeros where the points are too
 /// few.
 pub(super) fn smooth_part(points: &[Point]) -> Vec<f64> {
+    smooth_part_of(points, &points.iter().map(log_grey).collect::<Vec<_>>())
+}
+
+/// A cubic polynomial of the place that comes closest to a number at each point; zeros where the points are too few.
+pub(super) fn smooth_part_of(points: &[Point], values: &[f64]) -> Vec<f64> {
     let Some(first) = points.first() else { return Vec::new() };
     let [width, height] = extent(points);
     let scale = 1.0 / width.max(height).max(1e-9);
     let rows: Vec<[f64; 10]> =
         points.iter().map(|point| cubic((point.u - first.u) * scale, (point.v - first.v) * scale)).collect();
     let mut normal = Normal::new(10);
-    for (row, point) in rows.iter().zip(points) {
-        normal.add(row, log_grey(point), point.weight);
+    for ((row, value), point) in rows.iter().zip(values).zip(points) {
+        normal.add(row, *value, point.weight);
     }
     let total: f64 = points.iter().map(|point| point.weight).sum();
     let solved = normal.solve(|_, _| 1e-9 * total).unwrap_or(vec![0.0; 10]);

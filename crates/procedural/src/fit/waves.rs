@@ -116,8 +116,26 @@ impl Signal {
     }
 }
 
+/// What makes a wave stand out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    /// Its power.
+    Power,
+    /// Its power over that of waves of similar period: joints, which have many harmonics, before the tones of cells.
+    Contrast,
+}
+
 /// Up to `most` waves, the strongest first. Fewer where the points are too few.
 pub fn waves(points: &[Point], most: usize) -> Vec<Wave> {
+    ordered_waves(points, most, Order::Power)
+}
+
+/// Up to `most` waves that stand out against those of similar period. Their share is by how much they do.
+pub(super) fn lines(points: &[Point], most: usize) -> Vec<Wave> {
+    ordered_waves(points, most, Order::Contrast)
+}
+
+fn ordered_waves(points: &[Point], most: usize, order: Order) -> Vec<Wave> {
     if points.len() < LEAST_POINTS {
         return Vec::new();
     }
@@ -126,13 +144,13 @@ pub fn waves(points: &[Point], most: usize) -> Vec<Wave> {
     let grid = Grid::around(points);
     let mut found: Vec<Wave> = Vec::new();
     for _ in 0..most {
-        let Some(frequency) = grid.strongest(&signal) else { break };
+        let Some((contrast, frequency)) = grid.strongest(&signal, order) else { break };
         let frequency = refined(&signal, frequency, 0.25 / (grid.cell * grid.side as f64));
         let amplitude = signal.transform(frequency);
         let share = 2.0 * (amplitude[0] * amplitude[0] + amplitude[1] * amplitude[1]) / variance.max(1e-12);
-        let wave = Wave { frequency, amplitude, share };
-        signal.subtract(&wave);
-        found.push(wave);
+        signal.subtract(&Wave { frequency, amplitude, share });
+        let share = if order == Order::Contrast { contrast } else { share };
+        found.push(Wave { frequency, amplitude, share });
     }
     found.sort_by(|a, b| b.share.total_cmp(&a.share));
     found
@@ -163,24 +181,48 @@ impl Grid {
         Self { origin, cell: 2.0 * length / side as f64, side, least_frequency: 1.5 / length }
     }
 
-    /// The frequency of the greatest power that is neither too low nor close to what the grid cannot show.
-    fn strongest(&self, signal: &Signal) -> Option<[f64; 2]> {
+    /// The frequency of the greatest power, or contrast, that is neither too low nor close to what the grid cannot
+    /// show, after that power or contrast.
+    fn strongest(&self, signal: &Signal, order: Order) -> Option<(f64, [f64; 2])> {
         let power = self.spectrum(signal);
         let unit = 1.0 / (self.cell * self.side as f64);
         let signed = |at: usize| if at > self.side / 2 { at as f64 - self.side as f64 } else { at as f64 };
+        let rings = self.rings(&power);
         let mut best = None;
         for row in 0..=self.side / 2 {
             for column in 0..self.side {
                 let frequency = [signed(column) * unit, signed(row) * unit];
                 let size = libm::hypot(frequency[0], frequency[1]);
                 let shown = size > self.least_frequency && size < 0.45 / self.cell;
-                let found = power[row * self.side + column];
+                let background = if order == Order::Contrast { rings[self.ring(row, column)] } else { 1.0 };
+                let found = power[row * self.side + column] / background.max(1e-300);
                 if shown && best.is_none_or(|(most, _)| found > most) {
                     best = Some((found, frequency));
                 }
             }
         }
-        best.map(|(_, frequency)| frequency)
+        best
+    }
+
+    /// The ring of similar frequencies that a cell belongs to: four an octave.
+    fn ring(&self, row: usize, column: usize) -> usize {
+        let near = |at: usize| at.min(self.side - at) as f64;
+        let square = near(row) * near(row) + near(column) * near(column);
+        // Half of the binary logarithm of a square is that of its root.
+        (2.0 * libm::log2(square.max(1.0))) as usize
+    }
+
+    /// The mean power of each ring.
+    fn rings(&self, power: &[f64]) -> Vec<f64> {
+        let mut sums = vec![[0.0, 0.0]; 4 * 12];
+        for row in 0..=self.side / 2 {
+            for column in 0..self.side {
+                let [sum, count] = &mut sums[self.ring(row, column)];
+                *sum += power[row * self.side + column];
+                *count += 1.0;
+            }
+        }
+        sums.iter().map(|[sum, count]| sum / f64::max(*count, 1.0)).collect()
     }
 
     fn spectrum(&self, signal: &Signal) -> Vec<f64> {
