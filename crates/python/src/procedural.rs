@@ -49,7 +49,7 @@ pub fn procedural<'py>(
     }
     let part_set = part_set.map(|name| name.parse::<PartSetId>()).transpose();
     let part_set = part_set.map_err(|fault| PyValueError::new_err(format!("part_set: {fault}")))?;
-    let options = ProceduralOptions { part_set, keep_seen, detail, graphs: None };
+    let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
     let source = Arc::clone(&scene.source);
     let all = run_long(py, move |progress| made(&source, &estimate, &options, progress))?.map_err(failed)?;
     by_id(py, scene, all)

@@ -12,7 +12,7 @@ use mateval_scene::{Progress, SceneError, json};
 use super::bake::bake;
 use super::fitted_graphs;
 use super::materials_file;
-use super::options::ProceduralOptions;
+use super::options::{FitMode, ProceduralOptions};
 use super::page::{self, ShownScene};
 use super::pictures;
 use super::report_file::{REPORT, REPORT_FORMAT, ReportFile, SceneReport, library_sha256};
@@ -74,6 +74,7 @@ pub fn write(
 fn method(dataset: &Dataset, source: &EstimateSource, options: &ProceduralOptions) -> Method {
     let mut name = "procedural".to_owned();
     name.extend(options.part_set.iter().map(|set| format!("-{set}")));
+    name.push_str(if options.mode == FitMode::Paper { "-paper" } else { "" });
     name.push_str(if options.keep_seen { "-keep-seen" } else { "" });
     name.push_str(&format!("-{}", source.name()));
     let parts =
@@ -81,8 +82,12 @@ fn method(dataset: &Dataset, source: &EstimateSource, options: &ProceduralOption
     let estimate = source.description(dataset);
     let seen = if options.keep_seen { "; seen texels hold the estimate" } else { "" };
     let own = options.graphs.as_ref().map_or(String::new(), |_| " and graphs of a folder".to_owned());
+    let fitted = match options.mode {
+        FitMode::Best => "fitted",
+        FitMode::Paper => "fitted in the way of PSDR-Room",
+    };
     let description = format!(
-        "a procedural graph for each of {parts}, fitted to {estimate}, where one predicts held-out pixels better than one \
+        "a procedural graph for each of {parts}, {fitted} to {estimate}, where one shows held-out pixels better than one \
          colour, else the part's median{seen}; randomness times {}; built-in graphs {}{own}",
         options.detail,
         &library_sha256()[..12]

@@ -34,7 +34,7 @@ mod scene_materials;
 
 pub use bake::Baked;
 pub use files::{report_folder, write};
-pub use options::ProceduralOptions;
+pub use options::{FitMode, ProceduralOptions};
 
 /// The maps of every instance of a scene that has an atlas, by its place in the scene: what [`write()`] writes, without
 /// files.

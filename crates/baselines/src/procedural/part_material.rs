@@ -2,9 +2,11 @@
 
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
+use mateval_procedural::fit::paper::fit_as_paper;
 use mateval_procedural::fit::points::Point;
 use mateval_procedural::library::Class;
 
+use super::options::{FitMode, ProceduralOptions};
 use super::part_frame::{Chart, PartFrame};
 use super::part_samples::PartSamples;
 use crate::error::BaselineError;
@@ -48,7 +50,7 @@ impl PartMaterial {
         fitter: &Fitter,
         part: &PartSamples,
         category: Option<&str>,
-        detail: f64,
+        options: &ProceduralOptions,
         unseen: Values,
     ) -> Result<Self, BaselineError> {
         let mut all: Vec<Values> = part.samples.iter().map(|sample| sample.values).collect();
@@ -61,11 +63,14 @@ impl PartMaterial {
         if points.len() < LEAST_POINTS {
             return Ok(Self { chart, reason: Reason::FewSamples, ..flat });
         }
-        let fit = fitter.fit(&points, category)?;
+        let fit = match options.mode {
+            FitMode::Best => fitter.fit(&points, category)?,
+            FitMode::Paper => fit_as_paper(fitter, &points)?,
+        };
         if fit.chosen.class == Some(Class::Flat) {
             return Ok(Self { chart, reason: Reason::OneColor(fit), ..flat });
         }
-        let graph = Some(fit.chosen.with_detail(detail));
+        let graph = Some(fit.chosen.with_detail(options.detail));
         Ok(Self { graph, chart, reason: Reason::Graph(fit), ..flat })
     }
 

@@ -48,7 +48,7 @@ impl<'a> SceneMaterials<'a> {
             let owner = triangles.owners[part];
             let category = owner.and_then(|owner| category(&geometry.scene.instances[owner]));
             let unseen = owner.map_or(DEFAULT, |owner| medians.of(geometry, owner));
-            let material = PartMaterial::fitted(fitter, samples, category, options.detail, unseen);
+            let material = PartMaterial::fitted(fitter, samples, category, options, unseen);
             progress(Report::step("fit of parts", 1 + done.fetch_add(1, Ordering::Relaxed), samples_of_parts.len()));
             material
         };

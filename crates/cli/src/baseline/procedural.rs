@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
+use clap::ValueEnum;
 use mateval_baselines::estimate_source::EstimateSource;
-use mateval_baselines::procedural::{self, ProceduralOptions, report_folder};
+use mateval_baselines::procedural::{self, FitMode, ProceduralOptions, report_folder};
 use mateval_scene::PartSetId;
 
 use super::delight::Lights;
@@ -26,6 +27,9 @@ pub struct ProceduralArgs {
     /// The part set, such as `partfield` [default: the parts of the source].
     #[arg(long)]
     part_set: Option<PartSetId>,
+    /// How graphs are chosen.
+    #[arg(long, value_enum, default_value_t = Mode::Best)]
+    mode: Mode,
     /// Keep the estimate in texels that the input view shows, and let graphs fill only the others.
     #[arg(long)]
     keep_seen: bool,
@@ -35,6 +39,14 @@ pub struct ProceduralArgs {
     /// A folder of .mtlx files that are fitted beside the built-in graphs.
     #[arg(long, value_name = "FOLDER")]
     graphs: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Mode {
+    /// Orientation and sizes in closed form; a graph is taken if held-out pixels speak for it.
+    Best,
+    /// In the way of PSDR-Room, for comparison: a grid of turns and scales, then gradient descent.
+    Paper,
 }
 
 /// Writes the submission and its report.
@@ -50,6 +62,10 @@ pub fn run(args: &ProceduralArgs) -> anyhow::Result<Outcome> {
     }
     let options = ProceduralOptions {
         part_set: args.part_set.clone(),
+        mode: match args.mode {
+            Mode::Best => FitMode::Best,
+            Mode::Paper => FitMode::Paper,
+        },
         keep_seen: args.keep_seen,
         detail: args.detail,
         graphs: args.graphs.clone(),
