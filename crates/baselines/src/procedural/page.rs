@@ -37,7 +37,7 @@ fn section(scene: &ShownScene) -> String {
     let (few, unseen) = (count(ReasonWord::FewPixels), count(ReasonWord::Unseen));
     writeln!(
         text,
-        "<p>{graphs} parts have a graph, {colors} are one colour, {few} show too few pixels, {unseen} are not seen. The \
+        "<p>Parts with a graph: {graphs}; of one colour: {colors}; with too few pixels: {few}; not seen: {unseen}. The \
          graphs with their parameters: <a href=\"{id}/materials.mtlx\">materials.mtlx</a></p>"
     )
     .expect("writing to a String cannot fail");

@@ -109,7 +109,8 @@ impl PartReport {
         };
         let fit = material.fit();
         let all = || fit.into_iter().flat_map(|fit| std::iter::once(&fit.chosen).chain(&fit.others));
-        let others = fit.map_or(&[][..], |fit| &fit.others);
+        let taken = material.graph.as_ref().map(|graph| graph.graph.name.as_str());
+        let others = all().filter(|found| Some(found.graph.name.as_str()) != taken);
         let other = |other: &Candidate| OtherReport {
             graph: other.graph.name.clone(),
             error: other.error,
@@ -124,7 +125,7 @@ impl PartReport {
             values: material.values,
             chosen: material.graph.as_ref().map(GraphReport::new),
             error_of_one_color: all().find(|found| found.class == Some(Class::Flat)).map(|found| found.error),
-            others: others.iter().take(MOST_OTHERS).map(other).collect(),
+            others: others.take(MOST_OTHERS).map(other).collect(),
         }
     }
 }
