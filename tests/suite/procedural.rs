@@ -115,6 +115,24 @@ fn a_pattern_continues_where_nothing_is_seen() {
     assert!(floor_error(&nn, DVec3::ZERO) > 4.0 * exact, "{exact}");
 }
 
+/// The estimate has base colour alone: one-coloured parts have the format's roughness, graphs their own, and nothing is a
+/// mirror. A slash at the end of the submission's path does not move its report.
+#[test]
+fn maps_that_the_estimate_lacks_are_no_zeros() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("kept/");
+    procedural(&out, &["--keep-seen"], 2).ends_with(0).prints("kept.report/index.html");
+    assert!(folder.path().join("kept.report/report.json").is_file());
+    for submission in [&out, &*SUBMISSION] {
+        let path = |map: &str| submission.join("scenes/room/floor").join(map);
+        let bytes = |map: &str| image::open(path(map)).unwrap().to_luma8().into_raw();
+        assert!(bytes("roughness.png").iter().all(|byte| *byte > 25), "{submission:?}");
+        assert!(bytes("metallic.png").iter().all(|byte| *byte == 0));
+        // The twin: an instance without a graph has neither.
+        assert!(!submission.join("scenes/room/ceiling/roughness.png").exists());
+    }
+}
+
 #[test]
 fn threads_do_not_change_the_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -195,7 +213,7 @@ fn what_makes_no_sense_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let refused = |more: &[&str]| procedural(&out, more, 2).ends_with(2);
-    refused(&["--detail", "1.5"]).says("--detail 1.5: expected 0 to 1");
+    refused(&["--detail", "1.5"]).says("the detail is 1.5; expected 0 to 1");
     refused(&["--detail", "nan"]).says("expected 0 to 1");
     refused(&["--lights", "stage"]).says("--lights is for --estimate delight alone");
     refused(&["--part-set", "none"]).says("no part set 'none'");
@@ -205,6 +223,9 @@ fn what_makes_no_sense_is_refused() {
     refused(&["--graphs", &path]).says("holds 0 .mtlx files; expected 1 to 256");
     std::fs::write(graphs.join("bad.mtlx"), "<materialx version=\"1.39\"><image/></materialx>").unwrap();
     refused(&["--graphs", &path]).says("bad.mtlx");
+    let taken = entry("brick").unwrap().text;
+    std::fs::write(graphs.join("bad.mtlx"), taken).unwrap();
+    refused(&["--graphs", &path]).says("has the graph 'brick', which is built in");
     assert!(!out.exists() && !folder.path().join("out.report").exists());
     // Somebody's own folder is not replaced.
     std::fs::create_dir(folder.path().join("out.report")).unwrap();

@@ -41,6 +41,17 @@ pub enum BaselineError {
         /// The largest number.
         most: usize,
     },
+    /// Two graphs have one name.
+    #[error("'{}' has the graph '{name}', which is built in or in another file of its folder; give it another name", path.display())]
+    SameGraph {
+        /// The file.
+        path: PathBuf,
+        /// The graph's name.
+        name: String,
+    },
+    /// How much randomness is kept is no share.
+    #[error("the detail is {0}; expected 0 to 1")]
+    Detail(f64),
     /// Graphs that cannot be used.
     #[error("{}", lines(.0))]
     BadGraphs(Vec<ProceduralError>),

@@ -7,7 +7,6 @@ use mateval_baselines::BaselineError;
 use mateval_baselines::estimate::Estimate;
 use mateval_baselines::geometry::SceneGeometry;
 use mateval_baselines::procedural::{ProceduralOptions, scene_maps};
-use mateval_image::Picture;
 use mateval_scene::{PartSetId, Progress};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,12 +18,13 @@ use crate::long_work::run_long;
 use crate::scene::Scene;
 use crate::scene_source::SceneSource;
 
-/// Gives each part a procedural graph that is fitted to an estimate of the input view, so that patterns continue where the
-/// view shows nothing; parts without a pattern have their median. The maps are those of `mateval baseline procedural`.
+/// Gives each part a procedural graph that is fitted to an estimate of the input view, so that patterns continue where
+/// the view shows nothing; parts without a pattern have their median. The maps are those of
+/// `mateval baseline procedural`.
 ///
 /// base_color has the shape (height, width, 3), roughness and metallic (height, width); all have one size, which need
-/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. At least one of them must be given.
-/// `mateval.delight` makes them from the photo.
+/// not be the view's. Floats are linear; uint8 and uint16 hold base_color as sRGB. base_color must be given.
+/// `mateval.delight` makes all of them from the photo.
 ///
 /// part_set names the parts; None stands for those of the source. keep_seen keeps the estimate in texels that the input
 /// view shows. detail, 0 to 1, is how much of a pattern's randomness is kept.
@@ -44,12 +44,10 @@ pub fn procedural<'py>(
     detail: f64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let estimate = estimate([("base_color", base_color), ("roughness", roughness), ("metallic", metallic)])?;
-    if !(0.0..=1.0).contains(&detail) {
-        return Err(PyValueError::new_err(format!("detail: expected 0 to 1, found {detail}")));
-    }
     let part_set = part_set.map(|name| name.parse::<PartSetId>()).transpose();
     let part_set = part_set.map_err(|fault| PyValueError::new_err(format!("part_set: {fault}")))?;
     let options = ProceduralOptions { part_set, keep_seen, detail, ..ProceduralOptions::default() };
+    options.check().map_err(|fault| PyValueError::new_err(fault.to_string()))?;
     let source = Arc::clone(&scene.source);
     let all = run_long(py, move |progress| made(&source, &estimate, &options, progress))?.map_err(failed)?;
     by_id(py, scene, all)
@@ -65,9 +63,7 @@ fn made(
     let geometry = SceneGeometry::read(source.folder(), source.file())?;
     let mut all = BTreeMap::new();
     for (instance, baked) in scene_maps(&geometry, estimate, options, progress)? {
-        let side = baked.maps.base_color.as_ref().map_or(0, Picture::width);
-        let seen = options.keep_seen.then(|| Picture::new(side, side, baked.seen)).transpose()?;
-        all.insert(instance, MadeMaps { maps: baked.maps, seen });
+        all.insert(instance, MadeMaps { maps: baked.maps, seen: baked.seen });
     }
     Ok(all)
 }

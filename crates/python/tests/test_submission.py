@@ -96,10 +96,12 @@ def test_procedural_is_the_commands(root, dataset, scene, command, tmp_path):
         words = ["--keep-seen"] if keep_seen else []
         command("baseline", "procedural", "--dataset", root, "--out", out, "--estimate", "gt", "--detail", "0.5", *words)
         compare_maps(written(tmp_path / f"ours{keep_seen}", dataset, scene, maps), out)
-    with pytest.raises(ValueError, match="detail: expected 0 to 1, found 2"):
+    with pytest.raises(ValueError, match="the detail is 2; expected 0 to 1"):
         mateval.procedural(scene, detail=2, **estimate)
     with pytest.raises(ValueError, match="expected base_color, roughness or metallic"):
         mateval.procedural(scene)
+    with pytest.raises(mateval.Error, match="base_color"):
+        mateval.procedural(scene, roughness=truth.roughness)
     with pytest.raises(mateval.Error, match="no part set 'none'"):
         mateval.procedural(scene, part_set="none", **estimate)
 

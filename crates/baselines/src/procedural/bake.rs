@@ -1,13 +1,13 @@
 //! Bakes the materials of parts into the atlases of their instances.
 
 use glam::DVec2;
-use mateval_image::Picture;
+use mateval_image::{Mask, Picture};
 use mateval_scene::TriangleMesh;
 use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::uv_atlas::UvAtlas;
 use rayon::prelude::*;
 
-use super::part_material::PartMaterial;
+use super::part_material::{PartMaterial, completed};
 use super::residuals::Residuals;
 use super::scene_materials::SceneMaterials;
 use crate::estimate::{Estimate, GivenMaps, Values};
@@ -23,12 +23,12 @@ const TEXELS: usize = 4096;
 pub struct Baked {
     /// The maps, with filled gutters.
     pub maps: Maps,
-    /// Whether the input view shows each texel, row by row; empty where seen texels are not kept.
-    pub seen: Vec<bool>,
+    /// Whether the input view shows each texel; none where seen texels are not kept.
+    pub seen: Option<Mask>,
 }
 
-/// Bakes one instance, by its place in the scene, to an atlas of the dataset's own size. With `keep_seen` texels that the
-/// input view shows hold the estimate.
+/// Bakes one instance, by its place in the scene, to an atlas of the dataset's own size. With `keep_seen` texels that
+/// the input view shows hold the estimate.
 pub(super) fn bake(
     materials: &SceneMaterials<'_>,
     geometry: &SceneGeometry<'_>,
@@ -43,9 +43,13 @@ pub(super) fn bake(
         true => lift(geometry, seen, estimate, instance, size),
         false => unknown(geometry.mesh(instance), size),
     };
-    let is_seen = |texel: &Texel| matches!(texel, Texel::Seen(_));
-    let seen = if keep_seen { known.texels.pixels().iter().map(is_seen).collect() } else { Vec::new() };
-    let baker = Baker { of_part: &materials.of_part, residuals: &materials.residuals, given: materials.given };
+    let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
+    known.texels = known.texels.map(|texel| match texel {
+        Texel::Seen(values) => Texel::Seen(completed(values, materials.given)),
+        other => other,
+    });
+    let residuals = materials.residuals.as_deref();
+    let baker = Baker { of_part: &materials.of_part, residuals, given: materials.given };
     baker.fill_unseen(geometry.mesh(instance), materials.triangles.of(instance), &mut known);
     // A graph has a roughness and a metallic of its own.
     let has_graph = materials.has_graph(instance);
@@ -68,8 +72,8 @@ fn unknown(mesh: &TriangleMesh, size: usize) -> PartialAtlas {
 /// The materials of a scene, part by part, and the maps that its estimate gives.
 struct Baker<'a> {
     of_part: &'a [PartMaterial],
-    /// What is added to each; empty where materials stay as they are.
-    residuals: &'a [Residuals],
+    /// What is added to each; none where materials stay as they are.
+    residuals: Option<&'a [Residuals]>,
     given: GivenMaps,
 }
 
@@ -114,7 +118,7 @@ impl Baker<'_> {
             }
             _ => vec![material.values; texels.len()],
         };
-        if let Some(residuals) = self.residuals.get(part) {
+        if let Some(residuals) = self.residuals.map(|all| &all[part]) {
             for (values, texel) in values.iter_mut().zip(texels) {
                 let residual = residuals.at(position(texel));
                 values.iter_mut().zip(residual).for_each(|(value, more)| *value = (*value + more).clamp(0.0, 1.0));

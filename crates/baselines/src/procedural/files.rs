@@ -23,11 +23,11 @@ use crate::geometry::SceneGeometry;
 use crate::nn::seen_pixels;
 use crate::submission::{self, Method};
 
-/// The folder of a submission's report: its path with `.report` at its end.
+/// The folder of a submission's report: beside it, with `.report` at the end of its name.
 pub fn report_folder(submission: &Path) -> PathBuf {
-    let mut name = submission.as_os_str().to_owned();
+    let mut name = submission.file_name().unwrap_or_default().to_owned();
     name.push(".report");
-    PathBuf::from(name)
+    submission.with_file_name(name)
 }
 
 /// Writes a submission to `out` and returns the number of instances. Beside it, [`report_folder`] receives `index.html`
@@ -40,6 +40,7 @@ pub fn write(
     options: &ProceduralOptions,
     progress: Progress<'_>,
 ) -> Result<usize, BaselineError> {
+    options.check()?;
     let report = report_folder(out);
     submission::check_out(dataset, out, force)?;
     check_free(&report, force, "--out")?;
@@ -70,7 +71,7 @@ pub fn write(
     Ok(instances)
 }
 
-/// What it is called and all choices that were made.
+/// The method's name, and all choices that were made.
 fn method(dataset: &Dataset, source: &EstimateSource, options: &ProceduralOptions) -> Method {
     let mut name = "procedural".to_owned();
     name.extend(options.part_set.iter().map(|set| format!("-{set}")));
@@ -123,9 +124,10 @@ impl SceneMaker<'_> {
         let place = report.join(scene.id.as_str());
         std::fs::create_dir_all(&place).map_err(SceneError::io("make", &place))?;
         materials_file::write(&place.join("materials.mtlx"), &materials)?;
-        let photo = png_io::read_srgb(&geometry.folder.view(&geometry.view.id).join("rgb.png")).ok();
-        pictures::write(&place, photo.as_ref(), &estimate, &materials)?;
-        let shown = ShownScene { report: SceneReport::new(scene, &materials), has_photo: photo.is_some() };
+        let photo = geometry.folder.view(&geometry.view.id).join("rgb.png");
+        let photo = photo.exists().then(|| png_io::read_srgb(&photo)).transpose()?;
+        let has_photo = pictures::write(&place, photo.as_ref(), &estimate, &materials)?;
+        let shown = ShownScene { report: SceneReport::new(scene, &materials), has_photo };
         Ok((count, shown))
     }
 }

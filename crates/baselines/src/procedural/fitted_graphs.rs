@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_procedural::Graph;
 use mateval_procedural::fit::choose::Fitter;
+use mateval_procedural::library::entry;
 use mateval_procedural::limits::Limits;
 use mateval_procedural::mtlx::read_file;
 use mateval_scene::SceneError;
@@ -31,9 +32,12 @@ fn read(folder: &Path) -> Result<Vec<Graph>, BaselineError> {
     if paths.is_empty() || paths.len() > MOST_FILES {
         return Err(BaselineError::GraphCount { folder: folder.to_owned(), found: paths.len(), most: MOST_FILES });
     }
-    let (mut graphs, mut faults) = (Vec::new(), Vec::new());
+    let (mut graphs, mut faults): (Vec<Graph>, _) = (Vec::new(), Vec::new());
     for path in &paths {
         match read_file(path, &Limits::default()) {
+            Ok(graph) if entry(&graph.name).is_some() || graphs.iter().any(|other| other.name == graph.name) => {
+                return Err(BaselineError::SameGraph { path: path.clone(), name: graph.name });
+            }
             Ok(graph) => graphs.push(graph),
             Err(fault) => faults.push(fault),
         }

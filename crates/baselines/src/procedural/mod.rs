@@ -1,7 +1,7 @@
 //! Procedural materials (after PSDR-Room, Yan et al. 2023): a graph for each part, fitted to an estimate.
 //!
 //! In: the public geometry of a scene and an estimate of its input view. Out: a submission, and a report beside it with
-//! the graph of every part as `.mtlx`.
+//! the graphs as MaterialX.
 //!
 //! Each part's surface is laid out flat in metres, as the unfolded sides of a box ([`part_frame`]). The pixels that
 //! show its most visible side become points of that layout ([`part_samples`]), to which the graphs of
@@ -21,6 +21,7 @@ use crate::nn::seen_pixels;
 mod bake;
 mod files;
 mod fitted_graphs;
+mod interpolation;
 mod materials_file;
 mod options;
 mod page;

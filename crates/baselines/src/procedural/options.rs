@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use mateval_scene::PartSetId;
 
+use crate::error::BaselineError;
+
 /// How a graph is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FitMode {
@@ -24,11 +26,18 @@ pub struct ProceduralOptions {
     pub mode: FitMode,
     /// Whether texels that the input view shows hold the estimate, so that graphs fill only those that it does not show.
     pub keep_seen: bool,
-    /// How much of what is random in a pattern is kept, 0 to 1. Its phase cannot be known, so that 1 looks most alike
-    /// and 0 has the least error.
+    /// How much of what is random in a pattern is kept, 0 to 1. Its phase cannot be known: 1 looks most alike, 0 has the
+    /// least error.
     pub detail: f64,
     /// A folder of `.mtlx` files that are fitted beside the built-in graphs.
     pub graphs: Option<PathBuf>,
+}
+
+impl ProceduralOptions {
+    /// Fails unless `detail` is 0 to 1.
+    pub fn check(&self) -> Result<(), BaselineError> {
+        if (0.0..=1.0).contains(&self.detail) { Ok(()) } else { Err(BaselineError::Detail(self.detail)) }
+    }
 }
 
 impl Default for ProceduralOptions {

@@ -78,7 +78,7 @@ fn errors(part: &PartReport, chosen: &GraphReport) -> String {
     if let Some(error) = part.error_of_one_color {
         write!(text, "; one colour {error:.5}").expect("writing to a String cannot fail");
     }
-    if let Some(next) = part.others.iter().find(|other| Some(other.error) != part.error_of_one_color) {
+    if let Some(next) = part.runner_up() {
         let name = escaped(&next.graph);
         write!(text, "; runner-up {name} {:.5}", next.error).expect("writing to a String cannot fail");
     }
@@ -98,7 +98,7 @@ fn table(parts: &[&PartReport]) -> String {
             (None, ReasonWord::FewPixels) => "one colour: few pixels".to_owned(),
             (None, _) => "one colour".to_owned(),
         };
-        let runner_up = part.others.first().map_or("-".to_owned(), |other| escaped(&other.graph));
+        let runner_up = part.runner_up().map_or("-".to_owned(), |other| escaped(&other.graph));
         let (error, flat) = (part.chosen.as_ref().map(|chosen| chosen.error), part.error_of_one_color);
         writeln!(
             text,

@@ -1,6 +1,7 @@
 //! How the surface of a part is laid out flat, in metres: as the unfolded sides of a box.
 
 use glam::DVec3;
+use serde::Serialize;
 
 /// The world's vertical axis.
 const UP: DVec3 = DVec3::Y;
@@ -15,7 +16,8 @@ const SAME_DIRECTION: f64 = 0.966;
 const CANDIDATES: usize = 64;
 
 /// The side of the box that a triangle is laid out with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub(super) enum Chart {
     /// The side with the main normal.
     Front,
@@ -26,24 +28,11 @@ pub(super) enum Chart {
     Bottom,
 }
 
-impl Chart {
-    /// The word in reports.
-    pub(super) fn word(self) -> &'static str {
-        match self {
-            Self::Front => "front",
-            Self::Back => "back",
-            Self::Right => "right",
-            Self::Left => "left",
-            Self::Top => "top",
-            Self::Bottom => "bottom",
-        }
-    }
-}
-
 /// The frame of a part: `u` to the right, `v` upwards, `w` along the main normal.
 ///
 /// The sides of its box are unfolded around the front, so that a pattern continues across the box's edges. Places on
-/// the front depend on the directions of the axes alone, so that patterns continue across parts that share a plane.
+/// the front depend on the directions of the axes alone, so that patterns continue across parts that share a plane and
+/// these directions, as walls do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PartFrame {
     axes: [DVec3; 3],

@@ -1,31 +1,36 @@
 //! The material of a part: a fitted graph, or one colour.
 
+use std::array::from_fn;
+
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter, LEAST_POINTS};
 use mateval_procedural::fit::paper::fit_as_paper;
 use mateval_procedural::fit::points::Point;
 use mateval_procedural::library::Class;
+use mateval_procedural::settings::slots;
+use mateval_procedural::value::Type;
 
+use super::interpolation::interpolation_error;
 use super::options::{FitMode, ProceduralOptions};
 use super::part_frame::{Chart, PartFrame};
 use super::part_samples::PartSamples;
 use crate::error::BaselineError;
 use crate::estimate::{GivenMaps, Values};
-use crate::median::median;
+use crate::median::{DEFAULT, median};
 
 /// The most samples of a part that are looked at.
 const MOST_SAMPLES: usize = 8192;
 
-/// The error of a graph that predicts a pattern is below this share of that of one colour.
-const MOST_ERROR: f64 = 0.98;
+/// The largest error of a graph that predicts a pattern, as a share of the error of one colour.
+const MOST_RELATIVE_ERROR: f64 = 0.98;
 
-/// And it is lower by this at least: storing colours as bytes changes as much.
+/// The least difference of these errors: storing colours as bytes changes them by as much.
 const LEAST_GAIN: f64 = 2e-6;
 
 /// By how much a graph's error must be lower for each number that it has more than another.
-const PRICE: f64 = 0.002;
+const RELATIVE_PRICE_PER_NUMBER: f64 = 0.002;
 
-/// The least standard deviation of what is no noise, relative to the mean colour.
+/// The standard deviation, relative to the mean colour, above which the colours of a part are a texture and not noise.
 const LEAST_DEVIATION: f64 = 0.1;
 
 /// What decided on a part's material.
@@ -34,7 +39,7 @@ pub(super) enum Reason {
     /// No pixel shows it: it has the colour of its instance, or of its category.
     Unseen,
     /// Too few pixels of one side show it: it has the median of its pixels.
-    FewSamples,
+    FewPixels,
     /// No graph is better than one colour: it has the median of its pixels.
     OneColor(Fit),
     /// A graph is better.
@@ -63,36 +68,46 @@ impl PartMaterial {
         part: &PartSamples,
         category: Option<&str>,
         options: &ProceduralOptions,
+        given: GivenMaps,
         unseen: Values,
     ) -> Result<Self, BaselineError> {
-        let mut all: Vec<Values> = part.samples.iter().map(|sample| sample.values).collect();
-        let pixels = all.len();
-        let values = if all.is_empty() { unseen } else { median(&mut all) };
+        let pixels = part.shown.len();
+        let values = if pixels == 0 { unseen } else { median(&mut part.shown.clone()) };
+        let values = completed(values, given);
         let flat = Self { values, graph: None, chart: None, frame: part.frame, reason: Reason::Unseen, pixels };
-        let Some((chart, samples)) = part.of_main_chart() else { return Ok(flat) };
-        let chart = Some(chart);
-        let points: Vec<Point> = samples.iter().take(MOST_SAMPLES).map(|sample| sample.point).collect();
+        if pixels == 0 {
+            return Ok(flat);
+        }
+        let (chart, samples) = part.of_main_chart().unzip();
+        let points = samples.into_iter().flatten().map(|sample| sample.point).filter(Point::is_sound);
+        let points: Vec<Point> = points.take(MOST_SAMPLES).collect();
         if points.len() < LEAST_POINTS {
-            return Ok(Self { chart, reason: Reason::FewSamples, ..flat });
+            return Ok(Self { chart, reason: Reason::FewPixels, ..flat });
         }
         let fit = match options.mode {
             FitMode::Best => fitter.fit(&points, category)?,
             FitMode::Paper => fit_as_paper(fitter, &points)?,
         };
         let accepted = match options.mode {
-            FitMode::Best => accepted(&fit, flat.values),
+            FitMode::Best => accepted(&fit, interpolation_error(&points), flat.values),
             FitMode::Paper => Some(&fit.chosen).filter(|chosen| !is_flat(chosen)),
         };
-        let graph = accepted.map(|accepted| accepted.with_detail(options.detail));
-        let reason = if graph.is_some() { Reason::Graph(fit) } else { Reason::OneColor(fit) };
-        Ok(Self { graph, chart, reason, ..flat })
+        let Some(graph) = accepted.map(|accepted| accepted.with_detail(options.detail)) else {
+            return Ok(Self { chart, reason: Reason::OneColor(fit), ..flat });
+        };
+        Ok(Self { graph: Some(with_median_of(graph, &points)), chart, reason: Reason::Graph(fit), ..flat })
     }
 
     /// The material at places of the unfolded box, `[u, v, footprint]` in metres. Roughness and metallic are those of
     /// the estimate, or the graph's where it has none.
     pub(super) fn at(&self, places: &[[f64; 3]], given: GivenMaps) -> Vec<Values> {
         let Some(graph) = &self.graph else { return vec![self.values; places.len()] };
-        let of_outputs = |[red, green, blue, roughness, metallic]: [f64; 5]| {
+        let of_outputs = |outputs: [f64; 5]| {
+            // A user's graph may divide by zero.
+            if outputs.iter().any(|output| !output.is_finite()) {
+                return self.values;
+            }
+            let [red, green, blue, roughness, metallic] = outputs;
             let [.., median_roughness, median_metallic] = self.values;
             let color = [red, green, blue].map(|v| v.clamp(0.0, 1.0) as f32);
             let roughness = if given.roughness { median_roughness } else { roughness.clamp(0.0, 1.0) as f32 };
@@ -102,11 +117,11 @@ impl PartMaterial {
         graph.evaluate(places).into_iter().map(of_outputs).collect()
     }
 
-    /// The fit; none for a part that is hardly seen.
+    /// The fit; none for a part that too few pixels show.
     pub(super) fn fit(&self) -> Option<&Fit> {
         match &self.reason {
             Reason::OneColor(fit) | Reason::Graph(fit) => Some(fit),
-            Reason::Unseen | Reason::FewSamples => None,
+            Reason::Unseen | Reason::FewPixels => None,
         }
     }
 }
@@ -114,13 +129,15 @@ impl PartMaterial {
 /// The graph of a fit that a room's part gets; none for one colour.
 ///
 /// An estimate of a room is blurred and has light and noise left in it, whose statistics look like those of a texture.
-/// So pixels decide: the graph that predicts held-out ones best, if it does so better than one colour. Only where no
-/// graph does, and the estimate varies so much that it is no noise, the fit's own choice is taken, whose randomness has
-/// the look of what is seen.
-fn accepted(fit: &Fit, values: Values) -> Option<&Candidate> {
+/// So pixels decide: the graph that predicts held-out ones best, if it does so better than one colour and than the
+/// pixels around them. Only where no graph does, and the estimate varies so much that it is no noise, the fit's own
+/// choice is taken, whose randomness has the look of what is seen.
+fn accepted(fit: &Fit, of_neighbours: Option<f64>, values: Values) -> Option<&Candidate> {
     let all = || std::iter::once(&fit.chosen).chain(&fit.others);
     let of_one_color = all().find(|found| is_flat(found))?.error;
-    let predicts = |found: &&Candidate| found.error < (MOST_ERROR * of_one_color).min(of_one_color - LEAST_GAIN);
+    let of_others = of_neighbours.unwrap_or(of_one_color).min(of_one_color);
+    let most = (MOST_RELATIVE_ERROR * of_others).min(of_others - LEAST_GAIN);
+    let predicts = |found: &&Candidate| found.error < most;
     if let Some(best) = all().filter(predicts).min_by(|a, b| priced(a).total_cmp(&priced(b))) {
         return Some(best);
     }
@@ -129,9 +146,40 @@ fn accepted(fit: &Fit, values: Values) -> Option<&Candidate> {
     Some(&fit.chosen).filter(|chosen| varies && !is_flat(chosen))
 }
 
-/// The error, of two graphs that are as good less for the one with fewer numbers.
+/// The graph with its colours multiplied so that it has the median of the points, where that is a factor from a half to
+/// 2: a fit has their mean, which outliers move. All colours of a graph enter linearly.
+fn with_median_of(mut graph: Candidate, points: &[Point]) -> Candidate {
+    let places: Vec<[f64; 3]> = points.iter().map(|point| [point.u, point.v, point.footprint]).collect();
+    let shown = graph.evaluate(&places);
+    let middle = |mut numbers: Vec<f64>| {
+        numbers.sort_by(f64::total_cmp);
+        numbers[numbers.len() / 2]
+    };
+    let gains: [f64; 3] = from_fn(|c| {
+        let seen = middle(points.iter().map(|point| point.albedo[c]).collect());
+        let ratio = seen / middle(shown.iter().map(|outputs| outputs[c]).collect());
+        if ratio.is_finite() { ratio.clamp(0.5, 2.0) } else { 1.0 }
+    });
+    for (at, slot) in slots(&graph.graph).iter().enumerate() {
+        if graph.graph.parameters[slot.parameter].value.kind() == Type::Color3 {
+            let number = graph.settings.number_mut(at);
+            *number = (*number * gains[slot.component]).clamp(0.0, 1.0);
+        }
+    }
+    graph
+}
+
+/// The error, plus a small price for each number of the settings.
 fn priced(found: &Candidate) -> f64 {
-    found.error * (1.0 + PRICE * found.settings.numbers().len() as f64)
+    found.error * (1.0 + RELATIVE_PRICE_PER_NUMBER * found.settings.numbers().len() as f64)
+}
+
+/// The values with the format's defaults for maps that the estimate lacks.
+pub(super) fn completed(values: Values, given: GivenMaps) -> Values {
+    let [red, green, blue, roughness, metallic] = values;
+    let roughness = if given.roughness { roughness } else { DEFAULT[3] };
+    let metallic = if given.metallic { metallic } else { DEFAULT[4] };
+    [red, green, blue, roughness, metallic]
 }
 
 fn is_flat(found: &Candidate) -> bool {
@@ -157,7 +205,32 @@ mod tests {
     fn chosen(all: [(&str, f64); 3], grey: f32) -> Option<String> {
         let [first, others @ ..] = all.map(|(name, error)| candidate(name, error));
         let fit = Fit { chosen: first, others: others.into() };
-        accepted(&fit, [grey, grey, grey, 0.5, 0.0]).map(|found| found.graph.name.clone())
+        accepted(&fit, None, [grey, grey, grey, 0.5, 0.0]).map(|found| found.graph.name.clone())
+    }
+
+    #[test]
+    fn colours_get_the_median_of_the_points() {
+        let checks = candidate("checks", 0.0);
+        let place = |at: u32| [0.017 * f64::from(at % 50), 0.023 * f64::from(at / 50), 0.001];
+        let places: Vec<[f64; 3]> = (0..1000).map(place).collect();
+        let shown = checks.evaluate(&places);
+        let point = |(&[u, v, footprint], outputs): (&[f64; 3], &[f64; 5])| {
+            let albedo = [0.8 * outputs[0], outputs[1], 1.1 * outputs[2]];
+            Point { u, v, footprint, albedo, weight: 1.0 }
+        };
+        let points: Vec<Point> = places.iter().zip(&shown).map(point).collect();
+        let scaled = with_median_of(checks, &points).evaluate(&places);
+        for (point, outputs) in points.iter().zip(&scaled) {
+            assert!(point.albedo.iter().zip(outputs).all(|(a, b)| (a - b).abs() < 1e-9), "{point:?} {outputs:?}");
+        }
+    }
+
+    #[test]
+    fn what_neighbours_predict_is_no_pattern() {
+        let others = vec![candidate("paint", 3.0e-4)];
+        let fit = Fit { chosen: candidate("stripes", 2.0e-4), others };
+        let is_taken = |of_neighbours| accepted(&fit, Some(of_neighbours), [0.5, 0.5, 0.5, 0.5, 0.0]).is_some();
+        assert_eq!([is_taken(1.5e-4), is_taken(2.5e-4)], [false, true]);
     }
 
     #[test]

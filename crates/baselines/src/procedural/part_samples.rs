@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use mateval_procedural::fit::points::Point;
 use mateval_procedural::noise::cell::cell;
-use mateval_scene::PartSetId;
+use mateval_scene::{Camera, PartSetId};
 
 use super::part_frame::{Chart, PartFrame, Triangle};
 use crate::error::BaselineError;
@@ -33,7 +33,10 @@ pub(super) struct Sample {
 pub(super) struct PartSamples {
     /// None for a part without an area, or of an instance without an atlas.
     pub(super) frame: Option<PartFrame>,
-    /// In a random order, so that any first or every n-th of them are spread over the part.
+    /// The estimate at every pixel that shows the part.
+    pub(super) shown: Vec<Values>,
+    /// The pixels that show a pattern, in a random order, so that any first or every n-th of them are spread over the
+    /// part.
     pub(super) samples: Vec<Sample>,
 }
 
@@ -51,25 +54,35 @@ impl PartSamples {
         seen: &SeenPixels,
     ) -> Result<Vec<Self>, BaselineError> {
         let picture = geometry.part_picture(set)?;
-        let viewer = geometry.view.camera.position();
-        let origin = middle(geometry);
-        let frames = corners_of_parts(geometry, triangles);
-        let frames = frames.iter().map(|corners| PartFrame::new(corners, viewer, origin));
-        let mut parts: Vec<Self> = frames.map(|frame| Self { frame, samples: Vec::new() }).collect();
+        let (viewer, origin) = (geometry.view.camera.position(), middle(geometry));
+        let corners = corners_of_parts(geometry, triangles);
+        let frames = corners.iter().map(|corners| PartFrame::new(corners, viewer, origin));
+        let mut parts: Vec<Self> = frames.map(|frame| Self { frame, shown: Vec::new(), samples: Vec::new() }).collect();
         let place_of: BTreeMap<u16, usize> =
             triangles.parts.iter().enumerate().map(|(at, part)| (part.index.0.get(), at)).collect();
         for point in seen.points(geometry) {
             let (x, y) = seen.view_pixel(point.pixel.0, point.pixel.1);
-            let Some(part) = place_of.get(&picture.get(x, y)).map(|at| &mut parts[*at]) else { continue };
+            let Some(&at) = place_of.get(&picture.get(x, y)) else { continue };
+            // The view's pixel may show another instance than that of an estimate with more pixels.
+            if triangles.owners[at] != Some(point.instance) {
+                continue;
+            }
+            let part = &mut parts[at];
             let Some(frame) = part.frame else { continue };
             let values = estimate.at(point.pixel.0, point.pixel.1);
-            part.samples.extend(sample(&frame, seen, viewer, &point, values));
+            part.shown.push(values);
+            part.samples.extend(sample(&frame, &seen.camera, &point, values));
         }
         for part in &mut parts {
             let random = |sample: &Sample| cell(sample.pixel[0] as f64 + 0.5, sample.pixel[1] as f64 + 0.5);
             part.samples.sort_by(|a, b| random(a).total_cmp(&random(b)).then(a.pixel.cmp(&b.pixel)));
         }
         Ok(parts)
+    }
+
+    /// Where the samples lie on the unfolded box, `[u, v, footprint]` in metres.
+    pub(super) fn places(&self) -> Vec<[f64; 3]> {
+        self.samples.iter().map(|Sample { point, .. }| [point.u, point.v, point.footprint]).collect()
     }
 
     /// The side that most samples show, and those samples.
@@ -83,20 +96,24 @@ impl PartSamples {
 }
 
 /// None for what is seen at too steep an angle.
-fn sample(frame: &PartFrame, seen: &SeenPixels, viewer: DVec3, point: &SeenPoint, values: Values) -> Option<Sample> {
-    let to_viewer = viewer - point.place;
-    let cosine = (to_viewer.normalize_or_zero().dot(point.normal)).abs();
-    if cosine < LEAST_COSINE {
-        return None;
-    }
+fn sample(frame: &PartFrame, camera: &Camera, point: &SeenPoint, values: Values) -> Option<Sample> {
+    let footprint = footprint(camera, point.place, point.normal)?;
     let chart = frame.chart(point.normal);
     let [u, v] = frame.place(chart, point.place);
-    // The root of the pixel's area on the surface.
-    let footprint = to_viewer.length() / seen.camera.intrinsics.fx / cosine.sqrt();
     let albedo = [values[0], values[1], values[2]].map(f64::from);
     let pixel = [point.pixel.0, point.pixel.1];
-    let position = point.place;
-    Some(Sample { pixel, chart, position, values, point: Point { u, v, footprint, albedo, weight: 1.0 } })
+    Some(Sample { pixel, chart, position: point.place, values, point: Point { u, v, footprint, albedo, weight: 1.0 } })
+}
+
+/// The root of the area, in square metres, that a pixel covers of a surface; none where it is seen at too steep an angle.
+fn footprint(camera: &Camera, place: DVec3, normal: DVec3) -> Option<f64> {
+    let to_viewer = camera.position() - place;
+    let (_, depth) = camera.projection().project(place)?;
+    let distance = to_viewer.length();
+    let cosine = to_viewer.normalize_or_zero().dot(normal).abs();
+    // A pixel has the solid angle (depth / distance)^3 / (fx fy).
+    let solid_angle = (depth / distance).powi(3) / (camera.intrinsics.fx * camera.intrinsics.fy);
+    (cosine >= LEAST_COSINE).then(|| distance * (solid_angle / cosine).sqrt())
 }
 
 /// The middle of the box around all instances.
@@ -121,4 +138,27 @@ fn corners_of_parts(geometry: &SceneGeometry<'_>, triangles: &PartTriangles<'_>)
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_scene::Intrinsics;
+
+    use super::*;
+
+    /// The pixels of a picture cover a wall behind it without gaps: at any place of it their area is that of the square of
+    /// the depth over both focal lengths. The twin is the same pixel on a floor.
+    #[test]
+    fn footprints_are_roots_of_areas() {
+        let intrinsics = Intrinsics { fx: 100.0, fy: 160.0, ..Intrinsics::from_fov_x(64, 48, 1.0) };
+        let camera = Camera::look_at(DVec3::ZERO, -DVec3::Z, DVec3::Y, intrinsics).unwrap();
+        for place in [DVec3::new(0.0, 0.0, -2.0), DVec3::new(0.5, -0.2, -2.0)] {
+            let found = footprint(&camera, place, DVec3::Z).unwrap();
+            assert!((found / (4.0_f64 / 16_000.0).sqrt() - 1.0).abs() < 1e-9, "{place}: {found}");
+        }
+        let floor = footprint(&camera, DVec3::new(0.5, -0.2, -2.0), DVec3::Y).unwrap();
+        // Area times cosine is the same: 0.2 m below the eye, 2 m away.
+        assert!((floor / (4.0_f64 / 16_000.0 * 10.0).sqrt() - 1.0).abs() < 1e-9, "{floor}");
+        assert_eq!(footprint(&camera, DVec3::new(0.0, -0.01, -2.0), DVec3::Y), None);
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::library::{Class, LIBRARY};
-use mateval_scene::dataset::SceneFile;
+use mateval_scene::dataset::{Part, SceneFile};
 use mateval_scene::manifest::sha256_of_bytes;
 use serde::Serialize;
 
@@ -24,7 +24,7 @@ pub(super) struct ReportFile {
     pub(super) format: String,
     pub(super) method: String,
     pub(super) description: String,
-    /// Of the texts of the built-in graphs, in their order.
+    /// The hash of the texts of the built-in graphs, in their order.
     pub(super) library_sha256: String,
     pub(super) scenes: Vec<SceneReport>,
 }
@@ -45,14 +45,14 @@ pub(super) struct PartReport {
     pub(super) pixels: usize,
     pub(super) reason: ReasonWord,
     /// The side of its box that was fitted.
-    pub(super) side: Option<&'static str>,
+    pub(super) side: Option<Chart>,
     /// Median base colour (linear), roughness and metallic of its pixels, or what stands for them.
     pub(super) values: [f32; 5],
     /// The chosen graph.
     pub(super) chosen: Option<GraphReport>,
     /// The error of one colour at the same held-out pixels.
     pub(super) error_of_one_color: Option<f64>,
-    /// The other graphs, best first.
+    /// The other graphs, in the order of the fit's own score.
     pub(super) others: Vec<OtherReport>,
 }
 
@@ -82,6 +82,7 @@ pub(super) struct GraphReport {
 #[derive(Serialize)]
 pub(super) struct OtherReport {
     pub(super) graph: String,
+    pub(super) class: Option<Class>,
     pub(super) error: f64,
     pub(super) distance: f64,
 }
@@ -91,19 +92,28 @@ const MOST_OTHERS: usize = 5;
 
 impl SceneReport {
     pub(super) fn new(scene: &SceneFile, materials: &SceneMaterials<'_>) -> Self {
+        // Parts of instances without an atlas have no material.
+        let has_atlas = |owner: &Option<usize>| owner.is_some_and(|owner| scene.instances[owner].atlas.is_some());
+        let owners = materials.triangles.owners.iter().map(has_atlas);
         let parts = materials.triangles.parts.iter().zip(&materials.of_part);
-        let report = |(part, material): (&mateval_scene::dataset::Part, &PartMaterial)| {
+        let baked = parts.zip(owners).filter(|(_, has_atlas)| *has_atlas);
+        let report = |((part, material), _): ((&Part, &PartMaterial), bool)| {
             PartReport::new(part.id.to_string(), part.instance.to_string(), material)
         };
-        Self { id: scene.id.to_string(), parts: parts.map(report).collect() }
+        Self { id: scene.id.to_string(), parts: baked.map(report).collect() }
     }
 }
 
 impl PartReport {
+    /// The best graph that was not taken and is more than one colour.
+    pub(super) fn runner_up(&self) -> Option<&OtherReport> {
+        self.others.iter().find(|other| other.class != Some(Class::Flat))
+    }
+
     fn new(part: String, instance: String, material: &PartMaterial) -> Self {
         let reason = match &material.reason {
             Reason::Unseen => ReasonWord::Unseen,
-            Reason::FewSamples => ReasonWord::FewPixels,
+            Reason::FewPixels => ReasonWord::FewPixels,
             Reason::OneColor(_) => ReasonWord::OneColor,
             Reason::Graph(_) => ReasonWord::Graph,
         };
@@ -113,6 +123,7 @@ impl PartReport {
         let others = all().filter(|found| Some(found.graph.name.as_str()) != taken);
         let other = |other: &Candidate| OtherReport {
             graph: other.graph.name.clone(),
+            class: other.class,
             error: other.error,
             distance: other.distance,
         };
@@ -121,7 +132,7 @@ impl PartReport {
             instance,
             pixels: material.pixels,
             reason,
-            side: material.chart.map(Chart::word),
+            side: material.chart,
             values: material.values,
             chosen: material.graph.as_ref().map(GraphReport::new),
             error_of_one_color: all().find(|found| found.class == Some(Class::Flat)).map(|found| found.error),

@@ -23,8 +23,8 @@ pub(super) struct SceneMaterials<'a> {
     pub(super) triangles: PartTriangles<'a>,
     pub(super) samples: Vec<PartSamples>,
     pub(super) of_part: Vec<PartMaterial>,
-    /// By how much the estimate differs from each part's material; empty unless seen texels are kept.
-    pub(super) residuals: Vec<Residuals>,
+    /// By how much the estimate differs from each part's material; none unless seen texels are kept.
+    pub(super) residuals: Option<Vec<Residuals>>,
     /// The maps that the estimate gives.
     pub(super) given: GivenMaps,
 }
@@ -39,6 +39,11 @@ impl<'a> SceneMaterials<'a> {
         options: &ProceduralOptions,
         progress: Progress<'_>,
     ) -> Result<Self, BaselineError> {
+        options.check()?;
+        let given = estimate.given_maps();
+        if !given.base_color {
+            return Err(BaselineError::NoColor(geometry.scene.id.to_string()));
+        }
         let set = options.part_set.as_ref();
         let triangles = PartTriangles::read(geometry, set)?;
         let samples_of_parts = PartSamples::of_parts(geometry, set, &triangles, estimate, seen)?;
@@ -48,26 +53,25 @@ impl<'a> SceneMaterials<'a> {
             let owner = triangles.owners[part];
             let category = owner.and_then(|owner| category(&geometry.scene.instances[owner]));
             let unseen = owner.map_or(DEFAULT, |owner| medians.of(geometry, owner));
-            let material = PartMaterial::fitted(fitter, samples, category, options, unseen);
+            let material = PartMaterial::fitted(fitter, samples, category, options, given, unseen);
             progress(Report::step("fit of parts", 1 + done.fetch_add(1, Ordering::Relaxed), samples_of_parts.len()));
             material
         };
         let of_part = samples_of_parts.par_iter().enumerate().map(fitted).collect::<Result<Vec<_>, _>>()?;
-        let (samples, given) = (samples_of_parts, estimate.given_maps());
+        let samples = samples_of_parts;
         let residuals = |(samples, material)| Residuals::new(samples, material, given);
-        let residuals =
-            if options.keep_seen { samples.iter().zip(&of_part).map(residuals).collect() } else { Vec::new() };
+        let residuals = options.keep_seen.then(|| samples.iter().zip(&of_part).map(residuals).collect());
         Ok(Self { triangles, samples, of_part, residuals, given })
     }
 
     /// Whether any part of an instance has a graph.
     pub(super) fn has_graph(&self, instance: usize) -> bool {
-        let parts = self.triangles.owners.iter().zip(&self.of_part);
-        { parts }.any(|(owner, material)| *owner == Some(instance) && material.graph.is_some())
+        let mut parts = self.triangles.owners.iter().zip(&self.of_part);
+        parts.any(|(owner, material)| *owner == Some(instance) && material.graph.is_some())
     }
 }
 
-/// What a thing is called: its category, or the kind of a piece of the building.
+/// An instance's category, or the kind of a piece of the building.
 fn category(instance: &Instance) -> Option<&str> {
     instance.category.as_deref().or(instance.role.architecture_kind())
 }

@@ -57,9 +57,6 @@ pub fn run(args: &ProceduralArgs) -> anyhow::Result<Outcome> {
         (source, None) => source,
         (_, Some(_)) => bail!("--lights is for --estimate delight alone; other estimates are not lit"),
     };
-    if !(0.0..=1.0).contains(&args.detail) {
-        bail!("--detail {}: expected 0 to 1", args.detail);
-    }
     let options = ProceduralOptions {
         part_set: args.part_set.clone(),
         mode: match args.mode {
