@@ -146,19 +146,16 @@ fn accepted(fit: &Fit, of_neighbours: Option<f64>, values: Values) -> Option<&Ca
     Some(&fit.chosen).filter(|chosen| varies && !is_flat(chosen))
 }
 
-/// The graph with its colours multiplied so that it has the median of the points, where that is a factor from a half to
-/// 2: a fit has their mean, which outliers move. All colours of a graph enter linearly.
+/// The graph with its colours multiplied by the median ratio of points and graph, from a half to 2: a fit has the mean of
+/// the points, which outliers move. All colours of a graph enter linearly.
 fn with_median_of(mut graph: Candidate, points: &[Point]) -> Candidate {
     let places: Vec<[f64; 3]> = points.iter().map(|point| [point.u, point.v, point.footprint]).collect();
     let shown = graph.evaluate(&places);
-    let middle = |mut numbers: Vec<f64>| {
-        numbers.sort_by(f64::total_cmp);
-        numbers[numbers.len() / 2]
-    };
     let gains: [f64; 3] = from_fn(|c| {
-        let seen = middle(points.iter().map(|point| point.albedo[c]).collect());
-        let ratio = seen / middle(shown.iter().map(|outputs| outputs[c]).collect());
-        if ratio.is_finite() { ratio.clamp(0.5, 2.0) } else { 1.0 }
+        let ratios = points.iter().zip(&shown).map(|(point, outputs)| point.albedo[c] / outputs[c]);
+        let mut ratios: Vec<f64> = ratios.filter(|ratio| ratio.is_finite()).collect();
+        ratios.sort_by(f64::total_cmp);
+        ratios.get(ratios.len() / 2).map_or(1.0, |ratio| ratio.clamp(0.5, 2.0))
     });
     for (at, slot) in slots(&graph.graph).iter().enumerate() {
         if graph.graph.parameters[slot.parameter].value.kind() == Type::Color3 {
@@ -244,6 +241,6 @@ mod tests {
         let granite = [("granite", 3.0e-3), ("paint", 3.0e-3), ("carpet", 3.0e-3)];
         assert_eq!([chosen(granite, 0.3), chosen(granite, 0.9)], [name("granite"), None]);
         // Of two that predict the same, the one with fewer numbers is taken.
-        assert_eq!(chosen([("plaid", 1.0e-4), ("stripes", 1.0e-4), ("paint", 3.0e-4)], 0.5), name("stripes"));
+        assert_eq!(chosen([("stripes", 1.0e-4), ("plaid", 1.0e-4), ("paint", 3.0e-4)], 0.5), name("plaid"));
     }
 }
