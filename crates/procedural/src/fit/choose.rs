@@ -23,6 +23,7 @@ use super::pattern::Pattern;
 use super::periods::layout;
 use super::points::{Point, split, thinned};
 use super::roles::Role;
+use super::settle::settled;
 use super::smooth::flattened;
 use super::texture::{Colors, Sight, Texture};
 use super::waves::{Wave, lines, waves};
@@ -70,6 +71,9 @@ const LEAST_PROMISE: f64 = 0.015;
 
 /// How often tones are taken away and sizes are reconsidered.
 const ROUNDS: usize = 4;
+
+/// For how many starts, of each list of waves, the place of cells is searched.
+const SETTLED: usize = 1;
 
 /// How many periodic graphs are compared in their statistics.
 const PERIODIC: usize = 6;
@@ -250,18 +254,21 @@ fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wav
     if !starts.iter().any(|start| is_promising(model, start, &few)) {
         return None;
     }
-    let polished = starts.into_iter().map(|mut start| {
+    let fewer = thinned(seen, 500);
+    let polished = starts.into_iter().enumerate().map(|(place, mut start)| {
+        if place % most < SETTLED {
+            start.settings = settled(model, pattern.layout, start.settings, &fewer);
+        }
         let toneless = without_tones(model, &start.settings, &few);
         polish(model, &mut start.settings, &toneless, 8);
         let error = mean_square(model, &start.settings, &without_tones(model, &start.settings, &few));
         (cell_error(model, &start.settings, &many).unwrap_or(error), start.settings)
     });
     let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let few = thinned(seen, 500);
     for round in 0..if model.tone.is_some() { ROUNDS } else { 1 } {
         let toneless = without_tones(model, &settings, &many);
         polish(model, &mut settings, &toneless, 20);
-        let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &few) } else { None };
+        let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &fewer) } else { None };
         match resized {
             Some(resized) => settings = resized,
             None if round > 0 => break,

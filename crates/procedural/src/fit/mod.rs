@@ -17,6 +17,7 @@
 //!
 //! [`paper`] fits as PSDR-Room does, to be compared with.
 
+mod boards;
 pub mod candidate;
 mod category;
 mod cells;
@@ -33,6 +34,7 @@ mod periods;
 pub mod points;
 mod ranked;
 pub mod roles;
+mod settle;
 mod smooth;
 mod statistics;
 mod system;
