@@ -6,7 +6,7 @@ use super::smooth::log_grey;
 use crate::settings::Settings;
 
 /// The number of beginnings of a row that are compared, over the length of a board.
-const BEGINNINGS: usize = 6;
+const BEGINNINGS: usize = 12;
 
 /// The number that a board has is that of its row times this, and its place in the row.
 const ROW: i64 = 1 << 24;
@@ -83,7 +83,7 @@ mod tests {
         let random = |i: u32, of: f64| cell(f64::from(i) + 0.5, of);
         let planted = |u: f64, v: f64| {
             let row = (v / width).floor();
-            [row, (u / length + (4.0 * cell(row + 0.5, 9.5)).floor() / 6.0).floor()]
+            [row, (u / length + (8.0 * cell(row + 0.5, 9.5)).floor() / 12.0).floor()]
         };
         let place = |i: u32| {
             let (u, v) = (4.0 * random(i, 1.5), 1.5 * random(i, 2.5));

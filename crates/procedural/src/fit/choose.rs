@@ -24,6 +24,7 @@ use super::periods::layout;
 use super::points::{Point, split, thinned};
 use super::roles::Role;
 use super::settle::settled;
+use super::sizes::unusual;
 use super::smooth::flattened;
 use super::texture::{Colors, Sight, Texture};
 use super::waves::{Wave, lines, waves};
@@ -60,26 +61,41 @@ const STATISTICS: f64 = 0.25;
 /// The distance of statistics from which on more of it hardly counts.
 const FAR: f64 = 2.0;
 
+/// The distance of a single colour's statistics below which nothing but noise is left to explain.
+const OF_NOISE: f64 = -0.55;
+
+/// The score below which no texture's can be: its statistics are hardly ever closer than -0.8.
+const PREDICTED: f64 = -0.4;
+
 /// The price of each number that a graph has.
 const PRICE: f64 = 0.01;
 
 /// The worth of each unit of log-odds in a graph's favour.
 const PRIOR: f64 = 0.02;
 
-/// By how much a start has to be better than nothing.
-const LEAST_PROMISE: f64 = 0.015;
+/// The price of sizes that are a standard deviation from the usual ones. Nothing is known of those of a user's graph.
+const SIZES: f64 = 0.04;
+
+/// By how much a start has to be better than a single colour, or its cells than the same ones elsewhere.
+const LEAST_PROMISE: f64 = 0.025;
 
 /// How often tones are taken away and sizes are reconsidered.
 const ROUNDS: usize = 4;
 
-/// For how many starts, of each list of waves, the place of cells is searched.
-const SETTLED: usize = 1;
+/// How many starts of a pattern are polished.
+const STARTS: usize = 4;
+
+/// For how many of them the place of cells is searched.
+const SETTLED: usize = 2;
+
+/// How many patterns are polished.
+const POLISHED: usize = 7;
 
 /// How many periodic graphs are compared in their statistics.
-const PERIODIC: usize = 6;
+const PERIODIC: usize = 5;
 
 /// How many graphs without a period are refined.
-const RANDOM: usize = 6;
+const RANDOM: usize = 5;
 
 /// How many of those are refined from two starts.
 const TWICE: usize = 2;
@@ -90,7 +106,7 @@ const TWICE: usize = 2;
 pub struct Fit {
     /// The graph that was chosen; `paint` where none is better than a colour.
     pub chosen: Candidate,
-    /// The other graphs, best first.
+    /// The other graphs, best first. Textures are left out where a periodic graph is surely better.
     pub others: Vec<Candidate>,
 }
 
@@ -153,7 +169,11 @@ impl Fitter {
         let sight = Sight::new(&sound);
         paint.distance = sight.judged(&self.paint, &paint.settings);
         let mut others = self.fitted(&seen, &judged, &sight);
-        others.extend(self.textured(&sight, paint.error));
+        let least = others.iter().map(|other| score(other, paint.error, category)).fold(f64::INFINITY, f64::min);
+        // A texture has only its statistics, which cannot make up for what is predicted well.
+        if paint.distance > OF_NOISE && least > PREDICTED {
+            others.extend(self.textured(&sight, paint.error));
+        }
         // A user's graph may have values that are not numbers, which are no less than anything.
         others.retain(|other| other.error <= MOST_ERROR * paint.error && other.distance.is_finite());
         let score = |candidate: &Candidate| score(candidate, paint.error, category);
@@ -182,9 +202,15 @@ impl Fitter {
         let sharp = lines(&few, 8);
         let both = [strong.as_slice(), &sharp];
         let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
-        let fitted = |pattern: &Pattern| candidate(pattern, seen, judged, of(pattern));
-        let mut all: Vec<(&Model, Candidate)> =
-            self.patterns.iter().filter_map(|pattern| Some((&pattern.model, fitted(pattern)?))).collect();
+        let fewer = thinned(seen, 700);
+        let mut begun: Vec<(f64, &Pattern, Vec<Start>)> =
+            self.patterns.iter().filter_map(|pattern| begun(pattern, seen, &fewer, of(pattern))).collect();
+        begun.sort_by(|a, b| a.0.total_cmp(&b.0));
+        begun.truncate(POLISHED);
+        let mut all: Vec<(&Model, Candidate)> = Vec::new();
+        for (_, pattern, starts) in begun {
+            all.extend(candidate(pattern, seen, judged, starts).map(|candidate| (&pattern.model, candidate)));
+        }
         let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
         all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
         all.truncate(PERIODIC);
@@ -235,6 +261,7 @@ impl Fitter {
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
     let pixels = PIXELS * libm::log(candidate.error / of_paint.max(1e-12) + 1e-3);
     let price = PRICE * candidate.settings.numbers().len() as f64;
+    let price = price + SIZES * candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
     pixels + CELLS * candidate.cells + STATISTICS * compressed(candidate.distance) + price
         - PRIOR * log_odds(category, &candidate.graph.name)
 }
@@ -245,18 +272,29 @@ fn compressed(distance: f64) -> f64 {
     if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
 }
 
-/// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
-fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wave]]) -> Option<Candidate> {
+/// The starts of a pattern, the best first, after the logarithm of the best one's error in that of a single colour.
+/// `None` where none is promising.
+fn begun<'p>(
+    pattern: &'p Pattern,
+    seen: &[Point],
+    few: &[Point],
+    found: &[&[Wave]],
+) -> Option<(f64, &'p Pattern, Vec<Start>)> {
     let model = &pattern.model;
-    let (few, many) = (thinned(seen, 700), thinned(seen, 2048));
-    let most = 4 / found.len();
-    let starts: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
-    if !starts.iter().any(|start| is_promising(model, start, &few)) {
-        return None;
-    }
-    let fewer = thinned(seen, 500);
+    let most = STARTS / found.len();
+    let mut all: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
+    all.sort_by(|a, b| a.error.total_cmp(&b.error));
+    let best = all.first()?;
+    let promise = if model.tone.is_some() { excess(model, &best.settings, few) } else { gain(model, best, few) };
+    (promise < -LEAST_PROMISE).then_some((promise, pattern, all))
+}
+
+/// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
+fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], starts: Vec<Start>) -> Option<Candidate> {
+    let model = &pattern.model;
+    let (few, many, fewer) = (thinned(seen, 700), thinned(seen, 2048), thinned(seen, 500));
     let polished = starts.into_iter().enumerate().map(|(place, mut start)| {
-        if place % most < SETTLED {
+        if place < SETTLED {
             start.settings = settled(model, pattern.layout, start.settings, &fewer);
         }
         let toneless = without_tones(model, &start.settings, &few);
@@ -283,15 +321,13 @@ fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wav
     Some(candidate)
 }
 
-/// Whether a start is better than one colour, or its cells than the same ones elsewhere: others are not worth a search.
-fn is_promising(model: &Model, start: &Start, few: &[Point]) -> bool {
-    if model.tone.is_some() {
-        return excess(model, &start.settings, few) < -LEAST_PROMISE;
-    }
+/// The logarithm of a start's error in that of a single colour.
+fn gain(model: &Model, start: &Start, few: &[Point]) -> f64 {
     let count = few.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|c| few.iter().map(|point| point.albedo[c]).sum::<f64>() / count);
     let square = |point: &Point| (0..3).map(|c| (point.albedo[c] - mean[c]).powi(2)).sum::<f64>() / 3.0;
-    mean_square(model, &start.settings, few) < (1.0 - LEAST_PROMISE) * few.iter().map(square).sum::<f64>() / count
+    let of_one = few.iter().map(square).sum::<f64>() / count;
+    libm::log(mean_square(model, &start.settings, few).max(1e-12) / of_one.max(1e-12))
 }
 
 /// Bricks that are not shifted from row to row are tiles.

@@ -19,16 +19,16 @@ pub(super) struct Start {
 }
 
 /// The points at which starts are judged.
-const POINTS: usize = 640;
+const POINTS: usize = 420;
 
 /// The points at which a graph's waves are measured: fewer would be noisy by what else is in the pattern.
-const WAVE_POINTS: usize = 1280;
+const WAVE_POINTS: usize = 900;
 
 /// The least share of the variance that a wave of the points must have in the graph too.
 const LEAST_SHARE: f64 = 0.01;
 
 /// How many settings whose waves agree best are judged by colours.
-const AGREEING: usize = 80;
+const AGREEING: usize = 56;
 
 /// Settings whose turns in degrees, and whose lengths' logarithms, differ by less than this are the same.
 const SAME: [f64; 2] = [0.1, 0.003];
@@ -139,7 +139,7 @@ fn rows(
 /// Turns of rows, in radians: along the crests of the strongest waves.
 fn row_turns(seen: &[Wave]) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();
-    for turn in seen.iter().take(5).map(|wave| wave.direction() - FRAC_PI_2) {
+    for turn in seen.iter().take(4).map(|wave| wave.direction() - FRAC_PI_2) {
         let apart = |other: &f64| turn - other - PI * ((turn - other) / PI).round();
         if all.iter().all(|other| apart(other).abs() > SAME[0].to_radians()) {
             all.push(turn);

@@ -35,6 +35,7 @@ pub mod points;
 mod ranked;
 pub mod roles;
 mod settle;
+mod sizes;
 mod smooth;
 mod statistics;
 mod system;
