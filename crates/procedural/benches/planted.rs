@@ -19,15 +19,18 @@ use std::collections::BTreeMap;
 use cpu_time::ThreadTime;
 use mateval_procedural::fit::choose::Fitter;
 use planting::draw::{Draw, LENGTHS, Lengths, draw};
-use planting::outcome::{Outcome, outcome, outcome_as_paper};
+use planting::outcome::{Outcome, outcome, outcome_as_paper, outcome_of_category};
 use rayon::prelude::*;
 
 fn main() {
     let mut words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
-    let is_as_paper = words.first().is_some_and(|word| word == "paper");
-    words.drain(..usize::from(is_as_paper));
+    let fit = match words.first().map(String::as_str) {
+        Some("paper") => outcome_as_paper,
+        Some("category") => outcome_of_category,
+        _ => outcome,
+    };
+    words.drain(..usize::from(words.first().is_some_and(|word| word == "paper" || word == "category")));
     let draws: usize = words.first().map_or(20, |word| word.parse().unwrap());
-    let fit = if is_as_paper { outcome_as_paper } else { outcome };
     let fitter = Fitter::new().unwrap();
     println!("graph            class graph place  dB-0 dB-1 colour  s    instead");
     let lengths: Vec<&Lengths> =

@@ -49,11 +49,11 @@ const LEAST_VARIANCE: f64 = 2e-6;
 /// The most error of what is predictable in a graph, in those of a single colour.
 const MOST_ERROR: f64 = 1.01;
 
-/// The weight of the logarithm of the error.
-const PIXELS: f64 = 1.0;
+/// The weight of the logarithm of the error and of how much alike the points of a cell are.
+const PIXELS: f64 = 2.0;
 
-/// The weight of how much alike the points of a cell are.
-const CELLS: f64 = 1.0;
+/// The greatest sum of both, negated and weighted, that searches over many places find in noise; it does not count.
+const BY_CHANCE: f64 = 0.15;
 
 /// The weight of the distance of statistics.
 const STATISTICS: f64 = 0.25;
@@ -71,7 +71,7 @@ const PREDICTED: f64 = -0.4;
 const PRICE: f64 = 0.01;
 
 /// The worth of each unit of log-odds in a graph's favour.
-const PRIOR: f64 = 0.02;
+const PRIOR: f64 = 0.05;
 
 /// The price of sizes that are a standard deviation from the usual ones. Nothing is known of those of a user's graph.
 const SIZES: f64 = 0.04;
@@ -259,10 +259,11 @@ impl Fitter {
 /// What graphs are ordered by, the least first: by how much what can be predicted reduces the error of a single colour,
 /// how far statistics are, how many numbers a graph has, and whether things of the category are often made of it.
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
-    let pixels = PIXELS * libm::log(candidate.error / of_paint.max(1e-12) + 1e-3);
+    let pixels = PIXELS * (libm::log(candidate.error / of_paint.max(1e-12) + 1e-3) + candidate.cells);
+    let pixels = if pixels > 0.0 { pixels } else { (pixels + BY_CHANCE).min(0.0) };
     let price = PRICE * candidate.settings.numbers().len() as f64;
     let price = price + SIZES * candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
-    pixels + CELLS * candidate.cells + STATISTICS * compressed(candidate.distance) + price
+    pixels + STATISTICS * compressed(candidate.distance) + price
         - PRIOR * log_odds(category, &candidate.graph.name)
 }
 

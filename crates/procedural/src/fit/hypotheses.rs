@@ -19,7 +19,7 @@ pub(super) struct Start {
 }
 
 /// The points at which starts are judged.
-const POINTS: usize = 420;
+const POINTS: usize = 560;
 
 /// The points at which a graph's waves are measured: fewer would be noisy by what else is in the pattern.
 const WAVE_POINTS: usize = 900;
@@ -52,7 +52,11 @@ pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: u
     }
     // Only where waves agree are colours worth a look.
     shifted.sort_by(|a, b| b.0.total_cmp(&a.0));
-    shifted.truncate(if matches!(pattern.layout, Layout::Rows { .. }) { usize::MAX } else { AGREEING });
+    match pattern.layout {
+        Layout::Rows { .. } => {}
+        Layout::Similar { whole: Some(_), .. } => shifted.truncate(2 * AGREEING),
+        _ => shifted.truncate(AGREEING),
+    }
     let mut found: Vec<Start> = shifted.into_iter().map(|(_, settings)| judged(model, settings, &few)).collect();
     found.sort_by(|a, b| a.error.total_cmp(&b.error));
     found.truncate(most);
@@ -139,7 +143,7 @@ fn rows(
 /// Turns of rows, in radians: along the crests of the strongest waves.
 fn row_turns(seen: &[Wave]) -> Vec<f64> {
     let mut all: Vec<f64> = Vec::new();
-    for turn in seen.iter().take(4).map(|wave| wave.direction() - FRAC_PI_2) {
+    for turn in seen.iter().take(5).map(|wave| wave.direction() - FRAC_PI_2) {
         let apart = |other: &f64| turn - other - PI * ((turn - other) / PI).round();
         if all.iter().all(|other| apart(other).abs() > SAME[0].to_radians()) {
             all.push(turn);

@@ -47,7 +47,9 @@ impl Model {
         let shape = of(&[Role::Turn, Role::Shift, Role::Shape]);
         let program = Program::new(&graph);
         let mut model = Self { program, graph: Arc::new(graph), class, slots, colors, shape, tone: None };
-        if class == Some(Class::Lattice) && model.graph.name != "weave" {
+        // Panels of concrete are cells too; threads of cloth are not.
+        let is_of_cells = class == Some(Class::Lattice) || class.is_some() && model.graph.name == "concrete";
+        if is_of_cells && model.graph.name != "weave" {
             let is_of_cells = |at: &usize| {
                 let name = &model.graph.parameters[model.slots[*at].parameter].name;
                 !name.starts_with("joint") && !name.starts_with("gap")

@@ -66,6 +66,21 @@ pub const LENGTHS: [Lengths; 28] = [
     lengths("metal", &[], "streak_width", 100.0),
 ];
 
+/// A category of things that are often made of a graph; none where no category is.
+pub fn category(graph: &str) -> Option<&'static str> {
+    match graph {
+        "paint" | "plaster" | "roughcast" | "brick" | "mosaic" => Some("wall"),
+        "plank" | "strip_parquet" | "herringbone" | "basket_parquet" | "tile" | "hexagon" | "terrazzo" => Some("floor"),
+        "concrete" => Some("floor"),
+        "veneer" | "marble" | "travertine" | "granite" => Some("table"),
+        "carpet" | "trellis" | "checks" => Some("rug"),
+        "weave" | "corduroy" | "leather" | "houndstooth" => Some("sofa"),
+        "plaid" | "stripes" | "dots" => Some("curtain"),
+        "metal" => Some("lamp"),
+        _ => None,
+    }
+}
+
 /// A pattern.
 pub struct Draw {
     /// What is known of its lengths.

@@ -4,7 +4,7 @@ use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter};
 use mateval_procedural::fit::paper::fit_as_paper;
 
-use super::draw::Draw;
+use super::draw::{Draw, category};
 use super::lattice::lattice_errors;
 use super::view::{PIXELS, random, seen};
 
@@ -43,9 +43,15 @@ pub fn outcome_as_paper(fitter: &Fitter, draw: &Draw) -> Outcome {
     judged(&fit_as_paper(fitter, &seen(&draw.graph, &draw.settings, draw.side, 4096)).unwrap(), draw)
 }
 
-/// Fits a planted pattern.
+/// Fits a planted pattern of which nothing else is known.
 pub fn outcome(fitter: &Fitter, draw: &Draw) -> Outcome {
     judged(&fitter.fit(&seen(&draw.graph, &draw.settings, draw.side, 4096), None).unwrap(), draw)
+}
+
+/// Fits a planted pattern on a thing of a category that is often made of it.
+pub fn outcome_of_category(fitter: &Fitter, draw: &Draw) -> Outcome {
+    let points = seen(&draw.graph, &draw.settings, draw.side, 4096);
+    judged(&fitter.fit(&points, category(draw.entry.name)).unwrap(), draw)
 }
 
 /// Compares a fit with what was planted.
