@@ -3,7 +3,8 @@
 //! Three things decide. Pixels: how much better than a single colour the predictable part of a graph, such as joints
 //! and stripes, shows points that were held out. Cells: how much more alike the points of a tile or a board are than
 //! those of the same cells elsewhere. Statistics: how likely those of what is seen are among those of the graph, its
-//! randomness included. Graphs without a period predict no pixels, so only their statistics speak for them.
+//! randomness included. Graphs without a period predict no pixels, so only their statistics speak for them. Numbers,
+//! unusual sizes and unlikely categories have a small price.
 //!
 //! Held-out points take no part in the fit of what is periodic. They do take part in statistics, which are fitted by
 //! few numbers, and in the cubic polynomial whose shading is taken away before: it is fitted to all points, so that
@@ -168,14 +169,15 @@ impl Fitter {
         }
         let sight = Sight::new(&sound);
         paint.distance = sight.judged(&self.paint, &paint.settings);
+        // A user's graph may have values that are not numbers, which are no less than anything.
+        let is_usable = |other: &Candidate| other.error <= MOST_ERROR * paint.error && other.distance.is_finite();
         let mut others = self.fitted(&seen, &judged, &sight);
+        others.retain(is_usable);
         let least = others.iter().map(|other| score(other, paint.error, category)).fold(f64::INFINITY, f64::min);
         // A texture has only its statistics, which cannot make up for what is predicted well.
         if paint.distance > OF_NOISE && least > PREDICTED {
-            others.extend(self.textured(&sight, paint.error));
+            others.extend(self.textured(&sight, paint.error).into_iter().filter(is_usable));
         }
-        // A user's graph may have values that are not numbers, which are no less than anything.
-        others.retain(|other| other.error <= MOST_ERROR * paint.error && other.distance.is_finite());
         let score = |candidate: &Candidate| score(candidate, paint.error, category);
         others.sort_by(|a, b| score(a).total_cmp(&score(b)));
         let is_better = others.first().is_some_and(|best| score(best) < score(&paint) - LEAST_GAIN);
@@ -194,8 +196,20 @@ impl Fitter {
         Candidate::judged(&self.paint, settings, judged)
     }
 
-    /// The best fit of each pattern that has the waves of the points; the best ones also with what is random in them.
+    /// The best fit of each promising pattern; the best ones also with what is random in them.
     fn fitted(&self, seen: &[Point], judged: &[Point], sight: &Sight) -> Vec<Candidate> {
+        let mut all: Vec<(&Model, Candidate)> = Vec::new();
+        for (pattern, starts) in self.begun(seen) {
+            all.extend(candidate(pattern, seen, judged, starts).map(|candidate| (&pattern.model, candidate)));
+        }
+        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
+        all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
+        all.truncate(PERIODIC);
+        all.into_iter().map(|(model, candidate)| with_random(sight, model, candidate)).collect()
+    }
+
+    /// The patterns whose best start is most promising, with their starts.
+    fn begun(&self, seen: &[Point]) -> Vec<(&Pattern, Vec<Start>)> {
         let few = thinned(seen, 4096);
         let strong = waves(&few, 8);
         // The joints of cells stand out against waves of similar period, not by their power.
@@ -203,30 +217,11 @@ impl Fitter {
         let both = [strong.as_slice(), &sharp];
         let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
         let fewer = thinned(seen, 700);
-        let mut begun: Vec<(f64, &Pattern, Vec<Start>)> =
-            self.patterns.iter().filter_map(|pattern| begun(pattern, seen, &fewer, of(pattern))).collect();
-        begun.sort_by(|a, b| a.0.total_cmp(&b.0));
-        begun.truncate(POLISHED);
-        let mut all: Vec<(&Model, Candidate)> = Vec::new();
-        for (_, pattern, starts) in begun {
-            all.extend(candidate(pattern, seen, judged, starts).map(|candidate| (&pattern.model, candidate)));
-        }
-        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
-        all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
-        all.truncate(PERIODIC);
-        for (model, candidate) in &mut all {
-            let is_scattered = !model.of_role(Role::RandomColor).is_empty();
-            let colors = if is_scattered { Colors::Ranked } else { Colors::Kept };
-            let mut settings = candidate.settings.clone();
-            if is_scattered {
-                model.reset(&mut settings, Role::RandomColor);
-            }
-            let start = sight.with_amplitudes(model, settings, colors);
-            let roles = [Role::Amplitude, Role::RandomSize];
-            candidate.settings = sight.searched(model, start, &roles, colors).settings;
-            candidate.distance = sight.judged(model, &candidate.settings);
-        }
-        all.into_iter().map(|(_, candidate)| candidate).collect()
+        let with_starts = |pattern| begun(pattern, seen, &fewer, of(pattern)).map(|(best, all)| (best, pattern, all));
+        let mut all: Vec<(f64, &Pattern, Vec<Start>)> = self.patterns.iter().filter_map(with_starts).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.truncate(POLISHED);
+        all.into_iter().map(|(_, pattern, starts)| (pattern, starts)).collect()
     }
 
     /// The fits of the graphs without a period that come closest in their statistics. As their phase is random, no more
@@ -257,14 +252,15 @@ impl Fitter {
 }
 
 /// What graphs are ordered by, the least first: by how much what can be predicted reduces the error of a single colour,
-/// how far statistics are, how many numbers a graph has, and whether things of the category are often made of it.
+/// how far statistics are, how many numbers a graph has, how unusual its sizes are, and whether things of the category
+/// are often made of it.
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
     let pixels = PIXELS * (libm::log(candidate.error / of_paint.max(1e-12) + 1e-3) + candidate.cells);
     let pixels = if pixels > 0.0 { pixels } else { (pixels + BY_CHANCE).min(0.0) };
-    let price = PRICE * candidate.settings.numbers().len() as f64;
-    let price = price + SIZES * candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
-    pixels + STATISTICS * compressed(candidate.distance) + price
-        - PRIOR * log_odds(category, &candidate.graph.name)
+    let sizes = candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
+    let price = PRICE * candidate.settings.numbers().len() as f64 + SIZES * sizes;
+    let prior = PRIOR * log_odds(category, &candidate.graph.name);
+    pixels + STATISTICS * compressed(candidate.distance) + price - prior
 }
 
 /// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than how
@@ -273,27 +269,37 @@ fn compressed(distance: f64) -> f64 {
     if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
 }
 
+/// The candidate with what is random in its graph, and its statistics.
+fn with_random(sight: &Sight, model: &Model, mut candidate: Candidate) -> Candidate {
+    let is_scattered = !model.of_role(Role::RandomColor).is_empty();
+    let colors = if is_scattered { Colors::Ranked } else { Colors::Kept };
+    let mut settings = candidate.settings.clone();
+    if is_scattered {
+        model.reset(&mut settings, Role::RandomColor);
+    }
+    let start = sight.with_amplitudes(model, settings, colors);
+    candidate.settings = sight.searched(model, start, &[Role::Amplitude, Role::RandomSize], colors).settings;
+    candidate.distance = sight.judged(model, &candidate.settings);
+    candidate
+}
+
 /// The starts of a pattern, the best first, after the logarithm of the best one's error in that of a single colour.
 /// `None` where none is promising.
-fn begun<'p>(
-    pattern: &'p Pattern,
-    seen: &[Point],
-    few: &[Point],
-    found: &[&[Wave]],
-) -> Option<(f64, &'p Pattern, Vec<Start>)> {
+fn begun(pattern: &Pattern, seen: &[Point], few: &[Point], found: &[&[Wave]]) -> Option<(f64, Vec<Start>)> {
     let model = &pattern.model;
     let most = STARTS / found.len();
     let mut all: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
     all.sort_by(|a, b| a.error.total_cmp(&b.error));
     let best = all.first()?;
     let promise = if model.tone.is_some() { excess(model, &best.settings, few) } else { gain(model, best, few) };
-    (promise < -LEAST_PROMISE).then_some((promise, pattern, all))
+    (promise < -LEAST_PROMISE).then_some((promise, all))
 }
 
 /// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
 fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], starts: Vec<Start>) -> Option<Candidate> {
     let model = &pattern.model;
     let (few, many, fewer) = (thinned(seen, 700), thinned(seen, 2048), thinned(seen, 500));
+    // The place of cells is searched, and what that leads to is polished.
     let polished = starts.into_iter().enumerate().map(|(place, mut start)| {
         if place < SETTLED {
             start.settings = settled(model, pattern.layout, start.settings, &fewer);

@@ -152,7 +152,8 @@ impl Model {
         for batch in points.chunks(LANES) {
             evaluator.run(&lanes(batch));
             let found: Vec<Option<&Lanes>> = (0..chosen.len()).map(|at| evaluator.derivative(0, at)).collect();
-            let slopes = |lane: usize| found.iter().map(move |of_lanes| of_lanes.map_or(0.0, |of_lanes| of_lanes[lane]));
+            let slopes =
+                |lane: usize| found.iter().map(move |of_lanes| of_lanes.map_or(0.0, |of_lanes| of_lanes[lane]));
             all.extend((0..batch.len()).map(|lane| slopes(lane).collect()));
         }
         all

@@ -9,6 +9,7 @@ use mateval_procedural::{Graph, ProceduralError, Settings};
 use rayon::prelude::*;
 
 use crate::planting::draw::{Draw, LENGTHS, draw, slot};
+use crate::planting::lattice::lattice_errors;
 use crate::planting::outcome::{Outcome, find, judged, outcome_as_paper, psnr};
 use crate::planting::view::seen;
 
@@ -49,6 +50,33 @@ fn planted_patterns_are_found() {
 const CLASSES: usize = 22;
 const GRAPHS: usize = 18;
 const IN_PLACE: usize = 11;
+
+/// Dots are described by many settings: the lattice is what counts, and its multiples are not in place.
+#[test]
+fn lattices_are_the_same_whatever_describes_them() {
+    let dots = built_in("dots");
+    let planted = [("theta", "20"), ("pitch_u", "0.06"), ("pitch_v", "0.04"), ("stagger", "0.25")];
+    let with = |changes: &[(&str, &str)]| settings_of(&dots, &[planted.as_slice(), changes].concat());
+    let errors = |found: &Settings| lattice_errors(&dots, &["pitch_u", "pitch_v"], found, &with(&[]));
+    // The same dots, seen from behind, are the same lattice.
+    let turned = errors(&with(&[("theta", "-160")]));
+    assert!(turned[0] < 1e-9 && turned[1] < 1e-6, "{turned:?}");
+    // A vector (-0.015, 0.04) along the rows, with the area 0.06 * 0.04.
+    let length = 0.015_f64.hypot(0.04);
+    let turn = 20.0 + 0.04_f64.atan2(-0.015).to_degrees();
+    let height = 0.06 * 0.04 / length;
+    // Across the new rows is the opposite of the old ones' direction.
+    let share = (0.06 * 0.015 / length / length).rem_euclid(1.0);
+    let texts = [turn, length, height, 1.0 - share].map(|number| number.to_string());
+    let names = ["theta", "pitch_u", "pitch_v", "stagger"];
+    let other: Vec<(&str, &str)> = names.into_iter().zip(texts.iter().map(String::as_str)).collect();
+    let sheared = errors(&with(&other));
+    assert!(sheared[0] < 1e-6 && sheared[1] < 1e-4, "{sheared:?}");
+    // The twins: twice a length, another shift of rows, and a turn.
+    assert!(errors(&with(&[("pitch_u", "0.12"), ("stagger", "0.125")]))[0] > 0.3);
+    assert!(errors(&with(&[("stagger", "0.35")])).iter().any(|error| *error > 0.05));
+    assert!((errors(&with(&[("theta", "22")]))[1] - 2.0).abs() < 1e-6);
+}
 
 /// Stripes whose turn is on no coarse grid: the paper's way does not find them, and a fit that is shifted shows it.
 #[test]
