@@ -28,11 +28,16 @@ fn fit(fitter: &Fitter, draw: &Draw) -> Fit {
     fitter.fit(&seen(&draw.graph, &draw.settings, draw.side, 4096), None).unwrap()
 }
 
-/// One random pattern of each graph. The bench `planted` has more of them; what it finds is written there.
+/// One random pattern of each graph but those that have tests of their own below. The bench `planted` has more of them; what it finds is written there.
 #[test]
 fn planted_patterns_are_found() {
     let fitter = Fitter::new().unwrap();
-    let draws: Vec<Draw> = LENGTHS.iter().map(|lengths| draw(lengths, 1)).collect();
+    let draws: Vec<Draw> = LENGTHS
+        .iter()
+        .filter(|lengths| !["paint", "stripes", "granite"].contains(&lengths.graph))
+        .map(|lengths| draw(lengths, 1))
+        .collect();
+    assert_eq!(draws.len(), 25);
     let fits: Vec<Fit> = draws.par_iter().map(|draw| fit(&fitter, draw)).collect();
     let all: Vec<Outcome> = fits.iter().zip(&draws).map(|(fit, draw)| judged(fit, draw)).collect();
     for (outcome, draw) in all.iter().zip(&draws) {
@@ -44,12 +49,13 @@ fn planted_patterns_are_found() {
     assert!(count(Outcome::is_in_place) >= IN_PLACE);
     // The twin: each fit, judged as one of the next graph.
     let next = fits.iter().zip(draws.iter().cycle().skip(1)).map(|(fit, draw)| judged(fit, draw));
-    assert!(next.filter(|outcome| outcome.is_right_graph).count() <= 28 - GRAPHS);
+    assert!(next.filter(|outcome| outcome.is_right_graph).count() <= 25 - GRAPHS);
 }
 
-const CLASSES: usize = 22;
-const GRAPHS: usize = 18;
-const IN_PLACE: usize = 11;
+/// What has to be right at least: 22, 19 and 14 were, as these lines were written.
+const CLASSES: usize = 19;
+const GRAPHS: usize = 16;
+const IN_PLACE: usize = 12;
 
 /// Dots are described by many settings: the lattice is what counts, and its multiples are not in place.
 #[test]
