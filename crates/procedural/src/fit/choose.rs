@@ -3,7 +3,8 @@
 //! Three things decide. Pixels: how much better than a single colour the predictable part of a graph, such as joints
 //! and stripes, shows points that were held out. Cells: how much more alike the points of a tile or a board are than
 //! those of the same cells elsewhere. Statistics: how likely those of what is seen are among those of the graph, its
-//! randomness included. Graphs without a period predict no pixels, so only their statistics speak for them.
+//! randomness included. Graphs without a period predict no pixels, so only their statistics speak for them. Numbers,
+//! unusual sizes and unlikely categories have a small price.
 //!
 //! Held-out points take no part in the fit of what is periodic. They do take part in statistics, which are fitted by
 //! few numbers, and in the cubic polynomial whose shading is taken away before: it is fitted to all points, so that
@@ -23,6 +24,8 @@ use super::pattern::Pattern;
 use super::periods::layout;
 use super::points::{Point, split, thinned};
 use super::roles::Role;
+use super::settle::settled;
+use super::sizes::unusual;
 use super::smooth::flattened;
 use super::texture::{Colors, Sight, Texture};
 use super::waves::{Wave, lines, waves};
@@ -47,11 +50,11 @@ const LEAST_VARIANCE: f64 = 2e-6;
 /// The most error of what is predictable in a graph, in those of a single colour.
 const MOST_ERROR: f64 = 1.01;
 
-/// The weight of the logarithm of the error.
-const PIXELS: f64 = 1.0;
+/// The weight of the logarithm of the error and of how much alike the points of a cell are.
+const PIXELS: f64 = 2.0;
 
-/// The weight of how much alike the points of a cell are.
-const CELLS: f64 = 1.0;
+/// The greatest sum of both, negated and weighted, that searches over many places find in noise; it does not count.
+const BY_CHANCE: f64 = 0.15;
 
 /// The weight of the distance of statistics.
 const STATISTICS: f64 = 0.25;
@@ -59,23 +62,41 @@ const STATISTICS: f64 = 0.25;
 /// The distance of statistics from which on more of it hardly counts.
 const FAR: f64 = 2.0;
 
+/// The distance of a single colour's statistics below which nothing but noise is left to explain.
+const OF_NOISE: f64 = -0.55;
+
+/// The score below which no texture's can be: its statistics are hardly ever closer than -0.8.
+const PREDICTED: f64 = -0.4;
+
 /// The price of each number that a graph has.
 const PRICE: f64 = 0.01;
 
 /// The worth of each unit of log-odds in a graph's favour.
-const PRIOR: f64 = 0.02;
+const PRIOR: f64 = 0.05;
 
-/// By how much a start has to be better than nothing.
-const LEAST_PROMISE: f64 = 0.015;
+/// The price of sizes that are a standard deviation from the usual ones. Nothing is known of those of a user's graph.
+const SIZES: f64 = 0.04;
+
+/// By how much a start has to be better than a single colour, or its cells than the same ones elsewhere.
+const LEAST_PROMISE: f64 = 0.025;
 
 /// How often tones are taken away and sizes are reconsidered.
 const ROUNDS: usize = 4;
 
+/// How many starts of a pattern are polished.
+const STARTS: usize = 4;
+
+/// For how many of them the place of cells is searched.
+const SETTLED: usize = 2;
+
+/// How many patterns are polished.
+const POLISHED: usize = 7;
+
 /// How many periodic graphs are compared in their statistics.
-const PERIODIC: usize = 6;
+const PERIODIC: usize = 5;
 
 /// How many graphs without a period are refined.
-const RANDOM: usize = 6;
+const RANDOM: usize = 5;
 
 /// How many of those are refined from two starts.
 const TWICE: usize = 2;
@@ -86,7 +107,7 @@ const TWICE: usize = 2;
 pub struct Fit {
     /// The graph that was chosen; `paint` where none is better than a colour.
     pub chosen: Candidate,
-    /// The other graphs, best first.
+    /// The other graphs, best first. Textures are left out where a periodic graph is surely better.
     pub others: Vec<Candidate>,
 }
 
@@ -148,10 +169,15 @@ impl Fitter {
         }
         let sight = Sight::new(&sound);
         paint.distance = sight.judged(&self.paint, &paint.settings);
-        let mut others = self.fitted(&seen, &judged, &sight);
-        others.extend(self.textured(&sight, paint.error));
         // A user's graph may have values that are not numbers, which are no less than anything.
-        others.retain(|other| other.error <= MOST_ERROR * paint.error && other.distance.is_finite());
+        let is_usable = |other: &Candidate| other.error <= MOST_ERROR * paint.error && other.distance.is_finite();
+        let mut others = self.fitted(&seen, &judged, &sight);
+        others.retain(is_usable);
+        let least = others.iter().map(|other| score(other, paint.error, category)).fold(f64::INFINITY, f64::min);
+        // A texture has only its statistics, which cannot make up for what is predicted well.
+        if paint.distance > OF_NOISE && least > PREDICTED {
+            others.extend(self.textured(&sight, paint.error).into_iter().filter(is_usable));
+        }
         let score = |candidate: &Candidate| score(candidate, paint.error, category);
         others.sort_by(|a, b| score(a).total_cmp(&score(b)));
         let is_better = others.first().is_some_and(|best| score(best) < score(&paint) - LEAST_GAIN);
@@ -170,33 +196,32 @@ impl Fitter {
         Candidate::judged(&self.paint, settings, judged)
     }
 
-    /// The best fit of each pattern that has the waves of the points; the best ones also with what is random in them.
+    /// The best fit of each promising pattern; the best ones also with what is random in them.
     fn fitted(&self, seen: &[Point], judged: &[Point], sight: &Sight) -> Vec<Candidate> {
+        let mut all: Vec<(&Model, Candidate)> = Vec::new();
+        for (pattern, starts) in self.begun(seen) {
+            all.extend(candidate(pattern, seen, judged, starts).map(|candidate| (&pattern.model, candidate)));
+        }
+        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
+        all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
+        all.truncate(PERIODIC);
+        all.into_iter().map(|(model, candidate)| with_random(sight, model, candidate)).collect()
+    }
+
+    /// The patterns whose best start is most promising, with their starts.
+    fn begun(&self, seen: &[Point]) -> Vec<(&Pattern, Vec<Start>)> {
         let few = thinned(seen, 4096);
         let strong = waves(&few, 8);
         // The joints of cells stand out against waves of similar period, not by their power.
         let sharp = lines(&few, 8);
         let both = [strong.as_slice(), &sharp];
         let of = |pattern: &Pattern| if pattern.model.tone.is_some() { &both } else { &both[..1] };
-        let fitted = |pattern: &Pattern| candidate(pattern, seen, judged, of(pattern));
-        let mut all: Vec<(&Model, Candidate)> =
-            self.patterns.iter().filter_map(|pattern| Some((&pattern.model, fitted(pattern)?))).collect();
-        let promise = |candidate: &Candidate| libm::log(candidate.error.max(1e-12)) + candidate.cells;
-        all.sort_by(|a, b| promise(&a.1).total_cmp(&promise(&b.1)));
-        all.truncate(PERIODIC);
-        for (model, candidate) in &mut all {
-            let is_scattered = !model.of_role(Role::RandomColor).is_empty();
-            let colors = if is_scattered { Colors::Ranked } else { Colors::Kept };
-            let mut settings = candidate.settings.clone();
-            if is_scattered {
-                model.reset(&mut settings, Role::RandomColor);
-            }
-            let start = sight.with_amplitudes(model, settings, colors);
-            let roles = [Role::Amplitude, Role::RandomSize];
-            candidate.settings = sight.searched(model, start, &roles, colors).settings;
-            candidate.distance = sight.judged(model, &candidate.settings);
-        }
-        all.into_iter().map(|(_, candidate)| candidate).collect()
+        let fewer = thinned(seen, 700);
+        let with_starts = |pattern| begun(pattern, seen, &fewer, of(pattern)).map(|(best, all)| (best, pattern, all));
+        let mut all: Vec<(f64, &Pattern, Vec<Start>)> = self.patterns.iter().filter_map(with_starts).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.truncate(POLISHED);
+        all.into_iter().map(|(_, pattern, starts)| (pattern, starts)).collect()
     }
 
     /// The fits of the graphs without a period that come closest in their statistics. As their phase is random, no more
@@ -227,12 +252,15 @@ impl Fitter {
 }
 
 /// What graphs are ordered by, the least first: by how much what can be predicted reduces the error of a single colour,
-/// how far statistics are, how many numbers a graph has, and whether things of the category are often made of it.
+/// how far statistics are, how many numbers a graph has, how unusual its sizes are, and whether things of the category
+/// are often made of it.
 fn score(candidate: &Candidate, of_paint: f64, category: Option<&str>) -> f64 {
-    let pixels = PIXELS * libm::log(candidate.error / of_paint.max(1e-12) + 1e-3);
-    let price = PRICE * candidate.settings.numbers().len() as f64;
-    pixels + CELLS * candidate.cells + STATISTICS * compressed(candidate.distance) + price
-        - PRIOR * log_odds(category, &candidate.graph.name)
+    let pixels = PIXELS * (libm::log(candidate.error / of_paint.max(1e-12) + 1e-3) + candidate.cells);
+    let pixels = if pixels > 0.0 { pixels } else { (pixels + BY_CHANCE).min(0.0) };
+    let sizes = candidate.class.map_or(0.0, |_| unusual(&candidate.graph, &candidate.settings));
+    let price = PRICE * candidate.settings.numbers().len() as f64 + SIZES * sizes;
+    let prior = PRIOR * log_odds(category, &candidate.graph.name);
+    pixels + STATISTICS * compressed(candidate.distance) + price - prior
 }
 
 /// The distance of statistics, which grows like its logarithm from [`FAR`] on: pixels that agree count for more than how
@@ -241,27 +269,51 @@ fn compressed(distance: f64) -> f64 {
     if distance > FAR { FAR * (1.0 + libm::log(distance / FAR)) } else { distance }
 }
 
-/// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
-fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wave]]) -> Option<Candidate> {
-    let model = &pattern.model;
-    let (few, many) = (thinned(seen, 700), thinned(seen, 2048));
-    let most = 4 / found.len();
-    let starts: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
-    if !starts.iter().any(|start| is_promising(model, start, &few)) {
-        return None;
+/// The candidate with what is random in its graph, and its statistics.
+fn with_random(sight: &Sight, model: &Model, mut candidate: Candidate) -> Candidate {
+    let is_scattered = !model.of_role(Role::RandomColor).is_empty();
+    let colors = if is_scattered { Colors::Ranked } else { Colors::Kept };
+    let mut settings = candidate.settings.clone();
+    if is_scattered {
+        model.reset(&mut settings, Role::RandomColor);
     }
-    let polished = starts.into_iter().map(|mut start| {
+    let start = sight.with_amplitudes(model, settings, colors);
+    candidate.settings = sight.searched(model, start, &[Role::Amplitude, Role::RandomSize], colors).settings;
+    candidate.distance = sight.judged(model, &candidate.settings);
+    candidate
+}
+
+/// The starts of a pattern, the best first, after the logarithm of the best one's error in that of a single colour.
+/// `None` where none is promising.
+fn begun(pattern: &Pattern, seen: &[Point], few: &[Point], found: &[&[Wave]]) -> Option<(f64, Vec<Start>)> {
+    let model = &pattern.model;
+    let most = STARTS / found.len();
+    let mut all: Vec<Start> = found.iter().flat_map(|waves| starts(pattern, seen, waves, most)).collect();
+    all.sort_by(|a, b| a.error.total_cmp(&b.error));
+    let best = all.first()?;
+    let promise = if model.tone.is_some() { excess(model, &best.settings, few) } else { gain(model, best, few) };
+    (promise < -LEAST_PROMISE).then_some((promise, all))
+}
+
+/// The best of a few starts, polished. The tones of cells are taken away first, and again from where that leads.
+fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], starts: Vec<Start>) -> Option<Candidate> {
+    let model = &pattern.model;
+    let (few, many, fewer) = (thinned(seen, 700), thinned(seen, 2048), thinned(seen, 500));
+    // The place of cells is searched, and what that leads to is polished.
+    let polished = starts.into_iter().enumerate().map(|(place, mut start)| {
+        if place < SETTLED {
+            start.settings = settled(model, pattern.layout, start.settings, &fewer);
+        }
         let toneless = without_tones(model, &start.settings, &few);
         polish(model, &mut start.settings, &toneless, 8);
         let error = mean_square(model, &start.settings, &without_tones(model, &start.settings, &few));
         (cell_error(model, &start.settings, &many).unwrap_or(error), start.settings)
     });
     let (_, mut settings) = polished.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let few = thinned(seen, 500);
     for round in 0..if model.tone.is_some() { ROUNDS } else { 1 } {
         let toneless = without_tones(model, &settings, &many);
         polish(model, &mut settings, &toneless, 20);
-        let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &few) } else { None };
+        let resized = if round + 1 < ROUNDS { better(model, pattern.layout, &settings, &fewer) } else { None };
         match resized {
             Some(resized) => settings = resized,
             None if round > 0 => break,
@@ -276,15 +328,13 @@ fn candidate(pattern: &Pattern, seen: &[Point], judged: &[Point], found: &[&[Wav
     Some(candidate)
 }
 
-/// Whether a start is better than one colour, or its cells than the same ones elsewhere: others are not worth a search.
-fn is_promising(model: &Model, start: &Start, few: &[Point]) -> bool {
-    if model.tone.is_some() {
-        return excess(model, &start.settings, few) < -LEAST_PROMISE;
-    }
+/// The logarithm of a start's error in that of a single colour.
+fn gain(model: &Model, start: &Start, few: &[Point]) -> f64 {
     let count = few.len() as f64;
     let mean: [f64; 3] = std::array::from_fn(|c| few.iter().map(|point| point.albedo[c]).sum::<f64>() / count);
     let square = |point: &Point| (0..3).map(|c| (point.albedo[c] - mean[c]).powi(2)).sum::<f64>() / 3.0;
-    mean_square(model, &start.settings, few) < (1.0 - LEAST_PROMISE) * few.iter().map(square).sum::<f64>() / count
+    let of_one = few.iter().map(square).sum::<f64>() / count;
+    libm::log(mean_square(model, &start.settings, few).max(1e-12) / of_one.max(1e-12))
 }
 
 /// Bricks that are not shifted from row to row are tiles.

@@ -19,37 +19,55 @@ pub(super) struct Start {
 }
 
 /// The points at which starts are judged.
-const POINTS: usize = 640;
+const POINTS: usize = 560;
 
 /// The points at which a graph's waves are measured: fewer would be noisy by what else is in the pattern.
-const WAVE_POINTS: usize = 1280;
+const WAVE_POINTS: usize = 900;
 
 /// The least share of the variance that a wave of the points must have in the graph too.
 const LEAST_SHARE: f64 = 0.01;
+
+/// How many settings whose waves agree best are judged by colours.
+const AGREEING: usize = 56;
+
+/// Settings whose turns in degrees, and whose lengths' logarithms, differ by less than this are the same.
+const SAME: [f64; 2] = [0.1, 0.003];
+
+/// How many shifts from row to row are tried.
+const ROW_SHIFTS: usize = 4;
 
 /// The best starts, best first.
 pub(super) fn starts(pattern: &Pattern, points: &[Point], seen: &[Wave], most: usize) -> Vec<Start> {
     let (model, few) = (&pattern.model, thinned(points, POINTS));
     let basis = Basis::new(thinned(points, WAVE_POINTS), seen);
-    let mut found: Vec<Start> = Vec::new();
     let [width, height] = extent(points);
     let resolution = 1.0 / width.max(height).max(1e-9);
+    let mut shifted: Vec<(f64, Settings)> = Vec::new();
     for settings in turned_and_scaled(pattern, seen, resolution) {
         let shifts = match pattern.layout {
             Layout::Rows { width, .. } => across_rows(model, &settings, width),
             _ => shifts(model, &settings, &basis, seen),
         };
-        let at_shift = |[u, v]: [f64; 2]| {
-            let mut shifted = settings.clone();
-            model.set(&mut shifted, "t_u", u);
-            model.set(&mut shifted, "t_v", v);
-            judged(model, shifted, &few)
-        };
-        found.extend(shifts.into_iter().map(at_shift).min_by(|a, b| a.error.total_cmp(&b.error)));
+        shifted.extend(shifts.into_iter().map(|(agreement, shift)| (agreement, at_shift(model, &settings, shift))));
     }
+    // Only where waves agree are colours worth a look.
+    shifted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    match pattern.layout {
+        Layout::Rows { .. } => {}
+        Layout::Similar { whole: Some(_), .. } => shifted.truncate(2 * AGREEING),
+        _ => shifted.truncate(AGREEING),
+    }
+    let mut found: Vec<Start> = shifted.into_iter().map(|(_, settings)| judged(model, settings, &few)).collect();
     found.sort_by(|a, b| a.error.total_cmp(&b.error));
     found.truncate(most);
     found
+}
+
+fn at_shift(model: &Model, settings: &Settings, [u, v]: [f64; 2]) -> Settings {
+    let mut shifted = settings.clone();
+    model.set(&mut shifted, "t_u", u);
+    model.set(&mut shifted, "t_v", v);
+    shifted
 }
 
 /// A start by the error of its cells, if it has any; otherwise by that of its colours.
@@ -72,13 +90,21 @@ fn turned_and_scaled(pattern: &Pattern, seen: &[Wave], resolution: f64) -> Vec<S
 /// Matches each strong wave with each strong wave of the graph itself: the angle between them is the turn, and the
 /// ratio of their periods the scale.
 fn similar(model: &Model, length: &str, start: &Settings, own: &[Wave], seen: &[Wave]) -> Vec<Settings> {
-    let mut all = Vec::new();
-    for wave in seen.iter().take(5) {
-        for own in own {
-            for flip in [0.0, 180.0] {
-                let mut settings = start.clone();
-                model.set(&mut settings, "theta", degrees(wave.direction() - own.direction()) + flip);
-                scale_lengths(model, &mut settings, length, wave.period() / own.period());
+    let (Some(length_at), Some(theta_at)) = (model.slot(length), model.slot("theta")) else { return Vec::new() };
+    let is_same = |a: &Settings, b: &Settings| {
+        let turn = (a.numbers()[theta_at] - b.numbers()[theta_at]).abs();
+        turn < SAME[0] && libm::log(a.numbers()[length_at] / b.numbers()[length_at]).abs() < SAME[1]
+    };
+    // Patterns of cells are the same after half a turn.
+    let flips: &[f64] = if model.tone.is_some() { &[0.0] } else { &[0.0, 180.0] };
+    let mut all: Vec<Settings> = Vec::new();
+    let most = if model.slots.iter().any(|slot| !slot.is_real) { 5 } else { 8 };
+    for (wave, own) in seen.iter().take(most).flat_map(|wave| own.iter().map(move |own| (wave, own))) {
+        for flip in flips {
+            let mut settings = start.clone();
+            model.set(&mut settings, "theta", degrees(wave.direction() - own.direction()) + flip);
+            scale_lengths(model, &mut settings, length, wave.period() / own.period());
+            if !all.iter().any(|other| is_same(other, &settings)) {
                 all.push(settings);
             }
         }
@@ -97,7 +123,7 @@ fn rows(
     let start = model.start();
     let [width_at, length_at] = [width, length].map(|name| model.slot(name).map_or(1.0, |at| start.numbers()[at]));
     let mut all = Vec::new();
-    for turn in seen.iter().take(4).map(|wave| wave.direction() - FRAC_PI_2) {
+    for turn in row_turns(seen) {
         for period in periods(seen, turn + FRAC_PI_2, resolution) {
             for number in whole.map_or(0..=0, |(_, least, most)| least..=most) {
                 let mut settings = start.clone();
@@ -114,11 +140,23 @@ fn rows(
     all
 }
 
-/// Shifts across rows, in sixths of a row.
-fn across_rows(model: &Model, settings: &Settings, width: &str) -> Vec<[f64; 2]> {
+/// Turns of rows, in radians: along the crests of the strongest waves.
+fn row_turns(seen: &[Wave]) -> Vec<f64> {
+    let mut all: Vec<f64> = Vec::new();
+    for turn in seen.iter().take(5).map(|wave| wave.direction() - FRAC_PI_2) {
+        let apart = |other: &f64| turn - other - PI * ((turn - other) / PI).round();
+        if all.iter().all(|other| apart(other).abs() > SAME[0].to_radians()) {
+            all.push(turn);
+        }
+    }
+    all
+}
+
+/// Shifts across rows, in sixths of a row, which no wave tells apart.
+fn across_rows(model: &Model, settings: &Settings, width: &str) -> Vec<(f64, [f64; 2])> {
     let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
     let (sin, cos) = libm::sincos(number("theta").to_radians());
-    (0..6).map(|k| number(width) * f64::from(k) / 6.0).map(|shift| [-sin * shift, cos * shift]).collect()
+    (0..6).map(|k| number(width) * f64::from(k) / 6.0).map(|shift| (0.0, [-sin * shift, cos * shift])).collect()
 }
 
 /// The angle in degrees, from -90 to 90.
@@ -170,23 +208,36 @@ fn axes(
     all
 }
 
-/// Shifts from row to row in periods: those of waves that repeat once along a row, and a half. Rows that are shifted by
-/// s turn a wave along u by s periods a row.
+/// Shifts from row to row in periods: a half, and those that explain most of the waves. Rows that are shifted by s turn
+/// a wave that repeats m times along a length by m s periods a row.
 fn row_shifts(seen: &[Wave], turn: f64, [period_u, period_v]: [f64; 2], resolution: f64) -> Vec<f64> {
     let (sin, cos) = libm::sincos(turn);
-    let mut all = vec![0.5];
+    let mut waves: Vec<(f64, f64, f64)> = Vec::new();
     for wave in seen {
         let [fu, fv] = wave.frequency;
         let (along, across) = (fu * cos + fv * sin, fv * cos - fu * sin);
-        if (along.abs() - 1.0 / period_u).abs() < 0.3 * resolution {
-            let rows = across * along.signum() * period_v;
-            let share = rows - rows.floor();
-            if all.iter().all(|other| (other - share).abs() > 0.04) {
-                all.push(share);
-            }
+        let repeats = (along.abs() * period_u).round();
+        if (1.0..=6.0).contains(&repeats) && (along.abs() - repeats / period_u).abs() < 0.3 * resolution {
+            waves.push((repeats, across * along.signum() * period_v, wave.share));
         }
     }
-    all.truncate(3);
+    let explained = |shift: f64| -> f64 {
+        let off = |(repeats, rows): (f64, f64)| (rows - repeats * shift - (rows - repeats * shift).round()).abs();
+        let is_explained = |wave: &&(f64, f64, f64)| off((wave.0, wave.1)) < 0.4 * resolution * period_v;
+        waves.iter().filter(is_explained).map(|(.., share)| share).sum()
+    };
+    let shifts = |(repeats, rows, _): &(f64, f64, f64)| {
+        let (repeats, rows) = (*repeats, *rows);
+        (0..repeats as u32).map(move |add| (rows + f64::from(add)) / repeats).map(|share| share - share.floor())
+    };
+    let mut tried: Vec<(f64, f64)> = waves.iter().flat_map(shifts).map(|shift| (explained(shift), shift)).collect();
+    tried.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut all = vec![0.5];
+    for (_, shift) in tried {
+        if all.len() < ROW_SHIFTS && all.iter().all(|other| (other - shift).abs() > 0.01) {
+            all.push(shift);
+        }
+    }
     all
 }
 
@@ -273,9 +324,10 @@ impl Pair<'_> {
 }
 
 /// The shifts at which the graph's phases agree best with those of the points. The strongest wave and the strongest one
-/// across it give the shifts that are tried, and all waves judge them. As colours may be swapped, so may the sign.
+/// across it give the shifts that are tried, and all waves judge them: the greater the number, the better the waves
+/// agree. As colours may be swapped, so may the sign.
 /// None where the graph does not have the strongest wave.
-fn shifts(model: &Model, settings: &Settings, basis: &Basis, seen: &[Wave]) -> Vec<[f64; 2]> {
+fn shifts(model: &Model, settings: &Settings, basis: &Basis, seen: &[Wave]) -> Vec<(f64, [f64; 2])> {
     let own = Signal::without_mean(&model.shown(settings, &basis.points));
     let variance = own.variance().max(1e-12);
     let share = |[a, b]: [f64; 2]| 2.0 * (a * a + b * b) / variance;
@@ -288,11 +340,13 @@ fn shifts(model: &Model, settings: &Settings, basis: &Basis, seen: &[Wave]) -> V
     // Blocks repeat after several of their widths.
     let harmonics = if model.slots.iter().any(|slot| !slot.is_real) { 2 * HARMONICS } else { HARMONICS };
     let tried = second.map_or_else(|| along(first), |second| between(first, second, harmonics));
-    let agreement = |shift: &[f64; 2]| pairs.iter().map(|pair| pair.agreement(*shift)).sum::<f64>().abs();
+    // The correlation of both, up to a factor that all settings share.
+    let agreement =
+        |shift: &[f64; 2]| pairs.iter().map(|pair| pair.agreement(*shift)).sum::<f64>().abs() / variance.sqrt();
     let mut judged: Vec<(f64, [f64; 2])> = tried.into_iter().map(|shift| (agreement(&shift), shift)).collect();
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     judged.truncate(SHIFTS);
-    judged.into_iter().map(|(_, shift)| shift).collect()
+    judged
 }
 
 /// Whether the directions of two waves differ by more than 12 degrees.

@@ -7,16 +7,19 @@
 //!
 //! 1. Shading that is left is taken away, and a quarter of the points is held out.
 //! 2. Periodic graphs: the strongest waves of the colours ([`waves`]), and those that stand out against waves of similar
-//!    period, suggest turns, periods and shifts. For each of these starts the graph's colours are a linear least
-//!    squares problem, and cells such as tiles have a free tone each; the best starts are polished by
-//!    Levenberg-Marquardt steps. Sizes are then compared with their multiples and fractions.
+//!    period, suggest turns, periods and shifts. Those whose waves agree best are judged by colours, which are a linear
+//!    least squares problem. Cells such as tiles have random tones, and rows of boards begin anywhere. The most
+//!    promising patterns are searched for the place of their cells and polished by Levenberg-Marquardt steps; sizes are
+//!    then compared with their multiples and fractions.
 //! 3. What is random, in all graphs: sizes, amplitudes and scattered colours are those whose statistics, from the same
 //!    points and footprints, come closest to those seen: structure functions over distances and directions, their
-//!    sparseness and asymmetry, quantiles and chromaticity. Its phase cannot be known.
+//!    sparseness and asymmetry, quantiles and chromaticity. Its phase cannot be known. Textures are left out where a
+//!    periodic graph is surely better.
 //! 4. The choice.
 //!
 //! [`paper`] fits as PSDR-Room does, to be compared with.
 
+mod boards;
 pub mod candidate;
 mod category;
 mod cells;
@@ -33,6 +36,8 @@ mod periods;
 pub mod points;
 mod ranked;
 pub mod roles;
+mod settle;
+mod sizes;
 mod smooth;
 mod statistics;
 mod system;

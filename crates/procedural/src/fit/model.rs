@@ -6,7 +6,7 @@ use super::points::Point;
 use super::roles::{Role, role};
 use crate::batch::Evaluator;
 use crate::graph::Graph;
-use crate::lanes::{LANES, Points};
+use crate::lanes::{LANES, Lanes, Points};
 use crate::library::Class;
 use crate::program::compile::Program;
 use crate::settings::{Settings, Slot, slots};
@@ -18,6 +18,8 @@ pub(super) struct Tone {
     pub(super) slot: usize,
     /// The first slots of the cells' colours.
     pub(super) colors: Vec<usize>,
+    /// The slots of the width and the length of boards whose rows begin at random.
+    pub(super) boards: Option<[usize; 2]>,
 }
 
 /// A graph with what is needed to fit it.
@@ -45,13 +47,18 @@ impl Model {
         let shape = of(&[Role::Turn, Role::Shift, Role::Shape]);
         let program = Program::new(&graph);
         let mut model = Self { program, graph: Arc::new(graph), class, slots, colors, shape, tone: None };
-        if class == Some(Class::Lattice) && model.graph.name != "weave" {
+        // Panels of concrete are cells too; threads of cloth are not.
+        let is_of_cells = class == Some(Class::Lattice) || class.is_some() && model.graph.name == "concrete";
+        if is_of_cells && model.graph.name != "weave" {
             let is_of_cells = |at: &usize| {
                 let name = &model.graph.parameters[model.slots[*at].parameter].name;
                 !name.starts_with("joint") && !name.starts_with("gap")
             };
             let colors = model.colors.iter().copied().filter(is_of_cells).collect();
-            model.tone = model.slot("tone").map(|slot| Tone { slot, colors });
+            let is_of_boards = matches!(model.graph.name.as_str(), "plank" | "strip_parquet");
+            let boards = model.slot("width").zip(model.slot("length")).filter(|_| is_of_boards);
+            let boards = boards.map(|(width, length)| [width, length]);
+            model.tone = model.slot("tone").map(|slot| Tone { slot, colors, boards });
         }
         model
     }
@@ -99,10 +106,12 @@ impl Model {
         let mut row = vec![0.0; chosen.len()];
         for batch in points.chunks(LANES) {
             evaluator.run(&lanes(batch));
-            for (lane, point) in batch.iter().enumerate() {
-                for channel in 0..3 {
-                    for (at, slope) in row.iter_mut().enumerate() {
-                        *slope = evaluator.derivative(channel, at).map_or(0.0, |slopes| slopes[lane]);
+            for channel in 0..3 {
+                let slopes: Vec<Option<&Lanes>> =
+                    (0..chosen.len()).map(|at| evaluator.derivative(channel, at)).collect();
+                for (lane, point) in batch.iter().enumerate() {
+                    for (slope, of_lanes) in row.iter_mut().zip(&slopes) {
+                        *slope = of_lanes.map_or(0.0, |of_lanes| of_lanes[lane]);
                     }
                     visit(point, channel, evaluator.value(channel)[lane], &row);
                 }
@@ -142,8 +151,10 @@ impl Model {
         let mut all = Vec::with_capacity(points.len());
         for batch in points.chunks(LANES) {
             evaluator.run(&lanes(batch));
-            let slope = |lane: usize, at: usize| evaluator.derivative(0, at).map_or(0.0, |slopes| slopes[lane]);
-            all.extend((0..batch.len()).map(|lane| (0..chosen.len()).map(|at| slope(lane, at)).collect()));
+            let found: Vec<Option<&Lanes>> = (0..chosen.len()).map(|at| evaluator.derivative(0, at)).collect();
+            let slopes =
+                |lane: usize| found.iter().map(move |of_lanes| of_lanes.map_or(0.0, |of_lanes| of_lanes[lane]));
+            all.extend((0..batch.len()).map(|lane| slopes(lane).collect()));
         }
         all
     }

@@ -195,7 +195,7 @@ fn scaled(model: &Model, defaults: &Settings, factor: f64, strength: f64, turn: 
 
 /// Strengths of amplitudes that are tried: colours that differ make up for them.
 fn strengths(model: &Model) -> Vec<f64> {
-    if model.colors.len() > 1 { vec![0.7] } else { vec![0.4, 0.8] }
+    if model.colors.len() > 1 { vec![0.7] } else { vec![0.4, 0.8, 1.6] }
 }
 
 /// The direction of the least differences in degrees: of all directions, the one around which the squares of the pairs'

@@ -191,7 +191,7 @@ impl Grid {
         let mut best = None;
         for row in 0..=self.side / 2 {
             for column in 0..self.side {
-                let frequency = [signed(column) * unit, signed(row) * unit];
+                let frequency = [signed(row) * unit, signed(column) * unit];
                 let size = libm::hypot(frequency[0], frequency[1]);
                 let shown = size > self.least_frequency && size < 0.45 / self.cell;
                 let background = if order == Order::Contrast { rings[self.ring(row, column)] } else { 1.0 };
@@ -225,6 +225,7 @@ impl Grid {
         sums.iter().map(|[sum, count]| sum / f64::max(*count, 1.0)).collect()
     }
 
+    /// The power of each frequency: rows are those along u, columns those along v.
     fn spectrum(&self, signal: &Signal) -> Vec<f64> {
         let side = self.side;
         let mut cells = vec![Complex::new(0.0, 0.0); side * side];
@@ -233,11 +234,10 @@ impl Grid {
             cells[at(1) * side + at(0)] += weight * value;
         }
         let fft = FftPlanner::new().plan_fft_forward(side);
-        // Every row of the cells is transformed, then every column.
+        // Every row of the cells is transformed, then every column, which is a row from then on.
         fft.process(&mut cells);
         transpose(&mut cells, side);
         fft.process(&mut cells);
-        transpose(&mut cells, side);
         cells.iter().map(|cell| cell.norm_sqr()).collect()
     }
 }

@@ -1,4 +1,9 @@
-//! Random settings of the built-in graphs, within what is usual.
+//! Random settings of the built-in graphs, within what is usual and visible.
+//!
+//! Amplitudes are a quarter to all of their defaults. Plaster has nothing but its grain, of which the points show four
+//! or five per grain: with the noise of [`super::view`], a contrast below the default is one colour to any observer, so
+//! it is drawn from one to two defaults. Ribs of corduroy wander by a tenth of their distance; enough of them are shown
+//! for their mean distance to be known to 1 %.
 
 use mateval_procedural::fit::roles::{Role, role};
 use mateval_procedural::library::{Entry, entry};
@@ -55,11 +60,26 @@ pub const LENGTHS: [Lengths; 28] = [
     lengths("dots", &["pitch_u", "pitch_v"], "pitch_u", 11.0),
     lengths("trellis", &["pitch_u", "pitch_v"], "pitch_u", 11.0),
     with_whole(lengths("weave", &["pitch"], "pitch", 15.0), "twill", 1, 3),
-    lengths("corduroy", &["rib_period"], "rib_period", 12.0),
+    lengths("corduroy", &["rib_period"], "rib_period", 24.0),
     lengths("carpet", &[], "pile_size", 30.0),
     lengths("leather", &[], "cell_size", 30.0),
     lengths("metal", &[], "streak_width", 100.0),
 ];
+
+/// A category of things that are often made of a graph; none where no category is.
+pub fn category(graph: &str) -> Option<&'static str> {
+    match graph {
+        "paint" | "plaster" | "roughcast" | "brick" | "mosaic" => Some("wall"),
+        "plank" | "strip_parquet" | "herringbone" | "basket_parquet" | "tile" | "hexagon" | "terrazzo" => Some("floor"),
+        "concrete" => Some("floor"),
+        "veneer" | "marble" | "travertine" | "granite" => Some("table"),
+        "carpet" | "trellis" | "checks" => Some("rug"),
+        "weave" | "corduroy" | "leather" | "houndstooth" => Some("sofa"),
+        "plaid" | "stripes" | "dots" => Some("curtain"),
+        "metal" => Some("lamp"),
+        _ => None,
+    }
+}
 
 /// A pattern.
 pub struct Draw {
@@ -106,6 +126,7 @@ fn drawn(graph: &Graph, slot: &Slot, own: f64, scale: f64, bright: f64) -> f64 {
         Role::Turn => 180.0 * (own - 0.5),
         Role::Shift => own,
         Role::Color | Role::RandomColor => (slot.value * bright * jitter).min(0.9),
+        Role::Amplitude if graph.name == "plaster" => slot.value * (1.0 + own),
         Role::Amplitude => slot.value * (0.25 + 0.75 * own),
         Role::Shape | Role::RandomSize if is_length => slot.value * scale * jitter,
         Role::Shape | Role::RandomSize => slot.value * jitter,

@@ -3,5 +3,6 @@
 #![allow(dead_code, reason = "tests and the bench use different parts")]
 
 pub mod draw;
+pub mod lattice;
 pub mod outcome;
 pub mod view;

@@ -3,9 +3,9 @@
 use mateval_procedural::fit::candidate::Candidate;
 use mateval_procedural::fit::choose::{Fit, Fitter};
 use mateval_procedural::fit::paper::fit_as_paper;
-use mateval_procedural::{Graph, Settings};
 
-use super::draw::{Draw, value};
+use super::draw::{Draw, category};
+use super::lattice::lattice_errors;
 use super::view::{PIXELS, random, seen};
 
 /// What the fit of a planted pattern gave.
@@ -19,9 +19,9 @@ pub struct Outcome {
     pub is_right_graph: bool,
     /// Whether the planted graph has periods.
     pub is_periodic: bool,
-    /// The greatest relative error of the periods of the planted graph's own fit; infinite where it has none.
+    /// The greatest relative error of the lattice's lengths in the planted graph's own fit; infinite where it has none.
     pub period_error: f64,
-    /// The error of its turn in degrees.
+    /// The greatest error of the lattice's directions in degrees; infinite where it has none.
     pub turn_error: f64,
     /// The peak signal-to-noise ratio of the chosen colours without what is random, in decibels.
     pub psnr: f64,
@@ -32,7 +32,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether there are periods, and they are within 1 % and the turn within 1 degree.
+    /// Whether there are periods, and the lattice's lengths are within 1 % and its directions within 1 degree.
     pub fn is_in_place(&self) -> bool {
         self.is_periodic && self.period_error < 0.01 && self.turn_error < 1.0
     }
@@ -43,24 +43,30 @@ pub fn outcome_as_paper(fitter: &Fitter, draw: &Draw) -> Outcome {
     judged(&fit_as_paper(fitter, &seen(&draw.graph, &draw.settings, draw.side, 4096)).unwrap(), draw)
 }
 
-/// Fits a planted pattern.
+/// Fits a planted pattern of which nothing else is known.
 pub fn outcome(fitter: &Fitter, draw: &Draw) -> Outcome {
     judged(&fitter.fit(&seen(&draw.graph, &draw.settings, draw.side, 4096), None).unwrap(), draw)
+}
+
+/// Fits a planted pattern on a thing of a category that is often made of it.
+pub fn outcome_of_category(fitter: &Fitter, draw: &Draw) -> Outcome {
+    let points = seen(&draw.graph, &draw.settings, draw.side, 4096);
+    judged(&fitter.fit(&points, category(draw.entry.name)).unwrap(), draw)
 }
 
 /// Compares a fit with what was planted.
 pub fn judged(fit: &Fit, draw: &Draw) -> Outcome {
     let own = find(fit, draw.entry.name);
     let periods = draw.lengths.periods;
-    let period = |own: &Candidate| period_error(&draw.graph, periods, &own.settings, &draw.settings);
-    let turn = |own: &Candidate| turn_error(&draw.graph, &own.settings, &draw.settings);
+    let errors = |own: &Candidate| lattice_errors(&draw.graph, periods, &own.settings, &draw.settings);
+    let [period_error, turn_error] = own.filter(|_| !periods.is_empty()).map_or([f64::INFINITY; 2], errors);
     Outcome {
         chosen: fit.chosen.graph.name.clone(),
         is_right_class: fit.chosen.class == Some(draw.entry.class),
         is_right_graph: fit.chosen.graph.name == draw.entry.name,
         is_periodic: !periods.is_empty(),
-        period_error: own.map_or(f64::INFINITY, period),
-        turn_error: own.map_or(f64::INFINITY, turn),
+        period_error,
+        turn_error,
         psnr: psnr(draw, &fit.chosen.with_detail(0.0)),
         psnr_with_detail: psnr(draw, &fit.chosen),
         color_error: color_error(draw, &fit.chosen),
@@ -70,23 +76,6 @@ pub fn judged(fit: &Fit, draw: &Draw) -> Outcome {
 /// The fit of a graph, if there is one.
 pub fn find<'a>(fit: &'a Fit, graph: &str) -> Option<&'a Candidate> {
     std::iter::once(&fit.chosen).chain(&fit.others).find(|candidate| candidate.graph.name == graph)
-}
-
-/// The greatest relative error of the periods. A pattern that is turned by a quarter has them in the other order.
-fn period_error(graph: &Graph, periods: &[&str], found: &Settings, planted: &Settings) -> f64 {
-    let sorted = |settings: &Settings| {
-        let mut all: Vec<f64> = periods.iter().map(|name| value(graph, settings, name)).collect();
-        all.sort_by(f64::total_cmp);
-        all
-    };
-    let errors = sorted(found).into_iter().zip(sorted(planted)).map(|(found, planted)| (found / planted - 1.0).abs());
-    errors.fold(0.0, f64::max)
-}
-
-/// The error of the turn in degrees, up to the turns by which patterns repeat, which are multiples of 30 degrees.
-fn turn_error(graph: &Graph, found: &Settings, planted: &Settings) -> f64 {
-    let apart = value(graph, found, "theta") - value(graph, planted, "theta");
-    (apart - 30.0 * (apart / 30.0).round()).abs()
 }
 
 /// Colours at the same places of two candidates.

@@ -9,6 +9,7 @@ use mateval_procedural::{Graph, ProceduralError, Settings};
 use rayon::prelude::*;
 
 use crate::planting::draw::{Draw, LENGTHS, draw, slot};
+use crate::planting::lattice::lattice_errors;
 use crate::planting::outcome::{Outcome, find, judged, outcome_as_paper, psnr};
 use crate::planting::view::seen;
 
@@ -27,11 +28,16 @@ fn fit(fitter: &Fitter, draw: &Draw) -> Fit {
     fitter.fit(&seen(&draw.graph, &draw.settings, draw.side, 4096), None).unwrap()
 }
 
-/// One random pattern of each graph. The bench `planted` has more of them; what it finds is written there.
+/// One random pattern of each graph but those that have tests of their own below. The bench `planted` has more of them; what it finds is written there.
 #[test]
 fn planted_patterns_are_found() {
     let fitter = Fitter::new().unwrap();
-    let draws: Vec<Draw> = LENGTHS.iter().map(|lengths| draw(lengths, 1)).collect();
+    let draws: Vec<Draw> = LENGTHS
+        .iter()
+        .filter(|lengths| !["paint", "stripes", "granite"].contains(&lengths.graph))
+        .map(|lengths| draw(lengths, 1))
+        .collect();
+    assert_eq!(draws.len(), 25);
     let fits: Vec<Fit> = draws.par_iter().map(|draw| fit(&fitter, draw)).collect();
     let all: Vec<Outcome> = fits.iter().zip(&draws).map(|(fit, draw)| judged(fit, draw)).collect();
     for (outcome, draw) in all.iter().zip(&draws) {
@@ -43,12 +49,40 @@ fn planted_patterns_are_found() {
     assert!(count(Outcome::is_in_place) >= IN_PLACE);
     // The twin: each fit, judged as one of the next graph.
     let next = fits.iter().zip(draws.iter().cycle().skip(1)).map(|(fit, draw)| judged(fit, draw));
-    assert!(next.filter(|outcome| outcome.is_right_graph).count() <= 28 - GRAPHS);
+    assert!(next.filter(|outcome| outcome.is_right_graph).count() <= 25 - GRAPHS);
 }
 
-const CLASSES: usize = 22;
-const GRAPHS: usize = 18;
-const IN_PLACE: usize = 11;
+/// What has to be right at least: 22, 19 and 14 were, as these lines were written.
+const CLASSES: usize = 19;
+const GRAPHS: usize = 16;
+const IN_PLACE: usize = 12;
+
+/// Dots are described by many settings: the lattice is what counts, and its multiples are not in place.
+#[test]
+fn lattices_are_the_same_whatever_describes_them() {
+    let dots = built_in("dots");
+    let planted = [("theta", "20"), ("pitch_u", "0.06"), ("pitch_v", "0.04"), ("stagger", "0.25")];
+    let with = |changes: &[(&str, &str)]| settings_of(&dots, &[planted.as_slice(), changes].concat());
+    let errors = |found: &Settings| lattice_errors(&dots, &["pitch_u", "pitch_v"], found, &with(&[]));
+    // The same dots, seen from behind, are the same lattice.
+    let turned = errors(&with(&[("theta", "-160")]));
+    assert!(turned[0] < 1e-9 && turned[1] < 1e-6, "{turned:?}");
+    // A vector (-0.015, 0.04) along the rows, with the area 0.06 * 0.04.
+    let length = 0.015_f64.hypot(0.04);
+    let turn = 20.0 + 0.04_f64.atan2(-0.015).to_degrees();
+    let height = 0.06 * 0.04 / length;
+    // Across the new rows is the opposite of the old ones' direction.
+    let share = (0.06 * 0.015 / length / length).rem_euclid(1.0);
+    let texts = [turn, length, height, 1.0 - share].map(|number| number.to_string());
+    let names = ["theta", "pitch_u", "pitch_v", "stagger"];
+    let other: Vec<(&str, &str)> = names.into_iter().zip(texts.iter().map(String::as_str)).collect();
+    let sheared = errors(&with(&other));
+    assert!(sheared[0] < 1e-6 && sheared[1] < 1e-4, "{sheared:?}");
+    // The twins: twice a length, another shift of rows, and a turn.
+    assert!(errors(&with(&[("pitch_u", "0.12"), ("stagger", "0.125")]))[0] > 0.3);
+    assert!(errors(&with(&[("stagger", "0.35")])).iter().any(|error| *error > 0.05));
+    assert!((errors(&with(&[("theta", "22")]))[1] - 2.0).abs() < 1e-6);
+}
 
 /// Stripes whose turn is on no coarse grid: the paper's way does not find them, and a fit that is shifted shows it.
 #[test]
