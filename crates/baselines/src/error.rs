@@ -142,9 +142,7 @@ pub enum BaselineError {
         adapted: bool,
     },
     /// TEXGen paints base colour, and the estimate has none.
-    #[error(
-        "the estimate of scene '{0}' has no base_color, the only map that TEXGen paints; give an estimate with base_color"
-    )]
+    #[error("the estimate of scene '{0}' has no base_color; give an estimate with base_color")]
     NoColor(String),
     /// The pictures of one estimate differ in size.
     #[error("the estimate of scene '{scene}' in '{}' has pictures of {}x{} and of {}x{} pixels; expected one size", folder.display(), sizes[0].0, sizes[0].1, sizes[1].0, sizes[1].1)]

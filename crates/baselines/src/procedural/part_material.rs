@@ -30,8 +30,11 @@ const LEAST_GAIN: f64 = 2e-6;
 /// By how much a graph's error must be lower for each number that it has more than another.
 const RELATIVE_PRICE_PER_NUMBER: f64 = 0.002;
 
-/// The standard deviation, relative to the mean colour, above which the colours of a part are a texture and not noise.
-const LEAST_DEVIATION: f64 = 0.1;
+/// The standard deviation, relative to the mean colour, below which a pattern cannot be distinguished from leftover light.
+const LEAST_OF_PATTERN: f64 = 0.05;
+
+/// The same for colours without a pattern: above it they are a texture and not noise.
+const LEAST_OF_TEXTURE: f64 = 0.1;
 
 /// What decided on a part's material.
 #[derive(Clone, Debug)]
@@ -135,15 +138,18 @@ impl PartMaterial {
 fn accepted(fit: &Fit, of_neighbours: Option<f64>, values: Values) -> Option<&Candidate> {
     let all = || std::iter::once(&fit.chosen).chain(&fit.others);
     let of_one_color = all().find(|found| is_flat(found))?.error;
+    let mean = values[..3].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
+    let deviation = of_one_color.sqrt() / mean.max(f64::MIN_POSITIVE);
+    if deviation < LEAST_OF_PATTERN {
+        return None;
+    }
     let of_others = of_neighbours.unwrap_or(of_one_color).min(of_one_color);
     let most = (MOST_RELATIVE_ERROR * of_others).min(of_others - LEAST_GAIN);
     let predicts = |found: &&Candidate| found.error < most;
     if let Some(best) = all().filter(predicts).min_by(|a, b| priced(a).total_cmp(&priced(b))) {
         return Some(best);
     }
-    let mean = values[..3].iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0;
-    let varies = of_one_color.sqrt() > LEAST_DEVIATION * mean;
-    Some(&fit.chosen).filter(|chosen| varies && !is_flat(chosen))
+    Some(&fit.chosen).filter(|chosen| deviation > LEAST_OF_TEXTURE && !is_flat(chosen))
 }
 
 /// The graph with its colours multiplied by the median ratio of points and graph, from a half to 2: a fit has the mean of
@@ -226,21 +232,23 @@ mod tests {
     fn what_neighbours_predict_is_no_pattern() {
         let others = vec![candidate("paint", 3.0e-4)];
         let fit = Fit { chosen: candidate("stripes", 2.0e-4), others };
-        let is_taken = |of_neighbours| accepted(&fit, Some(of_neighbours), [0.5, 0.5, 0.5, 0.5, 0.0]).is_some();
+        let is_taken = |of_neighbours| accepted(&fit, Some(of_neighbours), [0.2, 0.2, 0.2, 0.5, 0.0]).is_some();
         assert_eq!([is_taken(1.5e-4), is_taken(2.5e-4)], [false, true]);
     }
 
     #[test]
     fn pixels_decide_before_statistics() {
         let name = |name: &str| Some(name.to_owned());
-        assert_eq!(chosen([("mosaic", 3.0e-4), ("stripes", 2.0e-4), ("paint", 3.0e-4)], 0.5), name("stripes"));
-        // A gain of 1 % is none, and neither is one that bytes cannot hold.
-        assert_eq!(chosen([("stripes", 2.97e-4), ("paint", 3.0e-4), ("checks", 3.0e-4)], 0.5), None);
-        assert_eq!(chosen([("stripes", 1.0e-6), ("paint", 2.0e-6), ("checks", 2.0e-6)], 0.5), None);
+        let striped = [("mosaic", 3.0e-4), ("stripes", 2.0e-4), ("paint", 3.0e-4)];
+        assert_eq!(chosen(striped, 0.2), name("stripes"));
+        // A pattern of less than 5 % of the mean, a gain of 1 %, and one that bytes cannot hold are none.
+        assert_eq!(chosen(striped, 0.5), None);
+        assert_eq!(chosen([("stripes", 2.97e-4), ("paint", 3.0e-4), ("checks", 3.0e-4)], 0.2), None);
+        assert_eq!(chosen([("stripes", 1.0e-6), ("paint", 2.0e-6), ("checks", 2.0e-6)], 0.02), None);
         // What varies much has a texture, what varies little is noise.
         let granite = [("granite", 3.0e-3), ("paint", 3.0e-3), ("carpet", 3.0e-3)];
         assert_eq!([chosen(granite, 0.3), chosen(granite, 0.9)], [name("granite"), None]);
         // Of two that predict the same, the one with fewer numbers is taken.
-        assert_eq!(chosen([("stripes", 1.0e-4), ("plaid", 1.0e-4), ("paint", 3.0e-4)], 0.5), name("plaid"));
+        assert_eq!(chosen([("stripes", 1.0e-4), ("plaid", 1.0e-4), ("paint", 3.0e-4)], 0.2), name("plaid"));
     }
 }
