@@ -29,7 +29,7 @@ const STAGES: [&str; 6] = ["geometry and estimate", "what pixels show", "lifting
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let Some(dataset) = words.first() else {
-        println!("SKIPPED: expected the folder of a dataset");
+        println!("usage: cargo bench -p mateval-baselines --bench lifting -- DATASET");
         return;
     };
     let dataset = Dataset::open(&PathBuf::from(dataset)).unwrap();

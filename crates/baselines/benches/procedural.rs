@@ -17,7 +17,7 @@ use mateval_scene::process_cpu::used;
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let Some(dataset) = words.first() else {
-        println!("SKIPPED: expected the folder of a dataset");
+        println!("usage: cargo bench -p mateval-baselines --bench procedural -- DATASET [SCENE...]");
         return;
     };
     let dataset = Dataset::open(&PathBuf::from(dataset)).unwrap();

@@ -29,6 +29,11 @@ pub(crate) struct PixelDerivative {
     pub(crate) value: Vec3,
 }
 
+/// The most memory that derivatives may take.
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
+/// The memory of one derivative by a colour: a sum in `f64` and a result in `f32`.
+pub(crate) const ENTRY_BYTES: u64 = 3 * (size_of::<f64>() + size_of::<f32>()) as u64;
+
 /// Tiles traced in parallel before their derivatives are summed in order, and samples of each. Together they need a
 /// few tens of megabytes at most.
 const TILES_AT_ONCE: usize = 64;

@@ -13,7 +13,7 @@ use mateval_image::{LinearRgb, Picture, TexelGrid};
 use mateval_scene::Camera;
 use mateval_scene::reference::{Surface, SurfaceIndex};
 
-use crate::derivative_pass::{self, PixelDerivative};
+use crate::derivative_pass::{self, ENTRY_BYTES, MOST_BYTES, PixelDerivative};
 use crate::error::{ExceededLimit, RequestFault, TracerError};
 use crate::settings::RenderSettings;
 use crate::world::World;
@@ -27,11 +27,6 @@ pub struct TexelGradient {
     /// from the top left as in a texture.
     pub texels: Vec<Option<Picture<LinearRgb>>>,
 }
-
-/// The most memory that the derivatives may take.
-const MOST_BYTES: u64 = 1 << 30;
-/// Of one texel: a sum in `f64` and a result in `f32`.
-const TEXEL_BYTES: u64 = 3 * (size_of::<f64>() + size_of::<f32>()) as u64;
 
 /// The gradient of a loss by the texels of the base colours of `world`. `residual` is the derivative of the loss by the
 /// linear radiance of each pixel of `camera`. `grids` holds one entry per surface; a surface without a grid has no
@@ -105,7 +100,7 @@ fn check_grids(surfaces: &[Surface], grids: &[Option<TexelGrid>]) -> Result<(), 
             return Err(RequestFault::MissingUv { surface: index, name: name() }.into());
         }
         let texels = (grid.width as u64).saturating_mul(grid.height as u64);
-        bytes = bytes.saturating_add(texels.saturating_mul(TEXEL_BYTES));
+        bytes = bytes.saturating_add(texels.saturating_mul(ENTRY_BYTES));
     }
     if bytes > MOST_BYTES {
         return Err(ExceededLimit::TexelBytes { bytes, allowed: MOST_BYTES }.into());

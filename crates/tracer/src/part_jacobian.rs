@@ -11,7 +11,7 @@ use mateval_image::{LinearRgb, Picture};
 use mateval_scene::Camera;
 use mateval_scene::reference::SurfaceIndex;
 
-use crate::derivative_pass;
+use crate::derivative_pass::{self, ENTRY_BYTES, MOST_BYTES};
 use crate::error::{ExceededLimit, RequestFault, TracerError};
 use crate::settings::RenderSettings;
 use crate::world::World;
@@ -26,11 +26,6 @@ pub struct PartJacobian {
     /// Block by block, row by row; for each block one entry per surface.
     values: Vec<[f32; 3]>,
 }
-
-/// The most memory that the derivatives may take.
-const MOST_BYTES: u64 = 1 << 30;
-/// Of one block and surface: sums in `f64` and results in `f32`.
-const ENTRY_BYTES: u64 = 3 * (size_of::<f64>() + size_of::<f32>()) as u64;
 
 impl PartJacobian {
     /// Columns and rows of blocks. Those at the right and lower edge may be smaller than the others.

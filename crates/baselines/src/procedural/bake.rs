@@ -1,15 +1,15 @@
 //! Bakes the materials of parts into the atlases of their instances.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use mateval_image::{Mask, Picture};
 use mateval_scene::TriangleMesh;
-use mateval_scene::submission::MAP_SIZES;
 use mateval_scene::uv_atlas::UvAtlas;
 use rayon::prelude::*;
 
 use super::part_material::{PartMaterial, completed};
 use super::residuals::Residuals;
 use super::scene_materials::SceneMaterials;
+use crate::error::BaselineError;
 use crate::estimate::{Estimate, GivenMaps, Values};
 use crate::geometry::SceneGeometry;
 use crate::lift::{PartialAtlas, Texel, lift, place_of, texel_size_m};
@@ -27,22 +27,36 @@ pub struct Baked {
     pub seen: Option<Mask>,
 }
 
-/// Bakes one instance, by its place in the scene, to an atlas of the dataset's own size. With `keep_seen` texels that
-/// the input view shows hold the estimate.
-pub(super) fn bake(
+/// Bakes every instance that has an atlas, to the dataset's own size, and calls `each` with its place in the scene. With
+/// `keep_seen` texels that the input view shows hold the estimate.
+pub(super) fn bake_all(
     materials: &SceneMaterials<'_>,
     geometry: &SceneGeometry<'_>,
     estimate: &Estimate,
     seen: &SeenPixels,
     keep_seen: bool,
+    mut each: impl FnMut(usize, Baked) -> Result<(), BaselineError>,
+) -> Result<(), BaselineError> {
+    for (at, instance) in geometry.scene.instances.iter().enumerate() {
+        if let Some(atlas) = &instance.atlas {
+            let known = match keep_seen {
+                true => lift(geometry, seen, estimate, at, atlas.size as usize),
+                false => unknown(geometry.mesh(at), atlas.size as usize),
+            };
+            each(at, bake(materials, geometry, known, keep_seen, at))?;
+        }
+    }
+    Ok(())
+}
+
+/// Completes an instance's atlas.
+fn bake(
+    materials: &SceneMaterials<'_>,
+    geometry: &SceneGeometry<'_>,
+    mut known: PartialAtlas,
+    keep_seen: bool,
     instance: usize,
 ) -> Baked {
-    let size =
-        geometry.scene.instances[instance].atlas.as_ref().map_or(*MAP_SIZES.start(), |atlas| atlas.size as usize);
-    let mut known = match keep_seen {
-        true => lift(geometry, seen, estimate, instance, size),
-        false => unknown(geometry.mesh(instance), size),
-    };
     let seen = keep_seen.then(|| known.texels.map(|texel| matches!(texel, Texel::Seen(_))));
     known.texels = known.texels.map(|texel| match texel {
         Texel::Seen(values) => Texel::Seen(completed(values, materials.given)),
@@ -107,20 +121,20 @@ impl Baker<'_> {
             let centre = DVec2::new((at % size) as f64 + 0.5, (at / size) as f64 + 0.5);
             place_of(atlas, mesh, triangle, centre)
         };
+        let positions: Vec<DVec3> = texels.iter().map(position).collect();
         let mut values = match (material.frame, &material.graph) {
             (Some(frame), Some(_)) => {
-                let place = |texel: &(usize, usize)| {
-                    let triangle = texel.1;
-                    let [u, v] = frame.place(frame.chart(mesh.geometric_normal(triangle)), position(texel));
+                let place = |(&(_, triangle), position): (&(usize, usize), &DVec3)| {
+                    let [u, v] = frame.place(frame.chart(mesh.geometric_normal(triangle)), *position);
                     [u, v, texel_size_m(atlas, mesh, triangle)]
                 };
-                material.at(&texels.iter().map(place).collect::<Vec<_>>(), self.given)
+                material.at(&texels.iter().zip(&positions).map(place).collect::<Vec<_>>(), self.given)
             }
             _ => vec![material.values; texels.len()],
         };
         if let Some(residuals) = self.residuals.map(|all| &all[part]) {
-            for (values, texel) in values.iter_mut().zip(texels) {
-                let residual = residuals.at(position(texel));
+            for (values, position) in values.iter_mut().zip(positions) {
+                let residual = residuals.at(position);
                 values.iter_mut().zip(residual).for_each(|(value, more)| *value = (*value + more).clamp(0.0, 1.0));
             }
         }

@@ -9,7 +9,7 @@ use mateval_scene::open::Dataset;
 use mateval_scene::work_folder::{WorkFolder, check_free};
 use mateval_scene::{Progress, SceneError, json};
 
-use super::bake::bake;
+use super::bake::bake_all;
 use super::fitted_graphs;
 use super::materials_file;
 use super::options::{FitMode, ProceduralOptions};
@@ -114,13 +114,11 @@ impl SceneMaker<'_> {
         let estimate = self.source.read(self.dataset, scene, self.progress)?;
         let seen = seen_pixels(&geometry, &estimate)?;
         let materials = SceneMaterials::fitted(&geometry, &estimate, &seen, fitter, self.options, self.progress)?;
-        let instances = scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some());
         let mut count = 0;
-        for (at, instance) in instances {
-            let baked = bake(&materials, &geometry, &estimate, &seen, self.options.keep_seen, at);
-            baked.maps.write(&folder.join(instance.id.as_str()))?;
+        bake_all(&materials, &geometry, &estimate, &seen, self.options.keep_seen, |at, baked| {
             count += 1;
-        }
+            baked.maps.write(&folder.join(scene.instances[at].id.as_str()))
+        })?;
         let place = report.join(scene.id.as_str());
         std::fs::create_dir_all(&place).map_err(SceneError::io("make", &place))?;
         materials_file::write(&place.join("materials.mtlx"), &materials)?;

@@ -1,7 +1,7 @@
 //! How well held-out points are predicted by those around them, without any pattern.
 //!
-//! Light and colour that is left in an estimate changes slowly, so that a pattern of few wide stripes predicts it well, and
-//! so do its neighbours. Only what they do not predict speaks for a pattern.
+//! Light and colour that is left in an estimate changes slowly, so that a pattern of few wide stripes predicts it well,
+//! and so do its neighbours. Only what they do not predict speaks for a pattern.
 
 use mateval_procedural::fit::points::{Point, split};
 use rstar::RTree;

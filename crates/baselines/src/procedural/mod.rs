@@ -48,7 +48,10 @@ pub fn scene_maps(
     let seen = seen_pixels(geometry, estimate)?;
     let materials =
         SceneMaterials::fitted(geometry, estimate, &seen, &fitted_graphs::fitter(options)?, options, progress)?;
-    let instances = geometry.scene.instances.iter().enumerate().filter(|(_, instance)| instance.atlas.is_some());
-    let baked = |at: usize| bake::bake(&materials, geometry, estimate, &seen, options.keep_seen, at);
-    Ok(instances.map(|(at, _)| (at, baked(at))).collect())
+    let mut all = BTreeMap::new();
+    bake::bake_all(&materials, geometry, estimate, &seen, options.keep_seen, |at, baked| {
+        all.insert(at, baked);
+        Ok(())
+    })?;
+    Ok(all)
 }

@@ -24,10 +24,10 @@ pub struct ProceduralOptions {
     pub part_set: Option<PartSetId>,
     /// How graphs are chosen.
     pub mode: FitMode,
-    /// Whether texels that the input view shows hold the estimate, so that graphs fill only those that it does not show.
+    /// Whether texels that the input view shows hold the estimate, so that graphs fill only the others.
     pub keep_seen: bool,
-    /// How much of what is random in a pattern is kept, 0 to 1. Its phase cannot be known: 1 looks most alike, 0 has the
-    /// least error.
+    /// How much of what is random in a pattern is kept, 0 to 1. Its phase cannot be known: 1 looks most alike, 0 has
+    /// the least error.
     pub detail: f64,
     /// A folder of `.mtlx` files that are fitted beside the built-in graphs.
     pub graphs: Option<PathBuf>,

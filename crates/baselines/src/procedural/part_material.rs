@@ -30,7 +30,8 @@ const LEAST_GAIN: f64 = 2e-6;
 /// By how much a graph's error must be lower for each number that it has more than another.
 const RELATIVE_PRICE_PER_NUMBER: f64 = 0.002;
 
-/// The standard deviation, relative to the mean colour, below which a pattern cannot be distinguished from leftover light.
+/// The standard deviation, relative to the mean colour, below which a pattern cannot be distinguished from leftover
+/// light.
 const LEAST_OF_PATTERN: f64 = 0.05;
 
 /// The same for colours without a pattern: above it they are a texture and not noise.
@@ -152,8 +153,8 @@ fn accepted(fit: &Fit, of_neighbours: Option<f64>, values: Values) -> Option<&Ca
     Some(&fit.chosen).filter(|chosen| deviation > LEAST_OF_TEXTURE && !is_flat(chosen))
 }
 
-/// The graph with its colours multiplied by the median ratio of points and graph, from a half to 2: a fit has the mean of
-/// the points, which outliers move. All colours of a graph enter linearly.
+/// The graph with its colours multiplied by the median ratio of points and graph, from a half to 2: a fit has the mean
+/// of the points, which outliers move. All colours of a graph enter linearly.
 fn with_median_of(mut graph: Candidate, points: &[Point]) -> Candidate {
     let places: Vec<[f64; 3]> = points.iter().map(|point| [point.u, point.v, point.footprint]).collect();
     let shown = graph.evaluate(&places);

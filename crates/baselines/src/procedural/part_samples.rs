@@ -105,7 +105,7 @@ fn sample(frame: &PartFrame, camera: &Camera, point: &SeenPoint, values: Values)
     Some(Sample { pixel, chart, position: point.place, values, point: Point { u, v, footprint, albedo, weight: 1.0 } })
 }
 
-/// The root of the area, in square metres, that a pixel covers of a surface; none where it is seen at too steep an angle.
+/// The root of the area that a pixel covers of a surface, in metres; none where it is seen at too steep an angle.
 fn footprint(camera: &Camera, place: DVec3, normal: DVec3) -> Option<f64> {
     let to_viewer = camera.position() - place;
     let (_, depth) = camera.projection().project(place)?;
@@ -146,8 +146,8 @@ mod tests {
 
     use super::*;
 
-    /// The pixels of a picture cover a wall behind it without gaps: at any place of it their area is that of the square of
-    /// the depth over both focal lengths. The twin is the same pixel on a floor.
+    /// The pixels of a picture cover a wall behind it without gaps: at any place of it their area is the square of the
+    /// depth over both focal lengths. The twin is the same pixel on a floor.
     #[test]
     fn footprints_are_roots_of_areas() {
         let intrinsics = Intrinsics { fx: 100.0, fy: 160.0, ..Intrinsics::from_fov_x(64, 48, 1.0) };

@@ -22,8 +22,8 @@ const SWATCH: usize = 192;
 const NO_PART_COLOR: LinearRgb = LinearRgb([0.2; 3]);
 
 /// Writes `photo.png`, if there is one, `estimate.png` and `fitted.png`, and for each part with a fit the same as
-/// `<part>-photo.png` and so on, with `<part>-swatch.png` if it has a graph. Returns whether it wrote the photo: not where
-/// the estimate has another size or shows another part of the view.
+/// `<part>-photo.png` and so on, with `<part>-swatch.png` if it has a graph. Returns whether it wrote the photo: not
+/// where the estimate has another size or shows another part of the view.
 pub(super) fn write(
     folder: &Path,
     photo: Option<&Picture<SrgbRgb>>,

@@ -73,7 +73,7 @@ mod tests {
     use crate::library::{Class, entry};
     use crate::noise::cell::cell;
 
-    /// Boards whose rows begin elsewhere than the graph's are told from each other.
+    /// Boards whose rows begin elsewhere than the graph's have numbers of their own.
     #[test]
     fn boards_that_begin_anywhere_are_found() {
         let model = Model::new(entry("plank").unwrap().graph().unwrap(), Some(Class::Lattice));

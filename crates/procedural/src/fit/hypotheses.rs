@@ -152,7 +152,7 @@ fn row_turns(seen: &[Wave]) -> Vec<f64> {
     all
 }
 
-/// Shifts across rows, in sixths of a row, which no wave tells apart.
+/// Shifts across rows, in sixths of a row, which no wave distinguishes.
 fn across_rows(model: &Model, settings: &Settings, width: &str) -> Vec<(f64, [f64; 2])> {
     let number = |name: &str| model.slot(name).map_or(0.0, |at| settings.numbers()[at]);
     let (sin, cos) = libm::sincos(number("theta").to_radians());

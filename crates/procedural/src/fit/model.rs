@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::points::Point;
-use super::roles::{Role, role};
+use super::roles::{Role, is_length, role};
 use crate::batch::Evaluator;
 use crate::graph::Graph;
 use crate::lanes::{LANES, Lanes, Points};
@@ -135,7 +135,7 @@ impl Model {
 
     /// Whether a slot is a length in metres.
     pub(super) fn is_length(&self, at: usize) -> bool {
-        self.graph.parameters[self.slots[at].parameter].doc.as_ref().is_some_and(|doc| doc.contains("in metres"))
+        is_length(&self.graph, self.slots[at].parameter)
     }
 
     /// How much of each colour is at each point: the derivatives of the first channel.

@@ -1,6 +1,7 @@
-//! How usual the sizes of a fitted graph are: metres tell a plank from a strip of parquet, and leather from roughcast.
+//! How usual the sizes of a fitted graph are: in metres, a plank and a strip of parquet differ, and so do leather
+//! and roughcast.
 
-use super::roles::{Role, role};
+use super::roles::{Role, is_length, role};
 use crate::graph::Graph;
 use crate::settings::{Settings, slots};
 
@@ -15,10 +16,9 @@ const MOST: f64 = 6.0;
 pub(super) fn unusual(graph: &Graph, settings: &Settings) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for (at, slot) in slots(graph).iter().enumerate() {
-        let parameter = &graph.parameters[slot.parameter];
         let is_size = matches!(role(graph, slot.parameter), Role::Shape | Role::RandomSize)
-            && parameter.doc.as_ref().is_some_and(|doc| doc.contains("in metres"))
-            && !["joint", "gap"].contains(&parameter.name.as_str());
+            && is_length(graph, slot.parameter)
+            && !["joint", "gap"].contains(&graph.parameters[slot.parameter].name.as_str());
         if is_size && slot.value > 0.0 {
             let apart = libm::log(settings.numbers()[at].max(1e-9) / slot.value) / libm::log(FACTOR);
             sum += (apart * apart).min(MOST);

@@ -25,8 +25,8 @@ pub(super) struct LitPicture {
 pub(super) struct RelitPhoto {
     /// The lights that bring most to the valid pixels, as they were fitted; the strongest first.
     pub(super) strongest: Vec<LitPicture>,
-    /// The sum of the other lights, each times its factor; and the photo where a pixel shows neither a known surface nor
-    /// the emission of a light, such as glass.
+    /// The sum of the other lights, each times its factor, and the photo where a pixel shows neither a known surface nor
+    /// a light's emission, such as glass.
     pub(super) rest: Picture<LinearRgb>,
     /// The room with each light times its factor.
     pub(super) whole: Picture<LinearRgb>,
