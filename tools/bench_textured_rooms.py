@@ -86,8 +86,11 @@ def main() -> None:
     mateval.run(*build, dataset)
     estimate = ["--estimate", "gt"]
     if args.estimate == "delight":
-        mateval.run("prep", "render", dataset, "--renderer", "builtin", "--samples", "64")
-        mateval.run("baseline", "delight", "--dataset", dataset, "--out", args.out / "delit")
+        # Scores are those of albedo alone, which a dataset without renders gives at once.
+        rendered = args.out / "rendered"
+        shutil.copytree(dataset, rendered)
+        mateval.run("prep", "render", rendered, "--renderer", "builtin", "--samples", "64")
+        mateval.run("baseline", "delight", "--dataset", rendered, "--out", args.out / "delit")
         estimate = ["--estimate", args.out / "delit", "--adapter", "delight"]
     for method, words in METHODS.items():
         mateval.run("baseline", *words, *estimate, "--dataset", dataset, "--out", args.out / method)

@@ -77,7 +77,7 @@ pub struct Args {
     /// Folder for everything that the demo makes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
-    /// Samples per pixel of each half of a rendered picture [default: 32; with --full 64].
+    /// Samples per pixel of each half of a rendered picture [default: 24; with --full 64].
     #[arg(long)]
     samples: Option<u32>,
     #[command(flatten)]
@@ -103,7 +103,7 @@ const SMALL: [u32; 2] = [160, 120];
 
 impl Args {
     fn samples(&self) -> u32 {
-        self.samples.unwrap_or(if self.full { 64 } else { 32 })
+        self.samples.unwrap_or(if self.full { 64 } else { 24 })
     }
 
     fn baselines(&self) -> Vec<DemoBaseline> {
