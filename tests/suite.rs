@@ -51,4 +51,5 @@ mod suite {
     mod survey;
     mod unsound_submissions;
     mod verify_faults;
+    mod wide_views;
 }

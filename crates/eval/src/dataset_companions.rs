@@ -19,7 +19,7 @@ use crate::light_score::keep_companions;
 use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
-use crate::truth::ViewTruth;
+use crate::view_set::ViewSet;
 
 /// What [`make_companions`] did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,6 +83,7 @@ fn of_scene(
         world: &world,
         atlases: &atlases,
         views: scored_views(dataset, scene)?,
+        set: ViewSet::Turned,
         predictions: &[],
         protocols: std::slice::from_ref(protocol),
         lpips: None,
@@ -91,8 +92,13 @@ fn of_scene(
         inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
         progress,
     };
-    let truths = task.views.iter().map(|view| ViewTruth::read(&folder, view)).collect::<Result<Vec<_>, _>>()?;
-    keep_companions(&task, renderer, &truths, 0)
+    let mut lists = BTreeMap::new();
+    for task in [ViewSet::Turned, ViewSet::Wide].into_iter().filter_map(|set| task.of(set)) {
+        if task.set == ViewSet::Turned || protocol.wide_views {
+            lists.extend(keep_companions(&task, renderer, &task.truths()?, 0)?);
+        }
+    }
+    Ok(lists)
 }
 
 /// The hash of each pass's list of pictures.

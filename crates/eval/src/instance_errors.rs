@@ -35,6 +35,11 @@ impl InstanceErrors {
         }
     }
 
+    /// Adds the sums of other views.
+    pub fn extend_where(&mut self, other: Self, is_wanted: impl Fn(Views) -> bool) {
+        self.0.extend(other.0.into_iter().filter(|((_, views, _), _)| is_wanted(*views)));
+    }
+
     /// The means, by picture, views and index. Pixels that show no instance are left out.
     pub fn finish(self, scene: &SceneFile) -> Vec<InstancePixelErrors> {
         let means = self.0.into_iter().filter_map(|((picture, views, index), (sum, pixels))| {

@@ -67,6 +67,7 @@ mod truth_noise;
 #[cfg(test)]
 mod unbiased_tests;
 pub mod verify;
+mod view_set;
 pub mod word_enum;
 
 pub use error::EvalError;

@@ -16,6 +16,7 @@ use crate::light_rules::{LightRules, Track};
 use crate::lit_scene::LitScene;
 use crate::relit::LightingName;
 use crate::seeds::seed;
+use crate::view_set::PassName;
 
 /// A set of lights, and the pictures that are made under them.
 pub(crate) struct LightPass<'a> {
@@ -52,13 +53,14 @@ impl PassPictures {
 impl<'a> LightPass<'a> {
     /// Pictures under the scene's own lights.
     pub(crate) fn of_own_lights(
-        name: &'static str,
+        name: PassName,
         lit: &'a LitScene<'a>,
         rules: &'a LightRules,
         pictures: PassPictures,
         progress: Progress<'a>,
     ) -> Self {
         let lights = lit.world.scene().lights.iter().map(|light| light.name.clone()).collect();
+        let name = lit.set.pass(name);
         Self { name, world: lit.world, lights, on_stage: false, pictures, lit, rules, progress }
     }
 
@@ -70,7 +72,8 @@ impl<'a> LightPass<'a> {
         rules: &'a LightRules,
         progress: Progress<'a>,
     ) -> Self {
-        Self { name: "stage", world, lights, on_stage: true, pictures: PassPictures::Fitted, lit, rules, progress }
+        let name = lit.set.pass(PassName::Stage);
+        Self { name, world, lights, on_stage: true, pictures: PassPictures::Fitted, lit, rules, progress }
     }
 
     /// The weights of the lights under which converged pictures of the companions are kept: those of the pass's pictures, or

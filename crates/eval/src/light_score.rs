@@ -163,6 +163,7 @@ impl<'a> LightScorer<'a> {
             world: task.world,
             atlases: task.atlases,
             views: task.views.clone(),
+            set: task.set,
             truths,
             lights,
             blocks: Vec::new(),
@@ -289,7 +290,7 @@ impl<'a> LightScorer<'a> {
             let error = |k: usize| light.noise_free_square(reference, k);
             errors.add(kind, Views::of(&view.id, Region::Valid), &truth.instances, &truth.valid, error);
             if let Some(unobserved) = &truth.unobserved {
-                errors.add(kind, Views::Unobserved, &truth.instances, unobserved, error);
+                errors.add(kind, Views::of(&view.id, Region::Unobserved), &truth.instances, unobserved, error);
             }
         }
     }

@@ -11,6 +11,7 @@ use crate::companions::Companions;
 use crate::control_variate::base_color_ratio;
 use crate::relit::{LightingName, RelitLighting};
 use crate::truth::{TrueLight, ViewTruth};
+use crate::view_set::ViewSet;
 
 /// A scene, and the true renders that predictions are compared with.
 pub(crate) struct LitScene<'a> {
@@ -22,6 +23,8 @@ pub(crate) struct LitScene<'a> {
     pub(crate) atlases: &'a [TriangleMesh],
     /// The views that are scored.
     pub(crate) views: Vec<&'a View>,
+    /// The set that they are.
+    pub(crate) set: ViewSet,
     /// The truth of each view.
     pub(crate) truths: &'a [ViewTruth],
     /// The true light of each view, by lighting (none: the scene's own lights).

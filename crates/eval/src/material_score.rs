@@ -126,7 +126,7 @@ impl SceneTask<'_> {
             };
             errors.add(*kind, Views::of(&view.id, Region::Valid), instances, valid, error);
             if let Some(unobserved) = unobserved {
-                errors.add(*kind, Views::Unobserved, instances, unobserved, error);
+                errors.add(*kind, Views::of(&view.id, Region::Unobserved), instances, unobserved, error);
             }
         }
     }

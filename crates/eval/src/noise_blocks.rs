@@ -3,41 +3,42 @@
 use glam::{DVec2, DVec3};
 use mateval_image::Picture;
 use mateval_scene::Camera;
-use mateval_tracer::shared_centre::share_centre;
+use mateval_tracer::shared_centre::groups_with_one_centre;
 
 use crate::light_rules::NoiseRules;
 
 /// The block of each pixel of each view. Pixels of one block, in any view, may share paths.
 ///
 /// Cameras that share a centre share paths: a path goes into every view that holds its direction. Blocks are then squares
-/// of [`NoiseRules::block_pixels`] pixels of the first camera's image plane. Other cameras have blocks of their own.
+/// of [`NoiseRules::block_pixels`] pixels of the image plane of the first of them. Other cameras have blocks of their own.
 pub fn noise_blocks(rules: &NoiseRules, cameras: &[Camera]) -> Vec<Picture<u32>> {
-    let side = rules.block_pixels;
-    let shared = share_centre(cameras);
-    let views = cameras.iter().zip(0_u32..);
-    views
-        .map(|(camera, view)| {
-            let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
-            Picture::from_fn(width, height, |x, y| {
-                let pixel = DVec2::new(x as f64 + 0.5, y as f64 + 0.5);
-                if shared {
-                    shared_block(&cameras[0], camera.direction(pixel), side)
-                } else {
-                    // Eight bits of view, twelve of row and column each: pictures have at most 16384 pixels a side.
-                    (view % 256) << 24 | (y as u32 / side).min(4095) << 12 | (x as u32 / side).min(4095)
-                }
-            })
+    let groups = groups_with_one_centre(cameras);
+    // Row and column get what bits the number of the group leaves. Pictures have at most 16384 pixels a side.
+    let bits = if groups.len() > 1 { 12 } else { 16 };
+    let group_of =
+        |view: usize| groups.iter().position(|group| group.contains(&view)).expect("every view is in a group");
+    let of_view = |(view, camera): (usize, &Camera)| {
+        let (width, height) = (camera.intrinsics.width as usize, camera.intrinsics.height as usize);
+        let group = group_of(view);
+        let first = &cameras[groups[group][0]];
+        // Eight bits.
+        let high = if groups.len() > 1 { (group as u32 % 256) << (2 * bits) } else { 0 };
+        Picture::from_fn(width, height, |x, y| {
+            let direction = camera.direction(DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
+            high | block(first, direction, rules.block_pixels, bits)
         })
-        .collect()
+    };
+    cameras.iter().enumerate().map(of_view).collect()
 }
 
-/// Sixteen bits of row and of column each, counted from far above and left of the picture.
-fn shared_block(first: &Camera, direction: DVec3, side: u32) -> u32 {
+/// `bits` bits of row and of column each, counted from far above and left of the picture.
+fn block(first: &Camera, direction: DVec3, side: u32, bits: u32) -> u32 {
     let local = first.rotation().transpose() * direction;
     let k = first.intrinsics;
     let at = DVec2::new(k.cx - k.fx * local.x / local.z, k.cy + k.fy * local.y / local.z);
-    let step = |value: f64| ((value / f64::from(side)).floor() + 32768.0).clamp(0.0, 65535.0) as u32;
-    step(at.y) << 16 | step(at.x)
+    let middle = f64::from(1_u32 << (bits - 1));
+    let step = |value: f64| ((value / f64::from(side)).floor() + middle).clamp(0.0, 2.0 * middle - 1.0) as u32;
+    step(at.y) << bits | step(at.x)
 }
 
 #[cfg(test)]

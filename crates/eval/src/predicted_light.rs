@@ -32,6 +32,7 @@ use crate::pilot_view::pilot_views;
 use crate::relit::LightingName;
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
 use crate::stored_light::StoredLight;
+use crate::view_set::PassName;
 
 /// A prediction rendered under some of the lights.
 pub struct PredictedLight {
@@ -83,11 +84,11 @@ pub(crate) fn predicted_light(
         fixed.extend(lit.lightings.iter().map(|lighting| (Track::Relit, Some(lighting.name))));
     }
     if !fixed.is_empty() {
-        let pass = LightPass::of_own_lights("own", lit, rules, PassPictures::Fixed(fixed), progress);
+        let pass = LightPass::of_own_lights(PassName::Own, lit, rules, PassPictures::Fixed(fixed), progress);
         Renderer { lit, rules, pass, predictions, find_companions }.render(each)?;
     }
     if has(Track::Fitted) && lit.scene.lights == SceneLights::Own {
-        let pass = LightPass::of_own_lights("fitted", lit, rules, PassPictures::Fitted, progress);
+        let pass = LightPass::of_own_lights(PassName::Fitted, lit, rules, PassPictures::Fitted, progress);
         Renderer { lit, rules, pass, predictions, find_companions }.render(each)?;
     }
     if has(Track::Fitted) && lit.scene.lights == SceneLights::Stage {

@@ -30,6 +30,8 @@ pub struct Protocol {
     pub mask_rule: MaskRule,
     /// The colour space of albedo's MSE and PSNR.
     pub albedo_space: AlbedoSpace,
+    /// Whether views from other places than the input view's are scored, where a scene has any.
+    pub wide_views: bool,
     /// The number of decimals to which LPIPS is rounded: its last bits depend on the processor.
     pub lpips_decimals: u32,
     /// The light under which predictions are compared.
@@ -67,6 +69,8 @@ impl Protocol {
             name: name.to_owned(),
             mask_rule,
             albedo_space,
+            // The paper has none.
+            wide_views: name != "paper",
             lpips_decimals: 6,
             light,
             fixed: FixedRules::of_this_scorer(),
@@ -173,6 +177,7 @@ mod tests {
                     "lpips_alex" => "lpips_vgg".into(),
                     other => format!("{other}x").into(),
                 },
+                serde_json::Value::Bool(holds) => (!holds).into(),
                 other => panic!("{pointer}: {other}"),
             };
             *value = next;

@@ -51,12 +51,16 @@ word_enum! {
     Views, a "kind of views":
     /// The valid pixels of the input view.
     Input = "input",
-    /// The valid pixels of the other views.
+    /// The valid pixels of the other views from its place.
     Novel = "novel",
     /// Texels that the input view sees.
     Observed = "observed",
-    /// Pixels of the other views, or texels, that the input view does not see.
+    /// Pixels of the other views from its place, or texels, that the input view does not see.
     Unobserved = "unobserved",
+    /// The valid pixels of views from other places.
+    Wide = "wide",
+    /// Those of them that the input view does not see.
+    WideUnobserved = "wide_unobserved",
 }
 
 word_enum! {
@@ -117,12 +121,16 @@ impl Views {
             Self::Novel => "Novel views",
             Self::Observed => "Observed",
             Self::Unobserved => "Unobserved",
+            Self::Wide => "Wide views",
+            Self::WideUnobserved => "Unobserved in wide views",
         }
     }
 
     /// The views that a region of one view counts for.
     pub fn of(view: &ViewId, region: Region) -> Self {
         match region {
+            Region::Valid if view.is_wide() => Self::Wide,
+            Region::Unobserved if view.is_wide() => Self::WideUnobserved,
             Region::Unobserved => Self::Unobserved,
             Region::Valid if view.as_str() == mateval_scene::layout::INPUT => Self::Input,
             Region::Valid => Self::Novel,
@@ -273,7 +281,7 @@ macro_rules! by_text {
 }
 // The patterns hold the shape alone: the words are listed once, in `dataset_spec/FORMAT.md`.
 by_text!(PictureName, UnknownWord, "^[a-z_]+$");
-by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z]+\\.[a-z0-9_]+$");
+by_text!(ResultKey, BadResultKey, "^[a-z_]+\\.[a-z_]+\\.[a-z0-9_]+$");
 
 #[cfg(test)]
 mod tests {
@@ -295,7 +303,7 @@ mod tests {
     #[test]
     fn keys_are_parsed_from_what_they_print() {
         let keys = all();
-        assert_eq!(keys.len(), 10 * 2 * 4 * Metric::ALL.len());
+        assert_eq!(keys.len(), 10 * 2 * 6 * Metric::ALL.len());
         for key in &keys {
             assert_eq!(key.to_string().parse(), Ok(*key));
             let json = serde_json::to_string(key).unwrap();

@@ -66,6 +66,19 @@ pub(crate) struct ScoreSheet {
     pub(crate) errors: InstanceErrors,
 }
 
+impl ScoreSheet {
+    /// Adds the numbers of wide views from a sheet that holds the input view's too.
+    pub(crate) fn add_wide(&mut self, sheet: Self) {
+        let is_wide = |views: Views| matches!(views, Views::Wide | Views::WideUnobserved);
+        let SceneScore { views, noise, companions, not_finite, .. } = sheet.score;
+        self.score.views.extend(views.into_iter().filter(|score| score.view.is_wide()));
+        self.score.noise.extend(noise.into_iter().filter(|score| is_wide(score.views)));
+        self.score.companions.extend(companions);
+        self.score.not_finite += not_finite;
+        self.errors.extend_where(sheet.errors, is_wide);
+    }
+}
+
 impl SceneScore {
     /// Adds pictures of a view.
     pub(crate) fn add(&mut self, view: &ViewId, pictures: Vec<PictureScore>) {

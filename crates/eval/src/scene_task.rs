@@ -13,8 +13,10 @@ use crate::error::EvalError;
 use crate::protocol::Protocol;
 use crate::result_key::{Region, Surfaces};
 use crate::truth::{ViewTruth, intersection};
+use crate::view_set::ViewSet;
 
 /// Everything that is needed to score submissions on one scene.
+#[derive(Clone)]
 pub(crate) struct SceneTask<'a> {
     pub(crate) scene: &'a SceneFile,
     pub(crate) folder: &'a SceneFolder,
@@ -22,6 +24,8 @@ pub(crate) struct SceneTask<'a> {
     pub(crate) atlases: &'a [TriangleMesh],
     /// The views that are scored.
     pub(crate) views: Vec<&'a View>,
+    /// The set that they are.
+    pub(crate) set: ViewSet,
     pub(crate) predictions: &'a [PredictedScene],
     pub(crate) protocols: &'a [Protocol],
     pub(crate) lpips: Option<&'a Lpips>,
@@ -42,6 +46,17 @@ pub(crate) struct MaskedRegion {
 }
 
 impl SceneTask<'_> {
+    /// The same task over one set of its views; none where the set is empty.
+    pub(crate) fn of(&self, set: ViewSet) -> Option<Self> {
+        let views = set.of(&self.views);
+        (!views.is_empty()).then(|| Self { views, set, ..self.clone() })
+    }
+
+    /// The true maps and masks of the views.
+    pub(crate) fn truths(&self) -> Result<Vec<ViewTruth>, EvalError> {
+        self.views.iter().map(|view| ViewTruth::read(self.folder, view)).collect()
+    }
+
     /// Adds scene and view to an error of a metric.
     pub(crate) fn locate_error<T>(&self, view: &View, found: Result<T, MetricError>) -> Result<T, EvalError> {
         found.map_err(|source| EvalError::Metric { scene: self.scene.id.clone(), view: view.id.clone(), source })

@@ -26,6 +26,7 @@ use crate::scene_score::SceneScore;
 use crate::scene_scorer::score_scene;
 use crate::scene_task::SceneTask;
 use crate::truth_noise::NoisyLighting;
+use crate::view_set::ViewSet;
 use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::hashed_file::{HashedFile, submission_sha256};
 use mateval_submission::prediction::{PredictedScene, read_scene};
@@ -255,6 +256,7 @@ impl ScorePlan<'_> {
             world: &world,
             atlases: &atlases,
             views: scored_views(self.dataset, scene)?,
+            set: ViewSet::Turned,
             predictions,
             protocols: &self.protocols,
             lpips: self.lpips.network(),

@@ -15,6 +15,7 @@ use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
+use crate::view_set::ViewSet;
 use mateval_submission::atlas_meshes::AtlasMeshes;
 use mateval_submission::prediction::{PredictedScene, read_scene};
 
@@ -78,6 +79,7 @@ pub fn scene_light(
         world: &world,
         atlases: &atlases,
         views,
+        set: ViewSet::Turned,
         predictions: &predictions,
         protocols: std::slice::from_ref(protocol),
         lpips: None,

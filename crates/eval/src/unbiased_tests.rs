@@ -25,6 +25,7 @@ use crate::open_scene::{OpenScene, scored_views};
 use crate::predicted_light::predicted_light;
 use crate::protocol::Protocol;
 use crate::truth::{RgbTruth, TrueLight, ViewTruth};
+use crate::view_set::ViewSet;
 
 /// Independent estimates of each kind.
 const SEEDS: usize = 16;
@@ -126,6 +127,7 @@ impl Room {
             world: &self.opened.world,
             atlases: &self.opened.atlases,
             views: views.clone(),
+            set: ViewSet::Turned,
             truths: &self.truths,
             lights: BTreeMap::from([(None, true_lights)]),
             blocks: noise_blocks(&rules("", samples).noise, &cameras),

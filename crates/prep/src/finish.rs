@@ -6,11 +6,11 @@ use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
-use mateval_scene::layout::{DATASET, INPUT, SceneFolder, TARGETS};
+use mateval_scene::layout::{DATASET, SceneFolder, TARGETS};
 use mateval_scene::open::check_whole;
 use mateval_scene::scene_hashes::SceneHashes;
 use mateval_scene::work_folder::remove;
-use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, ViewId, json, manifest};
+use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, json, manifest};
 
 use crate::build::scene_mark::{SceneMark, settings_sha256};
 use crate::build::start::is_build;
@@ -64,7 +64,7 @@ pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'
         dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
     }
     let known = scene_hashes(root, &mut dataset, progress)?;
-    json::write(&root.join(TARGETS), &targets(&recipe, &dataset))?;
+    json::write(&root.join(TARGETS), &targets(root, &dataset)?)?;
     mateval_image::store::write_whole(&root.join(RECIPE), text.as_bytes())?;
     write(root, dataset, &known)
 }
@@ -193,14 +193,14 @@ fn is_complete(root: &Path, id: &SceneId, renderer: &RendererId) -> bool {
         .is_ok_and(|scene| scene.views.iter().all(|view| folder.render(renderer, &view.id).join(RENDER_FILE).is_file()))
 }
 
-fn targets(recipe: &Recipe, dataset: &DatasetFile) -> TargetsFile {
-    let input = ViewId::new(INPUT).expect("our own id is an id");
-    let views: Vec<ViewId> = std::iter::once(input).chain(recipe.views.iter().map(|view| view.id.clone())).collect();
-    let of_scene = |scene: &SceneId| {
-        let scene = scene.clone();
-        views.iter().map(move |view| Target { scene: scene.clone(), view: view.clone() }).collect::<Vec<_>>()
-    };
-    TargetsFile { format: FORMAT.to_owned(), targets: dataset.scenes.iter().flat_map(of_scene).collect() }
+/// Every view of every scene: scenes differ in the wide views that they have a place for.
+fn targets(root: &Path, dataset: &DatasetFile) -> Result<TargetsFile, PrepError> {
+    let mut targets = Vec::new();
+    for id in &dataset.scenes {
+        let scene: SceneFile = json::read(&SceneFolder::of(root, id).scene_file())?;
+        targets.extend(scene.views.into_iter().map(|view| Target { scene: id.clone(), view: view.id }));
+    }
+    Ok(TargetsFile { format: FORMAT.to_owned(), targets })
 }
 
 /// `dataset.json` is written last: it names the manifest.

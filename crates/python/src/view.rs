@@ -60,7 +60,7 @@ impl View {
 
 #[pymethods]
 impl View {
-    /// Its id, as in `input` or `up_left`.
+    /// Its id, as in `input`, `up_left` or `wide_1`.
     #[getter]
     fn id(&self) -> &str {
         self.file().id.as_str()
@@ -76,6 +76,12 @@ impl View {
     #[getter]
     fn y_deg(&self) -> f64 {
         self.file().y_deg
+    }
+
+    /// Metres between this camera and the input view's; 0 for views that are the input view turned.
+    #[getter]
+    fn distance_m(&self) -> f64 {
+        self.file().wide.map_or(0.0, |wide| wide.distance_m)
     }
 
     /// The camera of every picture of the view.

@@ -135,14 +135,27 @@ pub struct SourceFile {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct View {
-    /// `input`, or the offset's name.
+    /// `input`, or the offset's name; begins with `wide_` for views from another place, and for no others.
     pub id: ViewId,
-    /// Degrees about the input camera's own X axis, up is positive.
+    /// Degrees about the input camera's own X axis, up is positive; 0 for wide views.
     pub x_deg: f64,
-    /// Degrees about the camera's own Y axis, after X; left is positive.
+    /// Degrees about the camera's own Y axis, after X; left is positive; 0 for wide views.
     pub y_deg: f64,
     /// The camera of every picture of the view.
     pub camera: Camera,
+    /// How far a wide view is from the input view; absent for all others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wide: Option<WideView>,
+}
+
+/// How far a view from another place is from the input view.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WideView {
+    /// Metres between both cameras.
+    pub distance_m: f64,
+    /// The share of the view's valid pixels that the input view does not show, 0 to 1.
+    pub unseen_share: f64,
 }
 
 /// One object that methods provide textures for.

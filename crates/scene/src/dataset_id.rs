@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::SceneFile;
+use crate::dataset::{SceneFile, WideView};
 use crate::open::Dataset;
-use crate::{RendererId, SceneId};
+use crate::{RendererId, SceneId, ViewId};
 
 /// The dataset and the scenes that were scored or checked.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DatasetId {
     /// Its name.
@@ -26,6 +26,9 @@ pub struct DatasetId {
     /// The house of each scored scene. Rankings draw scenes of one house together.
     #[serde(default)]
     pub houses: BTreeMap<SceneId, String>,
+    /// The views from other places than the input view's, by scene.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub wide_views: BTreeMap<SceneId, BTreeMap<ViewId, WideView>>,
     /// The renderer whose pictures were the reference for light; null without such pictures.
     #[serde(default)]
     pub scored_renderer: Option<RendererId>,
@@ -42,7 +45,15 @@ impl DatasetId {
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
             total_scenes: dataset.file.scenes.len(),
             houses: scenes.iter().map(|scene| (scene.id.clone(), scene.source.house.clone())).collect(),
+            wide_views: scenes.iter().filter_map(|scene| Some((scene.id.clone(), wide_views(scene)?))).collect(),
             scored_renderer: dataset.file.scored_renderer.clone(),
         }
     }
+}
+
+/// The wide views of a scene; none if it has none.
+fn wide_views(scene: &SceneFile) -> Option<BTreeMap<ViewId, WideView>> {
+    let found: BTreeMap<ViewId, WideView> =
+        scene.views.iter().filter_map(|view| Some((view.id.clone(), view.wide?))).collect();
+    (!found.is_empty()).then_some(found)
 }

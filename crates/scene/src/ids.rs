@@ -110,9 +110,16 @@ id_type!(
     PartSetId
 );
 id_type!(
-    /// A view's id, as in `input` or `up_left`.
+    /// A view's id, as in `input`, `up_left` or `wide_1`.
     ViewId
 );
+
+impl ViewId {
+    /// Whether it is the id of a view from another place than the input view's.
+    pub fn is_wide(&self) -> bool {
+        self.as_str().starts_with(crate::layout::WIDE)
+    }
+}
 
 id_type!(
     /// A renderer's id: a folder in `ground_truth/renders/`.

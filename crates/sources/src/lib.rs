@@ -11,6 +11,7 @@
 
 pub mod below;
 pub mod bitterli;
+pub mod clearance;
 pub mod error;
 pub mod front3d;
 pub mod log;

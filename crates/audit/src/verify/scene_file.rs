@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use glam::DMat3;
-use mateval_scene::dataset::{Part, SceneFile};
-use mateval_scene::layout::INPUT;
+use mateval_scene::Camera;
+use mateval_scene::dataset::{Part, SceneFile, View, WideView};
+use mateval_scene::layout::{INPUT, WIDE};
 
 use mateval_prep::faults::Faults;
 
@@ -45,11 +46,41 @@ fn check_views(scene: &SceneFile, faults: &mut Faults) {
                 "expected focal lengths and a size above 0, and a finite principal point",
             );
         }
-        let expected = input.camera.turned(view.x_deg, view.y_deg);
-        let same_place = view.camera.matrix().abs_diff_eq(expected.matrix(), CAMERA_SLACK);
-        if !same_place || view.camera.intrinsics != input.camera.intrinsics {
-            let message = format!("differs from the input camera turned by {} and {} degrees", view.x_deg, view.y_deg);
-            faults.add("bad_camera", FILE, &place, message);
+        check_place(view, &input.camera, at, faults);
+    }
+}
+
+/// Checks that a turned view is the input camera turned, and that a wide view is as far from it as it states.
+fn check_place(view: &View, input: &Camera, at: usize, faults: &mut Faults) {
+    let place = format!("/views/{at}/camera");
+    if view.camera.intrinsics != input.intrinsics {
+        faults.add("bad_camera", FILE, format!("{place}/intrinsics"), "differ from those of the input camera");
+    }
+    match &view.wide {
+        _ if view.wide.is_some() != view.id.is_wide() => {
+            let message = format!("a view has this key if and only if its id begins with '{WIDE}'");
+            faults.add("bad_view", FILE, format!("/views/{at}/wide"), message);
+        }
+        None => {
+            let expected = input.turned(view.x_deg, view.y_deg);
+            if !view.camera.matrix().abs_diff_eq(expected.matrix(), CAMERA_SLACK) {
+                let (x_deg, y_deg) = (view.x_deg, view.y_deg);
+                let message = format!("differs from the input camera turned by {x_deg} and {y_deg} degrees");
+                faults.add("bad_camera", FILE, &place, message);
+            }
+        }
+        Some(WideView { distance_m, unseen_share }) => {
+            let found = view.camera.position().distance(input.position());
+            // Also refuses numbers that are not finite.
+            let is_stated = (found - distance_m).abs() <= CAMERA_SLACK;
+            if !is_stated {
+                let message = format!("is {found} m from the input camera, and the view states {distance_m} m");
+                faults.add("bad_camera", FILE, &place, message);
+            }
+            if !(0.0..=1.0).contains(unseen_share) {
+                let message = format!("found {unseen_share}, expected 0 to 1");
+                faults.add("bad_view", FILE, format!("/views/{at}/wide/unseen_share"), message);
+            }
         }
     }
 }

@@ -49,10 +49,21 @@ pub(super) fn label_files(entry: &RecipeScene, source: &Path) -> BTreeSet<PathBu
 pub(crate) fn settings_sha256(recipe: &Recipe, id: &SceneId, tool: &str) -> String {
     // Every setting is printed with all its fields; other scenes, the dataset's name and the renderer's samples are not
     // among them. The text is read by nobody, and the tool's version stands in it.
-    let Recipe { name: _, version: _, resolution, views, atlas_size, materials, camera_rules, samples: _, scenes } =
-        recipe;
+    let Recipe {
+        name: _,
+        version: _,
+        resolution,
+        views,
+        wide,
+        atlas_size,
+        materials,
+        camera_rules,
+        samples: _,
+        scenes,
+    } = recipe;
     let entry = scenes.iter().find(|entry| entry.id == *id);
-    let settings =
-        format!("{tool}\n{resolution:?}\n{views:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}");
+    let settings = format!(
+        "{tool}\n{resolution:?}\n{views:?}\n{wide:?}\n{atlas_size:?}\n{materials:?}\n{camera_rules}\n{entry:?}"
+    );
     manifest::sha256_of_bytes(settings.as_bytes())
 }

@@ -8,6 +8,7 @@ mod scene_file;
 mod source;
 mod turned_views;
 mod view_pictures;
+mod wide_views;
 
 use std::path::Path;
 
@@ -61,6 +62,9 @@ pub fn build(
         seen = view_pictures::write(&plan, folder, &scored, progress)?.or_refuse(&entry.id)?;
     }
     plan.findings.extend(seen.findings);
+    for (view, unseen_share) in plan.views.iter_mut().zip(seen.unseen_shares) {
+        view.wide.iter_mut().for_each(|wide| wide.unseen_share = unseen_share);
+    }
     // The remaining files.
     geometry::write(&plan, folder, &atlases)?;
     reference_io::write(folder, &plan.scene)?;

@@ -9,9 +9,11 @@ use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::source_materials::SourceMaterials;
 use mateval_scene::{Finding, SceneLights, SourceKind, TriangleMesh};
 use mateval_sources::source_scene::SourceScene;
+use mateval_tracer::World;
 
 use super::fault::SceneFault;
 use super::turned_views::views_of;
+use super::wide_views::wide_views;
 use crate::conversion::convert;
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
@@ -69,7 +71,7 @@ pub(super) fn plan(
     let instances = instances::list(&read.scene, &read.origins).map_err(PrepError::scene(&entry.id))?;
     let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
-    let views = views_of(recipe, read.camera);
+    let mut views = views_of(recipe, read.camera);
     let SourceScene { kind, lights, states_roughness, states_metallic, file, files, absent, .. } = read;
     let mut findings = read.findings;
     let (scene, source_materials) = match recipe.materials {
@@ -80,13 +82,22 @@ pub(super) fn plan(
             (converted.scene, converted.source)
         }
     };
+    let scene = Arc::new(scene);
+    // After the scene is complete, so that wide views never add to it: the other views stay as they are.
+    if let Some(wide) = &recipe.wide {
+        let scored: Vec<bool> =
+            scene.surfaces.iter().map(|surface| scene.materials[surface.material.0].has_appearance()).collect();
+        let (found, lost) = wide_views(wide, &World::new(scene.clone())?, &read.camera, &scored, &file);
+        views.extend(found);
+        findings.extend(lost);
+    }
     let plan = Plan {
         kind,
         house: entry.house.clone().unwrap_or(read.house),
         lights,
         states_roughness,
         states_metallic,
-        scene: Arc::new(scene),
+        scene,
         source_materials,
         instances,
         shapes: read.origins.into_iter().map(|origin| origin.shape).collect(),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::png_io;
+use mateval_image::{Mask, png_io};
 use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_tracer::World;
@@ -18,6 +18,8 @@ use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
 pub(super) struct Seen {
     /// The nearest depth in metres at which the input view shows each instance, or where it does not, any other view.
     pub(super) nearest: Vec<Option<f64>>,
+    /// The share of the valid pixels of each view that the input view does not show.
+    pub(super) unseen_shares: Vec<f64>,
     /// Whether the input view shows something that is scored.
     input_shows_something: bool,
     /// Findings about views that are of little use.
@@ -55,6 +57,7 @@ pub(super) fn write(
         let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
         check_use(plan, &view.id, &geometry, &mut seen);
+        seen.unseen_shares.push(unseen_share(&geometry));
         write_view(folder, &view.id, &geometry, &truth)?;
         write_parts(&folder.view(&view.id), &geometry, &parts)?;
     }
@@ -97,6 +100,12 @@ fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
             nearest[place] = Some(nearest[place].map_or(depth, |other: f64| other.min(depth)));
         }
     }
+}
+
+fn unseen_share(geometry: &GeometryPictures) -> f64 {
+    let count = |mask: &Mask| mask.pixels().iter().filter(|&&holds| holds).count() as f64;
+    // No valid pixel, none unseen.
+    count(&geometry.unobserved) / count(&geometry.valid).max(1.0)
 }
 
 fn write_view(

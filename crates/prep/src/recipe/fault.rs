@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use mateval_scene::findings::shortened;
+use mateval_scene::layout::WIDE;
 use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
@@ -40,6 +41,50 @@ pub enum RecipeFault {
         x_deg: f64,
         /// Degrees about Y.
         y_deg: f64,
+    },
+    /// A turned view has the id of a wide one.
+    #[error("view '{id}': ids that begin with '{WIDE}' are those of views from other places; choose another id")]
+    TurnedId {
+        /// The view's id.
+        id: ViewId,
+    },
+    /// A wide view has the id of a turned one.
+    #[error("wide: view '{id}': the id must begin with '{WIDE}'")]
+    WideId {
+        /// The view's id.
+        id: ViewId,
+    },
+    /// There are too many wide views, or none.
+    #[error("wide: count = {found}: expected {least} to {most}")]
+    WideCount {
+        /// The number in the recipe.
+        found: u32,
+        /// The smallest number allowed.
+        least: u32,
+        /// The largest number allowed.
+        most: u32,
+    },
+    /// The range of distances of wide views is out of range, or falls.
+    #[error("wide: distance_m = {found:?}: expected two rising numbers from {least} to {most}")]
+    WideDistance {
+        /// The range in the recipe.
+        found: [f64; 2],
+        /// The smallest distance allowed, in metres.
+        least: f64,
+        /// The largest distance allowed, in metres.
+        most: f64,
+    },
+    /// A wide view stands too near to the input camera, or too far.
+    #[error("wide: view '{id}': offset_m = {found:?}: expected a length of {least} to {most} m")]
+    WideOffset {
+        /// The view's id.
+        id: ViewId,
+        /// The offset in the recipe.
+        found: [f64; 3],
+        /// The smallest length allowed, in metres.
+        least: f64,
+        /// The largest length allowed, in metres.
+        most: f64,
     },
     /// Pictures are too small or too large.
     #[error("{owner}: resolution = {found:?}: expected {} to {} a side", RESOLUTION.start(), RESOLUTION.end())]

@@ -11,6 +11,7 @@ mod sizes;
 mod tests;
 mod text;
 mod views;
+mod wide;
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -30,6 +31,7 @@ use sizes::check_sizes;
 pub(crate) use text::read_text;
 pub use views::Offset;
 pub(crate) use views::default_views;
+pub use wide::{DrawnViews, WideOffset, WideViews};
 
 /// The name of the recipe in the dataset.
 pub const RECIPE: &str = "recipe.toml";
@@ -51,6 +53,8 @@ pub struct Recipe {
     /// The novel views, as turns of the input camera; empty for a dataset of input views only.
     #[serde(default = "default_views")]
     pub views: Vec<Offset>,
+    /// Novel views from other places; none if absent.
+    pub wide: Option<WideViews>,
     /// Texels a side of every atlas; if absent, chosen by what the input view shows.
     pub atlas_size: Option<u32>,
     /// The materials of which the truth is made.
@@ -111,13 +115,20 @@ impl Recipe {
 
     fn check_views(&self, faults: &mut Vec<RecipeFault>) {
         let mut seen = BTreeSet::from([mateval_scene::layout::INPUT]);
+        let wide = self.wide.iter().flat_map(WideViews::given_ids);
+        for id in self.views.iter().map(|view| &view.id).chain(wide) {
+            if !seen.insert(id.as_str()) {
+                faults.push(RecipeFault::RepeatedView { id: id.clone() });
+            }
+        }
         for view in &self.views {
-            if !seen.insert(view.id.as_str()) {
-                faults.push(RecipeFault::RepeatedView { id: view.id.clone() });
+            if view.id.is_wide() {
+                faults.push(RecipeFault::TurnedId { id: view.id.clone() });
             }
             if !(view.x_deg.abs() <= 90.0 && view.y_deg.abs() <= 180.0) {
                 faults.push(RecipeFault::Turns { id: view.id.clone(), x_deg: view.x_deg, y_deg: view.y_deg });
             }
         }
+        self.wide.iter().for_each(|wide| wide.check(faults));
     }
 }

@@ -38,6 +38,32 @@ fn all_faults_are_reported_together() {
 }
 
 #[test]
+fn wide_views_have_ids_and_distances_of_their_own() {
+    let with = |words: &str| read_text(&format!("name = 'x'\n{words}\n[[scene]]\nid = 'a'\nbitterli = 'a'\n"));
+    let recipe = with("wide = { count = 4, distance_m = [0.3, 1.0] }").unwrap();
+    let drawn = DrawnViews { count: 4, distance_m: [0.3, 1.0], seed: 0 };
+    assert_eq!(recipe.wide, Some(WideViews::Drawn(drawn)));
+    with("wide = { views = [{ id = 'wide_left', offset_m = [-0.5, 0, 0] }] }").unwrap();
+    for (words, expected) in [
+        ("wide = { count = 0, distance_m = [0.3, 1.0] }", "count = 0: expected 1 to 16"),
+        ("wide = { count = 17, distance_m = [0.3, 1.0] }", "count = 17: expected 1 to 16"),
+        ("wide = { count = 1, distance_m = [1.0, 0.3] }", "distance_m = [1.0, 0.3]: expected two rising numbers"),
+        ("wide = { count = 1, distance_m = [nan, 1.0] }", "distance_m = [NaN, 1.0]"),
+        ("wide = { count = 1 }", "expected { count, distance_m }"),
+        ("wide = { views = [{ id = 'left', offset_m = [1, 0, 0] }] }", "the id must begin with 'wide_'"),
+        ("wide = { views = [{ id = 'wide_1', offset_m = [0, 0, 0] }] }", "expected a length of 0.05 to 10 m"),
+        ("views = [{ id = 'wide_1', x_deg = 1, y_deg = 1 }]", "choose another id"),
+        (
+            "wide = { views = [{ id = 'wide_1', offset_m = [1, 0, 0] }, { id = 'wide_1', offset_m = [2, 0, 0] }] }",
+            "'wide_1' is listed twice",
+        ),
+    ] {
+        let error = with(words).unwrap_err().to_string();
+        assert!(error.contains(expected), "{words}: {error}");
+    }
+}
+
+#[test]
 fn cameras_are_within_a_million_metres() {
     let at = |x: &str| {
         let text = "name = 'x'\n[[scene]]\nid = 'a'\nbitterli = 'a'\n";

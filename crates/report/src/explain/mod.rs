@@ -62,12 +62,14 @@ pub fn explain(plan: &ExplainPlan<'_>, progress: Progress<'_>) -> Result<Explana
     let scores = belongs::check(plan)?;
     let scene = plan.dataset.scene(plan.scene)?;
     progress(Report::step("pictures", 0, 2));
-    let views = scene_albedo(plan.dataset, scene, &[plan.submission])?;
+    // Wide views are scored apart.
+    let ids = scored_views(plan.dataset, scene)?.into_iter().map(|view| view.id.clone());
+    let shown = scene_albedo(plan.dataset, scene, &[plan.submission])?;
+    let (ids, views): (Vec<ViewId>, Vec<_>) = ids.zip(shown).filter(|(id, _)| !id.is_wide()).unzip();
     progress(Report::step("kinds of error", 1, 2));
     let patches = patches(&views);
     let found: Vec<(u16, Explained)> =
         patches.par_iter().map(|(index, patches)| (*index, explained(patches))).collect();
-    let ids: Vec<ViewId> = scored_views(plan.dataset, scene)?.into_iter().map(|view| view.id.clone()).collect();
     let whole = Explained::sum(found.iter().map(|(_, explained)| explained));
     let instances = worst_first(scene, &ids, &found, &whole);
     let worst = instances.iter().filter(|(_, i)| i.mse > 0.0).take(WORST).map(|(index, _)| *index).collect();

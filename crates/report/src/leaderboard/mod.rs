@@ -35,6 +35,8 @@ mod site;
 #[cfg(test)]
 mod tests;
 pub mod verified;
+mod wide_curves;
+mod wide_views;
 
 pub use plan::{LeaderboardPlan, Submissions};
 
@@ -48,7 +50,7 @@ use minijinja::value::Serde;
 
 use self::board::Board;
 use self::file::LEADERBOARD_PATH;
-use self::site::{PAGES, Page, Site, SiteWriter};
+use self::site::{PAGES, Page, Site, SiteWriter, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -79,6 +81,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     }
     scene_page::write_list(&board, &site)?;
     room_page::write(&board, &site)?;
+    wide_views::write(&board, &site)?;
     protocol_page::write(&board, &site)?;
     write_constant_pages(plan, &site)?;
     Ok(work.finish()?)
@@ -105,7 +108,7 @@ fn site(board: &Board<'_>) -> Site {
         houses: ranking.houses.values().collect::<BTreeSet<_>>().len(),
         has_intervals: board.has_intervals(),
         least_houses: ranking.rules.least_houses,
-        pages: PAGES,
+        pages: PAGES.into_iter().chain(wide_views::has_any(board).then_some(WIDE_VIEWS)).collect(),
     }
 }
 

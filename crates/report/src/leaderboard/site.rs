@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 11] = [
+const TEMPLATES: [(&str, &str); 12] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("slider.j2", include_str!("templates/slider.j2")),
@@ -33,6 +33,7 @@ const TEMPLATES: [(&str, &str); 11] = [
     ("protocol.j2", include_str!("templates/protocol.j2")),
     ("paper.j2", include_str!("templates/paper.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
+    ("wide_views.j2", include_str!("templates/wide_views.j2")),
 ];
 
 /// What every page shows.
@@ -48,7 +49,7 @@ pub(super) struct Site {
     pub(super) has_intervals: bool,
     /// The fewest houses for which there are intervals.
     pub(super) least_houses: usize,
-    pub(super) pages: [PageLink; 5],
+    pub(super) pages: Vec<PageLink>,
 }
 
 /// An entry of the menu.
@@ -58,7 +59,7 @@ pub(super) struct PageLink {
     title: &'static str,
 }
 
-/// The menu.
+/// The menu of every site.
 pub(super) const PAGES: [PageLink; 5] = [
     PageLink { file: "index.html", title: "Leaderboard" },
     PageLink { file: "scenes.html", title: "Scenes" },
@@ -66,6 +67,9 @@ pub(super) const PAGES: [PageLink; 5] = [
     PageLink { file: "paper.html", title: "The paper's numbers" },
     PageLink { file: "errata.html", title: "Errata" },
 ];
+
+/// The entry of a site whose scenes have views from other places.
+pub(super) const WIDE_VIEWS: PageLink = PageLink { file: "wide_views.html", title: "Wide views" };
 
 /// One page.
 pub(super) struct Page<'a> {

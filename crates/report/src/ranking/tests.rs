@@ -183,6 +183,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             version: "1".to_owned(),
             manifest_sha256: "m".to_owned(),
             total_scenes: ids.len(),
+            wide_views: BTreeMap::new(),
             houses: ids.iter().map(|id| (id.clone(), format!("house of {id}"))).collect(),
             scenes: ids,
             scored_renderer: None,

@@ -45,7 +45,7 @@ const PAPER: [TableWords; 4] = [
 ];
 
 /// The tables that the paper does not have.
-const OURS: [TableWords; 4] = [
+const OURS: [TableWords; 6] = [
     (
         "RGB, true light",
         &[("Input view", PictureKind::RgbTrue, Views::Input), ("Novel views", PictureKind::RgbTrue, Views::Novel)],
@@ -61,6 +61,20 @@ const OURS: [TableWords; 4] = [
     (
         "Roughness and metallic, novel views",
         &[("Roughness", PictureKind::Roughness, Views::Novel), ("Metallic", PictureKind::Metallic, Views::Novel)],
+    ),
+    (
+        "Albedo, wide views",
+        &[
+            ("Wide views", PictureKind::Albedo, Views::Wide),
+            ("Unobserved in wide views", PictureKind::Albedo, Views::WideUnobserved),
+        ],
+    ),
+    (
+        "RGB, true light, wide views",
+        &[
+            ("Wide views", PictureKind::RgbTrue, Views::Wide),
+            ("Unobserved in wide views", PictureKind::RgbTrue, Views::WideUnobserved),
+        ],
     ),
 ];
 

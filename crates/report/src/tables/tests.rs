@@ -58,6 +58,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             manifest_sha256: String::new(),
             scenes: vec![scene("b"), scene("a")],
             total_scenes: 2,
+            wide_views: BTreeMap::new(),
             houses: BTreeMap::new(),
             scored_renderer: None,
         },

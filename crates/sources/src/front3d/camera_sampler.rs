@@ -8,12 +8,12 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::{TriangleMesh, triangle};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
 use super::camera_rules::SamplerRules;
 use super::furnished_house::FurnishedHouse;
+use crate::clearance::distance_to_anything;
 
 /// A camera that keeps to the rules.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -212,7 +212,7 @@ impl<'a> RoomSampler<'a> {
         let nearest_m = views.map(|view| self.nearest_by_dense_rays(view)).fold(nearest(&seen), f64::min);
         holds(nearest_m >= rules.min_distance_m, Refusal::TooNear)?;
         // Everything around the camera.
-        let clearance_m = self.distance_to_anything(camera.position(), rules.clearance_m);
+        let clearance_m = distance_to_anything(&self.house.scene, camera.position(), rules.clearance_m);
         holds(clearance_m >= rules.clearance_m, Refusal::NoClearance)?;
         Ok(FoundCamera { camera, score, nearest_m, mean_m, tries: 0 })
     }
@@ -226,16 +226,6 @@ impl<'a> RoomSampler<'a> {
         let floor = above.y - f64::from(down.distance);
         let lifted = floor + rules.height_m[0] + (rules.height_m[1] - rules.height_m[0]) * height;
         Some(DVec3::new(above.x, lifted, above.z))
-    }
-
-    /// The distance to the nearest triangle of the house, or `enough` where that is smaller.
-    fn distance_to_anything(&self, from: DVec3, enough: f64) -> f64 {
-        let from = from.as_vec3();
-        let mut nearest = enough as f32;
-        for surface in &self.house.scene.surfaces {
-            nearest = nearest.min(distance_to_mesh(&surface.mesh, from, nearest));
-        }
-        f64::from(nearest)
     }
 
     /// The distance to the nearest surface that a dense grid of rays meets, since table edges and lamps fit between ten by
@@ -323,19 +313,4 @@ pub fn score(house: &FurnishedHouse, seen: &[Option<usize>], architecture_weight
     let all = seen.len().max(1) as f64;
     let spread: f64 = kinds.values().map(|count| 1.0 - *count as f64 / all).product();
     f64::from(weighted) / all * (kinds.len() as f64 / 3.0) * spread
-}
-
-/// The distance to the nearest point of a mesh, or `enough` where that is smaller.
-fn distance_to_mesh(mesh: &TriangleMesh, from: Vec3, enough: f32) -> f32 {
-    let mut nearest = enough;
-    for index in 0..mesh.triangles.len() {
-        let corners = mesh.corners(index);
-        // The bounding box excludes most triangles.
-        let (low, high) = (corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2]));
-        if (from.clamp(low, high) - from).length() < nearest {
-            let corners = corners.map(|corner| corner.as_dvec3());
-            nearest = nearest.min(triangle::distance(corners, from.as_dvec3()) as f32);
-        }
-    }
-    nearest
 }

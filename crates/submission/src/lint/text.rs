@@ -54,6 +54,7 @@ mod tests {
             scenes: Vec::new(),
             total_scenes: 0,
             houses: Default::default(),
+            wide_views: Default::default(),
             scored_renderer: None,
         };
         let text = plain(&LintFile::new(String::new(), None, dataset, 1, folded(findings)));

@@ -41,7 +41,7 @@ impl<'a> Progress<'a> {
 
 impl<'a, M: Copy> ViewsJob<'a, M> {
     /// Checks the arguments, for `variants` material variants, and returns the planes to expose.
-    pub(crate) fn planes(&self, variants: usize) -> Result<Vec<Plane>, TracerError> {
+    pub(crate) fn planes(&self, variants: usize) -> Result<Vec<SharedPlane>, TracerError> {
         self.settings.check()?;
         self.subject.lighting.check(self.subject.world.emitters().groups(), variants)?;
         check_seeds(self.seeds)?;
@@ -49,12 +49,12 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     }
 
     /// The number of tiles that [`Self::render`] exposes.
-    pub(crate) fn tiles(&self, planes: &[Plane]) -> usize {
-        self.seeds.len() * planes.iter().map(|plane| plane.tiles().len()).sum::<usize>()
+    pub(crate) fn tiles(&self, planes: &[SharedPlane]) -> usize {
+        self.seeds.len() * planes.iter().map(|shared| shared.plane.tiles().len()).sum::<usize>()
     }
 
     /// Renders the views for the subject's material variants, which share their paths and are at most `K`.
-    pub(crate) fn render<const K: usize>(&self, planes: &[Plane], progress: &Progress<'_>) -> Vec<ViewsRender>
+    pub(crate) fn render<const K: usize>(&self, planes: &[SharedPlane], progress: &Progress<'_>) -> Vec<ViewsRender>
     where
         M: MaterialSource<'a, K> + Sync,
     {
@@ -65,12 +65,12 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
         // Expose every plane once per seed.
         for &seed in self.seeds {
             let settings = RenderSettings { seed, ..*self.settings };
-            let halves = planes
-                .iter()
-                .flat_map(|plane| splat::expose::<_, K>(self.subject, plane, &settings, &mut counts, &done));
-            for (view, halves) in halves.enumerate() {
-                for (views, half) in views.iter_mut().zip(halves) {
-                    views[view].halves.push(half);
+            for shared in planes {
+                let of_views = splat::expose::<_, K>(self.subject, &shared.plane, &settings, &mut counts, &done);
+                for (view, halves) in shared.views.iter().zip(of_views) {
+                    for (views, half) in views.iter_mut().zip(halves) {
+                        views[*view].halves.push(half);
+                    }
                 }
             }
         }
@@ -84,12 +84,28 @@ impl<'a, M: Copy> ViewsJob<'a, M> {
     }
 }
 
-/// One plane for all cameras if they share a centre, otherwise one per camera.
-fn planes(cameras: &[Camera], samples: u32) -> Vec<Plane> {
-    match Plane::new(cameras, samples) {
-        Some(plane) => vec![plane],
-        None => cameras.iter().map(|camera| Plane::alone(camera, samples)).collect(),
+/// A plane, and which cameras see it.
+#[derive(Clone, Debug)]
+pub(crate) struct SharedPlane {
+    pub(super) plane: Plane,
+    /// Indices of the cameras, in the order of the plane's views.
+    pub(super) views: Vec<usize>,
+}
+
+/// A plane for each group of cameras with one centre.
+pub(super) fn planes(cameras: &[Camera], samples: u32) -> Vec<SharedPlane> {
+    let mut groups: Vec<SharedPlane> = Vec::new();
+    for (view, camera) in cameras.iter().enumerate() {
+        let joined = groups.iter_mut().find_map(|group| Some((group.plane.with(camera)?, group)));
+        match joined {
+            Some((plane, group)) => {
+                group.plane = plane;
+                group.views.push(view);
+            }
+            None => groups.push(SharedPlane { plane: Plane::alone(camera, samples), views: vec![view] }),
+        }
     }
+    groups
 }
 
 fn check_seeds(seeds: &[u64]) -> Result<(), RequestFault> {

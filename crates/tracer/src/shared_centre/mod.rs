@@ -20,16 +20,15 @@ use crate::light_basis::LightGroups;
 use crate::material_source::OwnMaterials;
 use crate::settings::RenderSettings;
 use crate::world::World;
+use job::planes;
 pub(crate) use job::{Progress, ViewsJob};
 pub use lighting::{LightMix, Lighting};
-use plane::Plane;
 pub(crate) use splat::Subject;
 pub use view_light::{HalfLight, ViewLight, ViewsRender};
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
 ///
-/// If the cameras share a centre ([`share_centre`]), all views come from one set of paths per seed, otherwise each view
-/// from its own. A pixel gets about `settings.samples` paths per seed; `settings.seed` is not used. `progress` is
+/// Views whose cameras share a centre ([`groups_with_one_centre`]) come from one set of paths per seed. A pixel gets about `settings.samples` paths per seed; `settings.seed` is not used. `progress` is
 /// called from any thread with the number of finished tiles and their total. The bytes of the pictures are the same for
 /// any number of threads in the current rayon pool.
 ///
@@ -51,8 +50,9 @@ pub fn render_views(
     Ok(renders.pop().expect("there is one variant"))
 }
 
-/// Whether views from these cameras can come from one set of paths: the cameras stand at one point, up to the rounding
-/// of ray origins, and no picture extends more than 75 degrees from where the first camera looks.
-pub fn share_centre(cameras: &[Camera]) -> bool {
-    Plane::new(cameras, 1).is_some()
+/// The cameras in groups whose views can come from one set of paths, as indices: the cameras of a group stand at one point,
+/// up to the rounding of ray origins, and no picture extends more than 75 degrees from where the group's first camera looks.
+/// A camera belongs to the first group that will have it, so that cameras from elsewhere never change a group.
+pub fn groups_with_one_centre(cameras: &[Camera]) -> Vec<Vec<usize>> {
+    planes(cameras, 1).into_iter().map(|group| group.views).collect()
 }

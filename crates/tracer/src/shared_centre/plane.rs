@@ -49,22 +49,20 @@ const WIDEST: f64 = 0.258_819_045_102_520_74;
 const ORIGIN_ROUNDING: f64 = 1.0 / (1 << 24) as f64;
 
 impl Plane {
-    /// `None` if the cameras have no common centre, or if one looks too far away from where the first looks.
-    pub(super) fn new(cameras: &[Camera], samples: u32) -> Option<Self> {
-        let first = cameras.first()?;
-        let mut plane = Self::alone(first, samples);
-        for camera in &cameras[1..] {
-            plane.include(camera)?;
-        }
-        Some(plane)
-    }
-
     /// The plane of a single view.
     pub(super) fn alone(camera: &Camera, samples: u32) -> Self {
         let intrinsics = camera.intrinsics;
         let (columns, rows) = (0..intrinsics.width as i32, 0..intrinsics.height as i32);
         let view = PlaneView { intrinsics, turn: None, scale: 1.0 };
         Self { camera: *camera, views: vec![view], samples, columns, rows }
+    }
+
+    /// The same plane for one more view. `None` if its camera has another centre, or looks too far away from where the first
+    /// looks.
+    pub(super) fn with(&self, camera: &Camera) -> Option<Self> {
+        let mut plane = self.clone();
+        plane.include(camera)?;
+        Some(plane)
     }
 
     fn include(&mut self, camera: &Camera) -> Option<()> {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use mateval_image::{LinearRgb, png_io};
 use mateval_scene::reference::Emission;
 use mateval_scene::{Camera, Intrinsics};
-use mateval_tracer::shared_centre::share_centre;
+use mateval_tracer::shared_centre::groups_with_one_centre;
 use mateval_tracer::{LightGroups, RenderSettings, ViewsRender, World, render_views};
 
 use super::light_basis::{lit_world, view};
@@ -18,6 +18,10 @@ const OFFSETS: [[f64; 2]; 5] = [[0.0, 0.0], [5.0, 5.0], [5.0, -5.0], [-5.0, 5.0]
 
 fn views() -> Vec<Camera> {
     OFFSETS.map(|[x, y]| view(SIZE as u32).turned(x, y)).to_vec()
+}
+
+fn has_one_group(cameras: &[Camera]) -> bool {
+    groups_with_one_centre(cameras).len() == 1
 }
 
 fn settings(samples: u32) -> RenderSettings {
@@ -235,9 +239,9 @@ fn other_view_sets_fall_back_to_one_pass_a_view() {
     let moved = Camera::from_rotation(first.rotation(), first.position() + DVec3::X * 1e-3, first.intrinsics);
     let back = first.turned(0.0, 120.0);
     let rounded = Camera::from_rotation(first.rotation(), first.position() + DVec3::X * 1e-9, first.intrinsics);
-    assert!(share_centre(&[first, rounded]) && share_centre(&views()));
+    assert!(has_one_group(&[first, rounded]) && has_one_group(&views()));
     for other in [moved, back] {
-        assert!(!share_centre(&[first, other]));
+        assert!(!has_one_group(&[first, other]));
         let pair = rendered(&world, &[first, other], 2, 0..2);
         assert_eq!(pair.passes, 2);
         for (index, camera) in [first, other].iter().enumerate() {
@@ -245,6 +249,21 @@ fn other_view_sets_fall_back_to_one_pass_a_view() {
             assert_eq!(pair.views[index], alone.views[0]);
         }
     }
+}
+
+/// Views that share a centre keep their pixels when one from elsewhere is rendered with them.
+#[test]
+fn a_view_from_elsewhere_changes_no_other() {
+    let world = lit_world([[1.0; 3]; 4]);
+    let first = view(SIZE as u32);
+    let moved = Camera::from_rotation(first.rotation(), first.position() + DVec3::X * 0.3, first.intrinsics);
+    let mut with = views();
+    with.insert(2, moved);
+    assert_eq!(groups_with_one_centre(&with), [vec![0, 1, 3, 4, 5], vec![2]]);
+    let (alone, with) = (rendered(&world, &views(), 2, 0..2), rendered(&world, &with, 2, 0..2));
+    assert_eq!(with.passes, 2);
+    let others = with.views.iter().enumerate().filter(|(at, _)| *at != 2).map(|(_, view)| view);
+    assert!(alone.views.iter().eq(others));
 }
 
 /// Views of other sizes and focal lengths share the paths too, and each pixel gets the requested samples.
@@ -283,7 +302,7 @@ fn small_pictures_lose_nothing() {
     let intrinsics = Intrinsics::from_fov_x(8, 8, 90.0_f64.to_radians());
     let first = Camera { intrinsics, ..view(8) };
     let cameras = [first, first.turned(22.0, 0.0), first.turned(-22.0, 0.0)];
-    assert!(share_centre(&cameras));
+    assert!(has_one_group(&cameras));
     let groups = LightGroups::together(1);
     let done = render_views(&world, &cameras, &groups, &settings(16), &[1], &|_, _| ()).unwrap();
     assert_eq!(done.passes, 1);

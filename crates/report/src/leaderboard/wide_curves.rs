@@ -1,0 +1,206 @@
+//! Curves of scores in wide views against how wide they are.
+//!
+//! In: the single values of each method. Out: a chart for each kind of picture and metric, with a line for each method, whose
+//! points are means over all views of one class.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mateval_eval::metric::Metric;
+use mateval_eval::result::PictureValue;
+use mateval_eval::result_key::{PictureName, Region, Surfaces};
+use mateval_scene::dataset::WideView;
+use mateval_scene::layout::INPUT;
+use mateval_scene::{SceneId, ViewId};
+use serde::Serialize;
+
+/// What a method scored.
+pub(super) struct Method<'a> {
+    pub(super) name: &'a str,
+    pub(super) pictures: &'a [PictureValue],
+    pub(super) wide_views: &'a BTreeMap<SceneId, BTreeMap<ViewId, WideView>>,
+}
+
+/// By what views are sorted into classes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    /// Centimetres from the input camera; the input view is at 0.
+    Distance,
+    /// Fifths of the valid pixels that the input view does not show.
+    UnseenShare,
+}
+
+/// A chart and the same numbers as a table.
+#[derive(Debug, PartialEq, Serialize)]
+pub(super) struct Chart {
+    title: String,
+    /// The classes of views, from left to right.
+    classes: Vec<String>,
+    /// The place of each class, in units of the chart.
+    columns: Vec<f64>,
+    /// The places of the top and bottom lines, and their values.
+    scale: [(f64, String); 2],
+    lines: Vec<Line>,
+}
+
+/// The line of one method.
+#[derive(Debug, PartialEq, Serialize)]
+struct Line {
+    name: String,
+    /// Places of the points, as SVG states them.
+    points: String,
+    dots: Vec<[f64; 2]>,
+    /// The values of all classes.
+    cells: Vec<Option<String>>,
+}
+
+/// Size of a chart, and the margins around its lines, in its own units.
+const SIZE: [f64; 2] = [320.0, 180.0];
+const MARGIN: [f64; 2] = [28.0, 16.0];
+
+/// Number of classes of shares.
+const SHARES: u32 = 5;
+
+/// The charts of every kind of picture and metric that wide views have values of.
+pub(super) fn charts(methods: &[Method<'_>], axis: Axis) -> Vec<Chart> {
+    let mut kinds: Vec<(PictureName, Metric)> = Vec::new();
+    let wide = methods.iter().flat_map(|method| method.pictures).filter(|value| value.view.is_wide());
+    for value in wide.filter(|value| value.picture.surfaces == Surfaces::All && value.value.is_some()) {
+        let kind = (value.picture, value.metric);
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
+        }
+    }
+    kinds.into_iter().filter_map(|kind| chart(methods, axis, kind)).collect()
+}
+
+/// None where there are fewer than two classes, which make no line.
+fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Metric)) -> Option<Chart> {
+    let means: Vec<BTreeMap<u32, f64>> = methods.iter().map(|method| means(method, axis, picture, metric)).collect();
+    let classes: BTreeSet<u32> = means.iter().flat_map(|means| means.keys().copied()).collect();
+    if classes.len() < 2 {
+        return None;
+    }
+    let values = || means.iter().flat_map(BTreeMap::values).copied();
+    let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let [width, height] = SIZE;
+    let (first, last) = (*classes.first()?, *classes.last()?);
+    let column = |class: u32| {
+        let share = f64::from(class - first) / f64::from(last - first);
+        rounded(MARGIN[0] + share * (width - 2.0 * MARGIN[0]))
+    };
+    let row = |value: f64| {
+        let share = if high > low { (high - value) / (high - low) } else { 0.5 };
+        rounded(MARGIN[1] + share * (height - 2.0 * MARGIN[1]))
+    };
+    let line = |(method, means): (&Method<'_>, &BTreeMap<u32, f64>)| {
+        let dots: Vec<[f64; 2]> = means.iter().map(|(class, value)| [column(*class), row(*value)]).collect();
+        Line {
+            name: method.name.to_owned(),
+            points: dots.iter().map(|[x, y]| format!("{x},{y}")).collect::<Vec<_>>().join(" "),
+            dots,
+            cells: classes.iter().map(|class| Some(metric.style().text(*means.get(class)?))).collect(),
+        }
+    };
+    Some(Chart {
+        title: format!("{}, {}", picture.kind.title(), metric.style().title),
+        classes: classes.iter().map(|class| class_title(axis, *class)).collect(),
+        columns: classes.iter().map(|class| column(*class)).collect(),
+        scale: [high, low].map(|value| (row(value), metric.style().text(value))),
+        lines: methods.iter().zip(&means).map(line).collect(),
+    })
+}
+
+/// The mean of a method's values in each class.
+fn means(method: &Method<'_>, axis: Axis, picture: PictureName, metric: Metric) -> BTreeMap<u32, f64> {
+    let mut sums: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
+    let wanted = method
+        .pictures
+        .iter()
+        .filter(|value| value.picture == picture && value.metric == metric && value.region == Region::Valid);
+    for value in wanted {
+        let (Some(class), Some(number)) = (class_of(method, axis, value), value.value) else { continue };
+        let (sum, count) = sums.entry(class).or_default();
+        *sum += number;
+        *count += 1.0;
+    }
+    sums.into_iter().map(|(class, (sum, count))| (class, sum / count)).collect()
+}
+
+fn class_of(method: &Method<'_>, axis: Axis, value: &PictureValue) -> Option<u32> {
+    let wide = method.wide_views.get(&value.scene)?;
+    match (axis, wide.get(&value.view)) {
+        (Axis::Distance, Some(view)) => Some((100.0 * view.distance_m).round() as u32),
+        (Axis::Distance, None) => (value.view.as_str() == INPUT).then_some(0),
+        (Axis::UnseenShare, Some(view)) => {
+            Some(((f64::from(SHARES) * view.unseen_share).floor() as u32).min(SHARES - 1))
+        }
+        (Axis::UnseenShare, None) => None,
+    }
+}
+
+fn class_title(axis: Axis, class: u32) -> String {
+    match axis {
+        Axis::Distance => format!("{:.2} m", f64::from(class) / 100.0),
+        Axis::UnseenShare => format!("{} to {} %", 100 * class / SHARES, 100 * (class + 1) / SHARES),
+    }
+}
+
+fn rounded(place: f64) -> f64 {
+    (10.0 * place).round() / 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mateval_eval::result_key::PictureKind;
+
+    fn value(view: &str, number: f64) -> PictureValue {
+        PictureValue {
+            scene: SceneId::new("a").unwrap(),
+            view: ViewId::new(view).unwrap(),
+            picture: PictureName::whole(PictureKind::Albedo),
+            lighting: None,
+            region: Region::Valid,
+            metric: Metric::Psnr,
+            value: Some(number),
+            exact: false,
+            noise: None,
+            count: 1,
+        }
+    }
+
+    fn wide(distance_m: f64, unseen_share: f64) -> WideView {
+        WideView { distance_m, unseen_share }
+    }
+
+    #[test]
+    fn values_are_sorted_into_classes() {
+        let pictures = [
+            value("input", 40.0),
+            value("up_left", 35.0),
+            value("wide_1", 30.0),
+            value("wide_2", 20.0),
+            value("wide_3", 10.0),
+        ];
+        let views = [("wide_1", wide(0.3, 0.1)), ("wide_2", wide(0.3, 0.19)), ("wide_3", wide(1.0, 1.0))];
+        let views = views.map(|(id, view)| (ViewId::new(id).unwrap(), view));
+        let wide_views = BTreeMap::from([(SceneId::new("a").unwrap(), BTreeMap::from(views))]);
+        let methods = [Method { name: "m", pictures: &pictures, wide_views: &wide_views }];
+        let cells = |axis| {
+            let charts = charts(&methods, axis);
+            assert_eq!(charts.len(), 1);
+            let cells: Vec<String> = charts[0].lines[0].cells.iter().flatten().cloned().collect();
+            (charts[0].classes.clone(), cells)
+        };
+        let titles = |titles: &[&str]| titles.iter().map(|title| (*title).to_owned()).collect::<Vec<_>>();
+        assert_eq!(
+            cells(Axis::Distance),
+            (titles(&["0.00 m", "0.30 m", "1.00 m"]), titles(&["40.00", "25.00", "10.00"]))
+        );
+        assert_eq!(cells(Axis::UnseenShare), (titles(&["0 to 20 %", "80 to 100 %"]), titles(&["25.00", "10.00"])));
+        // The best is at the top, and the first class on the left.
+        let chart = &charts(&methods, Axis::Distance)[0];
+        assert_eq!(chart.lines[0].dots[0], MARGIN);
+        assert_eq!(chart.lines[0].dots[2], [SIZE[0] - MARGIN[0], SIZE[1] - MARGIN[1]]);
+    }
+}
