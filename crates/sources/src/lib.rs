@@ -13,10 +13,16 @@ pub mod below;
 pub mod bitterli;
 pub mod error;
 pub mod front3d;
+pub mod gltf;
+mod json_size;
+mod licence;
 pub mod log;
+mod map_disc;
+mod mean_color;
 pub mod npy;
 pub mod parts;
 pub mod source_scene;
 pub mod surface_mesh;
+mod unique_names;
 
 pub use error::{InvalidSource, SourceError};
