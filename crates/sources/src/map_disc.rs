@@ -35,8 +35,7 @@ impl MapDisc {
         // Only texels near the disc are sampled; a texel reaches at most 0.36 degrees from its centre.
         let near = libm::cos((radius + 0.01).min(PI));
         let close = |index: usize| texel_direction(index % columns, index / columns, 0.5, 0.5).dot(center) >= near;
-        let shares: Vec<(usize, f64)> =
-            (0..columns * ROWS).filter(|&i| close(i)).map(|i| (i, covered(i))).collect();
+        let shares: Vec<(usize, f64)> = (0..columns * ROWS).filter(|&i| close(i)).map(|i| (i, covered(i))).collect();
         let solid_angle: f64 = shares.iter().map(|(index, share)| share * texel_solid_angle(index / columns)).sum();
         (solid_angle > 0.0).then_some(Self { shares, solid_angle })
     }

@@ -40,8 +40,8 @@ use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
 use crate::error::{InvalidSource, SourceError};
-use crate::log::Log;
 use crate::licence::read_licence;
+use crate::log::Log;
 use crate::source_scene::LicenceText;
 use crate::unique_names::UniqueNames;
 use document::Document;

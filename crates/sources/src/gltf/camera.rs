@@ -26,5 +26,7 @@ pub(super) fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> 
     let right = linear.y_axis.cross(back).try_normalize()?;
     let rotation = DMat3::from_cols(right, back.cross(right), back);
     let position = world_from_node.w_axis.truncate();
-    position.is_finite().then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
+    position
+        .is_finite()
+        .then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
 }

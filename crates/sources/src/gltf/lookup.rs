@@ -86,6 +86,6 @@ mod tests {
 
     #[test]
     fn a_transform_that_overflows_is_one_point() {
-        assert_eq!(of(r#"{"scale":[1e39,1]}"#).apply(Vec2::ONE), Vec2::ZERO);
+        assert_eq!(of(r#"{"offset":[0,3e38],"scale":[1,3e38]}"#).apply(Vec2::ONE), Vec2::ZERO);
     }
 }

@@ -156,12 +156,7 @@ impl Reader<'_> {
     }
 
     /// The opacity of the alpha mode; none where everything is opaque.
-    fn opacity(
-        &mut self,
-        material: &gltf::Material<'_>,
-        lookups: &Lookups<'_>,
-        pointer: &str,
-    ) -> Option<ScalarInput> {
+    fn opacity(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> Option<ScalarInput> {
         let factor = material.pbr_metallic_roughness().base_color_factor()[3];
         let cutoff = match material.alpha_mode() {
             AlphaMode::Opaque => return None,
@@ -191,7 +186,8 @@ impl Reader<'_> {
             return None;
         }
         let two_sided = material.double_sided();
-        let glow = |radiance: [f32; 3], map| radiance.iter().any(|v| *v > 0.0).then_some(Glow { radiance, map, two_sided });
+        let glow =
+            |radiance: [f32; 3], map| radiance.iter().any(|v| *v > 0.0).then_some(Glow { radiance, map, two_sided });
         let Some(lookup) = lookups.emissive.as_ref().filter(|_| radiance != [0.0; 3]) else {
             return glow(radiance, None);
         };

@@ -56,10 +56,7 @@ impl Reader<'_> {
         let (all_vertices, all_triangles) =
             (self.vertices.saturating_add(vertices), self.triangles.saturating_add(triangles));
         if all_vertices > self.limits.vertices || all_triangles > self.limits.triangles {
-            return Err(PrimitiveFault::TooLarge {
-                triangles: self.limits.triangles,
-                vertices: self.limits.vertices,
-            });
+            return Err(PrimitiveFault::TooLarge { triangles: self.limits.triangles, vertices: self.limits.vertices });
         }
         (self.vertices, self.triangles) = (all_vertices, all_triangles);
         Ok(())
@@ -110,7 +107,9 @@ impl Reader<'_> {
 
 /// The corners of strips and fans as those of single triangles, with the same front (glTF 2.0, section 3.7.2.1).
 fn listed(numbers: Vec<u32>, mode: Mode) -> Vec<u32> {
-    let strip = |at: usize, corners: &[u32]| if at % 2 == 0 { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] };
+    let strip = |at: usize, corners: &[u32]| {
+        if at % 2 == 0 { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }
+    };
     match mode {
         Mode::TriangleStrip => numbers.windows(3).enumerate().flat_map(|(at, corners)| strip(at, corners)).collect(),
         Mode::TriangleFan => {

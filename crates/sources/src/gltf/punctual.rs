@@ -57,7 +57,11 @@ impl Reader<'_> {
                 self.lamp(name, to_world(mesh, DMat4::IDENTITY, false).0, power, pointer);
             }
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
-                self.omit(Omission::Visible, "cones of spot lights (a disc of equal power shines to one side)", pointer);
+                self.omit(
+                    Omission::Visible,
+                    "cones of spot lights (a disc of equal power shines to one side)",
+                    pointer,
+                );
                 let solid_angle = spot_solid_angle(f64::from(inner_cone_angle), f64::from(outer_cone_angle));
                 let power = radiant.map(|value| value * solid_angle);
                 self.lamp(name, facing_disc(world_from_node.w_axis.truncate(), towards), power, pointer);
@@ -100,7 +104,8 @@ impl Reader<'_> {
     /// Adds a sun in the direction `to_sun`, which lights a surface that faces it with `irradiance` in W/m^2. All suns share
     /// one map.
     fn sun(&mut self, to_sun: DVec3, irradiance: [f64; 3], pointer: &str) {
-        let kind = format!("suns as points (they are discs of {SUN_DEG} degree in a map of {}x{ROWS} texels)", 2 * ROWS);
+        let kind =
+            format!("suns as points (they are discs of {SUN_DEG} degree in a map of {}x{ROWS} texels)", 2 * ROWS);
         self.omit(Omission::Slight, &kind, pointer);
         let Some(disc) = MapDisc::new(to_sun, SUN_DEG) else {
             return self.omit(Omission::Visible, "suns without a direction", pointer);
