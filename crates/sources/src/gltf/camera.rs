@@ -10,11 +10,17 @@ const ASPECT: f64 = 16.0 / 9.0;
 /// Least and most rows of such a picture.
 const HEIGHTS: std::ops::RangeInclusive<f64> = 16.0..=8192.0;
 
-/// The node's camera; none for an orthographic one, one without a field of view, or one that a transform flattens.
+/// Vertical fields of view in radians that a camera may have.
+const FIELDS: std::ops::RangeInclusive<f64> = 1e-3..=3.1;
+/// Farthest that a camera may stand from the origin along an axis, in metres, as in a recipe.
+const FARTHEST_M: f64 = 1e6;
+
+/// The node's camera; none for an orthographic one, one of an impossible field of view, one that a transform flattens, and
+/// one too far away.
 pub(super) fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> Option<Camera> {
     let gltf::camera::Projection::Perspective(lens) = camera.projection() else { return None };
     let fov_y = f64::from(lens.yfov());
-    if !(fov_y > 0.0 && fov_y < std::f64::consts::PI) {
+    if !FIELDS.contains(&fov_y) {
         return None;
     }
     let aspect = lens.aspect_ratio().map_or(ASPECT, f64::from);
@@ -26,7 +32,6 @@ pub(super) fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> 
     let right = linear.y_axis.cross(back).try_normalize()?;
     let rotation = DMat3::from_cols(right, back.cross(right), back);
     let position = world_from_node.w_axis.truncate();
-    position
-        .is_finite()
-        .then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
+    let is_near = position.abs().max_element() <= FARTHEST_M;
+    is_near.then(|| Camera::from_rotation(rotation, position, Intrinsics::from_fov_y(WIDTH, height, fov_y)))
 }

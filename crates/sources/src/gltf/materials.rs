@@ -9,7 +9,7 @@ use mateval_scene::material::{
 use mateval_scene::reference::{EmissionMap, MaterialIndex};
 
 use super::lookup::Lookup;
-use super::omitted::Omission;
+use super::omitted::{LEFT_OUT, Omission};
 use super::read_material::{Glow, ReadMaterial};
 use super::reader::Reader;
 
@@ -103,7 +103,7 @@ impl Reader<'_> {
         if ior >= 1.0 && specular <= 1.0 {
             return specular;
         }
-        self.omit(Omission::Visible, "an index of refraction outside of 1 to 1.79 (1.5 is used)", pointer);
+        self.omit(Omission::Visible, "an index of refraction outside of 1 to 1.79", "used 1.5", pointer);
         0.5
     }
 
@@ -121,11 +121,11 @@ impl Reader<'_> {
             return None;
         }
         if factor < GLASS || transmission.transmission_texture().is_some() {
-            self.omit(Omission::Visible, "transmission of a part of the light", pointer);
+            self.omit(Omission::Visible, "transmission of a part of the light", "made it opaque", pointer);
             return None;
         }
         if factor < 1.0 {
-            self.omit(Omission::Visible, "transmission of most of the light (all is transmitted)", pointer);
+            self.omit(Omission::Visible, "transmission of most of the light", "made it clear glass", pointer);
         }
         let (eta, white) = (material.ior().filter(|ior| *ior >= 1.0).unwrap_or(DEFAULT_IOR), [1.0; 3]);
         let specular_reflectance = ColorInput::Constant(white);
@@ -134,12 +134,12 @@ impl Reader<'_> {
         let volume = material.volume().filter(|volume| volume.thickness_factor() > 0.0);
         let Some(volume) = volume else {
             if !is_smooth {
-                self.omit(Omission::Visible, "roughness of thin glass", pointer);
+                self.omit(Omission::Visible, "roughness of thin glass", "made it smooth", pointer);
             }
             return Some(MaterialModel::ThinDielectric { eta, specular_reflectance, specular_transmittance: color });
         };
         if volume.attenuation_color() != white {
-            self.omit(Omission::Visible, "absorption inside glass", pointer);
+            self.omit(Omission::Visible, "absorption inside glass", LEFT_OUT, pointer);
         }
         let microfacets = match roughness {
             ScalarInput::Constant(0.0) => None,
@@ -148,7 +148,7 @@ impl Reader<'_> {
                 Some(Microfacets { distribution: Distribution::Ggx, alpha })
             }
             ScalarInput::Texture { .. } => {
-                self.omit(Omission::Visible, "a texture of the roughness of glass", pointer);
+                self.omit(Omission::Visible, "a texture of the roughness of glass", "made it smooth", pointer);
                 None
             }
         };
@@ -171,8 +171,8 @@ impl Reader<'_> {
             }
         };
         if cutoff.is_some() && matches!(opacity, Some(ScalarInput::Texture { .. })) {
-            let kind = "a mask between texels (texels are cut out before they are interpolated)";
-            self.omit(Omission::Slight, kind, pointer);
+            let action = "cut out whole texels, and interpolated between them";
+            self.omit(Omission::Slight, "masks that are cut out between texels", action, pointer);
         }
         opacity
     }
@@ -182,7 +182,7 @@ impl Reader<'_> {
         let strength = material.emissive_strength().unwrap_or(1.0);
         let radiance = material.emissive_factor().map(|factor| factor * strength);
         if !radiance.iter().all(|value| (0.0..=1e9).contains(value)) {
-            self.omit(Omission::Visible, "emission that is negative or above 1e9", pointer);
+            self.omit(Omission::Visible, "emission that is negative or above 1e9", LEFT_OUT, pointer);
             return None;
         }
         let two_sided = material.double_sided();
@@ -208,24 +208,27 @@ impl Reader<'_> {
     }
 
     fn omit_set(&mut self, what: &str, pointer: &str) {
-        let kind = format!("a texture of {what} at another uv set than the material's first (its mean is used)");
-        self.omit(Omission::Visible, &kind, pointer);
+        let feature = format!("a texture of {what} at another uv set than the material's first");
+        self.omit(Omission::Visible, &feature, "used its mean", pointer);
     }
 
     /// Counts the parts of a material that the principled model does not have.
     fn report_omitted(&mut self, material: &gltf::Material<'_>, pointer: &str) {
         if material.normal_texture().is_some() {
-            self.omit(Omission::Visible, "normal maps", pointer);
+            self.omit(Omission::Visible, "normal maps", LEFT_OUT, pointer);
         }
         if material.occlusion_texture().is_some() {
-            self.omit(Omission::Slight, "occlusion maps, which path tracing does not need", pointer);
+            self.omit(Omission::Slight, "occlusion maps, which path tracing does not need", LEFT_OUT, pointer);
         }
         if material.unlit() {
-            self.omit(Omission::Visible, "materials without light (KHR_materials_unlit); light falls on them", pointer);
+            let action = "let light fall on it as on any other";
+            self.omit(
+                Omission::Visible,
+                "materials that show their colour without light (KHR_materials_unlit)",
+                action,
+                pointer,
+            );
         }
-        let unknown: Vec<String> = material.extensions().into_iter().flat_map(|map| map.keys().cloned()).collect();
-        for name in unknown {
-            self.omit(Omission::Visible, &name, pointer);
-        }
+        self.omit_extensions(material.extensions().into_iter().flat_map(|map| map.keys()), pointer);
     }
 }

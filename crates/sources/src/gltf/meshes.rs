@@ -8,7 +8,7 @@ use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, triangles}
 use mateval_scene::gltf_error::GltfError;
 
 use super::error::PrimitiveFault;
-use super::omitted::Omission;
+use super::omitted::{LEFT_OUT, Omission};
 use super::reader::Reader;
 
 impl Reader<'_> {
@@ -84,7 +84,8 @@ impl Reader<'_> {
     ) -> Option<gltf::Accessor<'p>> {
         let accessor = primitive.get(&Semantic::TexCoords(set.unwrap_or(0)));
         if accessor.is_none() && set.is_some() {
-            self.omit(Omission::Visible, "textures of a primitive without their texture coordinates", pointer);
+            let feature = "textures of a primitive without their texture coordinates";
+            self.omit(Omission::Visible, feature, "looked them up at one point", pointer);
         }
         accessor
     }
@@ -97,10 +98,10 @@ impl Reader<'_> {
 
     fn report_omitted_attributes(&mut self, primitive: &gltf::Primitive<'_>, pointer: &str) {
         if primitive.get(&Semantic::Colors(0)).is_some() {
-            self.omit(Omission::Visible, "colours of vertices (COLOR_0)", pointer);
+            self.omit(Omission::Visible, "colours of vertices (COLOR_0)", LEFT_OUT, pointer);
         }
         if primitive.morph_targets().next().is_some() {
-            self.omit(Omission::Visible, "morph targets (the mesh is shown without them)", pointer);
+            self.omit(Omission::Visible, "morph targets", "showed the mesh without them", pointer);
         }
     }
 }

@@ -39,7 +39,7 @@ use crate::log::Log;
 use crate::source_scene::{InstanceOrigin, LicenceText};
 pub use error::GltfSceneError;
 pub use limits::Limits;
-use omitted::Omission;
+use omitted::{LEFT_OUT, Omission};
 use reader::Reader;
 
 /// The radiance from everywhere that lights a scene whose file has no light.
@@ -105,10 +105,11 @@ pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
 /// Reports the parts of a file that no node shows.
 fn report_unused(reader: &mut Reader<'_>, file: &gltf::Document) {
     if file.animations().next().is_some() {
-        reader.omit(Omission::Slight, "animations (the scene is shown at rest)", "/animations");
+        reader.omit(Omission::Slight, "animations", "showed the scene at rest", "/animations");
     }
     for scene in file.scenes().skip(1) {
-        reader.omit(Omission::Slight, "scenes besides the default one", &format!("/scenes/{}", scene.index()));
+        let pointer = format!("/scenes/{}", scene.index());
+        reader.omit(Omission::Slight, "further scenes", LEFT_OUT, &pointer);
     }
 }
 

@@ -12,7 +12,7 @@ use mateval_scene::reference::{Emission, Surface, SurfaceIndex};
 use super::camera::perspective;
 use super::error::PrimitiveFault;
 use super::meshes::flat_shaded;
-use super::omitted::Omission;
+use super::omitted::{LEFT_OUT, Omission};
 use super::read_material::ReadMaterial;
 use super::reader::Reader;
 use crate::parts::parts_of_labels;
@@ -81,18 +81,16 @@ impl Reader<'_> {
         let camera = node.camera()?;
         let found = perspective(&camera, world_from_node);
         if found.is_none() {
-            self.omit(Omission::Visible, "cameras that are not perspective, or have no direction or angle", pointer);
+            let feature = "cameras that are not perspective, or have no sound direction, angle or place";
+            self.omit(Omission::Visible, feature, LEFT_OUT, pointer);
         }
         found
     }
 
     fn node(&mut self, node: &gltf::Node<'_>, world_from_node: DMat4, pointer: &str) {
-        let unknown: Vec<String> = node.extensions().into_iter().flat_map(|map| map.keys().cloned()).collect();
-        for name in unknown {
-            self.omit(Omission::Visible, &name, pointer);
-        }
+        self.omit_extensions(node.extensions().into_iter().flat_map(|map| map.keys()), pointer);
         if node.skin().is_some() {
-            self.omit(Omission::Visible, "skins (the mesh is shown without its bones)", pointer);
+            self.omit(Omission::Visible, "skins", "showed the mesh without its bones", pointer);
         }
         let name = node_name(node);
         if let Some(light) = node.light() {
@@ -101,8 +99,8 @@ impl Reader<'_> {
         let Some(mesh) = node.mesh() else { return };
         let groups = self.groups(&mesh);
         if groups.len() > 1 {
-            let kind = "nodes of several materials as one instance (they become one instance for each material)";
-            self.omit(Omission::Slight, kind, pointer);
+            let action = "made one instance for each of its materials";
+            self.omit(Omission::Slight, "nodes of several materials as one instance", action, pointer);
         }
         let is_only = groups.len() == 1;
         for group in groups {
@@ -117,8 +115,8 @@ impl Reader<'_> {
         for primitive in mesh.primitives() {
             let pointer = format!("/meshes/{}/primitives/{}", mesh.index(), primitive.index());
             if self.primitives >= self.limits.primitives {
-                let kind = format!("primitives beyond {}", self.limits.primitives);
-                self.omit(Omission::Visible, &kind, &pointer);
+                let feature = format!("primitives beyond {}", self.limits.primitives);
+                self.omit(Omission::Visible, &feature, LEFT_OUT, &pointer);
                 break;
             }
             self.primitives += 1;
@@ -143,7 +141,7 @@ impl Reader<'_> {
 
     fn report_primitive(&mut self, fault: &PrimitiveFault, pointer: &str) {
         if let PrimitiveFault::NotASurface = fault {
-            return self.omit(Omission::Slight, "points and lines", pointer);
+            return self.omit(Omission::Slight, "points and lines", LEFT_OUT, pointer);
         }
         self.log.warn(fault.code(), pointer, fault.to_string(), "left the primitive out");
     }

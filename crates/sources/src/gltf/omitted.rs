@@ -2,15 +2,25 @@
 
 use std::collections::BTreeMap;
 
-use mateval_scene::findings::shortened;
-
 use crate::log::Log;
+
+/// What is done with most features that cannot be represented.
+pub(super) const LEFT_OUT: &str = "left it out";
 
 /// The features that were left out so far.
 #[derive(Debug, Default)]
 pub(super) struct Omitted {
-    /// By code and kind: how often, and the JSON pointer of the first.
-    kinds: BTreeMap<(Omission, String), (usize, String)>,
+    kinds: BTreeMap<(Omission, String), Occurrences>,
+}
+
+/// The occurrences of one kind of feature.
+#[derive(Debug)]
+struct Occurrences {
+    count: usize,
+    /// The JSON pointer of the first.
+    first: String,
+    /// What was done instead.
+    action: String,
 }
 
 /// Whether leaving a feature out changes how the scene looks.
@@ -23,20 +33,21 @@ pub(super) enum Omission {
 }
 
 impl Omitted {
-    /// Counts a feature at a JSON pointer. `kind` begins a sentence that ends in "not represented".
-    pub(super) fn add(&mut self, omission: Omission, kind: &str, pointer: &str) {
-        let first = || (0, pointer.to_owned());
-        self.kinds.entry((omission, shortened(kind))).or_insert_with(first).0 += 1;
+    /// Counts a feature at a JSON pointer. `feature` begins a sentence that ends in "not represented", and `action` states
+    /// what is done instead.
+    pub(super) fn add(&mut self, omission: Omission, feature: &str, action: &str, pointer: &str) {
+        let first = || Occurrences { count: 0, first: pointer.to_owned(), action: action.to_owned() };
+        self.kinds.entry((omission, feature.to_owned())).or_insert_with(first).count += 1;
     }
 
     /// Reports every kind with its count.
     pub(super) fn report(self, log: &mut Log) {
-        for ((omission, kind), (count, first)) in self.kinds {
+        for ((omission, feature), Occurrences { count, first, action }) in self.kinds {
             let times = if count == 1 { String::new() } else { format!(" ({count} times; the first is named)") };
-            let message = format!("{kind}: not represented{times}");
+            let message = format!("{feature}: not represented{times}");
             match omission {
-                Omission::Visible => log.warn("not_represented", &first, message, "left it out"),
-                Omission::Slight => log.note("not_represented", &first, message, "left it out"),
+                Omission::Visible => log.warn("not_represented", &first, message, action),
+                Omission::Slight => log.note("not_represented", &first, message, action),
             }
         }
     }

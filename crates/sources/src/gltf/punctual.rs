@@ -13,7 +13,7 @@ use mateval_scene::material::{ColorInput, Material, MaterialModel, TextureIndex}
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, SourceTexture, Surface, SurfaceIndex};
 use mateval_scene::{Role, TriangleMesh};
 
-use super::omitted::Omission;
+use super::omitted::{LEFT_OUT, Omission};
 use super::reader::Reader;
 use crate::bitterli::primitives::{disk, sphere};
 use crate::map_disc::{MapDisc, ROWS};
@@ -38,15 +38,16 @@ impl Reader<'_> {
     pub(super) fn punctual(&mut self, light: &Light<'_>, world_from_node: DMat4, name: &str, pointer: &str) {
         let intensity = light.color().map(|channel| f64::from(channel) * f64::from(light.intensity()));
         if !intensity.iter().all(|value| (0.0..=1e12).contains(value)) {
-            return self.omit(Omission::Visible, "lights that are negative or brighter than 1e12", pointer);
+            return self.omit(Omission::Visible, "lights that are negative or brighter than 1e12", LEFT_OUT, pointer);
         }
         if intensity == [0.0; 3] {
             return;
         }
-        let kind = "units of light (punctual lights at 683 lm/W; emission of strength 1 as radiance 1)";
-        self.omit(Omission::Slight, kind, pointer);
+        let message = "lights in photometric units, and emission of materials in a unit that writers disagree on";
+        let action = "took 683 lm as 1 W, and emission of strength 1 as radiance 1, as Blender's exporter does";
+        self.log.note("light_units", "/extensions/KHR_lights_punctual", message, action);
         if light.range().is_some() {
-            self.omit(Omission::Slight, "ranges of lights", pointer);
+            self.omit(Omission::Slight, "ranges of lights", "let them shine on", pointer);
         }
         let radiant = intensity.map(|value| value / LUMENS_PER_WATT);
         let towards = -DMat3::from_mat4(world_from_node).z_axis.normalize_or_zero();
@@ -57,11 +58,8 @@ impl Reader<'_> {
                 self.lamp(name, to_world(mesh, DMat4::IDENTITY, false).0, power, pointer);
             }
             Kind::Spot { inner_cone_angle, outer_cone_angle } => {
-                self.omit(
-                    Omission::Visible,
-                    "cones of spot lights (a disc of equal power shines to one side)",
-                    pointer,
-                );
+                let action = "made each a disc of equal power, which shines to one side";
+                self.omit(Omission::Visible, "cones of spot lights", action, pointer);
                 let solid_angle = spot_solid_angle(f64::from(inner_cone_angle), f64::from(outer_cone_angle));
                 let power = radiant.map(|value| value * solid_angle);
                 self.lamp(name, facing_disc(world_from_node.w_axis.truncate(), towards), power, pointer);
@@ -74,7 +72,7 @@ impl Reader<'_> {
     fn lamp(&mut self, name: &str, mesh: TriangleMesh, power: [f64; 3], pointer: &str) {
         let (area, is_full) = (mesh.area(), self.scene.lights.len() >= self.limits.lights);
         if mesh.triangles.is_empty() || !(area > 0.0) {
-            return self.omit(Omission::Visible, "lights without a place", pointer);
+            return self.omit(Omission::Visible, "lights without a place", LEFT_OUT, pointer);
         }
         let surface = SurfaceIndex(self.scene.surfaces.len());
         // A Lambertian surface emits pi times its radiance times its area.
@@ -104,11 +102,10 @@ impl Reader<'_> {
     /// Adds a sun in the direction `to_sun`, which lights a surface that faces it with `irradiance` in W/m^2. All suns share
     /// one map.
     fn sun(&mut self, to_sun: DVec3, irradiance: [f64; 3], pointer: &str) {
-        let kind =
-            format!("suns as points (they are discs of {SUN_DEG} degree in a map of {}x{ROWS} texels)", 2 * ROWS);
-        self.omit(Omission::Slight, &kind, pointer);
+        let action = format!("spread each over {SUN_DEG} degree of a map of {}x{ROWS} texels", 2 * ROWS);
+        self.omit(Omission::Slight, "suns without an extent", &action, pointer);
         let Some(disc) = MapDisc::new(to_sun, SUN_DEG) else {
-            return self.omit(Omission::Visible, "suns without a direction", pointer);
+            return self.omit(Omission::Visible, "suns without a direction", LEFT_OUT, pointer);
         };
         let Some(texture) = self.sun_map(pointer) else { return };
         let map = &mut self.scene.textures[texture.0].texture;

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use mateval_scene::findings::shortened;
 use mateval_scene::material::TextureIndex;
 use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
 use mateval_scene::source_folder::SourceFolder;
 
 use super::limits::Limits;
-use super::omitted::{Omission, Omitted};
+use super::omitted::{LEFT_OUT, Omission, Omitted};
 use super::read_material::ReadMaterial;
 use super::texture_key::TextureKey;
 use crate::log::Log;
@@ -64,15 +65,22 @@ impl<'a> Reader<'a> {
     }
 
     /// Counts a feature that the scene cannot represent.
-    pub(super) fn omit(&mut self, omission: Omission, kind: &str, pointer: &str) {
-        self.omitted.add(omission, kind, pointer);
+    pub(super) fn omit(&mut self, omission: Omission, feature: &str, action: &str, pointer: &str) {
+        self.omitted.add(omission, feature, action, pointer);
+    }
+
+    /// Counts the extensions of an object that the scene cannot represent.
+    pub(super) fn omit_extensions<'n>(&mut self, names: impl Iterator<Item = &'n String>, pointer: &str) {
+        for name in names {
+            self.omit(Omission::Visible, &shortened(name), LEFT_OUT, pointer);
+        }
     }
 
     /// Adds a light, unless there are as many as the limit allows, which is reported. A number makes its name unique.
     pub(super) fn add_light(&mut self, name: &str, emission: Emission, camera_visible: bool, pointer: &str) {
         if self.scene.lights.len() >= self.limits.lights {
-            let kind = format!("lights beyond {}", self.limits.lights);
-            return self.omit(Omission::Visible, &kind, pointer);
+            let feature = format!("lights beyond {}", self.limits.lights);
+            return self.omit(Omission::Visible, &feature, LEFT_OUT, pointer);
         }
         let name = self.light_names.unique(name.to_owned());
         self.scene.lights.push(LightGroup { name, emission, camera_visible });

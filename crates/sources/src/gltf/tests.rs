@@ -207,6 +207,15 @@ fn textures_are_colours_and_channels() {
     assert_eq!(half.scene.textures[rough.0].texture.texel(1, 0)[0], 0.25);
 }
 
+/// A mesh has one uv: for a texture at another set than the first, its mean stands.
+#[test]
+fn one_uv_set() {
+    let scene = textured(json!({ "pbr": { "metallicRoughnessTexture": { "index": 0, "texCoord": 1 } } }));
+    let (ColorInput::Texture { .. }, roughness, _) = principled(&scene) else { panic!() };
+    assert_eq!(roughness, ScalarInput::Constant(0.5));
+    assert_eq!(findings(&scene), [("not_represented", "/materials/0")]);
+}
+
 #[test]
 fn alpha_modes() {
     let opacity = |extra: Value| {

@@ -88,29 +88,27 @@ impl Reader<'_> {
 
     /// Reads a texture, unless it has been read before. A fault of its image is reported once.
     fn texture(&mut self, texture: &gltf::Texture<'_>, aspect: Aspect) -> Option<TextureIndex> {
-        let wrap = self.wrap(texture);
+        let [wrap, wrap_v] = wraps(texture);
         let image = texture.source();
         let key = TextureKey::new(image.index(), wrap, aspect);
         if let Some(known) = self.textures.get(&key) {
             return *known;
         }
+        self.report_sampler(texture, wrap != wrap_v);
         let read = if self.faulty_images.contains(&image.index()) { None } else { self.load(&image, wrap, aspect) };
         self.textures.insert(key, read);
         read
     }
 
-    fn wrap(&mut self, texture: &gltf::Texture<'_>) -> Wrap {
-        use gltf::texture::MagFilter;
+    fn report_sampler(&mut self, texture: &gltf::Texture<'_>, wraps_differ: bool) {
         let pointer = format!("/textures/{}", texture.index());
-        let [u, v] = wraps(texture);
-        if u != v {
-            let kind = "a texture that continues differently along v than along u";
-            self.omit(Omission::Visible, kind, &pointer);
+        if wraps_differ {
+            let feature = "a texture that continues differently along v than along u";
+            self.omit(Omission::Visible, feature, "used the mode of u for both", &pointer);
         }
-        if texture.sampler().mag_filter() == Some(MagFilter::Nearest) {
-            self.omit(Omission::Slight, "textures that are not filtered (they are filtered bilinearly)", &pointer);
+        if texture.sampler().mag_filter() == Some(gltf::texture::MagFilter::Nearest) {
+            self.omit(Omission::Slight, "textures without a filter", "filtered them bilinearly", &pointer);
         }
-        u
     }
 
     fn load(&mut self, image: &gltf::Image<'_>, wrap: Wrap, aspect: Aspect) -> Option<TextureIndex> {
