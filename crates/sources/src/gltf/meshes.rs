@@ -109,7 +109,7 @@ impl Reader<'_> {
 /// The corners of strips and fans as those of single triangles, with the same front (glTF 2.0, section 3.7.2.1).
 fn listed(numbers: Vec<u32>, mode: Mode) -> Vec<u32> {
     let strip = |at: usize, corners: &[u32]| {
-        if at % 2 == 0 { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }
+        if at.is_multiple_of(2) { [corners[0], corners[1], corners[2]] } else { [corners[1], corners[0], corners[2]] }
     };
     match mode {
         Mode::TriangleStrip => numbers.windows(3).enumerate().flat_map(|(at, corners)| strip(at, corners)).collect(),

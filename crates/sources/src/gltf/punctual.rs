@@ -71,7 +71,7 @@ impl Reader<'_> {
     /// Adds a surface that emits this power, in watts, on its front. The camera does not see it, and light passes through.
     fn lamp(&mut self, name: &str, mesh: TriangleMesh, power: [f64; 3], pointer: &str) {
         let (area, is_full) = (mesh.area(), self.scene.lights.len() >= self.limits.lights);
-        if mesh.triangles.is_empty() || !(area > 0.0) {
+        if area <= 0.0 || !area.is_finite() {
             return self.omit(Omission::Visible, "lights without a place", LEFT_OUT, pointer);
         }
         let surface = SurfaceIndex(self.scene.surfaces.len());
@@ -86,7 +86,7 @@ impl Reader<'_> {
         }
     }
 
-    /// A material that light passes unchanged. It has no base colour, so nobody has to find it.
+    /// A material that light passes unchanged. It has no base colour, so it is not predicted.
     fn clear_material(&mut self) -> MaterialIndex {
         let white = ColorInput::Constant([1.0; 3]);
         let model =

@@ -141,12 +141,12 @@ fn primitives_are_parts() {
     assert_eq!((roughness, metallic), (ScalarInput::Constant(1.0), ScalarInput::Constant(1.0)));
 }
 
-/// A mirrored node keeps its front, and transforms multiply down the tree.
+/// A mirrored node keeps its front, rotations are normalised, and transforms multiply down the tree.
 #[test]
 fn transforms() {
     let nodes = json!([
         { "translation": [10, 0, 0], "children": [1] },
-        { "name": "chair", "mesh": 0, "scale": [-2, 1, 1], "rotation": [0, 0, 0.70710678, 0.70710678] },
+        { "name": "chair", "mesh": 0, "scale": [-2, 1, 1], "rotation": [0, 0, 1, 1] },
     ]);
     let scene = read_json(&with("/nodes", nodes));
     let mesh = &scene.scene.surfaces[0].mesh;
