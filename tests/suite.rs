@@ -22,6 +22,7 @@ mod suite {
     mod fetching;
     mod flat_bases;
     mod full_disk;
+    mod gltf;
     mod graph;
     mod help;
     mod house;

@@ -23,19 +23,13 @@ pub fn texture_of_bytes(path: &Path, bytes: Vec<u8>, encoding: Encoding, wrap: W
     Texture::new(width, height, color_texels(path, decoded, encoding)?, wrap)
 }
 
-/// Reads a picture's alpha channel as a texture of scalars; none for a picture without alpha.
-pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError> {
-    let (_, alpha) = read_with_alpha(path, Encoding::Linear, wrap)?;
-    Ok(alpha)
-}
-
-/// Reads the values of a picture's file, 0 to 1 for one of bytes, and its alpha channel, if it has one.
-pub fn read_texture_and_alpha(path: &Path, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
-    read_with_alpha(path, Encoding::Linear, wrap)
-}
-
-fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
-    let bytes = read_file(path)?;
+/// Reads a texture and its alpha channel, if it has one, from a file's bytes. `path` serves for errors only.
+pub fn texture_and_alpha_of_bytes(
+    path: &Path,
+    bytes: Vec<u8>,
+    encoding: Encoding,
+    wrap: Wrap,
+) -> Result<(Texture, Option<Texture>), ImageError> {
     if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
         let picture = exr_io::linear_or_grey_of_bytes(path, &bytes)?;
         let texels = Texels::Linear(picture.pixels().iter().map(|p| p.0).collect());
@@ -50,6 +44,21 @@ fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Textu
     let texels = color_texels(path, decoded, encoding)?;
     let alpha = alpha.map(|texels| Texture::new(width, height, texels, wrap)).transpose()?;
     Ok((Texture::new(width, height, texels, wrap)?, alpha))
+}
+
+/// Reads a picture's alpha channel as a texture of scalars; none for a picture without alpha.
+pub fn read_alpha(path: &Path, wrap: Wrap) -> Result<Option<Texture>, ImageError> {
+    let (_, alpha) = read_with_alpha(path, Encoding::Linear, wrap)?;
+    Ok(alpha)
+}
+
+/// Reads the values of a picture's file, 0 to 1 for one of bytes, and its alpha channel, if it has one.
+pub fn read_texture_and_alpha(path: &Path, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
+    read_with_alpha(path, Encoding::Linear, wrap)
+}
+
+fn read_with_alpha(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<(Texture, Option<Texture>), ImageError> {
+    texture_and_alpha_of_bytes(path, read_file(path)?, encoding, wrap)
 }
 
 fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {

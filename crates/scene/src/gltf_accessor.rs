@@ -2,6 +2,8 @@
 //! float must be finite.
 
 use gltf::accessor::DataType;
+use gltf::json::camera::Type;
+use gltf::json::validation::Checked;
 
 use crate::gltf_error::GltfError;
 
@@ -22,7 +24,29 @@ pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, GltfError> {
     if primitives.flat_map(|primitive| primitive.attributes.values()).any(|at| at.value() >= root.accessors.len()) {
         return Err(GltfError::NoAccessor);
     }
+    check_sources(root)?;
     Ok(gltf::Gltf::from_slice(bytes)?)
+}
+
+/// Fails where an image states no place of its bytes, or a camera no projection of its type. The gltf crate assumes that
+/// they do.
+fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
+    let has_source = |image: &gltf::json::Image| match image.buffer_view {
+        Some(_) => image.mime_type.is_some(),
+        None => image.uri.is_some(),
+    };
+    if let Some(image) = root.images.iter().position(|image| !has_source(image)) {
+        return Err(GltfError::NoImageSource { image });
+    }
+    let has_projection = |camera: &gltf::json::Camera| match camera.type_ {
+        Checked::Valid(Type::Perspective) => camera.perspective.is_some(),
+        Checked::Valid(Type::Orthographic) => camera.orthographic.is_some(),
+        Checked::Invalid => false,
+    };
+    match root.cameras.iter().position(|camera| !has_projection(camera)) {
+        Some(camera) => Err(GltfError::NoProjection { camera }),
+        None => Ok(()),
+    }
 }
 
 /// The entries of an accessor of floats, `N` an entry.
@@ -130,5 +154,19 @@ mod tests {
             let found = parse(&bytes).unwrap_err();
             assert_eq!(matches!(found, GltfError::StatedLength { .. }), length < 12, "{found}");
         }
+    }
+
+    /// The gltf crate panics where these are looked up.
+    #[test]
+    fn images_and_cameras_without_content_are_refused() {
+        let view = r#""buffers":[{"byteLength":1}],"bufferViews":[{"buffer":0,"byteLength":1}]"#;
+        let with = |part: &str| parse(format!(r#"{{"asset":{{"version":"2.0"}},{view},{part}}}"#).as_bytes());
+        assert!(with(r#""images":[{"uri":"a"},{"bufferView":0,"mimeType":"image/png"}]"#).is_ok());
+        for image in [r#"{"bufferView":0}"#, "{}"] {
+            let error = with(&format!(r#""images":[{image}]"#)).unwrap_err();
+            assert!(error.to_string().starts_with("/images/0: "), "{error}");
+        }
+        let camera = r#""cameras":[{"type":"perspective","orthographic":{"xmag":1,"ymag":1,"zfar":9,"znear":0}}]"#;
+        assert!(with(camera).unwrap_err().to_string().starts_with("/cameras/0: "));
     }
 }

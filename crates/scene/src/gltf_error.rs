@@ -17,6 +17,18 @@ pub enum GltfError {
     /// An attribute of a mesh names an accessor that the file does not have.
     #[error("not valid glTF: an attribute names an accessor that does not exist")]
     NoAccessor,
+    /// An image has neither a file nor a buffer view with its type.
+    #[error("/images/{image}: expected `uri`, or `bufferView` and `mimeType`")]
+    NoImageSource {
+        /// The image.
+        image: usize,
+    },
+    /// A camera lacks the projection of its type.
+    #[error("/cameras/{camera}: expected a projection of the camera's type")]
+    NoProjection {
+        /// The camera.
+        camera: usize,
+    },
     /// An accessor that should hold floats holds something else.
     #[error("accessor {accessor}: expected {expected} floats an entry")]
     NotFloats {

@@ -64,6 +64,8 @@ pub enum SourceKind {
     Bitterli,
     /// A room of a 3D-FRONT house.
     Front3d,
+    /// A glTF file.
+    Gltf,
 }
 
 impl fmt::Display for SourceKind {
@@ -71,6 +73,7 @@ impl fmt::Display for SourceKind {
         f.write_str(match self {
             Self::Bitterli => "bitterli",
             Self::Front3d => "front3d",
+            Self::Gltf => "gltf",
         })
     }
 }
@@ -124,7 +127,7 @@ mod tests {
 
     #[test]
     fn kinds_print_as_they_are_written() {
-        for kind in [SourceKind::Bitterli, SourceKind::Front3d] {
+        for kind in [SourceKind::Bitterli, SourceKind::Front3d, SourceKind::Gltf] {
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.to_string());
         }
     }

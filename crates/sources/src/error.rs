@@ -6,6 +6,7 @@ use mateval_scene::source_folder::FileFault;
 
 use crate::bitterli::BitterliError;
 use crate::front3d::HouseError;
+use crate::gltf::GltfSceneError;
 
 /// Why a source could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -61,4 +62,7 @@ pub enum InvalidSource {
     /// The file is not a 3D-FRONT house.
     #[error(transparent)]
     House(HouseError),
+    /// The file is not a glTF scene that can be read.
+    #[error(transparent)]
+    Gltf(GltfSceneError),
 }

@@ -3,6 +3,8 @@
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use mateval_scene::TriangleMesh;
 
+use crate::log::Log;
+
 /// Coordinates beyond this many metres are faults.
 const FARTHEST: f32 = 1e9;
 
@@ -17,6 +19,30 @@ pub struct Repairs {
     pub normals: usize,
     /// Texture coordinates set to 0 because they were not finite.
     pub uvs: usize,
+}
+
+impl Repairs {
+    /// Reports the repairs to `mesh`, which has been repaired.
+    pub(crate) fn report(&self, place: &str, mesh: &TriangleMesh, log: &mut Log) {
+        let of = mesh.triangles.len() + self.not_finite;
+        if self.not_finite > 0 {
+            let message =
+                format!("{} of {of} triangles have corners that are not finite or too far away", self.not_finite);
+            log.warn("not_finite", place, message, "left them out");
+        }
+        if self.degenerate > 0 {
+            let message = format!("{} of {of} triangles have no area", self.degenerate);
+            log.note("degenerate_triangles", place, message, "kept them");
+        }
+        if self.normals > 0 {
+            let message = format!("{} normals are zero or not finite", self.normals);
+            log.note("bad_normals", place, message, "computed them from the adjacent faces");
+        }
+        if self.uvs > 0 {
+            let message = format!("{} texture coordinates are not finite", self.uvs);
+            log.warn("not_finite", place, message, "used (0, 0)");
+        }
+    }
 }
 
 /// The mesh in world space. A mirroring transform keeps the front: the winding is reversed where the determinant is

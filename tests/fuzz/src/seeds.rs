@@ -8,6 +8,26 @@ use mateval_image::exr_io::{Precision, write_linear, write_scalar};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::{TriangleMesh, glb, obj};
 
+/// A scene with a textured triangle, every kind of light and a camera.
+const LIT: &str = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1,2,3]}],
+"nodes":[{"name":"a","mesh":0,"scale":[-1,2,1],"rotation":[0,0,0,1]},{"camera":0,"translation":[0,1,3]},
+{"extensions":{"KHR_lights_punctual":{"light":0}},"children":[4]},{"extensions":{"KHR_lights_punctual":{"light":1}}},
+{"extensions":{"KHR_lights_punctual":{"light":2}}}],
+"cameras":[{"type":"perspective","perspective":{"yfov":0.8,"znear":0.1,"aspectRatio":1.5}}],
+"extensions":{"KHR_lights_punctual":{"lights":[{"type":"point","intensity":9,"color":[1,0.5,0]},
+{"type":"spot","spot":{"innerConeAngle":0.1,"outerConeAngle":0.6}},{"type":"directional","intensity":3}]}},
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1},"mode":4,"material":0}]}],
+"materials":[{"alphaMode":"MASK","doubleSided":true,"emissiveFactor":[1,0,0],"pbrMetallicRoughness":
+{"baseColorFactor":[1,0.5,1,1],"baseColorTexture":{"index":0,"extensions":
+{"KHR_texture_transform":{"offset":[0.1,0],"rotation":0.3,"scale":[2,2]}}}},
+"extensions":{"KHR_materials_emissive_strength":{"emissiveStrength":4},"KHR_materials_ior":{"ior":1.4}}}],
+"textures":[{"source":0,"sampler":0}],"samplers":[{"wrapS":33071,"wrapT":33648,"magFilter":9728}],
+"images":[{"uri":"data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},
+{"bufferView":0,"byteOffset":36,"componentType":5126,"count":3,"type":"VEC2"}],
+"bufferViews":[{"buffer":0,"byteLength":60}],
+"buffers":[{"byteLength":60,"uri":"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAgD8AAIA/AACAPwAAAAAAAAAA"}]}"#;
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let corpus = PathBuf::from(std::env::args().nth(1).ok_or("name the folder of the corpus")?);
     let work = tempfile::tempdir()?;
@@ -88,7 +108,7 @@ fn archives(corpus: &Path, work: &Path) -> Result<(), Box<dyn std::error::Error>
     Ok(())
 }
 
-/// The sample's rug as binary glTF.
+/// The sample's rug as binary glTF, and a small scene with lights.
 fn geometry(corpus: &Path, work: &Path, source: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let limits = obj::ObjLimits { triangles: 100_000, corners: 300_000 };
     let bytes = std::fs::read(source.join("room/models/rug.obj"))?;
@@ -96,6 +116,9 @@ fn geometry(corpus: &Path, work: &Path, source: &Path) -> Result<(), Box<dyn std
         obj::read(&bytes, limits, obj::Materials::Ignored).map_err(|fault| format!("{fault:?}"))?.mesh;
     let path = work.join("a.glb");
     glb::write(&path, &[glb::GlbNode { name: "rug".to_owned(), mesh }])?;
-    keep(corpus, "glb", "rug.glb", &std::fs::read(path)?)?;
+    let bytes = std::fs::read(path)?;
+    keep(corpus, "glb", "rug.glb", &bytes)?;
+    keep(corpus, "gltf_scene", "rug.glb", &bytes)?;
+    keep(corpus, "gltf_scene", "lit.gltf", LIT.as_bytes())?;
     Ok(())
 }

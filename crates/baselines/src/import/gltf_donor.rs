@@ -10,11 +10,11 @@ use gltf::mesh::Mode;
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
+use mateval_scene::gltf_webp::with_own_pictures;
 use mateval_scene::source_folder::SourceFolder;
 
 use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
 use super::error::{ImportError, Limited, Place, Unsupported};
-use super::gltf_webp::with_own_pictures;
 use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
 
 /// Reads the file `name` of the folder.

@@ -13,7 +13,6 @@ mod files;
 mod flat_materials;
 mod frame;
 mod gltf_donor;
-mod gltf_webp;
 mod limits;
 mod obj_donor;
 mod rebake;

@@ -52,6 +52,12 @@ pub enum SceneFault {
     /// A camera by position and target looks nowhere, or straight up or down.
     #[error("camera: position and target must differ, and not only in height")]
     CameraDirection,
+    /// A glTF has no camera, and neither has the recipe.
+    #[error(
+        "the file has no perspective camera; add one, or state it in the recipe, as in \
+         `camera = {{ position = [4.0, 1.5, 3.0], target = [1.0, 0.8, 0.5], fov_y_deg = 50 }}`"
+    )]
+    NoCameraInFile,
     /// The house has no such room.
     #[error("the house has no room '{room}'; it has '{}'", rooms.join("', '"))]
     NoRoom {

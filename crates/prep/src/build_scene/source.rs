@@ -14,14 +14,19 @@ use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, 
 use mateval_sources::bitterli;
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
+use mateval_sources::gltf;
 use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 use mateval_tracer::World;
+
+/// Width and height in pixels where neither the recipe nor a glTF with a camera states them.
+const DEFAULT_SIZE: [u32; 2] = [480, 270];
 
 /// Reads the scene; paths are relative to `root`.
 pub(super) fn read(recipe: &Recipe, entry: &RecipeScene, root: &Path) -> Result<SourceScene, PrepError> {
     match entry.source().map_err(PrepError::scene(&entry.id))? {
         RecipeSource::Bitterli(xml) => bitterli_scene(recipe, entry, root, xml),
         RecipeSource::Front3d(room) => front3d_scene(recipe, entry, root, room),
+        RecipeSource::Gltf(file) => gltf_scene(recipe, entry, root, file),
     }
 }
 
@@ -48,11 +53,7 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
 fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, SceneFault> {
     let old = source.intrinsics;
-    let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or([old.width, old.height]);
-    if ![width, height].iter().all(|side| RESOLUTION.contains(side)) {
-        let (least, most) = RESOLUTION.into_inner();
-        return Err(SceneFault::FilmSize { width, height, least, most });
-    }
+    let [width, height] = picture_size(recipe, entry, [old.width, old.height])?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
         return given_camera(given, [width, height]);
     }
@@ -66,6 +67,48 @@ fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Res
         cy: (old.cy - f64::from(old.height) / 2.0) * scale + f64::from(height) / 2.0,
     };
     Ok(Camera { intrinsics, ..*source })
+}
+
+/// The recipe's resolution, or else the source's. Fails where that is out of range.
+fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[u32; 2], SceneFault> {
+    let [width, height] = entry.resolution.or(recipe.resolution).unwrap_or(own);
+    if [width, height].iter().all(|side| RESOLUTION.contains(side)) {
+        return Ok([width, height]);
+    }
+    let (least, most) = RESOLUTION.into_inner();
+    Err(SceneFault::FilmSize { width, height, least, most })
+}
+
+fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, file: &Path) -> Result<SourceScene, PrepError> {
+    let read = gltf::read(&root.join(file), &gltf::Limits::default())?;
+    Ok(SourceScene {
+        kind: SourceKind::Gltf,
+        lights: read.lights,
+        states_roughness: true,
+        states_metallic: true,
+        house: file.file_stem().map_or_else(|| entry.id.to_string(), |stem| stem.to_string_lossy().into_owned()),
+        file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        origins: read.origins,
+        camera: gltf_camera(recipe, entry, read.camera).map_err(PrepError::scene(&entry.id))?,
+        scene: read.scene,
+        findings: read.findings,
+        licence: read.licence,
+        files: read.source_files,
+        absent: read.absent_files,
+    })
+}
+
+/// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.
+fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, own: Option<Camera>) -> Result<Camera, SceneFault> {
+    let own_size = own.map_or(DEFAULT_SIZE, |camera| [camera.intrinsics.width, camera.intrinsics.height]);
+    let [width, height] = picture_size(recipe, entry, own_size)?;
+    if let Some(RecipeCamera::Given(given)) = &entry.camera {
+        return given_camera(given, [width, height]);
+    }
+    let camera = own.ok_or(SceneFault::NoCameraInFile)?;
+    let focal = camera.intrinsics.fy * f64::from(height) / f64::from(camera.intrinsics.height);
+    let (cx, cy) = (f64::from(width) / 2.0, f64::from(height) / 2.0);
+    Ok(Camera { intrinsics: Intrinsics { width, height, fx: focal, fy: focal, cx, cy }, ..camera })
 }
 
 fn given_camera(given: &GivenCamera, [width, height]: [u32; 2]) -> Result<Camera, SceneFault> {

@@ -12,7 +12,7 @@ use super::fault::{RecipeFault, RecipeSceneFault};
 use super::sizes::check_sizes;
 
 /// The keys of a scene that name its source.
-const SOURCE_KEYS: [&str; 2] = ["bitterli", "front3d"];
+const SOURCE_KEYS: [&str; 3] = ["bitterli", "front3d", "gltf"];
 
 /// One scene of a recipe.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -24,9 +24,12 @@ pub struct RecipeScene {
     pub bitterli: Option<PathBuf>,
     /// A room of a 3D-FRONT house.
     pub front3d: Option<Front3dRoom>,
-    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder or the house's uid.
+    /// A glTF file, .glb or .gltf.
+    pub gltf: Option<PathBuf>,
+    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or the
+    /// glTF's name.
     pub house: Option<String>,
-    /// The input camera; if absent, the camera of the Mitsuba scene.
+    /// The input camera; if absent, the camera of the Mitsuba scene or of the glTF.
     pub camera: Option<RecipeCamera>,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
@@ -70,6 +73,8 @@ pub enum RecipeSource<'a> {
     Bitterli(&'a Path),
     /// A room of a 3D-FRONT house.
     Front3d(&'a Front3dRoom),
+    /// A glTF.
+    Gltf(&'a Path),
 }
 
 /// A path that a scene's source needs.
@@ -91,26 +96,33 @@ impl RecipeScene {
     pub fn source(&self) -> Result<RecipeSource<'_>, RecipeSceneFault> {
         let bitterli = self.bitterli.as_deref().map(RecipeSource::Bitterli);
         let front3d = self.front3d.as_ref().map(RecipeSource::Front3d);
-        let mut named = [bitterli, front3d].into_iter().flatten();
+        let gltf = self.gltf.as_deref().map(RecipeSource::Gltf);
+        let mut named = [bitterli, front3d, gltf].into_iter().flatten();
         match (named.next(), named.next()) {
             (Some(source), None) => Ok(source),
             _ => Err(RecipeSceneFault::NotOneSource { keys: &SOURCE_KEYS }),
         }
     }
 
-    /// The folder that the paths of the scene's files are relative to: the XML's folder, or else `source`, the folder that
-    /// the recipe's paths are relative to.
+    /// The folder that the paths of the scene's files are relative to: the folder of the XML or glTF, or else `source`, the
+    /// folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
-        match &self.bitterli {
-            Some(xml) => source.join(xml).parent().map(Path::to_owned).unwrap_or_default(),
+        match self.main_file() {
+            Some(file) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),
             None => source.to_owned(),
         }
+    }
+
+    /// The XML or glTF, which names all other files of the scene.
+    fn main_file(&self) -> Option<&Path> {
+        self.bitterli.as_deref().or(self.gltf.as_deref())
     }
 
     /// The paths that the source needs, relative to the folder of the recipe's paths.
     pub(crate) fn source_paths(&self) -> Vec<SourcePath> {
         let path = |key, path: &Path, is_folder| SourcePath { key, path: path.to_owned(), is_folder };
         let mut paths: Vec<SourcePath> = self.bitterli.iter().map(|xml| path("bitterli", xml, false)).collect();
+        paths.extend(self.gltf.iter().map(|gltf| path("gltf", gltf, false)));
         if let Some(room) = &self.front3d {
             paths.push(path("house", &room.house, false));
             paths.push(path("models", &room.models, true));
@@ -149,18 +161,19 @@ impl RecipeScene {
     fn check_source(&self) -> Result<(), RecipeSceneFault> {
         match (self.source()?, &self.camera) {
             (RecipeSource::Front3d(_), None) => Err(RecipeSceneFault::NoCamera),
-            (RecipeSource::Bitterli(_), Some(RecipeCamera::Seed { .. } | RecipeCamera::Designer(_))) => {
-                Err(RecipeSceneFault::CameraOfRooms)
-            }
+            (
+                RecipeSource::Bitterli(_) | RecipeSource::Gltf(_),
+                Some(RecipeCamera::Seed { .. } | RecipeCamera::Designer(_)),
+            ) => Err(RecipeSceneFault::CameraOfRooms),
             _ => Ok(()),
         }
     }
 
     fn check_label_folders(&self, faults: &mut Vec<RecipeSceneFault>) {
-        let root = if self.bitterli.is_some() {
-            "the XML's folder"
-        } else {
-            "the folder that the recipe's paths are relative to"
+        let root = match (&self.bitterli, &self.gltf) {
+            (Some(_), _) => "the XML's folder",
+            (None, Some(_)) => "the glTF's folder",
+            (None, None) => "the folder that the recipe's paths are relative to",
         };
         for (set, folder) in &self.part_labels {
             if SourceFolder::relative(&folder.to_string_lossy()).is_err() {

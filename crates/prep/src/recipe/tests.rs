@@ -108,3 +108,18 @@ fn unknown_words_are_refused_with_their_line() {
     let error = read_text("name = 'x'\nresolutoin = [4, 9]").unwrap_err().to_string();
     assert!(error.contains("resolutoin") && error.contains("line 2"), "{error}");
 }
+
+#[test]
+fn a_gltf_is_a_source() {
+    let with = |words: &str| read_text(&format!("name = 'x'\n[[scene]]\nid = 'a'\ngltf = 'rooms/a.glb'\n{words}"));
+    let recipe = with("").unwrap();
+    assert_eq!(recipe.scenes[0].source().unwrap(), RecipeSource::Gltf(Path::new("rooms/a.glb")));
+    assert_eq!(recipe.scenes[0].root(Path::new("all")), Path::new("all/rooms"));
+    for (words, message) in [
+        ("bitterli = 'b.xml'", "exactly one of the keys `bitterli`, `front3d`, `gltf`"),
+        ("camera = { seed = 1 }", "`seed` and `designer` are for `front3d`"),
+        ("part_labels = { one = '../labels' }", "glTF's folder"),
+    ] {
+        assert!(with(words).unwrap_err().to_string().contains(message), "{words}");
+    }
+}

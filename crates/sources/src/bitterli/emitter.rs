@@ -8,7 +8,8 @@ use mateval_scene::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::texture::{Bounds, all_texels, mean_color};
+use super::texture::{Bounds, all_texels};
+use crate::mean_color::mean_color;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 

@@ -33,15 +33,17 @@ mod texture_key;
 mod transform;
 mod value;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
 use crate::error::{InvalidSource, SourceError};
+use crate::licence::read_licence;
 use crate::log::Log;
 use crate::source_scene::LicenceText;
+use crate::unique_names::UniqueNames;
 use document::Document;
 pub use error::{BitterliError, ValueError};
 pub use limits::Limits;
@@ -93,8 +95,7 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
         materials: BTreeMap::new(),
         totals: Totals::default(),
         has_environment: false,
-        light_names: BTreeSet::new(),
-        light_numbers: BTreeMap::new(),
+        light_names: UniqueNames::default(),
     };
     let camera = read_elements(&mut reader, &document).map_err(invalid)?;
     report_unused(&mut reader, &document);
@@ -117,19 +118,6 @@ fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, Stri
     let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
     let text = String::from_utf8(bytes).map_err(|_| SourceError::invalid(xml_path, InvalidSource::NotUtf8))?;
     Ok((source, name, text))
-}
-
-/// The licence beside the scene. A scene must not be passed on without it, so an unreadable licence is a finding.
-fn read_licence(source: &mut SourceFolder, log: &mut Log) -> Option<LicenceText> {
-    let file = ["LICENSE.txt", "LICENSE", "license.txt"].into_iter().find(|name| source.path(name).is_ok())?;
-    match source.read(file) {
-        Ok(bytes) => Some(LicenceText { file: file.to_owned(), text: String::from_utf8_lossy(&bytes).into_owned() }),
-        Err(fault) => {
-            let action = "left it out; copy it by hand";
-            log.push(mateval_scene::Severity::Warning, fault.code, file, "", fault.message, action);
-            None
-        }
-    }
 }
 
 fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {

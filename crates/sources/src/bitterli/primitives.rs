@@ -71,7 +71,7 @@ pub(crate) fn cube() -> TriangleMesh {
 }
 
 /// The disk of radius 1 at z = 0, facing +z, as a fan with the area of the disk; uv = (radius, angle / 2 pi).
-pub(super) fn disk() -> TriangleMesh {
+pub(crate) fn disk() -> TriangleMesh {
     let mut build = Builder::default();
     let step = 2.0 * PI / f64::from(SEGMENTS);
     // A polygon inscribed in the unit circle is smaller by sin(step) / step.
@@ -107,7 +107,7 @@ pub(super) fn cylinder(start: DVec3, end: DVec3, radius: f64) -> TriangleMesh {
 }
 
 /// A sphere that faces outwards, with poles at +-z; uv = (phi / 2 pi, theta / pi).
-pub(super) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
+pub(crate) fn sphere(center: DVec3, radius: f64) -> TriangleMesh {
     let mut build = Builder::default();
     let (columns, rows) = (SEGMENTS, SEGMENTS / 2);
     for row in 0..=rows {

@@ -1,6 +1,6 @@
 //! The state that all parts of the reader share: the scene under construction, its files and its findings.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use mateval_scene::Severity;
 use mateval_scene::material::TextureIndex;
@@ -11,6 +11,7 @@ use super::limits::Limits;
 use super::parameters::Parameters;
 use super::texture_key::TextureKey;
 use crate::log::Log;
+use crate::unique_names::UniqueNames;
 use mateval_scene::source_folder::{FileFault, SourceFolder};
 
 /// A scene under construction.
@@ -32,9 +33,7 @@ pub(super) struct Reader<'a> {
     pub(super) materials: BTreeMap<usize, MaterialIndex>,
     pub(super) totals: Totals,
     pub(super) has_environment: bool,
-    pub(super) light_names: BTreeSet<String>,
-    /// By name: the last number that was appended to it.
-    pub(super) light_numbers: BTreeMap<String, usize>,
+    pub(super) light_names: UniqueNames,
 }
 
 /// Totals over the shapes read so far.
@@ -59,13 +58,8 @@ impl<'a> Reader<'a> {
     }
 
     /// Adds a light. A number makes its name unique.
-    pub(super) fn add_light(&mut self, mut light: LightGroup) {
-        let stem = light.name.clone();
-        while !self.light_names.insert(light.name.clone()) {
-            let number = self.light_numbers.entry(stem.clone()).or_insert(1);
-            *number += 1;
-            light.name = format!("{stem}-{number}");
-        }
-        self.scene.lights.push(light);
+    pub(super) fn add_light(&mut self, light: LightGroup) {
+        let name = self.light_names.unique(light.name);
+        self.scene.lights.push(LightGroup { name, ..light });
     }
 }

@@ -8,7 +8,7 @@ use super::document::Element;
 use super::parameters::Parameters;
 use super::primitives;
 use super::reader::Reader;
-use crate::surface_mesh::{Repairs, smooth_normals, to_world};
+use crate::surface_mesh::{smooth_normals, to_world};
 use mateval_scene::findings::shortened;
 use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
 use mateval_scene::source_folder::{FileFault, SourceFolder};
@@ -79,7 +79,7 @@ impl<'a> Reader<'a> {
         }
         // In world space, impossible triangles are gone and missing normals are made.
         let (mut mesh, repairs) = to_world(object, world_from_object, flip);
-        self.report_repairs(&from.place, &repairs, &mesh);
+        repairs.report(&from.place, &mesh, &mut self.log);
         if mesh.triangles.is_empty() {
             self.log.warn("empty_mesh", &from.place, "expected triangles, found none", LEFT_OUT);
             return None;
@@ -93,27 +93,6 @@ impl<'a> Reader<'a> {
             self.log.warn("limit", &from.place, "the scene has more triangles or vertices than the limit", LEFT_OUT);
         }
         (!over).then_some(mesh)
-    }
-
-    fn report_repairs(&mut self, place: &str, repairs: &Repairs, mesh: &TriangleMesh) {
-        let of = mesh.triangles.len() + repairs.not_finite;
-        if repairs.not_finite > 0 {
-            let message =
-                format!("{} of {of} triangles have corners that are not finite or too far away", repairs.not_finite);
-            self.log.warn("not_finite", place, message, "left them out");
-        }
-        if repairs.degenerate > 0 {
-            let message = format!("{} of {of} triangles have no area", repairs.degenerate);
-            self.log.note("degenerate_triangles", place, message, "kept them");
-        }
-        if repairs.normals > 0 {
-            let message = format!("{} normals are zero or not finite", repairs.normals);
-            self.log.note("bad_normals", place, message, "computed them from the adjacent faces");
-        }
-        if repairs.uvs > 0 {
-            let message = format!("{} texture coordinates are not finite", repairs.uvs);
-            self.log.warn("not_finite", place, message, "used (0, 0)");
-        }
     }
 
     fn object_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<TriangleMesh> {

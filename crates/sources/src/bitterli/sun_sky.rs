@@ -13,9 +13,7 @@ use super::reader::Reader;
 use super::sun::{self, CIE_Y_INTEGRAL, SUN_DIAMETER_DEG};
 use super::transform::rotation;
 use super::value;
-
-/// Rows of the map; it has twice as many columns, so a texel is 0.35 degrees high.
-const ROWS: usize = 512;
+use crate::map_disc::{MapDisc, ROWS, texel_direction};
 
 /// The parameters of the plugins `sunsky`, `sun` and `sky`.
 #[derive(Clone, Copy, Debug)]
@@ -111,51 +109,17 @@ fn bake(sky: &SunSky) -> Option<Texture> {
     Texture::new(columns, ROWS, Texels::Linear(texels), Wrap::Repeat).ok()
 }
 
-/// The direction of a point in a texel. `right` and `down` run from 0 to 1 over the texel.
-fn texel_direction(column: usize, row: usize, right: f64, down: f64) -> DVec3 {
-    let phi = 2.0 * PI * (column as f64 + right) / (2 * ROWS) as f64;
-    let theta = PI * (row as f64 + down) / ROWS as f64;
-    let (sin_phi, cos_phi) = libm::sincos(phi);
-    let (sin_theta, cos_theta) = libm::sincos(theta);
-    DVec3::new(sin_phi * sin_theta, cos_theta, -cos_phi * sin_theta)
-}
-
 /// Spreads the sun's power over the texels that its disc covers. As in Mitsuba, the power is that of a disc of the sun's
 /// real size, whatever size is set.
 fn add_sun(texels: &mut [[f32; 3]], sky: &SunSky) {
-    // The fraction of a texel that the disc covers, by 16 x 16 samples.
-    const PARTS: usize = 16;
-    let radius = (sky.sun_diameter_deg / 2.0).to_radians().max(PI / ROWS as f64 / 2.0);
-    let least_cos = libm::cos(radius);
-    let columns = 2 * ROWS;
-    let covered = |index: usize| {
-        let inside = |part: usize| {
-            let (right, down) = ((part % PARTS) as f64 + 0.5, (part / PARTS) as f64 + 0.5);
-            let at = texel_direction(index % columns, index / columns, right / PARTS as f64, down / PARTS as f64);
-            at.dot(sky.sun) >= least_cos
-        };
-        (0..PARTS * PARTS).filter(|&part| inside(part)).count() as f64 / (PARTS * PARTS) as f64
-    };
-    // Only texels near the disc are sampled; a texel reaches at most 0.36 degrees from its centre.
-    let near = libm::cos((radius + 0.01).min(PI));
-    let close = |index: usize| texel_direction(index % columns, index / columns, 0.5, 0.5).dot(sky.sun) >= near;
-    let shares: Vec<(usize, f64)> = (0..texels.len()).filter(|&i| close(i)).map(|i| (i, covered(i))).collect();
-    let solid_angle: f64 = shares.iter().map(|(index, share)| share * texel_solid_angle(index / columns)).sum();
-    if solid_angle <= 0.0 {
-        return;
-    }
+    let Some(disc) = MapDisc::new(sky.sun, sky.sun_diameter_deg) else { return };
     // Each covered texel takes its share of the power.
     let true_solid_angle = 2.0 * PI * (1.0 - libm::cos((SUN_DIAMETER_DEG / 2.0).to_radians()));
     let radiance = sun::radiance(libm::asin(sky.sun.y.clamp(0.0, 1.0)), sky.turbidity);
-    for (index, share) in shares {
-        let factor = sky.sun_scale * share * true_solid_angle / solid_angle;
+    for (index, share) in disc.shares {
+        let factor = sky.sun_scale * share * true_solid_angle / disc.solid_angle;
         texels[index].iter_mut().zip(radiance).for_each(|(texel, value)| *texel += (value * factor) as f32);
     }
-}
-
-fn texel_solid_angle(row: usize) -> f64 {
-    let edge = |row: usize| libm::cos(PI * row as f64 / ROWS as f64);
-    PI / ROWS as f64 * (edge(row) - edge(row + 1))
 }
 
 /// The sky without the sun.
@@ -201,6 +165,7 @@ impl Dome {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::map_disc::texel_solid_angle;
 
     fn sky(elevation_deg: f64) -> SunSky {
         let (sin, cos) = elevation_deg.to_radians().sin_cos();

@@ -316,18 +316,6 @@ fn luminance_texture(texture: &Texture) -> Result<Texture, FileFault> {
         .map_err(|error| FileFault { code: "unreadable_texture", message: error.to_string() })
 }
 
-/// The mean colour of a texture's texels, summed in f64.
-pub(super) fn mean_color(texture: &Texture) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for y in 0..texture.height() {
-        for x in 0..texture.width() {
-            let texel = texture.texel(x, y);
-            sum.iter_mut().zip(texel).for_each(|(s, v)| *s += f64::from(v));
-        }
-    }
-    sum.map(|s| s / (texture.width() * texture.height()) as f64)
-}
-
 /// A linear colour, and the number of wavelengths that it approximates, if it is a spectrum.
 fn constant_color(element: &Element) -> Result<([f64; 3], Option<usize>), ValueError> {
     let text = element.attribute("value").unwrap_or("");

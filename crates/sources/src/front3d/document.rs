@@ -5,6 +5,7 @@ use serde_json::Value;
 
 use super::error::HouseError;
 use super::limits::Limits;
+use crate::json_size::JsonSize;
 
 /// Parses an object. Fails where the text is not JSON, not an object, or exceeds `limits`.
 pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
@@ -18,22 +19,9 @@ pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseErro
     serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason })
 }
 
-/// Counts the values in the text before it is parsed, since two bytes of text can take a hundred bytes of memory.
+/// Counts the values in the text before it is parsed.
 fn check_size(text: &[u8], limits: &Limits) -> Result<(), HouseError> {
-    let (mut values, mut containers, mut in_text, mut escaped) = (0_usize, 0_usize, false, false);
-    for byte in text {
-        if in_text {
-            in_text = escaped || *byte != b'"';
-            escaped = !escaped && *byte == b'\\';
-            continue;
-        }
-        match byte {
-            b'"' => in_text = true,
-            b',' | b':' => values += 1,
-            b'[' | b'{' => containers += 1,
-            _ => {}
-        }
-    }
+    let JsonSize { values, containers } = JsonSize::of(text);
     if values > limits.json_values || containers > limits.json_containers {
         let (most_values, most_containers) = (limits.json_values, limits.json_containers);
         return Err(HouseError::TooLarge { values, containers, most_values, most_containers });

@@ -1,0 +1,234 @@
+//! Materials: metallic-roughness as Blender's principled, glass by `KHR_materials_transmission`, alpha modes, emission.
+
+use gltf::material::AlphaMode;
+use mateval_image::texture_io::Encoding;
+use mateval_scene::findings::shortened;
+use mateval_scene::material::{
+    ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+};
+use mateval_scene::reference::{EmissionMap, MaterialIndex};
+
+use super::lookup::Lookup;
+use super::omitted::{LEFT_OUT, Omission};
+use super::read_material::{Glow, ReadMaterial};
+use super::reader::Reader;
+
+/// The index of refraction of `KHR_materials_ior` where the file states none.
+const DEFAULT_IOR: f32 = 1.5;
+/// Disney's `specular` is the reflectance at normal incidence over this; an index of 1.5 gives 0.5.
+const MOST_REFLECTANCE: f32 = 0.08;
+/// From this share of transmitted light on a material is glass.
+const GLASS: f32 = 0.5;
+
+/// The lookups of a material's textures. All are looked up at the uv set of the first; the mean stands for a texture at
+/// another set, since a mesh has one uv.
+struct Lookups<'a> {
+    base_color: Option<Lookup<'a>>,
+    metallic_roughness: Option<Lookup<'a>>,
+    emissive: Option<Lookup<'a>>,
+}
+
+impl<'a> Lookups<'a> {
+    fn new(material: &gltf::Material<'a>) -> Self {
+        let pbr = material.pbr_metallic_roughness();
+        Self {
+            base_color: pbr.base_color_texture().map(|info| Lookup::new(&info)),
+            metallic_roughness: pbr.metallic_roughness_texture().map(|info| Lookup::new(&info)),
+            emissive: material.emissive_texture().map(|info| Lookup::new(&info)),
+        }
+    }
+
+    /// The uv set of the material; none where it has no texture.
+    fn set(&self) -> Option<u32> {
+        let first = self.base_color.as_ref().or(self.metallic_roughness.as_ref()).or(self.emissive.as_ref());
+        first.map(|lookup| lookup.set)
+    }
+}
+
+impl Reader<'_> {
+    /// The material of a primitive, read when it is first used.
+    pub(super) fn material(&mut self, material: &gltf::Material<'_>) -> ReadMaterial {
+        if let Some(known) = self.materials.get(&material.index()) {
+            return *known;
+        }
+        let pointer = material.index().map_or_else(|| "/materials".to_owned(), |index| format!("/materials/{index}"));
+        self.report_omitted(material, &pointer);
+        let lookups = Lookups::new(material);
+        let model = self.model(material, &lookups, &pointer);
+        let opacity = self.opacity(material, &lookups, &pointer);
+        let glow = self.glow(material, &lookups, &pointer);
+        let own_name = || material.index().map_or_else(|| "default".to_owned(), |index| format!("material {index}"));
+        let name = material.name().map(shortened).unwrap_or_else(own_name);
+        self.scene.materials.push(Material { name, model, two_sided: true, opacity, bump: None });
+        let index = MaterialIndex(self.scene.materials.len() - 1);
+        let read = ReadMaterial { index, uv_set: lookups.set(), glow };
+        self.materials.insert(material.index(), read);
+        read
+    }
+
+    fn model(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> MaterialModel {
+        let pbr = material.pbr_metallic_roughness();
+        let [red, green, blue, _] = pbr.base_color_factor();
+        let base_color = match &lookups.base_color {
+            Some(lookup) => self.color(lookup, [red, green, blue]),
+            None => ColorInput::Constant([red, green, blue]),
+        };
+        let factors = [pbr.roughness_factor(), pbr.metallic_factor()];
+        let [roughness, metallic] = match &lookups.metallic_roughness {
+            Some(lookup) if Some(lookup.set) == lookups.set() => {
+                [self.scalar(lookup, 1, factors[0]), self.scalar(lookup, 2, factors[1])]
+            }
+            Some(lookup) => {
+                self.omit_set("metallic and roughness", pointer);
+                let mean = self.mean(lookup, Encoding::Linear);
+                [ScalarInput::Constant(factors[0] * mean[1]), ScalarInput::Constant(factors[1] * mean[2])]
+            }
+            None => factors.map(ScalarInput::Constant),
+        };
+        if let Some(glass) = self.glass(material, base_color, roughness, pointer) {
+            return glass;
+        }
+        let specular = self.specular(material, pointer);
+        MaterialModel::Principled { base_color, roughness, metallic, specular, flavour: PrincipledFlavour::Blender }
+    }
+
+    /// Disney's `specular` of the index of refraction; 0.5 where that is not representable.
+    fn specular(&mut self, material: &gltf::Material<'_>, pointer: &str) -> f32 {
+        let ior = material.ior().unwrap_or(DEFAULT_IOR);
+        if ior == DEFAULT_IOR {
+            return 0.5;
+        }
+        let share = (ior - 1.0) / (ior + 1.0);
+        let specular = share * share / MOST_REFLECTANCE;
+        if ior >= 1.0 && specular <= 1.0 {
+            return specular;
+        }
+        self.omit(Omission::Visible, "an index of refraction outside of 1 to 1.79", "used 1.5", pointer);
+        0.5
+    }
+
+    /// The glass of a material that transmits most light; none for any other material.
+    fn glass(
+        &mut self,
+        material: &gltf::Material<'_>,
+        color: ColorInput,
+        roughness: ScalarInput,
+        pointer: &str,
+    ) -> Option<MaterialModel> {
+        let transmission = material.transmission()?;
+        let factor = transmission.transmission_factor();
+        if factor == 0.0 {
+            return None;
+        }
+        if factor < GLASS || transmission.transmission_texture().is_some() {
+            self.omit(Omission::Visible, "transmission of a part of the light", "made it opaque", pointer);
+            return None;
+        }
+        if factor < 1.0 {
+            self.omit(Omission::Visible, "transmission of most of the light", "made it clear glass", pointer);
+        }
+        let (eta, white) = (material.ior().filter(|ior| *ior >= 1.0).unwrap_or(DEFAULT_IOR), [1.0; 3]);
+        let specular_reflectance = ColorInput::Constant(white);
+        let is_smooth = roughness == ScalarInput::Constant(0.0);
+        // Without a thickness the surface is a thin sheet (KHR_materials_transmission).
+        let volume = material.volume().filter(|volume| volume.thickness_factor() > 0.0);
+        let Some(volume) = volume else {
+            if !is_smooth {
+                self.omit(Omission::Visible, "roughness of thin glass", "made it smooth", pointer);
+            }
+            return Some(MaterialModel::ThinDielectric { eta, specular_reflectance, specular_transmittance: color });
+        };
+        if volume.attenuation_color() != white {
+            self.omit(Omission::Visible, "absorption inside glass", LEFT_OUT, pointer);
+        }
+        let microfacets = match roughness {
+            ScalarInput::Constant(0.0) => None,
+            ScalarInput::Constant(value) => {
+                let alpha = ScalarInput::Constant(value * value);
+                Some(Microfacets { distribution: Distribution::Ggx, alpha })
+            }
+            ScalarInput::Texture { .. } => {
+                self.omit(Omission::Visible, "a texture of the roughness of glass", "made it smooth", pointer);
+                None
+            }
+        };
+        Some(MaterialModel::Dielectric { eta, specular_reflectance, specular_transmittance: color, microfacets })
+    }
+
+    /// The opacity of the alpha mode; none where everything is opaque.
+    fn opacity(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> Option<ScalarInput> {
+        let factor = material.pbr_metallic_roughness().base_color_factor()[3];
+        let cutoff = match material.alpha_mode() {
+            AlphaMode::Opaque => return None,
+            AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
+            AlphaMode::Blend => None,
+        };
+        let opacity = match &lookups.base_color {
+            Some(lookup) => self.alpha(lookup, factor, cutoff),
+            None => {
+                let value = cutoff.map_or(factor, |cutoff| if factor >= cutoff { 1.0 } else { 0.0 });
+                (value < 1.0).then_some(ScalarInput::Constant(value))
+            }
+        };
+        if cutoff.is_some() && matches!(opacity, Some(ScalarInput::Texture { .. })) {
+            let action = "cut out whole texels, and interpolated between them";
+            self.omit(Omission::Slight, "masks that are cut out between texels", action, pointer);
+        }
+        opacity
+    }
+
+    /// The emission of a material. Emission of strength 1 is radiance 1, as Blender's exporter writes it.
+    fn glow(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> Option<Glow> {
+        let strength = material.emissive_strength().unwrap_or(1.0);
+        let radiance = material.emissive_factor().map(|factor| factor * strength);
+        if !radiance.iter().all(|value| (0.0..=1e9).contains(value)) {
+            self.omit(Omission::Visible, "emission that is negative or above 1e9", LEFT_OUT, pointer);
+            return None;
+        }
+        let two_sided = material.double_sided();
+        let glow =
+            |radiance: [f32; 3], map| radiance.iter().any(|v| *v > 0.0).then_some(Glow { radiance, map, two_sided });
+        let Some(lookup) = lookups.emissive.as_ref().filter(|_| radiance != [0.0; 3]) else {
+            return glow(radiance, None);
+        };
+        if Some(lookup.set) != lookups.set() {
+            self.omit_set("emission", pointer);
+            let mean = self.mean(lookup, Encoding::Srgb);
+            return glow(std::array::from_fn(|channel| radiance[channel] * mean[channel]), None);
+        }
+        match self.color(lookup, [1.0; 3]) {
+            ColorInput::Texture { texture, uv } => {
+                // A texture that is black everywhere is no lamp.
+                let is_lit = self.scene.textures[texture.0].texture.bytes().iter().any(|byte| *byte != 0);
+                if is_lit { glow(radiance, Some(EmissionMap { texture, uv })) } else { None }
+            }
+            // A texture that cannot be read does not glow: what it lights is unknown.
+            ColorInput::Constant(_) => None,
+        }
+    }
+
+    fn omit_set(&mut self, what: &str, pointer: &str) {
+        let feature = format!("a texture of {what} at another uv set than the material's first");
+        self.omit(Omission::Visible, &feature, "used its mean", pointer);
+    }
+
+    /// Counts the parts of a material that the principled model does not have.
+    fn report_omitted(&mut self, material: &gltf::Material<'_>, pointer: &str) {
+        if material.normal_texture().is_some() {
+            self.omit(Omission::Visible, "normal maps", LEFT_OUT, pointer);
+        }
+        if material.occlusion_texture().is_some() {
+            self.omit(Omission::Slight, "occlusion maps, which path tracing does not need", LEFT_OUT, pointer);
+        }
+        if material.unlit() {
+            let action = "let light fall on it as on any other";
+            self.omit(
+                Omission::Visible,
+                "materials that show their colour without light (KHR_materials_unlit)",
+                action,
+                pointer,
+            );
+        }
+        self.omit_extensions(material.extensions().into_iter().flat_map(|map| map.keys()), pointer);
+    }
+}

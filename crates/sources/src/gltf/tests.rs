@@ -1,0 +1,486 @@
+//! Tests on whole files, built here, with and without faults. `tests/suite/gltf.rs` reads files that Blender wrote.
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use mateval_image::{Picture, png_io};
+use mateval_scene::Severity;
+use mateval_scene::material::{ColorInput, MaterialModel, ScalarInput};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+use super::*;
+
+/// A triangle in z = 0 that faces +z: positions, uv (with v downwards) and indices.
+const FLOATS: [f32; 15] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+const INDICES: [u16; 3] = [0, 1, 2];
+
+fn triangle_bytes() -> Vec<u8> {
+    let floats = FLOATS.iter().flat_map(|value| value.to_le_bytes());
+    floats.chain(INDICES.iter().flat_map(|index| index.to_le_bytes())).collect()
+}
+
+fn data_uri(bytes: &[u8]) -> String {
+    format!("data:application/octet-stream;base64,{}", base64::encode(bytes))
+}
+
+/// A scene of one node with one triangle, whose buffer is part of the JSON.
+fn triangle() -> Value {
+    json!({
+        "asset": { "version": "2.0" },
+        "scene": 0,
+        "scenes": [{ "nodes": [0] }],
+        "nodes": [{ "name": "chair", "mesh": 0 }],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2, "material": 0 }] }],
+        "materials": [{ "name": "wood", "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.75 } }],
+        "accessors": [
+            { "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] },
+            { "bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 3, "type": "VEC2" },
+            { "bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR" },
+        ],
+        "bufferViews": [
+            { "buffer": 0, "byteLength": 60 },
+            { "buffer": 0, "byteOffset": 60, "byteLength": 6 },
+        ],
+        "buffers": [{ "byteLength": 66, "uri": data_uri(&triangle_bytes()) }],
+    })
+}
+
+/// [`triangle`] with the value at a JSON pointer set. A missing key is added; `-` appends to a list.
+fn with(pointer: &str, value: Value) -> Value {
+    changed(triangle(), pointer, value)
+}
+
+fn changed(mut file: Value, pointer: &str, value: Value) -> Value {
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    match file.pointer_mut(parent).unwrap() {
+        Value::Object(map) => drop(map.insert(key.to_owned(), value)),
+        Value::Array(list) if key == "-" => list.push(value),
+        Value::Array(list) => list[key.parse::<usize>().unwrap()] = value,
+        other => panic!("{other}"),
+    }
+    file
+}
+
+fn read_bytes_in(folder: &Path, bytes: &[u8]) -> Result<GltfScene, SourceError> {
+    let path = folder.join("room.gltf");
+    std::fs::write(&path, bytes).unwrap();
+    read(&path, &Limits::default())
+}
+
+fn read_bytes(bytes: &[u8]) -> Result<GltfScene, SourceError> {
+    read_bytes_in(tempfile::tempdir().unwrap().path(), bytes)
+}
+
+fn read_json(file: &Value) -> GltfScene {
+    read_bytes(file.to_string().as_bytes()).unwrap()
+}
+
+fn error_of(file: &Value) -> String {
+    read_bytes(file.to_string().as_bytes()).unwrap_err().to_string()
+}
+
+/// Code and place of each finding, but for `no_light`, which most of these files cause.
+fn findings(scene: &GltfScene) -> Vec<(&str, &str)> {
+    let others = scene.findings.iter().filter(|finding| finding.code != "no_light");
+    others.map(|finding| (finding.code.as_str(), finding.place.as_str())).collect()
+}
+
+fn principled(scene: &GltfScene) -> (ColorInput, ScalarInput, ScalarInput) {
+    match scene.scene.materials[0].model {
+        MaterialModel::Principled { base_color, roughness, metallic, .. } => (base_color, roughness, metallic),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The whole path of a small file, from a .gltf and from a .glb.
+#[test]
+fn a_node_is_an_instance() {
+    let mut apart = triangle();
+    apart["buffers"][0].as_object_mut().unwrap().remove("uri");
+    let glb = glb(&apart, &triangle_bytes());
+    for scene in [read_json(&triangle()), read_bytes(&glb).unwrap()] {
+        assert_eq!(findings(&scene), []);
+        let surface = &scene.scene.surfaces[0];
+        assert_eq!((surface.name.as_str(), scene.scene.materials[0].name.as_str()), ("chair", "wood"));
+        assert_eq!(surface.mesh.positions[1].to_array(), [1.0, 0.0, 0.0]);
+        // v counts from the top in the file, from the bottom here.
+        assert_eq!(surface.mesh.uvs.as_ref().unwrap()[1].to_array(), [1.0, 0.0]);
+        let expected = (ColorInput::Constant([1.0; 3]), ScalarInput::Constant(0.75), ScalarInput::Constant(0.0));
+        assert_eq!(principled(&scene), expected);
+        assert_eq!((scene.lights, scene.camera), (SceneLights::Stage, None));
+    }
+}
+
+fn glb(file: &Value, blob: &[u8]) -> Vec<u8> {
+    let padded = |mut bytes: Vec<u8>, with: u8| {
+        bytes.resize(bytes.len().next_multiple_of(4), with);
+        bytes
+    };
+    let (json, blob) = (padded(file.to_string().into_bytes(), b' '), padded(blob.to_vec(), 0));
+    let word = |value: usize| (value as u32).to_le_bytes();
+    let length = 28 + json.len() + blob.len();
+    let header = [b"glTF".as_slice(), &word(2), &word(length), &word(json.len()), b"JSON"].concat();
+    [header, json, [word(blob.len()).as_slice(), b"BIN\0"].concat(), blob].concat()
+}
+
+/// Primitives of one material are the parts of one instance; another material is another instance.
+#[test]
+fn primitives_are_parts() {
+    let same = triangle()["meshes"][0]["primitives"][0].clone();
+    let other = json!({ "attributes": { "POSITION": 0 }, "indices": 2 });
+    let file = changed(with("/meshes/0/primitives/-", same), "/meshes/0/primitives/-", other);
+    let scene = read_json(&file);
+    let names: Vec<&str> = scene.scene.surfaces.iter().map(|surface| surface.name.as_str()).collect();
+    assert_eq!(names, ["chair wood", "chair default"]);
+    assert_eq!(scene.origins[0].part_of_triangle, Some(vec![0, 1]));
+    assert_eq!(scene.origins[1].part_of_triangle, None);
+    assert_eq!(findings(&scene), [("not_represented", "/nodes/0")]);
+    // The material of primitives without one: glTF's defaults.
+    let MaterialModel::Principled { roughness, metallic, .. } = scene.scene.materials[1].model else { panic!() };
+    assert_eq!((roughness, metallic), (ScalarInput::Constant(1.0), ScalarInput::Constant(1.0)));
+}
+
+/// A mirrored node keeps its front, rotations are normalised, and transforms multiply down the tree.
+#[test]
+fn transforms() {
+    let nodes = json!([
+        { "translation": [10, 0, 0], "children": [1] },
+        { "name": "chair", "mesh": 0, "scale": [-2, 1, 1], "rotation": [0, 0, 1, 1] },
+    ]);
+    let scene = read_json(&with("/nodes", nodes));
+    let mesh = &scene.scene.surfaces[0].mesh;
+    assert_eq!(findings(&scene), []);
+    // (1, 0, 0) is scaled to (-2, 0, 0), turned to (0, -2, 0) and moved.
+    assert!(mesh.positions.iter().any(|place| (*place - glam::Vec3::new(10.0, -2.0, 0.0)).length() < 1e-5));
+    assert!((mesh.geometric_normal(0) - glam::DVec3::Z).length() < 1e-6, "{}", mesh.geometric_normal(0));
+}
+
+fn write_png(path: &Path) {
+    let texels = [[255, 0, 0, 255], [0, 255, 0, 0], [0, 0, 255, 100], [255, 255, 255, 200]];
+    png_io::write_rgba_bytes(path, &Picture::new(2, 2, texels.to_vec()).unwrap()).unwrap();
+}
+
+/// A material whose base colour and roughness come from an image beside the file, with a space in its name.
+fn textured(extra: Value) -> GltfScene {
+    let folder = tempfile::tempdir().unwrap();
+    write_png(&folder.path().join("a b.png"));
+    let pbr = json!({ "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 0 } });
+    let mut material = json!({ "pbrMetallicRoughness": pbr });
+    for (key, value) in extra.as_object().unwrap() {
+        match key.as_str() {
+            "pbr" => {
+                material["pbrMetallicRoughness"].as_object_mut().unwrap().extend(value.as_object().unwrap().clone())
+            }
+            _ => material[key] = value.clone(),
+        }
+    }
+    let file = changed(with("/materials/0", material), "/images", json!([{ "uri": "a%20b.png" }]));
+    let file = changed(file, "/textures", json!([{ "source": 0, "sampler": 0 }]));
+    let file = changed(file, "/samplers", json!([{ "wrapS": 33071, "wrapT": 33071 }]));
+    read_bytes_in(folder.path(), file.to_string().as_bytes()).unwrap()
+}
+
+#[test]
+fn textures_are_colours_and_channels() {
+    let scene = textured(json!({}));
+    assert_eq!(findings(&scene), []);
+    let (ColorInput::Texture { texture: color, .. }, roughness, metallic) = principled(&scene) else { panic!() };
+    let ScalarInput::Texture { texture: numbers, channel: 1, .. } = roughness else { panic!("{roughness:?}") };
+    let ScalarInput::Texture { texture: same, channel: 2, .. } = metallic else { panic!("{metallic:?}") };
+    assert_eq!(numbers, same);
+    let textures = &scene.scene.textures;
+    assert_eq!(
+        (textures[color.0].name.as_str(), textures[color.0].texture.wrap()),
+        ("a b.png", mateval_image::Wrap::Clamp)
+    );
+    assert!(textures[color.0].sha256.is_some() && scene.source_files.iter().any(|(file, _)| file == "a b.png"));
+    assert_eq!(textures[color.0].texture.texel(0, 0), [1.0, 0.0, 0.0]);
+    // Factors multiply linear values.
+    let half = textured(json!({ "pbr": { "baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0.25 } }));
+    let (ColorInput::Texture { texture, .. }, ScalarInput::Texture { texture: rough, channel: 0, .. }, _) =
+        principled(&half)
+    else {
+        panic!()
+    };
+    assert_eq!(half.scene.textures[texture.0].texture.texel(1, 1), [0.5, 1.0, 1.0]);
+    assert_eq!(half.scene.textures[rough.0].texture.texel(1, 0)[0], 0.25);
+}
+
+/// A mesh has one uv: for a texture at another set than the first, its mean stands.
+#[test]
+fn one_uv_set() {
+    let scene = textured(json!({ "pbr": { "metallicRoughnessTexture": { "index": 0, "texCoord": 1 } } }));
+    let (ColorInput::Texture { .. }, roughness, _) = principled(&scene) else { panic!() };
+    assert_eq!(roughness, ScalarInput::Constant(0.5));
+    assert_eq!(findings(&scene), [("not_represented", "/materials/0")]);
+}
+
+#[test]
+fn alpha_modes() {
+    let opacity = |extra: Value| {
+        let scene = textured(extra);
+        match scene.scene.materials[0].opacity {
+            Some(ScalarInput::Texture { texture, .. }) => {
+                let texture = &scene.scene.textures[texture.0].texture;
+                Some([texture.texel(0, 0)[0], texture.texel(1, 0)[0], texture.texel(0, 1)[0], texture.texel(1, 1)[0]])
+            }
+            Some(ScalarInput::Constant(value)) => Some([value; 4]),
+            None => None,
+        }
+    };
+    assert_eq!(opacity(json!({})), None);
+    assert_eq!(opacity(json!({ "alphaMode": "MASK" })), Some([1.0, 0.0, 0.0, 1.0]));
+    assert_eq!(opacity(json!({ "alphaMode": "MASK", "alphaCutoff": 0.3 })), Some([1.0, 0.0, 1.0, 1.0]));
+    let blend = opacity(json!({ "alphaMode": "BLEND", "pbr": { "baseColorFactor": [1, 1, 1, 0.5] } })).unwrap();
+    assert_eq!(blend, [0.5, 0.0, 0.5 * (100.0 / 255.0), 0.5 * (200.0 / 255.0)]);
+}
+
+#[test]
+fn glass_transmits() {
+    let extensions =
+        json!({ "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_ior": { "ior": 1.33 } });
+    let pbr = json!({ "baseColorFactor": [0.9, 1, 1, 1], "roughnessFactor": 0 });
+    let scene = read_json(&with("/materials/0", json!({ "pbrMetallicRoughness": pbr, "extensions": extensions })));
+    let MaterialModel::ThinDielectric { eta, specular_transmittance, .. } = scene.scene.materials[0].model else {
+        panic!()
+    };
+    assert_eq!((eta, specular_transmittance), (1.33, ColorInput::Constant([0.9, 1.0, 1.0])));
+    assert_eq!(findings(&scene), []);
+}
+
+#[test]
+fn surfaces_that_emit() {
+    let material = json!({
+        "emissiveFactor": [1, 0.5, 0], "doubleSided": true,
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 8 } },
+    });
+    let scene = read_json(&with("/materials/0", material));
+    let expected = Emission::Area {
+        surfaces: vec![mateval_scene::reference::SurfaceIndex(0)],
+        radiance: [8.0, 4.0, 0.0],
+        map: None,
+        two_sided: true,
+    };
+    assert_eq!((&scene.scene.lights[0].emission, scene.lights), (&expected, SceneLights::Own));
+}
+
+/// A file with lights in its nodes 1, 2 and so on.
+fn lit(lights: &[Value]) -> Value {
+    let mut file = with("/extensions", json!({ "KHR_lights_punctual": { "lights": lights } }));
+    for light in 0..lights.len() {
+        let node = json!({ "extensions": { "KHR_lights_punctual": { "light": light } }, "translation": [0, 2, 0] });
+        file = changed(changed(file, "/nodes/-", node), "/scenes/0/nodes/-", json!(light + 1));
+    }
+    file
+}
+
+/// 683 candela over the whole sphere are 4 pi watts.
+#[test]
+fn a_point_light_keeps_its_power() {
+    let scene = read_json(&lit(&[json!({ "type": "point", "intensity": 683, "color": [1, 0.5, 0] })]));
+    let Emission::Area { surfaces, radiance, .. } = &scene.scene.lights[0].emission else { panic!() };
+    let area = scene.scene.surfaces[surfaces[0].0].mesh.area();
+    for (found, share) in radiance.iter().zip([1.0, 0.5, 0.0]) {
+        assert!((PI * area * f64::from(*found) - 4.0 * PI * share).abs() < 1e-4);
+    }
+    assert!(!scene.scene.lights[0].camera_visible);
+    assert!(!scene.scene.materials[scene.scene.surfaces[1].material.0].has_appearance());
+}
+
+#[test]
+fn ten_thousand_lights_are_limited() {
+    let lights = vec![json!({ "type": "point", "intensity": 1 }); 10_000];
+    let scene = read_json(&lit(&lights));
+    assert_eq!((scene.scene.lights.len(), scene.scene.surfaces.len()), (128, 129));
+    let beyond = scene.findings.iter().find(|finding| finding.message.contains("lights beyond 128"));
+    assert!(beyond.unwrap().message.contains("9872 times"), "{beyond:?}");
+    let names: std::collections::BTreeSet<_> = scene.scene.lights.iter().map(|light| &light.name).collect();
+    assert_eq!(names.len(), 128);
+}
+
+#[test]
+fn the_first_perspective_camera_counts() {
+    let cameras = json!([
+        { "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1 } },
+        { "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1, "aspectRatio": 2.0 } },
+    ]);
+    let nodes = json!([{ "mesh": 0, "children": [1, 2] }, { "camera": 0 }, { "camera": 1, "translation": [0, 1, 3], "scale": [2, 2, 2] }]);
+    let scene = read_json(&changed(with("/cameras", cameras), "/nodes", nodes));
+    let camera = scene.camera.unwrap();
+    assert_eq!(camera.position().to_array(), [0.0, 1.0, 3.0]);
+    assert_eq!((camera.intrinsics.width, camera.intrinsics.height), (480, 240));
+    assert_eq!(findings(&scene), [("not_represented", "/nodes/1")]);
+}
+
+/// Each kind is one finding, however often it occurs.
+#[test]
+fn kinds_are_counted() {
+    let extensions = json!({ "KHR_materials_clearcoat": {}, "KHR_materials_sheen": {} });
+    let mut file = with("/materials/0", json!({ "name": "a", "extensions": extensions }));
+    file = changed(file, "/materials/-", json!({ "extensions": { "KHR_materials_sheen": {} } }));
+    file = changed(
+        file,
+        "/meshes/0/primitives/-",
+        json!({ "attributes": { "POSITION": 0 }, "indices": 2, "material": 1 }),
+    );
+    let scene = read_json(&file);
+    let messages: Vec<&str> = scene.findings.iter().map(|finding| finding.message.as_str()).collect();
+    assert!(messages.contains(&"KHR_materials_clearcoat: not represented"), "{messages:?}");
+    assert!(messages.contains(&"KHR_materials_sheen: not represented (2 times; the first is named)"), "{messages:?}");
+}
+
+#[test]
+fn required_extensions_are_refused_by_name() {
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization", "ACME_new"] {
+        let error = error_of(&with("/extensionsRequired", json!([name])));
+        assert!(error.contains("room.gltf") && error.contains(&format!("/extensionsRequired: '{name}'")), "{error}");
+    }
+    let known = with("/extensionsRequired", json!(["KHR_texture_transform", "KHR_lights_punctual"]));
+    assert_eq!(findings(&read_json(&known)), []);
+}
+
+#[test]
+fn circles_end() {
+    let nodes = json!([{ "mesh": 0, "children": [1] }, { "children": [0, 1] }]);
+    let scene = read_json(&with("/nodes", nodes));
+    assert_eq!(
+        (scene.scene.surfaces.len(), findings(&scene).as_slice()),
+        (1, &[("not_a_tree", "/nodes/0"), ("not_a_tree", "/nodes/1")][..])
+    );
+}
+
+#[test]
+fn missing_files_have_a_pointer() {
+    for uri in ["none.bin", "../secret.bin", "/etc/passwd", "data:text/plain,hello", "data:;base64,@@@"] {
+        let error = error_of(&with("/buffers/0/uri", json!(uri)));
+        assert!(error.contains("room.gltf") && error.contains("/buffers/0/uri: "), "{error}");
+    }
+    let mut none = triangle();
+    none["buffers"][0].as_object_mut().unwrap().remove("uri");
+    assert!(error_of(&none).contains("/buffers/0: expected a `uri`"));
+    // A missing image is replaced.
+    let pbr = json!({ "baseColorTexture": { "index": 0 } });
+    let mut file =
+        changed(with("/materials/0", json!({ "pbrMetallicRoughness": pbr })), "/textures", json!([{ "source": 0 }]));
+    for uri in ["none.png", "../secret.png", "room.gltf"] {
+        file = changed(file, "/images", json!([{ "uri": uri }]));
+        let scene = read_json(&file);
+        assert_eq!(findings(&scene).iter().map(|finding| finding.1).collect::<Vec<_>>(), ["/images/0"], "{uri}");
+        assert_eq!(principled(&scene).0, ColorInput::Constant([0.5; 3]));
+    }
+}
+
+/// Faults of a primitive leave the rest of the scene whole.
+#[test]
+fn faulty_primitives_are_left_out() {
+    let faults = [
+        ("/accessors/0/count", json!(6), "as many entries"),
+        ("/accessors/2/count", json!(9_000_000), "reaches outside its buffer"),
+        ("/accessors/2/count", json!(900_000_000), "more than 20000000 triangles"),
+        ("/accessors/2/count", json!(2), "expected three a triangle"),
+        ("/accessors/2/type", json!("VEC2"), "expected one index"),
+        ("/accessors/2/componentType", json!(5126), "expected indices"),
+        ("/accessors/0/byteOffset", json!(40), "reaches outside its buffer"),
+        ("/bufferViews/0/byteLength", json!(1_u64 << 40), "reaches outside its buffer"),
+        ("/accessors/1/componentType", json!(5121), "expected floats or normalized"),
+    ];
+    for (pointer, value, message) in faults {
+        let scene = read_json(&with(pointer, value));
+        let found = scene.findings.iter().find(|finding| finding.place == "/meshes/0/primitives/0");
+        let found = found.unwrap_or_else(|| panic!("{pointer}: {:?}", scene.findings));
+        assert!(found.message.contains(message), "{pointer}: {}", found.message);
+        assert!(scene.scene.surfaces.is_empty(), "{pointer}");
+    }
+    let sparse =
+        json!({ "count": 1, "indices": { "bufferView": 1, "componentType": 5123 }, "values": { "bufferView": 0 } });
+    let scene = read_json(&with("/accessors/0/sparse", sparse));
+    assert!(scene.findings.iter().any(|finding| finding.message.contains("sparse")), "{:?}", scene.findings);
+    let mut bytes = triangle_bytes();
+    bytes[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    let scene = read_json(&with("/buffers/0/uri", json!(data_uri(&bytes))));
+    assert!(scene.findings.iter().any(|finding| finding.message.contains("not finite")), "{:?}", scene.findings);
+    bytes = triangle_bytes();
+    bytes[60] = 7;
+    let scene = read_json(&with("/buffers/0/uri", json!(data_uri(&bytes))));
+    assert!(
+        scene.findings.iter().any(|finding| finding.message.contains("is 7, expected less than 3")),
+        "{:?}",
+        scene.findings
+    );
+}
+
+#[test]
+fn invalid_indices_are_errors_with_a_pointer() {
+    for (pointer, value, place) in [
+        ("/nodes/0/mesh", json!(9), "/nodes/0/mesh: "),
+        ("/scenes/0/nodes", json!([9]), "/scenes/0/nodes/0: "),
+        ("/bufferViews/0/buffer", json!(9), "/bufferViews/0/buffer: "),
+    ] {
+        let error = error_of(&with(pointer, value));
+        assert!(error.contains(place), "{error}");
+    }
+    assert!(error_of(&with("/scenes", json!([]))).contains("/scene"), "{}", error_of(&with("/scenes", json!([]))));
+}
+
+/// JSON whose parsed form would be huge, before it is parsed.
+#[test]
+fn large_json_is_refused() {
+    let many = vec![json!({}); 1_100_000];
+    let error = error_of(&with("/nodes", json!(many)));
+    assert!(error.contains("1048576 lists and objects"), "{error}");
+}
+
+/// Meshes that many nodes show count for each of them, before they are read.
+#[test]
+fn copies_count() {
+    let nodes: Vec<Value> = (0..50).map(|_| json!({ "mesh": 0 })).collect();
+    let file = changed(with("/nodes", json!(nodes)), "/scenes/0/nodes", json!((0..50).collect::<Vec<_>>()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room.gltf");
+    std::fs::write(&path, file.to_string()).unwrap();
+    let limits = Limits { triangles: 20, primitives: 30, ..Limits::default() };
+    let scene = read(&path, &limits).unwrap();
+    assert_eq!(scene.scene.surfaces.len(), 20);
+    let beyond = scene.findings.iter().find(|finding| finding.message.contains("primitives beyond 30"));
+    assert!(beyond.is_some_and(|finding| finding.severity == Severity::Warning), "{:?}", scene.findings);
+}
+
+/// Damaged bytes cause no panic.
+#[test]
+fn damage_is_an_error_or_another_scene() {
+    let sound =
+        glb(&lit(&[json!({ "type": "spot", "spot": {} }), json!({ "type": "directional" })]), &triangle_bytes());
+    let mut refused = 0;
+    for at in 0..sound.len() {
+        let mut damaged = sound.clone();
+        damaged[at] = b'9';
+        refused += usize::from(read_bytes(&damaged).is_err());
+    }
+    assert!(refused > sound.len() / 4, "{refused} of {}", sound.len());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Any numbers in a node's transform, a light and a texture transform give a scene of finite numbers.
+    #[test]
+    fn numbers_stay_finite(values in prop::collection::vec(prop::num::f64::ANY, 14)) {
+        let number = |at: usize| if values[at].is_finite() { json!(values[at]) } else { json!(0.0) };
+        let light = json!({ "type": "point", "intensity": number(0), "color": [number(1), 1, 1] });
+        let mut file = lit(&[light, json!({ "type": "directional", "intensity": number(2) })]);
+        file = changed(file, "/nodes/0/rotation", json!([number(3), number(4), number(5), number(6)]));
+        file = changed(file, "/nodes/0/scale", json!([number(7), number(8), number(9)]));
+        file = changed(file, "/nodes/1/translation", json!([number(10), number(11), number(12)]));
+        if let Ok(scene) = read_bytes(file.to_string().as_bytes()) {
+            for surface in &scene.scene.surfaces {
+                prop_assert!(surface.mesh.positions.iter().all(|place| place.is_finite()));
+            }
+            for light in &scene.scene.lights {
+                if let Emission::Area { radiance, .. } = &light.emission {
+                    prop_assert!(radiance.iter().all(|value| value.is_finite() && *value >= 0.0));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! Textures: images of the file, decoded once for each use, with the factors of materials multiplied in.
+
+use std::path::Path;
+
+use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
+use mateval_image::{ImageError, Texels, Texture, Wrap};
+use mateval_scene::Severity;
+use mateval_scene::findings::shortened;
+use mateval_scene::gltf_accessor::view_bytes;
+use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex};
+use mateval_scene::reference::SourceTexture;
+use mateval_scene::source_folder::FileFault;
+
+use super::lookup::{Lookup, wraps};
+use super::omitted::Omission;
+use super::reader::Reader;
+use super::texture_key::{Aspect, TextureKey};
+use super::uri;
+use crate::mean_color::mean_color;
+
+/// Linear mid-grey, which replaces a colour that cannot be read.
+const MISSING: f32 = 0.5;
+
+/// The first bytes of the picture formats that glTF allows, and of WebP.
+const SIGNATURES: [&[u8]; 3] = [b"\x89PNG", b"\xff\xd8\xff", b"RIFF"];
+
+/// A decoded image.
+struct Decoded {
+    name: String,
+    sha256: String,
+    color: Texture,
+    alpha: Option<Texture>,
+}
+
+impl Reader<'_> {
+    /// A colour: a texture's times a linear factor. One that cannot be read is mid-grey times the factor.
+    pub(super) fn color(&mut self, lookup: &Lookup<'_>, factor: [f32; 3]) -> ColorInput {
+        if factor == [0.0; 3] {
+            return ColorInput::Constant(factor);
+        }
+        match self.texture(&lookup.texture, Aspect::Color(factor.map(f32::to_bits))) {
+            Some(texture) => ColorInput::Texture { texture, uv: lookup.uv },
+            None => ColorInput::Constant(factor.map(|value| value * MISSING)),
+        }
+    }
+
+    /// A number: one channel of a texture times a factor. One that cannot be read is the factor.
+    pub(super) fn scalar(&mut self, lookup: &Lookup<'_>, channel: usize, factor: f32) -> ScalarInput {
+        if factor == 0.0 {
+            return ScalarInput::Constant(0.0);
+        }
+        let (aspect, channel) =
+            if factor == 1.0 { (Aspect::Values, channel) } else { (Aspect::Channel(channel, factor.to_bits()), 0) };
+        match self.texture(&lookup.texture, aspect) {
+            Some(texture) => ScalarInput::Texture { texture, channel, uv: lookup.uv },
+            None => ScalarInput::Constant(factor),
+        }
+    }
+
+    /// The opacity: the alpha channel times a factor, and with `cutoff` 1 where that reaches it, else 0. None where the
+    /// texture is opaque or cannot be read.
+    pub(super) fn alpha(&mut self, lookup: &Lookup<'_>, factor: f32, cutoff: Option<f32>) -> Option<ScalarInput> {
+        let aspect = match cutoff {
+            Some(cutoff) => Aspect::Mask(factor.to_bits(), cutoff.to_bits()),
+            None => Aspect::Alpha(factor.to_bits()),
+        };
+        let texture = self.texture(&lookup.texture, aspect)?;
+        let values = &self.scene.textures[texture.0].texture;
+        let first = values.texel(0, 0)[0];
+        let is_even = (values.width(), values.height()) == (1, 1);
+        match is_even {
+            true if first == 1.0 => None,
+            true => Some(ScalarInput::Constant(first)),
+            false => Some(ScalarInput::Texture { texture, channel: 0, uv: lookup.uv }),
+        }
+    }
+
+    /// The mean of a texture, as linear values or as sRGB colours; mid-grey where it cannot be read.
+    pub(super) fn mean(&mut self, lookup: &Lookup<'_>, encoding: Encoding) -> [f32; 3] {
+        let aspect = match encoding {
+            Encoding::Srgb => Aspect::Color([1.0_f32.to_bits(); 3]),
+            Encoding::Linear => Aspect::Values,
+        };
+        let texture = self.texture(&lookup.texture, aspect);
+        texture.map_or([MISSING; 3], |at| mean_color(&self.scene.textures[at.0].texture).map(|value| value as f32))
+    }
+
+    /// Reads a texture, unless it has been read before. A fault of its image is reported once.
+    fn texture(&mut self, texture: &gltf::Texture<'_>, aspect: Aspect) -> Option<TextureIndex> {
+        let [wrap, wrap_v] = wraps(texture);
+        let image = texture.source();
+        let key = TextureKey::new(image.index(), wrap, aspect);
+        if let Some(known) = self.textures.get(&key) {
+            return *known;
+        }
+        self.report_sampler(texture, wrap != wrap_v);
+        let read = if self.faulty_images.contains(&image.index()) { None } else { self.load(&image, wrap, aspect) };
+        self.textures.insert(key, read);
+        read
+    }
+
+    fn report_sampler(&mut self, texture: &gltf::Texture<'_>, wraps_differ: bool) {
+        let pointer = format!("/textures/{}", texture.index());
+        if wraps_differ {
+            let feature = "a texture that continues differently along v than along u";
+            self.omit(Omission::Visible, feature, "used the mode of u for both", &pointer);
+        }
+        if texture.sampler().mag_filter() == Some(gltf::texture::MagFilter::Nearest) {
+            self.omit(Omission::Slight, "textures without a filter", "filtered them bilinearly", &pointer);
+        }
+    }
+
+    fn load(&mut self, image: &gltf::Image<'_>, wrap: Wrap, aspect: Aspect) -> Option<TextureIndex> {
+        let encoding = if matches!(aspect, Aspect::Color(_)) { Encoding::Srgb } else { Encoding::Linear };
+        let loaded = self.decode(image, encoding, wrap).and_then(|decoded| {
+            let Decoded { name, sha256, color, alpha } = decoded;
+            let texture = match aspect {
+                Aspect::Color(bits) => scaled(color, bits.map(f32::from_bits)),
+                Aspect::Values => Ok(color),
+                Aspect::Channel(channel, bits) => {
+                    let factor = f32::from_bits(bits);
+                    grey(&color, |texel| texel[channel] * factor)
+                }
+                Aspect::Alpha(bits) => opacity(alpha, wrap, |alpha| alpha * f32::from_bits(bits)),
+                Aspect::Mask(bits, cutoff) => {
+                    let (factor, cutoff) = (f32::from_bits(bits), f32::from_bits(cutoff));
+                    opacity(alpha, wrap, |alpha| if alpha * factor >= cutoff { 1.0 } else { 0.0 })
+                }
+            };
+            let texture = texture.map_err(|error| picture_fault(&error))?;
+            Ok(SourceTexture { name, sha256: Some(sha256), texture })
+        });
+        match loaded {
+            Ok(texture) => {
+                self.scene.textures.push(texture);
+                Some(TextureIndex(self.scene.textures.len() - 1))
+            }
+            Err(fault) => {
+                self.faulty_images.insert(image.index());
+                let file = self.log.file().to_owned();
+                let pointer = format!("/images/{}", image.index());
+                let action = "used linear mid-grey as colour, the factor as number, and no opacity";
+                self.log.push(Severity::Warning, fault.code, &file, &pointer, fault.message, action);
+                None
+            }
+        }
+    }
+
+    fn decode(&mut self, image: &gltf::Image<'_>, encoding: Encoding, wrap: Wrap) -> Result<Decoded, FileFault> {
+        let limit = |most: usize| FileFault {
+            code: "limit",
+            message: format!("all textures together have more than {most} texels"),
+        };
+        if self.texels > self.limits.texels {
+            return Err(limit(self.limits.texels));
+        }
+        let (bytes, file) = match image.source() {
+            gltf::image::Source::Uri { uri, .. } => uri::read(uri, &mut self.source)?,
+            gltf::image::Source::View { view, .. } => {
+                let buffer = &self.buffers[view.buffer().index()];
+                let bytes = view_bytes(&view, buffer);
+                let fault = |error| FileFault { code: "bad_image", message: format!("{error}") };
+                (bytes.map_err(fault)?.to_vec(), None)
+            }
+        };
+        if !SIGNATURES.iter().any(|signature| bytes.starts_with(signature)) {
+            let message = "expected PNG, JPEG or WebP, found other bytes".to_owned();
+            return Err(FileFault { code: "bad_image", message });
+        }
+        let sha256 = sha256_of_bytes(&bytes);
+        let own_name = || image.name().map(shortened).unwrap_or_else(|| format!("image {}", image.index()));
+        let name = file.unwrap_or_else(own_name);
+        let read = texture_and_alpha_of_bytes(Path::new(&name), bytes, encoding, wrap);
+        let (color, alpha) = read.map_err(|error| picture_fault(&error))?;
+        self.texels = self.texels.saturating_add(color.width() * color.height());
+        if self.texels > self.limits.texels {
+            return Err(limit(self.limits.texels));
+        }
+        Ok(Decoded { name, sha256, color, alpha })
+    }
+}
+
+/// The fault of a picture, without its path, which the finding names.
+fn picture_fault(error: &ImageError) -> FileFault {
+    let message = match error {
+        ImageError::Io { source, .. } => source.to_string(),
+        ImageError::Invalid { what, .. } | ImageError::Unsupported { what, .. } => what.clone(),
+        ImageError::PixelCount { .. } => error.to_string(),
+    };
+    FileFault { code: "bad_image", message }
+}
+
+/// The texture times a linear factor; the texture itself where that is 1.
+fn scaled(texture: Texture, factor: [f32; 3]) -> Result<Texture, ImageError> {
+    if factor == [1.0; 3] {
+        return Ok(texture);
+    }
+    let texels = all_texels(&texture).map(|texel| std::array::from_fn(|channel| texel[channel] * factor[channel]));
+    Texture::new(texture.width(), texture.height(), Texels::Linear(texels.collect()), texture.wrap())
+}
+
+/// A texture of one number a texel.
+fn grey(texture: &Texture, value: impl Fn([f32; 3]) -> f32) -> Result<Texture, ImageError> {
+    let texels = all_texels(texture).map(value).collect();
+    Texture::new(texture.width(), texture.height(), Texels::Grey(texels), texture.wrap())
+}
+
+/// The opacity of an alpha channel, which is 1 for a picture without one. A single texel where it is the same everywhere.
+fn opacity(alpha: Option<Texture>, wrap: Wrap, value: impl Fn(f32) -> f32) -> Result<Texture, ImageError> {
+    match alpha {
+        Some(alpha) => Ok(grey(&alpha, |texel| value(texel[0]))?.collapsed()),
+        None => Texture::new(1, 1, Texels::Grey(vec![value(1.0)]), wrap),
+    }
+}
+
+/// All texels, row by row.
+fn all_texels(texture: &Texture) -> impl Iterator<Item = [f32; 3]> + '_ {
+    (0..texture.height()).flat_map(move |y| (0..texture.width()).map(move |x| texture.texel(x, y)))
+}
