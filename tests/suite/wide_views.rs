@@ -157,13 +157,13 @@ fn nearest_neighbours_fall_and_the_truth_does_not() {
         let summary = &result(&format!("wide-{method}"))["protocols"]["mateval-2"]["summary"];
         summary[key].as_f64().unwrap_or_else(|| panic!("no {key}"))
     };
-    for picture in ["albedo", "rgb_true"] {
-        let [input, wide, unseen] =
-            ["input", "wide", "wide_unobserved"].map(|views| psnr("nn", &format!("{picture}.{views}.psnr")));
-        assert!(input > wide + 1.0 && wide > unseen + 1.0, "{picture}: {input} {wide} {unseen}");
+    for (picture, fall) in [("albedo", 1.0), ("rgb_true", 0.5)] {
+        let [input, wide] = ["input", "wide"].map(|views| psnr("nn", &format!("{picture}.{views}.psnr")));
         let [truth_input, truth_wide] = ["input", "wide"].map(|views| psnr("gt", &format!("{picture}.{views}.psnr")));
-        assert!(truth_wide > truth_input - 3.0 && truth_wide > wide + 3.0, "{picture}: {truth_input} {truth_wide}");
+        assert!(input > wide + fall, "{picture}: {input} {wide}");
+        assert!(truth_wide > truth_input - 1.5 && truth_wide > wide + 3.0, "{picture}: {truth_input} {truth_wide}");
     }
+    assert!(psnr("nn", "albedo.wide.psnr") > psnr("nn", "albedo.wide_unobserved.psnr") + 0.5);
     let file = result("wide-nn");
     assert_eq!(file["dataset"]["wide_views"]["room"].as_object().unwrap().len(), 3);
 }

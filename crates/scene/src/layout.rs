@@ -12,9 +12,6 @@ pub const TARGETS: &str = "targets.json";
 pub const MANIFEST: &str = "MANIFEST.sha256";
 /// The input view's id.
 pub const INPUT: &str = "input";
-/// How the ids of wide views begin, and those of no other view. So a result, which names a view by its id alone, says for
-/// which means it counts.
-pub const WIDE: &str = "wide_";
 
 /// The meshes of a set of parts, relative to the scene's folder: `geometry/parts.glb` for the source's own parts,
 /// `geometry/parts_<set>.glb` for another set.

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 
 use glam::DMat3;
-use mateval_scene::Camera;
 use mateval_scene::dataset::{Part, SceneFile, View, WideView};
-use mateval_scene::layout::{INPUT, WIDE};
+use mateval_scene::layout::INPUT;
+use mateval_scene::{Camera, ViewId};
 
 use mateval_prep::faults::Faults;
 
@@ -58,7 +58,7 @@ fn check_place(view: &View, input: &Camera, at: usize, faults: &mut Faults) {
     }
     match &view.wide {
         _ if view.wide.is_some() != view.id.is_wide() => {
-            let message = format!("a view has this key if and only if its id begins with '{WIDE}'");
+            let message = format!("a view has this key if and only if its id begins with '{}'", ViewId::WIDE);
             faults.add("bad_view", FILE, format!("/views/{at}/wide"), message);
         }
         None => {

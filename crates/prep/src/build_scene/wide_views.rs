@@ -7,7 +7,6 @@
 use glam::{DVec2, DVec3};
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_scene::dataset::{View, WideView};
-use mateval_scene::layout::WIDE;
 use mateval_scene::{Finding, Severity, ViewId};
 use mateval_sources::clearance::distance_to_anything;
 use mateval_sources::front3d::camera_rules::SamplerRules;
@@ -68,7 +67,7 @@ pub(super) fn wide_views(
             let (mut views, mut findings) = (Vec::new(), Vec::new());
             for number in 0..drawn.count {
                 let distance = distance_m(drawn, number);
-                let id = ViewId::new(&format!("{WIDE}{}", number + 1)).expect("our own ids are ids");
+                let id = ViewId::new(&format!("{}{}", ViewId::WIDE, number + 1)).expect("our own ids are ids");
                 match judge.draw(drawn.seed, number, distance) {
                     Some(place) => views.extend(looking_at(id, place, target, input)),
                     None => {

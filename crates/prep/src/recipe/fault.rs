@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use mateval_scene::findings::shortened;
-use mateval_scene::layout::WIDE;
 use mateval_scene::{PartSetId, SceneError, SceneId, ViewId};
 use mateval_sources::below::BelowError;
 
@@ -43,13 +42,16 @@ pub enum RecipeFault {
         y_deg: f64,
     },
     /// A turned view has the id of a wide one.
-    #[error("view '{id}': ids that begin with '{WIDE}' are those of views from other places; choose another id")]
+    #[error(
+        "view '{id}': ids that begin with '{}' are those of views from other places; choose another id",
+        ViewId::WIDE
+    )]
     TurnedId {
         /// The view's id.
         id: ViewId,
     },
     /// A wide view has the id of a turned one.
-    #[error("wide: view '{id}': the id must begin with '{WIDE}'")]
+    #[error("wide: view '{id}': the id must begin with '{}'", ViewId::WIDE)]
     WideId {
         /// The view's id.
         id: ViewId,

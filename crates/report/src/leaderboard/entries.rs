@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mateval_eval::result::ResultFile;
+use mateval_eval::result::{PictureValue, ResultFile};
 use mateval_scene::findings::shortened;
 use mateval_scene::{Finding, SceneError, Severity};
 use mateval_submission::method_name;
@@ -12,6 +12,7 @@ use mateval_submission::method_name;
 use super::errata::ErrataFile;
 use super::results_folder::ResultsFolder;
 use super::verified::{self, Verified};
+use super::wide_curves;
 use crate::error::ReportError;
 
 /// What to do with a file that is not what a board expects in its place.
@@ -22,7 +23,7 @@ const UNFIT: &str = "correct it, or leave it out: a folder of results holds NAME
 /// What a board is made from.
 #[derive(Debug, Default)]
 pub struct Entries {
-    /// The results of the methods, without the scores of single pictures.
+    /// The results of the methods, with the scores of those single pictures alone that curves show.
     pub results: Vec<ResultFile>,
     /// Whether each of them was verified.
     pub verified: Vec<Verified>,
@@ -66,8 +67,13 @@ fn read_result(path: &Path, findings: &mut Vec<Finding>) -> Result<Option<Result
     let Some(mut result) = fitting(read, "a result", path, findings)? else { return Ok(None) };
     let bad_name = method_name::check(&result.method, Severity::Error, &path.display().to_string());
     findings.extend(bad_name.map(|finding| Finding { place: "/method".to_owned(), ..finding }));
-    // Single pictures are most of a result's memory, and the site does not show them.
-    result.protocols.values_mut().for_each(|scores| scores.pictures = Vec::new());
+    // Single pictures are most of a result's memory, and the site shows those of curves alone.
+    let wide_views = &result.dataset.wide_views;
+    let is_kept = |value: &PictureValue| wide_views.contains_key(&value.scene) && wide_curves::is_shown(value);
+    for scores in result.protocols.values_mut() {
+        scores.pictures.retain(is_kept);
+        scores.pictures.shrink_to_fit();
+    }
     Ok(Some(result))
 }
 

@@ -60,11 +60,18 @@ const MARGIN: [f64; 2] = [28.0, 16.0];
 /// Number of classes of shares.
 const SHARES: u32 = 5;
 
+/// Whether curves show a value, if its scene has wide views.
+pub(super) fn is_shown(value: &PictureValue) -> bool {
+    let is_of_a_class = value.view.is_wide() || value.view.as_str() == INPUT;
+    is_of_a_class && value.region == Region::Valid && value.picture.surfaces == Surfaces::All
+}
+
 /// The charts of every kind of picture and metric that wide views have values of.
 pub(super) fn charts(methods: &[Method<'_>], axis: Axis) -> Vec<Chart> {
     let mut kinds: Vec<(PictureName, Metric)> = Vec::new();
-    let wide = methods.iter().flat_map(|method| method.pictures).filter(|value| value.view.is_wide());
-    for value in wide.filter(|value| value.picture.surfaces == Surfaces::All && value.value.is_some()) {
+    let wide =
+        methods.iter().flat_map(|method| method.pictures).filter(|value| value.view.is_wide() && is_shown(value));
+    for value in wide.filter(|value| value.value.is_some()) {
         let kind = (value.picture, value.metric);
         if !kinds.contains(&kind) {
             kinds.push(kind);

@@ -1,13 +1,22 @@
 //! The page that shows how scores fall in views from other places than the input view's.
 
-use mateval_scene::dataset::WideView;
+use std::collections::BTreeMap;
+
 use minijinja::context;
 use minijinja::value::Serde;
+use serde::Serialize;
 
 use super::board::Board;
 use super::site::{Page, SiteWriter};
 use super::wide_curves::{Axis, Chart, Method, charts};
 use crate::error::ReportError;
+
+/// Charts over one axis.
+#[derive(Serialize)]
+struct Section {
+    title: &'static str,
+    charts: Vec<Chart>,
+}
 
 /// Whether any scene has wide views.
 pub(super) fn has_any(board: &Board<'_>) -> bool {
@@ -28,22 +37,23 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
             wide_views: &board.results[at].dataset.wide_views,
         })
         .collect();
-    let all: Vec<&WideView> =
-        methods.iter().take(1).flat_map(|m| m.wide_views.values()).flat_map(|v| v.values()).collect();
-    let distances: Vec<Chart> = charts(&methods, Axis::Distance);
-    let shares: Vec<Chart> = charts(&methods, Axis::UnseenShare);
+    let scenes = methods.first().map(|method| method.wide_views);
+    let sections = [
+        Section { title: "By distance from the input camera", charts: charts(&methods, Axis::Distance) },
+        Section {
+            title: "By the share of the picture that the input view does not show",
+            charts: charts(&methods, Axis::UnseenShare),
+        },
+    ];
     site.page(&Page {
         file: "wide_views.html",
         template: "wide_views.j2",
         title: "Wide views",
         scripts: &[],
         values: context! {
-            views => all.len(),
-            scenes => methods.first().map_or(0, |method| method.wide_views.len()),
-            sections => [
-                context! { title => "By distance from the input camera", charts => Serde(&distances) },
-                context! { title => "By the share of the picture that the input view does not show", charts => Serde(&shares) },
-            ],
+            views => scenes.map_or(0, |scenes| scenes.values().map(BTreeMap::len).sum()),
+            scenes => scenes.map_or(0, BTreeMap::len),
+            sections => Serde(&sections),
         },
     })
 }
