@@ -1,7 +1,7 @@
 """Builds a scene of MatEval in Blender and writes it with Blender's own glTF exporter.
 
-The job is a JSON file: `surfaces`, `materials`, `lights` and `camera` as in a dataset's `reference.json`, `lights.json` and
-`scene.json`, `textures` as files, and `lamps` of Blender's own.
+The job is a JSON file: `surfaces`, `materials`, `lights` and `camera` as in a dataset's `reference.json`, `lights.json`
+and `scene.json`, `textures` as files, and `lamps` of Blender's own.
 """
 
 import json

@@ -1,5 +1,5 @@
-//! A scene that Blender's own glTF exporter writes is the same scene again: the built-in room, as .glb and as .gltf with
-//! files beside it.
+//! A scene that Blender's own glTF exporter writes is the same scene again: the built-in room, as .glb and as .gltf
+//! with files beside it.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -137,7 +137,8 @@ fn same_triangles(found: &Surface, expected: &Surface) {
     }
 }
 
-/// Base colour within half a step of 8 bits, roughness and metallic exactly, at the centre of every triangle and the texels.
+/// Base colour within half a step of 8 bits, roughness and metallic exactly, at the centre of every triangle and the
+/// texels.
 fn same_material(found: (&ReferenceScene, &Surface), expected: (&ReferenceScene, &Surface)) {
     let [ours, theirs] = [found, expected].map(|(scene, surface)| &scene.materials[surface.material.0]);
     let name = &expected.1.name;
@@ -277,7 +278,9 @@ fn small() -> String {
         [18, 12, 6, 0].map(|shift| char::from(DIGITS[word >> shift & 63]))
     });
     let uri = format!("data:;base64,{}", digits.collect::<String>());
-    let accessor = json!({ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0] });
+    let accessor = json!({
+        "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0],
+    });
     json!({
         "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
         "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }], "accessors": [accessor],

@@ -28,8 +28,8 @@ pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, GltfError> {
     Ok(gltf::Gltf::from_slice(bytes)?)
 }
 
-/// Fails where an image states no place of its bytes, or a camera no projection of its type. The gltf crate assumes that
-/// they do.
+/// Fails where an image states no place of its bytes, or a camera no projection of its type. The gltf crate assumes
+/// that they do.
 fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
     let has_source = |image: &gltf::json::Image| match image.buffer_view {
         Some(_) => image.mime_type.is_some(),

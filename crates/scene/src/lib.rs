@@ -5,7 +5,8 @@
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
 //! [`mod@reference`] describe a scene with its materials and lights; [`role`] states what its instances are;
 //! [`dataset`], [`layout`], [`manifest`] and [`open`] are the files of a dataset, [`submission`] those of a submission.
-//! [`bounded_cache`] keeps what later runs can use again. [`obj`], [`gltf_accessor`], [`gltf_webp`] and [`source_folder`] read untrusted files.
+//! [`bounded_cache`] keeps what later runs can use again. [`obj`], [`gltf_accessor`], [`gltf_webp`] and
+//! [`source_folder`] read untrusted files.
 
 pub mod bounded_cache;
 pub mod build_folder;

@@ -1,5 +1,5 @@
-//! The number of values in a JSON text, counted before it is parsed, since two bytes of text can take a hundred bytes of
-//! memory.
+//! The number of values in a JSON text, counted before it is parsed, since two bytes of text can take a hundred bytes
+//! of memory.
 
 /// The number of values in a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -26,8 +26,8 @@ pub struct RecipeScene {
     pub front3d: Option<Front3dRoom>,
     /// A glTF file, .glb or .gltf.
     pub gltf: Option<PathBuf>,
-    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or the
-    /// glTF's name.
+    /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or
+    /// the glTF's name.
     pub house: Option<String>,
     /// The input camera; if absent, the camera of the Mitsuba scene or of the glTF.
     pub camera: Option<RecipeCamera>,
@@ -104,8 +104,8 @@ impl RecipeScene {
         }
     }
 
-    /// The folder that the paths of the scene's files are relative to: the folder of the XML or glTF, or else `source`, the
-    /// folder that the recipe's paths are relative to.
+    /// The folder that the paths of the scene's files are relative to: the folder of the XML or glTF, or else `source`,
+    /// the folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
         match self.main_file() {
             Some(file) => source.join(file).parent().map(Path::to_owned).unwrap_or_default(),

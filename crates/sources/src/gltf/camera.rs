@@ -15,8 +15,8 @@ const FIELDS: std::ops::RangeInclusive<f64> = 1e-3..=3.1;
 /// Farthest that a camera may stand from the origin along an axis, in metres, as in a recipe.
 const FARTHEST_M: f64 = 1e6;
 
-/// The node's camera; none for an orthographic one, one of an impossible field of view, one that a transform flattens, and
-/// one too far away.
+/// The node's camera; none for an orthographic one, one of an impossible field of view, one that a transform flattens,
+/// and one too far away.
 pub(super) fn perspective(camera: &gltf::Camera<'_>, world_from_node: DMat4) -> Option<Camera> {
     let gltf::camera::Projection::Perspective(lens) = camera.projection() else { return None };
     let fov_y = f64::from(lens.yfov());

@@ -24,8 +24,8 @@ impl<'a> Lookup<'a> {
 
 /// The extension's matrix, translation * rotation * scale, for a v that grows upwards; glTF's grows downwards.
 ///
-/// The rotation is counter-clockwise in the picture (KHR_texture_transform, section "Overview"). A transform that is not
-/// finite maps everything to one point.
+/// The rotation is counter-clockwise in the picture (KHR_texture_transform, section "Overview"). A transform that is
+/// not finite maps everything to one point.
 fn upward(transform: &gltf::texture::TextureTransform<'_>) -> UvTransform {
     let [offset_u, offset_v] = transform.offset().map(f64::from);
     let [scale_u, scale_v] = transform.scale().map(f64::from);

@@ -1,13 +1,14 @@
 //! Reads any glTF 2.0 scene: .glb, or .gltf with its buffers and images in files beside it or in the JSON itself.
 //!
-//! The input is the path of the file; no file outside its folder is read. The output is a [`GltfScene`]: instances in world
-//! space, their materials as Blender's principled model, lights, and the first perspective camera. Faulty parts of the file,
-//! and what a scene cannot represent, are left out or replaced and reported as findings, whose places are JSON pointers. An
-//! error means that there is no scene to read.
+//! The input is the path of the file; no file outside its folder is read. The output is a [`GltfScene`]: instances in
+//! world space, their materials as Blender's principled model, lights, and the first perspective camera. Faulty parts
+//! of the file, and what a scene cannot represent, are left out or replaced and reported as findings, whose places are
+//! JSON pointers. An error means that there is no scene to read.
 //!
-//! `document` parses the JSON within limits, and `buffers` reads the binary data, both with `uri` for files. `nodes` walks
-//! the tree of the default scene: `meshes` reads triangles, `materials` and `textures` (with `lookup`) the surfaces, `camera`
-//! the camera and `punctual` the lights. `reader` is the state that they share, `omitted` counts what is not represented.
+//! `document` parses the JSON within limits, and `buffers` reads the binary data, both with `uri` for files. `nodes`
+//! walks the tree of the default scene: `meshes` reads triangles, `materials` and `textures` (with `lookup`) the
+//! surfaces, `camera` the camera and `punctual` the lights. `reader` is the state that they share, `omitted` counts
+//! what is not represented.
 
 mod buffers;
 mod camera;
@@ -68,8 +69,8 @@ pub struct GltfScene {
 
 /// Reads the default scene, or else the first scene, of the glTF at `path`.
 ///
-/// Fails where the file or one of its buffers cannot be read, the JSON is not valid glTF, breaks `limits` or requires an
-/// unknown extension, or the file has no scene.
+/// Fails where the file or one of its buffers cannot be read, the JSON is not valid glTF, breaks `limits` or requires
+/// an unknown extension, or the file has no scene.
 pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
     // The file and its buffers.
     let invalid = |error| SourceError::invalid(path, InvalidSource::Gltf(error));

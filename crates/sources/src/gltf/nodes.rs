@@ -1,4 +1,5 @@
-//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as parts.
+//! The nodes of a scene: each mesh of a node becomes an instance for each of its materials, with its primitives as
+//! parts.
 
 use std::collections::BTreeSet;
 

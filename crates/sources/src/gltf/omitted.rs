@@ -33,8 +33,8 @@ pub(super) enum Omission {
 }
 
 impl Omitted {
-    /// Counts a feature at a JSON pointer. `feature` begins a sentence that ends in "not represented", and `action` states
-    /// what is done instead.
+    /// Counts a feature at a JSON pointer. `feature` begins a sentence that ends in "not represented", and `action`
+    /// states what is done instead.
     pub(super) fn add(&mut self, omission: Omission, feature: &str, action: &str, pointer: &str) {
         let first = || Occurrences { count: 0, first: pointer.to_owned(), action: action.to_owned() };
         self.kinds.entry((omission, feature.to_owned())).or_insert_with(first).count += 1;

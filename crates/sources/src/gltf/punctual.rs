@@ -1,8 +1,8 @@
-//! Lights of `KHR_lights_punctual`: points as small spheres, spots as small discs, suns as discs in a map of the light from
-//! outside.
+//! Lights of `KHR_lights_punctual`: points as small spheres, spots as small discs, suns as discs in a map of the light
+//! from outside.
 //!
-//! The extension's intensities are photometric, those of a scene are radiometric. They are converted as Blender's importer
-//! and exporter do by default ("Standard" lighting mode of io_scene_gltf2 4.5): 683 lumens are one watt.
+//! The extension's intensities are photometric, those of a scene are radiometric. They are converted as Blender's
+//! importer and exporter do by default ("Standard" lighting mode of io_scene_gltf2 4.5): 683 lumens are one watt.
 
 use std::f64::consts::PI;
 
@@ -20,8 +20,8 @@ use crate::map_disc::{MapDisc, ROWS};
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::to_world;
 
-/// Luminous efficacy of green light of 540 THz (the SI's definition of the candela), which glTF's writers use for light of
-/// any colour.
+/// Luminous efficacy of green light of 540 THz (the SI's definition of the candela), which glTF's writers use for light
+/// of any colour.
 const LUMENS_PER_WATT: f64 = 683.0;
 
 /// The radius of the spheres and discs in metres: that of an A60 bulb, so that shadows are as soft as a real lamp's.
@@ -68,7 +68,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Adds a surface that emits this power, in watts, on its front. The camera does not see it, and light passes through.
+    /// Adds a surface that emits this power, in watts, on its front. The camera does not see it, and light passes
+    /// through.
     fn lamp(&mut self, name: &str, mesh: TriangleMesh, power: [f64; 3], pointer: &str) {
         let (area, is_full) = (mesh.area(), self.scene.lights.len() >= self.limits.lights);
         if area <= 0.0 || !area.is_finite() {
@@ -99,8 +100,8 @@ impl Reader<'_> {
         MaterialIndex(self.scene.materials.len() - 1)
     }
 
-    /// Adds a sun in the direction `to_sun`, which lights a surface that faces it with `irradiance` in W/m^2. All suns share
-    /// one map.
+    /// Adds a sun in the direction `to_sun`, which lights a surface that faces it with `irradiance` in W/m^2. All suns
+    /// share one map.
     fn sun(&mut self, to_sun: DVec3, irradiance: [f64; 3], pointer: &str) {
         let action = format!("spread each over {SUN_DEG} degree of a map of {}x{ROWS} texels", 2 * ROWS);
         self.omit(Omission::Slight, "suns without an extent", &action, pointer);

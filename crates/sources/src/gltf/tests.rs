@@ -305,7 +305,11 @@ fn the_first_perspective_camera_counts() {
         { "type": "orthographic", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 9, "znear": 0.1 } },
         { "type": "perspective", "perspective": { "yfov": 1.0, "znear": 0.1, "aspectRatio": 2.0 } },
     ]);
-    let nodes = json!([{ "mesh": 0, "children": [1, 2] }, { "camera": 0 }, { "camera": 1, "translation": [0, 1, 3], "scale": [2, 2, 2] }]);
+    let nodes = json!([
+        { "mesh": 0, "children": [1, 2] },
+        { "camera": 0 },
+        { "camera": 1, "translation": [0, 1, 3], "scale": [2, 2, 2] },
+    ]);
     let scene = read_json(&changed(with("/cameras", cameras), "/nodes", nodes));
     let camera = scene.camera.unwrap();
     assert_eq!(camera.position().to_array(), [0.0, 1.0, 3.0]);

@@ -206,7 +206,8 @@ fn grey(texture: &Texture, value: impl Fn([f32; 3]) -> f32) -> Result<Texture, I
     Texture::new(texture.width(), texture.height(), Texels::Grey(texels), texture.wrap())
 }
 
-/// The opacity of an alpha channel, which is 1 for a picture without one. A single texel where it is the same everywhere.
+/// The opacity of an alpha channel, which is 1 for a picture without one. A single texel where it is the same
+/// everywhere.
 fn opacity(alpha: Option<Texture>, wrap: Wrap, value: impl Fn(f32) -> f32) -> Result<Texture, ImageError> {
     match alpha {
         Some(alpha) => Ok(grey(&alpha, |texel| value(texel[0]))?.collapsed()),
