@@ -48,6 +48,7 @@ mod suite {
     mod sample;
     mod schemas;
     mod scores;
+    mod stated;
     mod stats;
     mod survey;
     mod unsound_submissions;

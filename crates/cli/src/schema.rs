@@ -19,6 +19,7 @@ use mateval_report::leaderboard::errata::ErrataFile;
 use mateval_report::leaderboard::file::LeaderboardFile;
 use mateval_scene::dataset::{DatasetFile, SceneFile, TargetsFile};
 use mateval_scene::json;
+use mateval_scene::material_class::MaterialClassesFile;
 use mateval_scene::reference_io::{LightsFile, ReferenceFile, SourceMaterialsFile};
 use mateval_scene::submission::SubmissionFile;
 use mateval_submission::lint::LintFile;
@@ -50,7 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Good)
 }
 
-fn schemas() -> [(&'static str, Schema); 24] {
+fn schemas() -> [(&'static str, Schema); 25] {
     [
         ("dataset", schema_for!(DatasetFile)),
         ("targets", schema_for!(TargetsFile)),
@@ -58,6 +59,7 @@ fn schemas() -> [(&'static str, Schema); 24] {
         ("reference", schema_for!(ReferenceFile)),
         ("source_materials", schema_for!(SourceMaterialsFile)),
         ("lights", schema_for!(LightsFile)),
+        ("material_classes", schema_for!(MaterialClassesFile)),
         ("render", schema_for!(RenderFile)),
         ("submission", schema_for!(SubmissionFile)),
         ("companions", schema_for!(CompanionsFile)),

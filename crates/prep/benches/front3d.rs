@@ -11,7 +11,7 @@ use mateval_prep::atlas::{SizeWish, unwrap};
 use mateval_prep::bake::bake;
 use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_sources::front3d::room_scene::room_scene;
-use mateval_sources::front3d::{HouseFiles, Limits, furnish, read_house};
+use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish, read_house};
 use mateval_testkit::data::shared_data;
 use mateval_tracer::World;
 
@@ -38,6 +38,7 @@ fn files(root: &Path, uid: &str, textures: bool) -> HouseFiles {
         textures: textures.then(|| "3D-FRONT-texture".into()),
         cameras: None,
         blenderproc_compat: false,
+        appearance: AppearanceRule::Constant,
     }
 }
 

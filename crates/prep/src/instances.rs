@@ -62,7 +62,7 @@ mod tests {
     use glam::Vec3;
     use mateval_scene::TriangleMesh;
     use mateval_scene::reference::MaterialIndex;
-    use mateval_sources::front3d::{HouseFiles, Limits, furnish};
+    use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish};
 
     use super::*;
     use crate::part_split::PartSplit;
@@ -104,6 +104,7 @@ mod tests {
             textures: None,
             cameras: None,
             blenderproc_compat: false,
+            appearance: AppearanceRule::Constant,
         };
         let house = furnish(&files, &Limits::default()).unwrap();
         let origins: Vec<_> = house.placed.iter().map(|placed| placed.origin.clone()).collect();

@@ -95,6 +95,11 @@ impl SceneFolder {
         self.truth().join("lights.json")
     }
 
+    /// `ground_truth/material_classes.json`: the class of material of each part, where the source's reader states it.
+    pub fn material_classes(&self) -> PathBuf {
+        self.truth().join("material_classes.json")
+    }
+
     /// `ground_truth/reference`: surfaces with their source uv, materials and textures.
     pub fn reference(&self) -> PathBuf {
         self.truth().join("reference")

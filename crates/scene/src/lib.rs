@@ -25,6 +25,7 @@ pub mod layout;
 pub mod lease;
 pub mod manifest;
 pub mod material;
+pub mod material_class;
 pub mod mesh;
 pub mod obj;
 pub mod open;

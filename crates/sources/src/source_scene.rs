@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::error::{InvalidSource, SourceError};
 
+use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::{Camera, Finding, Role, SceneLights, SourceKind, TriangleMesh};
@@ -29,6 +30,9 @@ pub struct InstanceOrigin {
     pub super_category: Option<String>,
     /// The part of each triangle, numbered from 0. Without it, connected components are the parts.
     pub part_of_triangle: Option<Vec<usize>>,
+    /// The class of material of each part, by its number in `part_of_triangle`, where the reader states it; none of a
+    /// part whose triangles belong to several.
+    pub class_of_part: Option<Vec<Option<MaterialClass>>>,
     /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal for all
     /// copies.
     pub shape: Option<Arc<TriangleMesh>>,

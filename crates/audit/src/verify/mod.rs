@@ -15,6 +15,7 @@ use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
 use mateval_scene::ids::quoted;
 use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
+use mateval_scene::material_class::MaterialClassesFile;
 use mateval_scene::open::{absent_scenes, is_below};
 use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, Severity, json, manifest, reference_io};
 use mateval_tracer::World;
@@ -155,6 +156,19 @@ fn check_source_materials(folder: &SceneFolder, count: usize, faults: &mut Fault
     faults.read("ground_truth/reference/source", reference_io::read_source_materials(folder, count));
 }
 
+/// Checks the classes of materials, where there are any: one for each of the source's own parts.
+fn check_material_classes(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
+    const FILE: &str = "ground_truth/material_classes.json";
+    if !folder.material_classes().exists() {
+        return;
+    }
+    schema::check::<MaterialClassesFile>(folder.path(), FILE, faults);
+    let Some(file) = read_json::<MaterialClassesFile>(FILE, &folder.material_classes(), faults) else { return };
+    if !file.parts.iter().map(|part| &part.part).eq(scene.parts.iter().map(|part| &part.id)) {
+        faults.add("wrong_parts", FILE, "/parts", "expected the parts of scene.json in their order");
+    }
+}
+
 fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &mut Faults) {
     schema::check::<SceneFile>(folder.path(), "scene.json", faults);
     let Some(scene) = read_json::<SceneFile>("scene.json", &folder.scene_file(), faults) else { return };
@@ -169,6 +183,7 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
             schema::check::<reference_io::LightsFile>(&folder.truth(), "lights.json", faults);
             let Some(reference) = faults.read("ground_truth/reference", reference_io::read(folder)) else { return };
             check_source_materials(folder, reference.materials.len(), faults);
+            check_material_classes(folder, &scene, faults);
             geometry::check_materials(folder, &scene, faults);
             if !geometry::matches_reference(&reference, &meshes, faults) {
                 return;

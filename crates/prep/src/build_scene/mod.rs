@@ -12,9 +12,11 @@ mod wide_views;
 
 use std::path::Path;
 
+use mateval_scene::dataset::FORMAT;
 use mateval_scene::layout::SceneFolder;
+use mateval_scene::material_class::MaterialClassesFile;
 use mateval_scene::reference::Surface;
-use mateval_scene::{Progress, Report, reference_io};
+use mateval_scene::{Progress, Report, json, reference_io};
 use mateval_sources::source_scene::LicenceText;
 
 use crate::atlas::cache::AtlasCache;
@@ -70,6 +72,10 @@ pub fn build(
     reference_io::write(folder, &plan.scene)?;
     if let Some(source) = &plan.source_materials {
         reference_io::write_source_materials(folder, source)?;
+    }
+    if let Some(parts) = plan.classes.take() {
+        let file = MaterialClassesFile { format: FORMAT.to_owned(), parts };
+        json::write(&folder.material_classes(), &file)?;
     }
     scene_file::write(plan, recipe, entry, &atlases, folder)?;
     Ok(Built { licence, absent })

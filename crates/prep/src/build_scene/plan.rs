@@ -4,11 +4,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use mateval_scene::dataset::{TrueMaterials, View};
+use mateval_scene::material_class::{ClassifiedPart, MaterialClass};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::source_materials::SourceMaterials;
 use mateval_scene::{Finding, SceneLights, SourceKind, TriangleMesh};
-use mateval_sources::source_scene::SourceScene;
+use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 use mateval_tracer::World;
 
 use super::fault::SceneFault;
@@ -18,7 +19,7 @@ use crate::conversion::convert;
 use crate::error::PrepError;
 use crate::instances::{self, InstanceEntry};
 use crate::part_labels;
-use crate::part_split::PartSplit;
+use crate::part_split::{PartEntry, PartSplit};
 use crate::recipe::{Recipe, RecipeScene};
 
 /// A scene with numbered instances and parts and with the cameras of all views.
@@ -39,6 +40,9 @@ pub(super) struct Plan {
     pub(super) shapes: Vec<Option<Arc<TriangleMesh>>>,
     /// The source's own parts first.
     pub(super) part_splits: Vec<PartSplit>,
+    /// The class of material of each of the source's own parts, in their order, where the source's reader states
+    /// classes.
+    pub(super) classes: Option<Vec<ClassifiedPart>>,
     pub(super) views: Vec<View>,
     pub(super) findings: Vec<Finding>,
     /// The file that findings refer to by default.
@@ -70,6 +74,7 @@ pub(super) fn plan(
     }
     let instances = instances::list(&read.scene, &read.origins).map_err(PrepError::scene(&entry.id))?;
     let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
+    let classes = classified_parts(&own, &read.origins);
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
     let mut views = views_of(recipe, read.camera);
     let SourceScene { kind, lights, states_roughness, states_metallic, file, files, absent, .. } = read;
@@ -102,12 +107,27 @@ pub(super) fn plan(
         instances,
         shapes: read.origins.into_iter().map(|origin| origin.shape).collect(),
         part_splits,
+        classes,
         views,
         findings,
         file,
         files,
     };
     Ok((plan, absent))
+}
+
+/// The classes of the source's own parts; none where its reader states none.
+fn classified_parts(own: &PartSplit, origins: &[InstanceOrigin]) -> Option<Vec<ClassifiedPart>> {
+    let mut all = Vec::new();
+    for (instance, origin) in own.instances.iter().zip(origins) {
+        let classes = origin.class_of_part.as_ref()?;
+        let classified = |(part, class): (&PartEntry, &Option<MaterialClass>)| ClassifiedPart {
+            part: part.id.clone(),
+            class: *class,
+        };
+        all.extend(instance.parts.iter().zip(classes).map(classified));
+    }
+    Some(all)
 }
 
 /// The source's own parts, then those of the recipe's labels.

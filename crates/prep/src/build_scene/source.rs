@@ -145,6 +145,7 @@ fn files(root: &Path, room: &Front3dRoom) -> HouseFiles {
         textures: room.textures.clone(),
         cameras: room.cameras.clone(),
         blenderproc_compat: room.blenderproc_compat,
+        appearance: room.appearance_rule(),
     }
 }
 

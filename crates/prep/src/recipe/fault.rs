@@ -132,6 +132,9 @@ pub enum RecipeSceneFault {
     /// The source has no camera of its own.
     #[error("a room needs a camera, as in `camera = {{ seed = 1 }}`")]
     NoCamera,
+    /// A seed of roughnesses that are not drawn.
+    #[error("`appearance_seed` needs `appearance = \"stated\"`")]
+    UnusedSeed,
     /// The source cannot draw cameras and has no designers' cameras.
     #[error("`seed` and `designer` are for `front3d`")]
     CameraOfRooms,

@@ -26,7 +26,7 @@ use fault::RecipeFault;
 pub use limits::ATLAS_SIZES;
 pub(crate) use limits::RESOLUTION;
 pub(crate) use scene::SourcePath;
-pub use scene::{Front3dRoom, RecipeScene, RecipeSource};
+pub use scene::{AppearanceWord, Front3dRoom, RecipeScene, RecipeSource};
 use sizes::check_sizes;
 pub(crate) use text::read_text;
 pub use views::Offset;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::{PartSetId, SceneId};
+use mateval_sources::front3d::AppearanceRule;
 use serde::Deserialize;
 
 use super::camera::RecipeCamera;
@@ -64,6 +65,32 @@ pub struct Front3dRoom {
     /// Mirror the layout as BlenderProc does.
     #[serde(default)]
     pub blenderproc_compat: bool,
+    /// Where roughness and metallic come from.
+    #[serde(default)]
+    pub appearance: AppearanceWord,
+    /// The seed of what [`AppearanceWord::Stated`] draws; 0 if absent.
+    pub appearance_seed: Option<u64>,
+}
+
+/// The rule for the roughness and metallic of a 3D-FRONT room.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AppearanceWord {
+    /// 0.5 and 0 everywhere.
+    #[default]
+    Constant,
+    /// By the class of material that the data states.
+    Stated,
+}
+
+impl Front3dRoom {
+    /// The rule for its roughness and metallic.
+    pub(crate) fn appearance_rule(&self) -> AppearanceRule {
+        match self.appearance {
+            AppearanceWord::Constant => AppearanceRule::Constant,
+            AppearanceWord::Stated => AppearanceRule::Stated { seed: self.appearance_seed.unwrap_or(0) },
+        }
+    }
 }
 
 /// The source of a scene.
@@ -146,6 +173,9 @@ impl RecipeScene {
         check_sizes(&format!("scene '{}'", self.id), self.resolution, self.atlas_size, faults);
         let mut own = Vec::new();
         own.extend(self.check_source().err());
+        if let Some(Front3dRoom { appearance: AppearanceWord::Constant, appearance_seed: Some(_), .. }) = self.front3d {
+            own.push(RecipeSceneFault::UnusedSeed);
+        }
         self.check_label_folders(&mut own);
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             own.push(RecipeSceneFault::Exposure { found: self.exposure });

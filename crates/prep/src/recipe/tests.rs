@@ -1,6 +1,7 @@
 //! What a recipe must contain, and that all of its faults are reported.
 
 use super::*;
+use mateval_sources::front3d::AppearanceRule;
 
 fn read_text(text: &str) -> Result<Recipe, PrepError> {
     let folder = tempfile::tempdir().unwrap();
@@ -101,6 +102,20 @@ fn labels_lie_below_the_scenes_folder() {
         let error = with(bad).unwrap_err().to_string();
         assert!(error.contains(&format!("part_labels.one = '{bad}'")) && error.contains("XML's folder"), "{error}");
     }
+}
+
+#[test]
+fn a_seed_of_roughnesses_needs_stated_ones() {
+    let with = |words: &str| {
+        let room = "front3d = { house = 'h.json', room = 'R-1', models = 'm', ";
+        read_text(&format!("name = 'x'\n[[scene]]\nid = 'a'\n{room}{words} }}\ncamera = {{ seed = 1 }}"))
+    };
+    let rule = |recipe: Recipe| recipe.scenes[0].front3d.as_ref().unwrap().appearance_rule();
+    assert_eq!(rule(with("textures = 't'").unwrap()), AppearanceRule::Constant);
+    assert_eq!(rule(with("appearance = 'stated'").unwrap()), AppearanceRule::Stated { seed: 0 });
+    assert_eq!(rule(with("appearance = 'stated', appearance_seed = 7").unwrap()), AppearanceRule::Stated { seed: 7 });
+    let error = with("appearance_seed = 7").unwrap_err().to_string();
+    assert!(error.contains("`appearance_seed` needs"), "{error}");
 }
 
 #[test]

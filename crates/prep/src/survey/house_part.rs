@@ -8,7 +8,7 @@ use mateval_scene::dataset::SourceFile;
 use mateval_scene::manifest::sha256_of_file;
 use mateval_scene::work_folder::{WorkFolder, remove, remove_beside};
 use mateval_scene::{FindingCount, json};
-use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
+use mateval_sources::front3d::{self, AppearanceRule, FurnishedHouse, HouseFiles};
 use serde::{Deserialize, Serialize};
 
 use super::candidates::{HouseSurvey, search_rooms};
@@ -134,6 +134,7 @@ impl<'a> HouseSearch<'a> {
             textures: options.textures.clone(),
             cameras: options.cameras.clone(),
             blenderproc_compat: false,
+            appearance: AppearanceRule::Constant,
         };
         let furnished = front3d::furnish(&files, &front3d::Limits::default())?;
         Ok((search_rooms(options, &furnished)?, furnished))

@@ -4,13 +4,17 @@ use std::collections::BTreeMap;
 
 use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_image::transfer::linear_from_srgb;
-use mateval_image::{ImageError, Wrap};
+use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::Severity;
 use mateval_scene::material::{
     ColorInput, Material, MaterialModel, PrincipledFlavour, ScalarInput, TextureIndex, UvTransform,
 };
+use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::{MaterialIndex, SourceTexture};
 
+use super::appearance_rule::AppearanceRule;
+use super::class_table;
+use super::finish::{BLOCK, Finish};
 use super::house::{House, HouseMaterial};
 use super::model::{Library, is_folder_name};
 use crate::log::Log;
@@ -21,6 +25,7 @@ use mateval_scene::source_folder::FileFault;
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
 /// Blender's default, which BlenderProc does not change. The data has no roughness.
 const ROUGHNESS: f32 = 0.5;
+const METALLIC: f32 = 0.0;
 
 /// The materials and textures made so far, each once.
 #[derive(Debug)]
@@ -30,10 +35,12 @@ pub(super) struct Appearances {
     /// Texels of all textures.
     texels: usize,
     most_texels: usize,
+    /// Where roughness and metallic come from.
+    pub(super) rule: AppearanceRule,
     /// By file. None stands for a file that is missing or faulty, which has been reported.
     known_textures: BTreeMap<String, Option<TextureIndex>>,
-    /// By index in [`House::materials`].
-    of_architecture: BTreeMap<Option<usize>, MaterialIndex>,
+    /// By index in [`House::materials`] and by class.
+    of_architecture: BTreeMap<(Option<usize>, Option<MaterialClass>), MaterialIndex>,
     /// By model id.
     of_models: BTreeMap<String, MaterialIndex>,
     /// Number of materials that name a texture although no folder of textures was given.
@@ -42,12 +49,13 @@ pub(super) struct Appearances {
 
 impl Appearances {
     /// No materials yet. All textures may have at most `most_texels` texels.
-    pub(super) fn new(most_texels: usize) -> Self {
+    pub(super) fn new(most_texels: usize, rule: AppearanceRule) -> Self {
         Self {
             materials: Vec::new(),
             textures: Vec::new(),
             texels: 0,
             most_texels,
+            rule,
             known_textures: BTreeMap::new(),
             of_architecture: BTreeMap::new(),
             of_models: BTreeMap::new(),
@@ -55,8 +63,14 @@ impl Appearances {
         }
     }
 
-    /// The material of a model, and whether its texture could be read.
-    pub(super) fn of_model(&mut self, jid: &str, models: &mut Library, log: &mut Log) -> (MaterialIndex, bool) {
+    /// The material of a model, whose classes `finish` states, and whether its texture could be read.
+    pub(super) fn of_model(
+        &mut self,
+        jid: &str,
+        finish: Option<&Finish>,
+        models: &mut Library,
+        log: &mut Log,
+    ) -> (MaterialIndex, bool) {
         let texture = self.texture(jid, models, "used linear mid-grey", log);
         if let Some(known) = self.of_models.get(jid) {
             return (*known, texture.is_some());
@@ -65,22 +79,24 @@ impl Appearances {
             Some(texture) => ColorInput::Texture { texture, uv: UvTransform::default() },
             None => ColorInput::Constant(MISSING),
         };
-        let index = self.add(jid.to_owned(), color);
+        let numbers = self.numbers(jid, finish.map_or(&[], |finish| &finish.classes), finish.map(|finish| finish.uv));
+        let index = self.add(jid.to_owned(), color, numbers);
         self.of_models.insert(jid.to_owned(), index);
         (index, texture.is_some())
     }
 
-    /// The material made of `house.materials[material]`, and its colour. Without a material it is mid-grey.
+    /// The material made of `house.materials[material]` in a class, and its colour. Without a material it is mid-grey.
     pub(super) fn of_architecture(
         &mut self,
         house: &House,
         material: Option<usize>,
+        class: Option<MaterialClass>,
         textures: Option<&mut Library>,
         log: &mut Log,
     ) -> (MaterialIndex, [f32; 3]) {
         let source = material.map(|material| &house.materials[material]);
         let plain = source.map_or(MISSING, |source| source.color.map(|v| linear_from_srgb(v as f32 / 255.0)));
-        if let Some(known) = self.of_architecture.get(&material) {
+        if let Some(known) = self.of_architecture.get(&(material, class)) {
             return (*known, plain);
         }
         let texture = source.and_then(|source| self.architecture_texture(source, textures, log));
@@ -89,8 +105,9 @@ impl Appearances {
             _ => ColorInput::Constant(plain),
         };
         let name = source.map_or("none", |source| source.uid.as_str());
-        let index = self.add(name.to_owned(), color);
-        self.of_architecture.insert(material, index);
+        let numbers = self.numbers(name, class.as_slice(), None);
+        let index = self.add(name.to_owned(), color, numbers);
+        self.of_architecture.insert((material, class), index);
         (index, plain)
     }
 
@@ -147,13 +164,34 @@ impl Appearances {
         Ok(SourceTexture { name: shown.to_owned(), sha256, texture: texture.collapsed() })
     }
 
-    fn add(&mut self, name: String, base_color: ColorInput) -> MaterialIndex {
+    /// Roughness and metallic of the material `id`: constants, or for several classes a texture that is looked up at
+    /// `uv`.
+    fn numbers(&mut self, id: &str, classes: &[MaterialClass], uv: Option<UvTransform>) -> [ScalarInput; 2] {
+        let drawn: Vec<[f32; 2]> = match self.rule {
+            AppearanceRule::Constant => vec![[ROUGHNESS, METALLIC]],
+            AppearanceRule::Stated { seed } => {
+                classes.iter().map(|class| class_table::drawn(*class, id, seed)).collect()
+            }
+        };
+        if let [one] = drawn[..] {
+            return one.map(ScalarInput::Constant);
+        }
+        let texels: Vec<[f32; 3]> =
+            drawn.iter().flat_map(|[roughness, metallic]| [[*roughness, *metallic, 0.0]; BLOCK]).collect();
+        let texture = Texture::new(texels.len(), 1, Texels::Linear(texels), Wrap::Clamp);
+        let texture = texture.expect("a row of texels is a texture");
+        self.textures.push(SourceTexture { name: format!("classes of {id}"), sha256: None, texture });
+        let (texture, uv) = (TextureIndex(self.textures.len() - 1), uv.unwrap_or_default());
+        [0, 1].map(|channel| ScalarInput::Texture { texture, channel, uv })
+    }
+
+    fn add(&mut self, name: String, base_color: ColorInput, [roughness, metallic]: [ScalarInput; 2]) -> MaterialIndex {
         self.materials.push(Material {
             name,
             model: MaterialModel::Principled {
                 base_color,
-                roughness: ScalarInput::Constant(ROUGHNESS),
-                metallic: ScalarInput::Constant(0.0),
+                roughness,
+                metallic,
                 specular: 0.5,
                 flavour: PrincipledFlavour::Blender,
             },

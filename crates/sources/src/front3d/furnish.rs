@@ -30,7 +30,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     // Its rooms, with models and textures.
     let models = library(files, &files.models, limits)?;
     let textures = files.textures.as_ref().map(|path| library(files, path, limits)).transpose()?;
-    let mut furnisher = Furnisher::new(&house, models, textures, limits, files.blenderproc_compat, log);
+    let mut furnisher = Furnisher::new(&house, models, textures, limits, files, log);
     let wanted_pieces = (0..house.rooms.len()).map(|room| furnisher.add_room(room)).collect();
     let Furnished { scene, placed, mut log, libraries } = furnisher.finish();
 
@@ -44,6 +44,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
         house,
         file,
         scene: Arc::new(scene),
+        appearance: files.appearance,
         placed,
         wanted_pieces,
         findings: log.into_findings(),

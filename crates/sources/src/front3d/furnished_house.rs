@@ -5,6 +5,7 @@ use std::sync::Arc;
 use mateval_scene::Finding;
 use mateval_scene::reference::ReferenceScene;
 
+use super::appearance_rule::AppearanceRule;
 use super::house::{DesignerCamera, House};
 use crate::source_scene::InstanceOrigin;
 
@@ -41,6 +42,8 @@ pub struct FurnishedHouse {
     pub file: String,
     /// All surfaces, room by room, without lights. It is shared with the [`World`](mateval_tracer::World) made of it.
     pub scene: Arc<ReferenceScene>,
+    /// Where the roughness and metallic of its materials come from.
+    pub appearance: AppearanceRule,
     /// Facts about each surface, in the order of `scene.surfaces`.
     pub placed: Vec<PlacedSurface>,
     /// Designers' cameras by number, from the file beside the house or else from the JSON.

@@ -9,12 +9,15 @@ use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Role, Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
-use super::coincident;
+use super::appearance_rule::AppearanceRule;
+use super::finish::Finish;
 use super::furnished_house::{PlacedModel, PlacedSurface};
 use super::house::{Child, ChildKind, House, world_from_house};
+use super::house_files::HouseFiles;
 use super::limits::Limits;
 use super::model::{self, Library, Model, is_folder_name};
-use super::model_info::ModelInfo;
+use super::model_info::{Kind, ModelInfo};
+use super::{classify, coincident};
 use crate::log::Log;
 use crate::parts::parts_of_labels;
 use crate::source_scene::InstanceOrigin;
@@ -61,7 +64,7 @@ impl<'a> Furnisher<'a> {
         mut models: Library,
         textures: Option<Library>,
         limits: &Limits,
-        compat: bool,
+        files: &HouseFiles,
         mut log: Log,
     ) -> Self {
         Self {
@@ -70,10 +73,10 @@ impl<'a> Furnisher<'a> {
             models,
             textures,
             limits: *limits,
-            compat,
+            compat: files.blenderproc_compat,
             log,
             known_models: BTreeMap::new(),
-            appearances: Appearances::new(limits.texels),
+            appearances: Appearances::new(limits.texels, files.appearance),
             triangles: 0,
             surfaces: Vec::new(),
             placed: Vec::new(),
@@ -131,14 +134,30 @@ impl<'a> Furnisher<'a> {
         }
         // A surface for each group.
         for ((kind, material), merged) in groups {
-            let (index, color) =
-                self.appearances.of_architecture(house, material, self.textures.as_mut(), &mut self.log);
             let parts = parts_of_labels(&merged.mesh, &merged.mesh_of_triangle);
-            let role = Role::Architecture { kind: kind.to_owned() };
-            let origin = InstanceOrigin { role, part_of_triangle: Some(parts), ..InstanceOrigin::default() };
+            let finish = self.architecture_finish(material, kind, room, &parts);
+            let class = finish.as_ref().map(|finish| finish.classes[0]);
+            let textures = self.textures.as_mut();
+            let (index, color) = self.appearances.of_architecture(house, material, class, textures, &mut self.log);
+            let origin = InstanceOrigin {
+                role: Role::Architecture { kind: kind.to_owned() },
+                part_of_triangle: Some(parts),
+                class_of_part: finish.map(|finish| finish.of_parts),
+                ..InstanceOrigin::default()
+            };
             self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });
             self.placed.push(PlacedSurface { room, origin, model: None, color });
         }
+    }
+
+    /// The class of architecture of one material and type; none where classes are not asked for.
+    fn architecture_finish(&self, material: Option<usize>, kind: &str, room: usize, parts: &[usize]) -> Option<Finish> {
+        if self.appearances.rule == AppearanceRule::Constant {
+            return None;
+        }
+        let content = material.and_then(|material| self.house.materials[material].content.as_deref());
+        let class = classify::of_architecture(content, kind, &self.house.rooms[room].kind);
+        Some(Finish::uniform(class, 1 + parts.iter().max().copied().unwrap_or(0)))
     }
 
     /// Counts the mesh's triangles and reports whether they are within the limit on triangles.
@@ -170,7 +189,8 @@ impl<'a> Furnisher<'a> {
             let message = format!("expected a scale of at least {SMALLEST_SCALE}, found {}", child.placement.scale);
             return self.log.warn("scale_tiny", &format!("{}/scale", child.place), message, "left the piece out");
         }
-        let Some(model) = self.model(&record.jid, &record.place) else { return };
+        let kind = self.info.kind(record);
+        let Some(model) = self.model(&record.jid, &kind, &record.place) else { return };
         if !self.fits_limit(&model.mesh, &child.place) {
             return;
         }
@@ -187,8 +207,8 @@ impl<'a> Furnisher<'a> {
             self.log.note("mirrored_piece", &place, message, "mirrored it and kept its front sides outside");
         }
         // Its material, categories and names.
-        let (material, complete) = self.appearances.of_model(&record.jid, &mut self.models, &mut self.log);
-        let kind = self.info.kind(record);
+        let finish = model.finish.as_ref();
+        let (material, complete) = self.appearances.of_model(&record.jid, finish, &mut self.models, &mut self.log);
         if !kind.known {
             let message = format!("model_info.json does not list '{}'", shortened(&record.jid));
             let action = format!("guessed the super-category '{}'", kind.super_category);
@@ -208,14 +228,15 @@ impl<'a> Furnisher<'a> {
                 category: kind.category,
                 super_category: Some(kind.super_category),
                 part_of_triangle: Some(model.part_of_triangle.clone()),
+                class_of_part: finish.map(|finish| finish.of_parts.clone()),
                 shape: is_rigid(matrix, child.placement.scale).then(|| scaled(&model.mesh, child.placement.scale)),
             },
             color: MISSING,
         });
     }
 
-    /// The model with this id, read at its first use.
-    fn model(&mut self, jid: &str, place: &str) -> Option<Rc<Model>> {
+    /// The model with this id, read at its first use. `kind` is that of the piece.
+    fn model(&mut self, jid: &str, kind: &Kind, place: &str) -> Option<Rc<Model>> {
         if !is_folder_name(jid) {
             let message = format!("expected the name of a folder, found '{}'", shortened(jid));
             self.log.warn("bad_jid", &format!("{place}/jid"), message, "left its pieces out");
@@ -226,7 +247,13 @@ impl<'a> Furnisher<'a> {
         }
         let left = self.limits.triangles.saturating_sub(self.triangles);
         let limits = Limits { triangles: left, ..self.limits };
-        let model = model::read(jid, &mut self.models, &limits, &mut self.log).map(Rc::new);
+        let mut model = model::read(jid, &mut self.models, &limits, &mut self.log);
+        if self.appearances.rule != AppearanceRule::Constant {
+            let class = classify::of_model(kind.material.as_deref(), &kind.super_category);
+            let file = self.models.shown(&format!("{jid}/raw_model.obj"));
+            model = model.map(|model| model.classified(class, &file, &mut self.log));
+        }
+        let model = model.map(Rc::new);
         self.known_models.insert(jid.to_owned(), model.clone());
         model
     }

@@ -75,6 +75,8 @@ pub struct HouseMaterial {
     pub uid: String,
     /// The name of its texture's folder; none where the colour counts.
     pub texture: Option<String>,
+    /// The words of its content type, as in `material wallpaper`.
+    pub content: Option<String>,
     /// sRGB-encoded colour, 0 to 255.
     pub color: [f64; 3],
     /// The map from the mesh's uv to the texture's.

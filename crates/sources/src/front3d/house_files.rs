@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::appearance_rule::AppearanceRule;
+
 /// Paths of a house and its library.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HouseFiles {
@@ -18,6 +20,8 @@ pub struct HouseFiles {
     /// Whether to place everything as BlenderProc does: the architecture mirrored, and each piece of furniture mirrored
     /// back.
     pub blenderproc_compat: bool,
+    /// Where roughness and metallic come from.
+    pub appearance: AppearanceRule,
 }
 
 /// A path with forward slashes, as findings and lists of files give it.

@@ -98,9 +98,19 @@ fn material(uid: String, record: &Value, place: String, log: &mut Log) -> HouseM
     HouseMaterial {
         uid,
         texture: jid.map(str::to_owned),
+        content: content(record),
         color: color(record, &place, log),
         uv: uv_transform(record, &place, log),
         place,
+    }
+}
+
+/// The content type, which is a list of words in most files.
+fn content(record: &Value) -> Option<String> {
+    match record.get("contentType")? {
+        Value::String(words) => Some(words.clone()),
+        Value::Array(words) => Some(words.iter().filter_map(Value::as_str).collect::<Vec<_>>().join(" ")),
+        _ => None,
     }
 }
 

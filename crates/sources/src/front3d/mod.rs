@@ -8,19 +8,24 @@
 //! The steps:
 //! - `document` parses the JSON within limits; `house_reader` and `house_mesh` turn it into a [`House`];
 //! - [`furnish()`] places everything with `furnisher`, `model`, `model_info` and `appearance`; `drop_shadow` finds
-//!   painted shadows, `coincident` moves apart the `sheets` that coincide; `cameras` adds the designers' cameras;
+//!   painted shadows, `classify` the classes of material by `class_table`, `finish` lays them out over a surface;
+//!   `coincident` moves apart the `sheets` that coincide; `cameras` adds the designers' cameras;
 //! - the caller builds one [`World`](mateval_tracer::World) from the house's scene;
 //! - [`camera_sampler`] draws cameras in it that keep [`camera_rules`];
 //! - [`room_scene`] selects one room and what its views see of the other rooms, and `lights` adds the lights.
 
 mod appearance;
+mod appearance_rule;
 pub mod camera_rules;
 pub mod camera_sampler;
 mod cameras;
+mod class_table;
+mod classify;
 mod coincident;
 mod document;
 mod drop_shadow;
 mod error;
+mod finish;
 mod furnish;
 mod furnished_house;
 mod furnisher;
@@ -35,6 +40,7 @@ mod model_info;
 pub mod room_scene;
 mod sheets;
 
+pub use appearance_rule::AppearanceRule;
 pub use error::HouseError;
 pub use furnish::{furnish, read_house};
 pub use furnished_house::{FurnishedHouse, PlacedModel, PlacedSurface};

@@ -7,12 +7,14 @@ use mateval_image::Wrap;
 use mateval_image::texture_io::read_texture_and_alpha;
 use mateval_scene::{Severity, TriangleMesh};
 
-use super::drop_shadow;
+use super::finish::Finish;
 use super::limits::Limits;
+use super::{classify, drop_shadow};
 use crate::log::Log;
 use crate::parts::labelled_parts;
 use crate::surface_mesh::{has_area, to_world};
 use mateval_scene::findings::shortened;
+use mateval_scene::material_class::MaterialClass;
 use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits, ObjMesh};
 use mateval_scene::source_folder::{LookedFor, SourceFolder};
 
@@ -25,6 +27,29 @@ pub(super) struct Model {
     pub(super) mesh: Arc<TriangleMesh>,
     /// The part of each triangle. Parts are the connected components of each group.
     pub(super) part_of_triangle: Vec<usize>,
+    /// The OBJ group of each triangle, as an index in `groups`.
+    group_of_triangle: Vec<usize>,
+    /// The names of the OBJ groups.
+    groups: Vec<String>,
+    /// The classes of material, where [`Self::classified`] has found them.
+    pub(super) finish: Option<Finish>,
+}
+
+impl Model {
+    /// The model with the classes of its groups, where `class` is that of the model as a whole.
+    pub(super) fn classified(mut self, class: MaterialClass, file: &str, log: &mut Log) -> Self {
+        let of_groups: Vec<MaterialClass> = self.groups.iter().map(|name| classify::of_group(name, class)).collect();
+        let of_triangles: Vec<MaterialClass> = self.group_of_triangle.iter().map(|group| of_groups[*group]).collect();
+        let mut mesh = (*self.mesh).clone();
+        let finish = Finish::laid_out(&mut mesh, &of_triangles, &self.part_of_triangle).unwrap_or_else(|| {
+            let message = "the texture coordinates spread too far for the classes of groups".to_owned();
+            log.push(Severity::Note, "spread_uv", file, "", message, "gave all groups the class of the model");
+            Finish::uniform(class, 1 + self.part_of_triangle.iter().max().copied().unwrap_or(0))
+        });
+        self.mesh = Arc::new(mesh);
+        self.finish = Some(finish);
+        self
+    }
 }
 
 /// A folder of models or textures, and its name in findings and lists of files.
@@ -82,6 +107,7 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         let message = "only some faces have texture coordinates or normals".to_owned();
         warn("mixed_faces", "", message, "dropped them for all faces");
     }
+    let names: Vec<String> = read.groups.iter().map(|group| group.name.clone()).collect();
     // What is kept of it, in metres.
     let (mesh, group_of_triangle) = without_shadows(read, &file, log);
     let Some((mesh, groups)) = in_metres(mesh, group_of_triangle, &file, log) else {
@@ -90,7 +116,8 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
         return None;
     };
     let (mesh, groups) = without_painted_shadow(mesh, groups, &format!("{jid}/texture.png"), library, &file, log);
-    Some(Model { part_of_triangle: labelled_parts(&mesh, &groups), mesh: Arc::new(mesh) })
+    let part_of_triangle = labelled_parts(&mesh, &groups);
+    Some(Model { part_of_triangle, mesh: Arc::new(mesh), group_of_triangle: groups, groups: names, finish: None })
 }
 
 fn missing_model(code: &'static str) -> &'static str {

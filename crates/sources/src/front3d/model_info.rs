@@ -1,4 +1,5 @@
-//! Categories of furniture from 3D-FUTURE's `model_info.json`, and guesses for models that it does not list.
+//! Categories and materials of furniture from 3D-FUTURE's `model_info.json`, and guesses for models that it does not
+//! list.
 
 use std::collections::BTreeMap;
 
@@ -47,13 +48,16 @@ pub(super) struct ModelInfo {
 struct Row {
     super_category: String,
     category: Option<String>,
+    material: Option<String>,
 }
 
-/// The categories of a piece of furniture.
+/// The categories and the material of a piece of furniture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Kind {
     pub(super) super_category: String,
     pub(super) category: Option<String>,
+    /// Its main material, as in `Solid Wood`.
+    pub(super) material: Option<String>,
     /// Whether `model_info.json` lists the model.
     pub(super) known: bool,
 }
@@ -80,7 +84,9 @@ impl ModelInfo {
             let known = text(row, "super-category")?;
             let super_category = SUPER_CATEGORIES.iter().find(|one| one.eq_ignore_ascii_case(known))?;
             let category = text(row, "category").map(tidy);
-            Some((text(row, "model_id")?.to_owned(), Row { super_category: (*super_category).to_owned(), category }))
+            let material = text(row, "material").map(str::to_owned);
+            let super_category = (*super_category).to_owned();
+            Some((text(row, "model_id")?.to_owned(), Row { super_category, category, material }))
         };
         // Rows are collected in reverse, so that the first of two rows for one model counts.
         let rows = all.iter().rev().filter_map(row).collect();
@@ -95,12 +101,13 @@ impl ModelInfo {
         });
         if let Some(row) = self.rows.get(&record.jid) {
             let category = row.category.clone().or(named);
-            return Kind { super_category: row.super_category.clone(), category, known: true };
+            let material = row.material.clone();
+            return Kind { super_category: row.super_category.clone(), category, material, known: true };
         }
         let words = [record.category.as_deref(), record.title.as_deref()];
         let words = words.into_iter().flatten().collect::<Vec<_>>().join(" ").to_lowercase();
         let guess = WORDS.iter().find(|(word, _)| words.contains(word)).map_or("Others", |(_, kind)| kind);
-        Kind { super_category: guess.to_owned(), category: named, known: false }
+        Kind { super_category: guess.to_owned(), category: named, material: None, known: false }
     }
 }
 
@@ -126,7 +133,7 @@ mod tests {
 
     #[test]
     fn the_list_takes_precedence_over_words() {
-        let text = br#"[{"model_id": "a", "super-category": "Sofa", "category": "Three-Seat / Multi-seat Sofa"},
+        let text = br#"[{"model_id": "a", "super-category": "Sofa", "category": "Three-Seat / Multi-seat Sofa", "material": "Suede"},
             {"model_id": "a", "super-category": "Bed"}, {"model_id": "b", "super-category": "chair", "category": null}, 7]"#;
         let mut log = Log::new("h".into(), 10);
         let info = ModelInfo::parse(text, "model_info.json", &Limits::default(), &mut log);
@@ -141,6 +148,8 @@ mod tests {
         assert_eq!(kind("c", None, Some("lighting/pendant")), ("Lighting".into(), "pendant".into(), false));
         assert_eq!(kind("c", Some("植物"), None), ("Others".into(), "植物".into(), false));
         assert_eq!(kind("c", None, None), ("Others".into(), String::new(), false));
+        let materials = ["a", "b", "c"].map(|jid| info.kind(&record(jid, None, None)).material);
+        assert_eq!(materials, [Some("Suede".to_owned()), None, None]);
     }
 
     #[test]

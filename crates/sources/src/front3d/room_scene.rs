@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::ids::id_text_from;
-use mateval_scene::material::{ColorInput, MaterialModel, TextureIndex};
+use mateval_scene::material::TextureIndex;
 use mateval_scene::reference::{MaterialIndex, ReferenceScene, Surface};
 use mateval_scene::{Camera, SceneLights, SourceKind};
 use mateval_tracer::World;
 use mateval_tracer::aov::{coarse_subpixels, hit_through};
 use rayon::prelude::*;
 
+use super::appearance_rule::AppearanceRule;
 use super::furnished_house::FurnishedHouse;
 use super::lights;
 use crate::source_scene::SourceScene;
@@ -29,11 +30,12 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
         surface.name.clone_from(name);
     }
     scene.lights = lights::groups(house, &kept, &scene);
+    let states = house.appearance != AppearanceRule::Constant;
     SourceScene {
         kind: SourceKind::Front3d,
         lights: SceneLights::Stage,
-        states_roughness: false,
-        states_metallic: false,
+        states_roughness: states,
+        states_metallic: states,
         house: house.house.uid.clone(),
         file: house.file.clone(),
         scene,
@@ -105,9 +107,7 @@ fn scene_of(scene: &ReferenceScene, kept: &[usize]) -> ReferenceScene {
         let source = &scene.surfaces[surface];
         let material = *materials.entry(source.material.0).or_insert_with(|| {
             let mut material = scene.materials[source.material.0].clone();
-            if let MaterialModel::Principled { base_color: ColorInput::Texture { texture, .. }, .. } =
-                &mut material.model
-            {
+            for texture in material.texture_indices_mut() {
                 let index = *textures.entry(texture.0).or_insert_with(|| {
                     part.textures.push(scene.textures[texture.0].clone());
                     TextureIndex(part.textures.len() - 1)

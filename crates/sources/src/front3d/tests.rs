@@ -1,6 +1,7 @@
 //! Tests the reader on the sample house and its faults, on generated houses, on hostile files, and on real data if it
 //! exists.
 
+mod appearances;
 mod cameras;
 mod faults;
 mod hostile;
@@ -63,6 +64,7 @@ impl Disk {
             textures: Some("house/3D-FRONT-texture".into()),
             cameras: None,
             blenderproc_compat: false,
+            appearance: AppearanceRule::Constant,
         }
     }
 
@@ -189,5 +191,6 @@ fn lone_house(folder: &Path, text: &[u8]) -> HouseFiles {
         textures: None,
         cameras: None,
         blenderproc_compat: false,
+        appearance: AppearanceRule::Constant,
     }
 }

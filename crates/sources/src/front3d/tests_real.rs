@@ -22,6 +22,7 @@ fn real(uid: &str) -> Option<FurnishedHouse> {
         textures: None,
         cameras: Some("camera_data.json".into()),
         blenderproc_compat: false,
+        appearance: AppearanceRule::Constant,
     };
     Some(furnish(&files, &Limits::default()).unwrap())
 }
