@@ -35,6 +35,7 @@ mod suite {
     mod part_labels;
     mod partial;
     mod partial_board;
+    mod perturb;
     mod planted;
     mod procedural;
     mod publish;

@@ -26,6 +26,11 @@ static STATED: LazyLock<[PathBuf; 2]> = LazyLock::new(|| {
     [source, dataset]
 });
 
+/// The rendered dataset with stated materials. It has furniture.
+pub fn dataset() -> &'static Path {
+    &STATED[1]
+}
+
 fn recipe(folder: &Path, words: &str) -> PathBuf {
     let path = folder.join("recipe.toml");
     let room = "house = \"house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json\", room = \"LivingDiningRoom-101\", \

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use mateval_scene::dataset::{DatasetFile, FORMAT};
-use mateval_scene::layout::{DATASET, MANIFEST};
+use mateval_scene::layout::{DATASET, MANIFEST, is_ground_truth};
 use mateval_scene::manifest::{self, Entry, sha256_of_bytes};
 use mateval_scene::open::check_whole;
 use mateval_scene::work_folder::{WorkFolder, check_holds_none};
@@ -69,12 +69,6 @@ fn split(root: &Path) -> Result<(Vec<Entry>, Vec<Entry>), AuditError> {
 fn commitment_of(withheld: &[Entry]) -> String {
     let lines: String = withheld.iter().map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect();
     sha256_of_bytes(lines.as_bytes())
-}
-
-/// Whether the path is of the form `scenes/<scene>/ground_truth/...`.
-fn is_ground_truth(file: &str) -> bool {
-    let mut parts = file.split('/');
-    parts.next() == Some("scenes") && parts.nth(1) == Some("ground_truth")
 }
 
 fn copy(from: &Path, to: &Path, files: &[&str], progress: &dyn Fn(usize)) -> Result<(), AuditError> {

@@ -82,7 +82,8 @@ pub fn write_scenes(
         licence: None,
         cost: None,
         assumed_encodings: method.assumed_encodings.clone(),
-        dataset_manifest_sha256: dataset.file.manifest_sha256.clone(),
+        geometry: dataset.file.perturbation(),
+        dataset_manifest_sha256: dataset.file.scored_manifest_sha256().to_owned(),
     };
     json::write(&work.path().join(SUBMISSION), &file)?;
     work.finish()?;

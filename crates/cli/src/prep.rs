@@ -7,6 +7,7 @@ mod compare;
 mod export;
 mod finish;
 mod mitsuba;
+mod perturb;
 mod publish;
 pub mod render;
 mod stats;
@@ -33,6 +34,9 @@ pub enum Command {
     Compare(compare::CompareArgs),
     /// Checks a dataset: hashes, schemas, reprojection, ids and masks. Exit code 1: it has an error.
     Verify(verify::VerifyArgs),
+    /// Copies what methods see of a dataset with furniture moved, scaled or bent, to measure what imperfect geometry
+    /// costs.
+    Perturb(perturb::PerturbArgs),
     /// Splits a dataset into the public files and the ground truth of a hidden split, and writes a page that describes the
     /// release. Exit code 1: the page states a fault.
     Publish(publish::PublishArgs),
@@ -54,6 +58,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Companions(args) => companions::run(args),
         Command::Compare(args) => compare::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Perturb(args) => perturb::run(args),
         Command::Publish(args) => publish::run(args),
         Command::Export(args) => export::run(args),
         Command::Stats(args) => stats::run(args),

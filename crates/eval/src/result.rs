@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_scene::dataset_id::DatasetId;
+use mateval_scene::perturbation::Perturbation;
 use mateval_scene::submission::Cost;
 use mateval_scene::{Finding, InstanceId, SceneError, SceneId, ViewId, json};
 use schemars::JsonSchema;
@@ -49,6 +50,14 @@ impl ResultFile {
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         json::read_format(path, RESULT_FORMAT)
     }
+
+    /// The method's name in tables and on boards, with the geometry that it was given, as in `nn (pose 2)`.
+    pub fn shown_method(&self) -> String {
+        match &self.submission.geometry {
+            None => self.method.clone(),
+            Some(perturbation) => format!("{} ({perturbation})", self.method),
+        }
+    }
 }
 
 /// A submission.
@@ -68,6 +77,9 @@ pub struct SubmissionId {
     /// What the method costs to run, as stated by the submission.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost: Option<Cost>,
+    /// How the geometry that it was made from differs from the true one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<Perturbation>,
 }
 
 /// The scores of one protocol.

@@ -343,6 +343,7 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
             url: entry.file.url,
             licence: entry.file.licence,
             cost: entry.file.cost,
+            geometry: entry.file.geometry,
         },
         dataset: DatasetId::new(plan.dataset, scored.iter().copied()),
         lpips_weights: BTreeMap::from([(LPIPS_NET.name().to_owned(), weights.map(str::to_owned))]),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use mateval_scene::ids::quoted;
+use mateval_scene::perturbation::PerturbationKind;
 use mateval_scene::{SceneId, ViewId};
 
 use crate::build_scene::fault::SceneFault;
@@ -36,6 +37,36 @@ pub enum PrepError {
         path: PathBuf,
         /// What is wrong with it, and where.
         source: Box<toml::de::Error>,
+    },
+    /// A level that a kind of perturbation does not have.
+    #[error("{kind} has the levels 0 to {most}, found {found}")]
+    NoSuchLevel {
+        /// The kind.
+        kind: PerturbationKind,
+        /// The level that was asked for.
+        found: u32,
+        /// The highest level.
+        most: u32,
+    },
+    /// A dataset whose geometry is not the true one.
+    #[error("the geometry of '{}' is perturbed already; start from the dataset with the true one", path.display())]
+    PerturbedAlready {
+        /// The dataset.
+        path: PathBuf,
+    },
+    /// A scene without ground truth, from which pictures of its geometry are made.
+    #[error(
+        "scene '{scene}' has no ground truth, without which its pictures cannot be made again; add its ground_truth/"
+    )]
+    NoTruth {
+        /// The scene.
+        scene: SceneId,
+    },
+    /// A dataset in which nothing can be moved.
+    #[error("no scene of '{}' has furniture; only 3D-FRONT rooms state which objects are furniture", path.display())]
+    NoFurniture {
+        /// The dataset.
+        path: PathBuf,
     },
     /// A list of rejected rooms that is not valid.
     #[error("list '{}': {source}", path.display())]

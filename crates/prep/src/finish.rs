@@ -58,6 +58,7 @@ pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'
         scenes,
         scored_renderer: None,
         licences: Vec::new(),
+        geometry: None,
         manifest_sha256: String::new(),
     };
     for id in &dataset.scenes {

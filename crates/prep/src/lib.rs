@@ -6,7 +6,8 @@
 //! The steps: [`recipe`] reads and checks the whole recipe. [`build`] then makes scene by scene with [`build_scene`]:
 //! [`mateval_sources`] reads the source, [`instances`] numbers its surfaces, [`part_split`] and [`part_labels`] split them
 //! into parts, [`atlas`] unwraps them, [`bake`] fills their textures, and [`views`] makes the pictures. [`render`] adds the
-//! RGB truth. [`survey`] lists the rooms that a recipe could name.
+//! RGB truth. [`survey`] lists the rooms that a recipe could name. [`perturb`] copies what methods see, with other
+//! geometry.
 
 pub mod atlas;
 pub mod bake;
@@ -21,6 +22,7 @@ pub mod instances;
 pub mod numbering;
 pub mod part_labels;
 pub mod part_split;
+pub mod perturb;
 pub mod recipe;
 pub mod render;
 pub mod scene_meshes;

@@ -73,7 +73,8 @@ impl Submission {
             licence,
             cost: cost.map(|cost| cost_of(&cost)).transpose()?,
             assumed_encodings: std::collections::BTreeMap::new(),
-            dataset_manifest_sha256: dataset.file.manifest_sha256.clone(),
+            geometry: dataset.file.perturbation(),
+            dataset_manifest_sha256: dataset.file.scored_manifest_sha256().to_owned(),
         };
         // Later writes go to the same folder even if the program changes its current one.
         let out = std::path::absolute(&out)?;

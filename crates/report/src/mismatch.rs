@@ -200,7 +200,7 @@ impl fmt::Display for SubmissionVersion {
 impl Mismatch {
     /// The reason for which a result has no scores under a protocol, if it has none.
     pub(crate) fn of_result(result: &ResultFile, protocol: &str) -> Option<Self> {
-        let method = result.method.clone();
+        let method = result.shown_method();
         let scored = || result.protocols.keys().cloned().collect();
         let is_scored = result.protocols.contains_key(protocol);
         (!is_scored).then(|| Self::Protocol { method, protocol: protocol.to_owned(), scored: scored() })

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
+use crate::perturbation::{Perturbation, PerturbedGeometry};
 use crate::role::{Role, SceneLights, SourceKind};
 
 /// The name of this version of the format.
@@ -29,8 +30,24 @@ pub struct DatasetFile {
     pub scored_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,
+    /// How its geometry differs from that of the dataset on which submissions are scored; absent where it is the true
+    /// one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<PerturbedGeometry>,
     /// SHA-256 of MANIFEST.sha256, hex. The manifest holds every file but itself and this one.
     pub manifest_sha256: String,
+}
+
+impl DatasetFile {
+    /// `manifest_sha256` of the dataset on which submissions made from this one are scored.
+    pub fn scored_manifest_sha256(&self) -> &str {
+        self.geometry.as_ref().map_or(&self.manifest_sha256, |geometry| &geometry.true_manifest_sha256)
+    }
+
+    /// The perturbation of its geometry.
+    pub fn perturbation(&self) -> Option<Perturbation> {
+        self.geometry.as_ref().map(|geometry| geometry.perturbation)
+    }
 }
 
 /// A scene's licence text, as it came with its source.

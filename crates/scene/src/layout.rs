@@ -25,6 +25,12 @@ pub fn part_picture(set: Option<&PartSetId>) -> String {
     set.map_or("part.png".to_owned(), |set| format!("part_{set}.png"))
 }
 
+/// Whether a path in the dataset is of the form `scenes/<scene>/ground_truth/...`.
+pub fn is_ground_truth(file: &str) -> bool {
+    let mut parts = file.split('/');
+    parts.next() == Some("scenes") && parts.nth(1) == Some("ground_truth")
+}
+
 /// The paths of one scene.
 #[derive(Clone, Debug)]
 pub struct SceneFolder(PathBuf);

@@ -29,6 +29,7 @@ pub mod material_class;
 pub mod mesh;
 pub mod obj;
 pub mod open;
+pub mod perturbation;
 pub mod plain_instances;
 pub mod process_cpu;
 pub mod progress;

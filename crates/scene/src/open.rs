@@ -244,6 +244,7 @@ mod tests {
             scenes: vec![room.clone(), hall.clone()],
             scored_renderer: None,
             licences: Vec::new(),
+            geometry: None,
             manifest_sha256: String::new(),
         };
         let chosen =

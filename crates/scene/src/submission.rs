@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::ids::{InstanceId, SceneId};
+use crate::perturbation::Perturbation;
 use crate::stored_encoding::StoredEncoding;
 use crate::{SceneError, json};
 
@@ -42,6 +43,9 @@ pub struct SubmissionFile {
     /// By map, the encodings of the method's pictures that its authors do not state, and that the adapter assumed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub assumed_encodings: BTreeMap<Map, StoredEncoding>,
+    /// How the geometry that it was made from differs from the true one; absent where it was made from the true one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<Perturbation>,
     /// `manifest_sha256` of the dataset that it was made for.
     pub dataset_manifest_sha256: String,
 }

@@ -63,6 +63,7 @@ fn dataset(scenes: Vec<SceneFile>) -> Dataset {
             scenes: scenes.iter().map(|scene| scene.id.clone()).collect(),
             scored_renderer: None,
             licences: Vec::new(),
+            geometry: None,
             manifest_sha256: String::new(),
         },
         targets: TargetsFile { format: FORMAT.to_owned(), targets: Vec::new() },

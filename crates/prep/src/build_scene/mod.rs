@@ -7,7 +7,7 @@ mod plan;
 mod scene_file;
 mod source;
 mod turned_views;
-mod view_pictures;
+pub(crate) mod view_pictures;
 mod wide_views;
 
 use std::path::Path;

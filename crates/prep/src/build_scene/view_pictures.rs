@@ -58,7 +58,8 @@ pub(super) fn write(
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
         check_use(plan, &view.id, &geometry, &mut seen);
         seen.unseen_shares.push(unseen_share(&geometry));
-        write_view(folder, &view.id, &geometry, &truth)?;
+        write_geometry(folder, &view.id, &geometry)?;
+        write_truth(folder, &view.id, &truth)?;
         write_parts(&folder.view(&view.id), &geometry, &parts)?;
     }
     progress(Report::step("views", plan.views.len(), plan.views.len()));
@@ -93,7 +94,7 @@ fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut
 }
 
 /// Lowers the nearest depth of every instance that the view shows.
-fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
+pub(crate) fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
     for (instance, depth) in geometry.instance.pixels().iter().zip(geometry.depth.pixels()) {
         if let Some(place) = usize::from(*instance).checked_sub(1) {
             let depth = f64::from(*depth);
@@ -102,17 +103,18 @@ fn note_nearest(geometry: &GeometryPictures, nearest: &mut [Option<f64>]) {
     }
 }
 
-fn unseen_share(geometry: &GeometryPictures) -> f64 {
+/// The share of the valid pixels that the input view does not show.
+pub(crate) fn unseen_share(geometry: &GeometryPictures) -> f64 {
     let count = |mask: &Mask| mask.pixels().iter().filter(|&&holds| holds).count() as f64;
     // No valid pixel, none unseen.
     count(&geometry.unobserved) / count(&geometry.valid).max(1.0)
 }
 
-fn write_view(
+/// Writes the pictures of geometry that methods see, except those of parts.
+pub(crate) fn write_geometry(
     folder: &SceneFolder,
     view: &ViewId,
     geometry: &GeometryPictures,
-    truth: &TruthPictures,
 ) -> Result<(), PrepError> {
     let shown = folder.view(view);
     exr_io::write_scalar(&shown.join("depth.exr"), &geometry.depth, Precision::Float)?;
@@ -122,6 +124,10 @@ fn write_view(
     if view.as_str() != INPUT {
         png_io::write_mask(&shown.join("unobserved.png"), &geometry.unobserved)?;
     }
+    Ok(())
+}
+
+fn write_truth(folder: &SceneFolder, view: &ViewId, truth: &TruthPictures) -> Result<(), PrepError> {
     let hidden = folder.truth_view(view);
     exr_io::write_linear(&hidden.join("albedo.exr"), &truth.albedo, Precision::Float)?;
     exr_io::write_linear(&hidden.join("diffuse_albedo.exr"), &truth.diffuse_albedo, Precision::Float)?;
@@ -132,7 +138,11 @@ fn write_view(
 }
 
 /// Writes the picture of each set of parts. `parts` holds the name of its file and its value for every triangle.
-fn write_parts(shown: &Path, geometry: &GeometryPictures, parts: &[(String, Vec<Vec<u16>>)]) -> Result<(), PrepError> {
+pub(crate) fn write_parts(
+    shown: &Path,
+    geometry: &GeometryPictures,
+    parts: &[(String, Vec<Vec<u16>>)],
+) -> Result<(), PrepError> {
     for (file, values) in parts {
         let picture = geometry.triangle.map(|seen| SeenTriangle::value_in(seen, values));
         png_io::write_ids(&shown.join(file), &picture)?;

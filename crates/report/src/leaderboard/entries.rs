@@ -53,7 +53,8 @@ pub fn read(files: &ResultsFolder) -> Result<Entries, ReportError> {
         entries.errata = fitting(ErrataFile::read(path), "errata", path, &mut findings)?;
     }
     let results = &entries.results;
-    let names = results.iter().map(|result| result.method.trim());
+    let shown: Vec<String> = results.iter().map(ResultFile::shown_method).collect();
+    let names = shown.iter().map(|name| name.trim());
     findings.extend(repeated(&paths, names, "name", "/method", "give each method its own name, or leave one out"));
     let hashes = results.iter().map(|result| result.submission.sha256.as_str());
     let action = "a submission is ranked once: leave one out";

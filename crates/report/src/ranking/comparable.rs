@@ -23,7 +23,7 @@ impl<'a> Entrant<'a> {
     }
 
     fn name(&self) -> String {
-        self.result.method.clone()
+        self.result.shown_method()
     }
 
     /// The fingerprint that it would have if these scenes had been scored; without scenes, a hash of everything else

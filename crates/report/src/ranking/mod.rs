@@ -93,8 +93,8 @@ fn methods(board: &Board<'_>, partial: bool) -> Vec<RankedMethod> {
         let scored = &entrant.result.dataset.scenes;
         let not_scored: Vec<SceneId> = board.scenes.iter().filter(|scene| !scored.contains(scene)).cloned().collect();
         RankedMethod {
-            id: unused_id(&entrant.result.method, &mut ids),
-            method: entrant.result.method.clone(),
+            id: unused_id(&entrant.result.shown_method(), &mut ids),
+            method: entrant.result.shown_method(),
             submission_sha256: entrant.result.submission.sha256.clone(),
             partial: partial && !(not_scored.is_empty() && entrant.left_out.is_empty()),
             not_scored,

@@ -177,6 +177,7 @@ pub(crate) fn result(method: &str, psnr: &[f64]) -> ResultFile {
             url: None,
             licence: None,
             cost: None,
+            geometry: None,
         },
         dataset: DatasetId {
             name: "d".to_owned(),

@@ -87,7 +87,7 @@ fn check_comparable(results: &[ResultFile], ceiling: Option<&ResultFile>, protoc
     let mut mismatches = Vec::new();
     for result in results.iter().chain(ceiling) {
         let of_result = Mismatch::of_result(result, protocol);
-        let (first_name, other) = (first.method.clone(), result.method.clone());
+        let (first_name, other) = (first.shown_method(), result.shown_method());
         if of_result.is_none() && fingerprint(first).is_some_and(|first| Some(first) != fingerprint(result)) {
             mismatches.push(Mismatch::Fingerprints { first: first_name.clone(), other: other.clone() });
         }

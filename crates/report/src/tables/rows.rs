@@ -35,11 +35,11 @@ pub(super) fn groups(
     grouping: Grouping,
 ) -> Vec<Group> {
     let all = results.iter().chain(ceiling);
-    let scored: Vec<(&str, &ProtocolResult)> =
-        all.filter_map(|result| Some((result.method.as_str(), result.protocols.get(protocol)?))).collect();
+    let scored: Vec<(String, &ProtocolResult)> =
+        all.filter_map(|result| Some((result.shown_method(), result.protocols.get(protocol)?))).collect();
     let group = |name: &str, values: &dyn Fn(usize, &ProtocolResult) -> BTreeMap<CellKey, Value>| {
-        let row = |(at, (method, scores)): (usize, &(&str, &ProtocolResult))| Row {
-            method: (*method).to_owned(),
+        let row = |(at, (method, scores)): (usize, &(String, &ProtocolResult))| Row {
+            method: method.clone(),
             values: values(at, scores),
         };
         let mut rows: Vec<Row> = scored.iter().enumerate().map(row).collect();

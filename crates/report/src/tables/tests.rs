@@ -51,6 +51,7 @@ fn result(method: &str, summary: &[(&str, f64)]) -> ResultFile {
             url: None,
             licence: None,
             cost: None,
+            geometry: None,
         },
         dataset: DatasetId {
             name: String::new(),

@@ -15,7 +15,7 @@ use crate::method_name;
 use crate::submitted_file::SubmittedFile;
 
 /// Its keys, the kinds of value that each may have, and whether it must be given. They are those of [`SubmissionFile`].
-const KEYS: [(&str, &[&str], bool); 8] = [
+const KEYS: [(&str, &[&str], bool); 9] = [
     ("format", &["a string"], true),
     ("method", &["a string"], true),
     ("description", &["a string"], false),
@@ -23,6 +23,7 @@ const KEYS: [(&str, &[&str], bool); 8] = [
     ("licence", &["a string", "null"], false),
     ("cost", &["an object", "null"], false),
     ("assumed_encodings", &["an object"], false),
+    ("geometry", &["an object", "null"], false),
     ("dataset_manifest_sha256", &["a string"], true),
 ];
 
@@ -141,6 +142,7 @@ fn check_hash(text: &str, manifest_sha256: &str) -> Option<Finding> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_scene::perturbation::{Perturbation, PerturbationKind};
     use mateval_scene::stored_encoding::StoredEncoding;
     use mateval_scene::submission::Cost;
     use serde_json::json;
@@ -165,6 +167,7 @@ mod tests {
             licence: Some("MIT".to_owned()),
             cost: Some(Cost { seconds_a_scene: 1.5, hardware: "a laptop".to_owned() }),
             assumed_encodings: [(mateval_scene::submission::Map::Roughness, StoredEncoding::Linear)].into(),
+            geometry: Some(Perturbation { kind: PerturbationKind::Pose, level: 1 }),
             dataset_manifest_sha256: "0".repeat(64),
         };
         let whole = serde_json::to_value(&file).unwrap();
