@@ -67,7 +67,7 @@ pub(super) fn wide_views(
             let (mut views, mut findings) = (Vec::new(), Vec::new());
             for number in 0..drawn.count {
                 let distance = distance_m(drawn, number);
-                let id = ViewId::new(&format!("{}{}", ViewId::WIDE, number + 1)).expect("our own ids are ids");
+                let id = ViewId::new(format!("{}{}", ViewId::WIDE, number + 1)).expect("our own ids are ids");
                 match judge.draw(drawn.seed, number, distance) {
                     Some(place) => views.extend(looking_at(id, place, target, input)),
                     None => {
