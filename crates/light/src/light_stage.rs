@@ -23,8 +23,7 @@ pub struct NamedLight {
 }
 
 /// The lights of a scene's stage, for all views of the scene from the input camera's place: a stage does not depend on wide
-/// views. Instances that belong to the building may be walls; no other
-/// instance is one. `world` holds a surface for each instance, in the order of the instances.
+/// views. Instances that belong to the building may be walls; no other instance is one. `world` holds a surface for each instance, in the order of the instances.
 pub fn scene_lights(rules: &StageRules, scene: &SceneFile, world: &World) -> Vec<NamedLight> {
     let views = scene.views.iter().filter(|view| !view.id.is_wide());
     let cameras: Vec<Camera> = views.map(|view| view.camera).collect();

@@ -50,8 +50,8 @@ impl Motion {
                 let way = TAU * unit(1);
                 Self::Rigid {
                     centre: middle,
-                    turn: DMat3::from_rotation_y(sign * angle_deg.to_radians()),
-                    step: distance_m * DVec3::new(way.cos(), 0.0, way.sin()),
+                    turn: turn_about_y(sign * angle_deg.to_radians()),
+                    step: distance_m * DVec3::new(libm::cos(way), 0.0, libm::sin(way)),
                 }
             }
             Amount::Scale { share } => {
@@ -62,7 +62,7 @@ impl Motion {
                     // Uniform over the sphere.
                     let (height, around) = (2.0 * unit(3 * axis + 1) - 1.0, TAU * unit(3 * axis + 2));
                     let flat = (1.0 - height * height).sqrt();
-                    let direction = DVec3::new(flat * around.cos(), height, flat * around.sin());
+                    let direction = DVec3::new(flat * libm::cos(around), height, flat * libm::sin(around));
                     Wave { vector: direction * (TAU / WAVELENGTH_M), phase: TAU * unit(3 * axis + 3) }
                 };
                 // Three waves of this amplitude, at right angles, move no point further than `most_m`.
@@ -91,7 +91,7 @@ impl Motion {
             Self::Rigid { centre, turn, step } => *centre + *turn * (place - *centre) + *step,
             Self::Scale { base, factor } => *base + (place - *base) * *factor,
             Self::Waves { amplitude, waves } => {
-                place + *amplitude * DVec3::from(waves.map(|wave| wave.phase_at(place).sin()))
+                place + *amplitude * DVec3::from(waves.map(|wave| libm::sin(wave.phase_at(place))))
             }
         }
     }
@@ -103,7 +103,7 @@ impl Motion {
             Self::Scale { factor, .. } => DMat3::from_diagonal(DVec3::splat(*factor)),
             Self::Waves { amplitude, waves } => {
                 // Row i is the gradient of the displacement along axis i.
-                let rows = waves.map(|wave| *amplitude * wave.phase_at(place).cos() * wave.vector);
+                let rows = waves.map(|wave| *amplitude * libm::cos(wave.phase_at(place)) * wave.vector);
                 DMat3::IDENTITY + DMat3::from_cols(rows[0], rows[1], rows[2]).transpose()
             }
         }
@@ -114,6 +114,12 @@ impl Wave {
     fn phase_at(self, place: DVec3) -> f64 {
         self.vector.dot(place) + self.phase
     }
+}
+
+/// A rotation about +Y. Sine and cosine are libm's, which are the same on every machine.
+fn turn_about_y(angle: f64) -> DMat3 {
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
 }
 
 #[cfg(test)]

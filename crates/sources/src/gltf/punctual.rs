@@ -71,7 +71,7 @@ impl Reader<'_> {
     /// Adds a surface that emits this power, in watts, on its front. The camera does not see it, and light passes
     /// through.
     fn lamp(&mut self, name: &str, mesh: TriangleMesh, power: [f64; 3], pointer: &str) {
-        let (area, is_full) = (mesh.area(), self.scene.lights.len() >= self.limits.lights);
+        let area = mesh.area();
         if area <= 0.0 || !area.is_finite() {
             return self.omit(Omission::Visible, "lights without a place", LEFT_OUT, pointer);
         }
@@ -79,8 +79,7 @@ impl Reader<'_> {
         // A Lambertian surface emits pi times its radiance times its area.
         let radiance = power.map(|value| (value / (PI * area)) as f32);
         let emission = Emission::Area { surfaces: vec![surface], radiance, map: None, two_sided: false };
-        self.add_light(name, emission, false, pointer);
-        if !is_full {
+        if self.add_light(name, emission, false, pointer) {
             let material = self.clear_material();
             self.scene.surfaces.push(Surface { name: name.to_owned(), mesh, material });
             self.origins.push(InstanceOrigin { role: Role::LightFixture {}, ..InstanceOrigin::default() });
@@ -136,9 +135,8 @@ impl Reader<'_> {
         let map = Texture::new(2 * ROWS, ROWS, dark, Wrap::Repeat).ok()?;
         let texture = TextureIndex(self.scene.textures.len());
         let world_from_environment = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let lights = self.scene.lights.len();
-        self.add_light(SUN, Emission::Environment { texture, scale: 1.0, world_from_environment }, false, pointer);
-        if self.scene.lights.len() == lights {
+        let emission = Emission::Environment { texture, scale: 1.0, world_from_environment };
+        if !self.add_light(SUN, emission, false, pointer) {
             return None;
         }
         self.scene.textures.push(SourceTexture { name: SUN.to_owned(), sha256: None, texture: map });

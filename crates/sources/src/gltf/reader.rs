@@ -76,13 +76,16 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Adds a light, unless there are as many as the limit allows, which is reported. A number makes its name unique.
-    pub(super) fn add_light(&mut self, name: &str, emission: Emission, camera_visible: bool, pointer: &str) {
+    /// Adds a light, unless there are as many as the limit allows, which is reported. Returns whether it was added. A number
+    /// makes its name unique.
+    pub(super) fn add_light(&mut self, name: &str, emission: Emission, camera_visible: bool, pointer: &str) -> bool {
         if self.scene.lights.len() >= self.limits.lights {
             let feature = format!("lights beyond {}", self.limits.lights);
-            return self.omit(Omission::Visible, &feature, LEFT_OUT, pointer);
+            self.omit(Omission::Visible, &feature, LEFT_OUT, pointer);
+            return false;
         }
         let name = self.light_names.unique(name.to_owned());
         self.scene.lights.push(LightGroup { name, emission, camera_visible });
+        true
     }
 }

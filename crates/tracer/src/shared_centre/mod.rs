@@ -28,9 +28,10 @@ pub use view_light::{HalfLight, ViewLight, ViewsRender};
 
 /// Renders what all `cameras` see, once per seed, one picture per group of lights.
 ///
-/// Views whose cameras share a centre ([`groups_with_one_centre`]) come from one set of paths per seed. A pixel gets about `settings.samples` paths per seed; `settings.seed` is not used. `progress` is
-/// called from any thread with the number of finished tiles and their total. The bytes of the pictures are the same for
-/// any number of threads in the current rayon pool.
+/// Views whose cameras share a centre ([`groups_with_one_centre`]) come from one set of paths per seed. A pixel gets
+/// about `settings.samples` paths per seed; `settings.seed` is not used. `progress` is called from any thread with the
+/// number of finished tiles and their total. The bytes of the pictures are the same for any number of threads in the
+/// current rayon pool.
 ///
 /// Fails if a setting is out of range, if a seed occurs twice (two halves would be the same), or if the groups were
 /// made for another number of lights.
