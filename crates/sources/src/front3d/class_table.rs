@@ -3,8 +3,7 @@
 //!
 //! Abbreviated sources:
 //! - `Roblox`: the chart of PBR values in "Material references", create.roblox.com/docs/art/modeling/material-reference;
-//! - `MaterialX`: `resources/Materials/Examples/StandardSurface` of github.com/AcademySoftwareFoundation/MaterialX;
-//! - `PhysicallyBased`: the database physicallybased.info.
+//! - `MaterialX`: `resources/Materials/Examples/StandardSurface` of github.com/AcademySoftwareFoundation/MaterialX.
 
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::material_class::MaterialClass;
@@ -30,7 +29,7 @@ pub(super) const TABLE: [ClassRow; 15] = [
         words: &["glass"],
         roughness: [0.05, 0.1],
         metallic: 0.0,
-        source: "PhysicallyBased, Glass: 0. Our choice: slightly above it, so that highlights of lamps can be sampled",
+        source: "our choice: smooth but for what lets highlights of lamps be sampled; no chart that we read lists it",
     },
     ClassRow {
         class: MaterialClass::Metal,
@@ -157,7 +156,7 @@ mod tests {
         for class in MaterialClass::ALL {
             let rows: Vec<&ClassRow> = TABLE.iter().filter(|row| row.class == class).collect();
             let [row] = rows[..] else { panic!("{class}: {} rows", rows.len()) };
-            let is_cited = ["Roblox", "MaterialX", "PhysicallyBased"].iter().any(|name| row.source.contains(name));
+            let is_cited = ["Roblox", "MaterialX"].iter().any(|name| row.source.contains(name));
             assert!(is_cited || row.source.starts_with("our choice: "), "{class}: {}", row.source);
             let [low, high] = row.roughness;
             assert!(0.0 < low && low < high && high <= 1.0, "{class}");
