@@ -188,7 +188,7 @@ pub struct InstancePixelErrors {
     pub super_category: Option<String>,
     /// Albedo, aligned albedo, or light of track `true` or `fitted`.
     pub picture: PictureKind,
-    /// `input`, `novel`, `unobserved`.
+    /// `input`, `novel`, `unobserved`, `wide`, `wide_unobserved`.
     pub views: Views,
     /// Valid pixels that show it, in all of these views.
     pub pixels: usize,

@@ -120,10 +120,8 @@ fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Me
 /// The mean of a method's values in each class.
 fn means(method: &Method<'_>, axis: Axis, picture: PictureName, metric: Metric) -> BTreeMap<u32, f64> {
     let mut sums: BTreeMap<u32, (f64, f64)> = BTreeMap::new();
-    let wanted = method
-        .pictures
-        .iter()
-        .filter(|value| value.picture == picture && value.metric == metric && value.region == Region::Valid);
+    let wanted =
+        method.pictures.iter().filter(|value| value.picture == picture && value.metric == metric && is_shown(value));
     for value in wanted {
         let (Some(class), Some(number)) = (class_of(method, axis, value), value.value) else { continue };
         let (sum, count) = sums.entry(class).or_default();
