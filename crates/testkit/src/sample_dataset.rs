@@ -33,13 +33,23 @@ static DATASET: LazyLock<Dataset> = LazyLock::new(|| {
 
 /// Builds the dataset without renders.
 pub fn built() -> PathBuf {
-    let folder = kept_folder("dataset");
+    build_in("dataset", "")
+}
+
+/// Builds the dataset without renders and with one view from another place in each scene.
+pub fn built_with_wide_views() -> PathBuf {
+    build_in("wide_dataset", "wide = { count = 1, distance_m = [0.3, 0.3] }\n")
+}
+
+/// Builds the dataset in a kept folder of this name, with another line in the recipe.
+fn build_in(name: &str, line: &str) -> PathBuf {
+    let folder = kept_folder(name);
     let (source, out) = (folder.join("source"), folder.join("dataset"));
     mateval_sample::write(&source).unwrap();
     let recipe = source.join("recipe.toml");
     let whole = std::fs::read_to_string(&recipe).unwrap();
     assert!(whole.contains(HEAD[0]), "{whole}");
-    std::fs::write(&recipe, whole.replace(HEAD[0], HEAD[1])).unwrap();
+    std::fs::write(&recipe, whole.replace(HEAD[0], &format!("{}{line}", HEAD[1]))).unwrap();
     let options =
         BuildOptions { recipe, source: None, out: out.clone(), scenes: Vec::new(), force: false, atlas_cache: None };
     build(&options, "test", &|_| ()).unwrap();

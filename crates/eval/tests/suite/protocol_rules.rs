@@ -10,27 +10,30 @@ use mateval_eval::noise_blocks::noise_blocks;
 use mateval_eval::pilot::samples_under_bound;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::relit::lightings;
-use mateval_eval::score::score;
+use mateval_eval::score::{ScorePlan, score};
 use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_stage;
 use mateval_metrics::{NoiseFreeMse, NoisePsnr};
 use mateval_scene::Camera;
+use mateval_scene::open::Dataset;
 use mateval_testkit::box_room::{self, box_room, quad};
 use mateval_tracer::World;
 use serde_json::{Value, json};
 
 use super::sample::{dataset, hasty, plan, write_grey};
 use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::sample_dataset::built_with_wide_views;
 
 /// The start of JSON pointers, and a value that the rules below it decide.
 type Reading = (&'static str, fn(&Protocol) -> Value);
 
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
-const READINGS: [Reading; 19] = [
+const READINGS: [Reading; 20] = [
     ("/name", scores),
     ("/mask_rule", scores),
     ("/albedo_space", scores),
     ("/lpips_decimals", stored_lpips),
+    ("/wide_views", wide_scores),
     ("/light/tracks/", light),
     ("/light/flavour", light),
     ("/light/max_bounces", light),
@@ -75,6 +78,7 @@ fn changes(value: &Value) -> Vec<Value> {
             [1, number + 1, 4 * number].into_iter().filter(|other| *other != number).map(Value::from).collect()
         }
         Value::Number(number) => [0.25, 4.0, 100.0, 1e4].map(|by| json!(by * number.as_f64().unwrap() + 1e-9)).to_vec(),
+        Value::Bool(flag) => vec![json!(!flag)],
         Value::String(_) => {
             ["black_fill", "inside", "srgb", "mitsuba", "true", "fitted", "another"].map(Value::from).to_vec()
         }
@@ -104,9 +108,20 @@ fn quick() -> Protocol {
 
 /// The scores of a submission without light.
 fn scores(protocol: &Protocol) -> Value {
+    albedo_scores(dataset(), protocol)
+}
+
+/// The same for a dataset with views from other places.
+fn wide_scores(protocol: &Protocol) -> Value {
+    static DATASET: LazyLock<Dataset> = LazyLock::new(|| Dataset::open(&built_with_wide_views()).unwrap());
+    albedo_scores(&DATASET, protocol)
+}
+
+fn albedo_scores(dataset: &'static Dataset, protocol: &Protocol) -> Value {
     let mut protocol = protocol.clone();
     protocol.light.tracks.clear();
-    let results = score(&plan(&[&GREY], &protocol, &["room"]), &|_| ()).unwrap();
+    let plan = ScorePlan { dataset, ..plan(&[&GREY], &protocol, &["room"]) };
+    let results = score(&plan, &|_| ()).unwrap();
     let mut protocols = serde_json::to_value(&results[0].protocols).unwrap();
     for result in protocols.as_object_mut().unwrap().values_mut() {
         for key in ["protocol", "fingerprint"] {
