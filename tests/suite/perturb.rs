@@ -149,6 +149,18 @@ fn submissions_are_scored_on_the_true_geometry() {
     let mut tables = mateval();
     tables.args(["eval", "tables"]).args([path("true.json"), path("fallen.json")]).args(["--format", "csv"]);
     run(&mut tables).ends_with(0).prints("nn-plain (pose 3)");
+    let site = path("site");
+    let mut board = mateval();
+    board.args(["eval", "leaderboard"]).args([path("true.json"), path("fallen.json")]).arg("--out").arg(&site);
+    run(&mut board).ends_with(0);
+    let page = std::fs::read_to_string(site.join("perturbed.html")).unwrap();
+    assert!(
+        page.contains("<polyline") && page.contains("level 3") && page.contains("Albedo, input view, PSNR"),
+        "{page}"
+    );
+    let shown = |summary: &Value| format!("<td>{:.2}</td>", psnr(summary));
+    assert!(page.contains(&shown(&on_true)) && page.contains(&shown(&on_moved)), "{page}");
+    assert!(std::fs::read_to_string(site.join("index.html")).unwrap().contains("perturbed.html"));
     // The truth's scores do not depend on what its submission states.
     run(&mut baseline("gt", dataset(), &path("gt"))).ends_with(0);
     copy_folder(&path("gt"), &path("stated"));

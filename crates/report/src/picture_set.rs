@@ -36,8 +36,8 @@ pub fn write(
     progress: Progress<'_>,
 ) -> Result<(), ReportError> {
     let views = scored_views(plan.dataset, scene)?;
-    for shown in plan.shown {
-        for (view, row) in views.iter().zip(rows(plan, scene, *shown, progress)?) {
+    for shown in plan.shown_of(scene) {
+        for (view, row) in views.iter().zip(rows(plan, scene, shown, progress)?) {
             let write = |method: &str, kind: &str, picture: &Picture<[u8; 3]>| -> Result<(), ReportError> {
                 let path = place(plan.out, method, &scene.id, &view.id, kind);
                 let folder = path.parent().unwrap_or(plan.out);

@@ -66,6 +66,14 @@ pub(crate) struct StripRow {
     compared: Vec<Picture<[f32; 3]>>,
 }
 
+impl StripPlan<'_> {
+    /// What is shown of the scene: no light where the scene has a photo from elsewhere, whose light is not known.
+    pub(crate) fn shown_of(&self, scene: &SceneFile) -> impl Iterator<Item = Shown> {
+        let has_light = scene.photo.is_none();
+        self.shown.iter().copied().filter(move |shown| has_light || *shown == Shown::Albedo)
+    }
+}
+
 impl Shown {
     /// The kind of picture that is shown, which file names contain.
     pub fn kind(self) -> PictureKind {
@@ -90,9 +98,12 @@ pub fn write(plan: &StripPlan<'_>, progress: Progress<'_>) -> Result<Vec<PathBuf
         ["", "-error"].map(|what| plan.out.join(format!("{scene}-{}{what}.png", shown.kind())))
     };
     let jobs: Vec<(&SceneFile, Shown)> =
-        chosen.iter().flat_map(|scene| plan.shown.iter().map(|shown| (*scene, *shown))).collect();
+        chosen.iter().flat_map(|scene| plan.shown_of(scene).map(|shown| (*scene, shown))).collect();
     for (scene, shown) in &jobs {
         paths(&scene.id, *shown).iter().try_for_each(|path| check_free(path, plan.force, "--out"))?;
+    }
+    if jobs.len() < chosen.len() * plan.shown.len() {
+        progress(Report::Message("scenes with a photo from elsewhere have no pictures of light, which is not known"));
     }
     std::fs::create_dir_all(plan.out).map_err(SceneError::io("make", plan.out))?;
     let mut written = Vec::new();

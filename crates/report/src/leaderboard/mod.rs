@@ -12,6 +12,7 @@
 mod board;
 mod board_page;
 mod ceiling;
+mod chart;
 mod columns;
 mod comparison;
 mod downloads;
@@ -23,6 +24,7 @@ mod heads;
 mod method_page;
 mod named_submission;
 mod paper;
+mod perturbed;
 mod pictures;
 mod plan;
 mod protocol_page;
@@ -50,7 +52,7 @@ use minijinja::value::Serde;
 
 use self::board::Board;
 use self::file::LEADERBOARD_PATH;
-use self::site::{PAGES, Page, Site, SiteWriter, WIDE_VIEWS};
+use self::site::{PAGES, PERTURBED, Page, Site, SiteWriter, WIDE_VIEWS};
 use crate::error::ReportError;
 use crate::ranking::rank;
 
@@ -82,6 +84,7 @@ pub fn write(plan: &LeaderboardPlan<'_>, out: &Path, force: bool, progress: Prog
     scene_page::write_list(&board, &site)?;
     room_page::write(&board, &site)?;
     wide_views::write(&board, &site)?;
+    perturbed::write(&board, &site)?;
     protocol_page::write(&board, &site)?;
     write_constant_pages(plan, &site)?;
     Ok(work.finish()?)
@@ -108,7 +111,11 @@ fn site(board: &Board<'_>) -> Site {
         houses: ranking.houses.values().collect::<BTreeSet<_>>().len(),
         has_intervals: board.has_intervals(),
         least_houses: ranking.rules.least_houses,
-        pages: PAGES.into_iter().chain(wide_views::has_any(board).then_some(WIDE_VIEWS)).collect(),
+        pages: PAGES
+            .into_iter()
+            .chain(wide_views::has_any(board).then_some(WIDE_VIEWS))
+            .chain(perturbed::has_any(board).then_some(PERTURBED))
+            .collect(),
     }
 }
 

@@ -21,7 +21,7 @@ const ASSETS: [(&str, &str); 6] = [
     ("downloads/PROTOCOL.md", include_str!("../../../../dataset_spec/PROTOCOL.md")),
 ];
 
-const TEMPLATES: [(&str, &str); 12] = [
+const TEMPLATES: [(&str, &str); 14] = [
     ("base.j2", include_str!("templates/base.j2")),
     ("marks.j2", include_str!("templates/marks.j2")),
     ("slider.j2", include_str!("templates/slider.j2")),
@@ -33,7 +33,9 @@ const TEMPLATES: [(&str, &str); 12] = [
     ("protocol.j2", include_str!("templates/protocol.j2")),
     ("paper.j2", include_str!("templates/paper.j2")),
     ("errata.j2", include_str!("templates/errata.j2")),
+    ("charts.j2", include_str!("templates/charts.j2")),
     ("wide_views.j2", include_str!("templates/wide_views.j2")),
+    ("perturbed.j2", include_str!("templates/perturbed.j2")),
 ];
 
 /// What every page shows.
@@ -70,6 +72,9 @@ pub(super) const PAGES: [PageLink; 5] = [
 
 /// The entry of a site whose scenes have views from other places.
 pub(super) const WIDE_VIEWS: PageLink = PageLink { file: "wide_views.html", title: "Wide views" };
+
+/// The entry of a site with submissions that were made from perturbed geometry.
+pub(super) const PERTURBED: PageLink = PageLink { file: "perturbed.html", title: "Imperfect geometry" };
 
 /// One page.
 pub(super) struct Page<'a> {

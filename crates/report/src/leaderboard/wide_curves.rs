@@ -3,7 +3,7 @@
 //! In: the single values of each method. Out: a chart for each kind of picture and metric, with a line for each method, whose
 //! points are means over all views of one class.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use mateval_eval::metric::Metric;
 use mateval_eval::result::PictureValue;
@@ -11,7 +11,8 @@ use mateval_eval::result_key::{PictureName, Region, Surfaces};
 use mateval_scene::dataset::WideView;
 use mateval_scene::layout::INPUT;
 use mateval_scene::{SceneId, ViewId};
-use serde::Serialize;
+
+use super::chart::{Chart, Values};
 
 /// What a method scored.
 pub(super) struct Method<'a> {
@@ -28,34 +29,6 @@ pub(super) enum Axis {
     /// Fifths of the valid pixels that the input view does not show.
     UnseenShare,
 }
-
-/// A chart and the same numbers as a table.
-#[derive(Debug, PartialEq, Serialize)]
-pub(super) struct Chart {
-    title: String,
-    /// The classes of views, from left to right.
-    classes: Vec<String>,
-    /// The place of each class, in units of the chart.
-    columns: Vec<f64>,
-    /// The places of the top and bottom lines, and their values.
-    scale: [(f64, String); 2],
-    lines: Vec<Line>,
-}
-
-/// The line of one method.
-#[derive(Debug, PartialEq, Serialize)]
-struct Line {
-    name: String,
-    /// Places of the points, as SVG states them.
-    points: String,
-    dots: Vec<[f64; 2]>,
-    /// The values of all classes.
-    cells: Vec<Option<String>>,
-}
-
-/// Size of a chart, and the margins around its lines, in its own units.
-const SIZE: [f64; 2] = [320.0, 180.0];
-const MARGIN: [f64; 2] = [28.0, 16.0];
 
 /// Number of classes of shares.
 const SHARES: u32 = 5;
@@ -80,41 +53,11 @@ pub(super) fn charts(methods: &[Method<'_>], axis: Axis) -> Vec<Chart> {
     kinds.into_iter().filter_map(|kind| chart(methods, axis, kind)).collect()
 }
 
-/// None where there are fewer than two classes, which make no line.
 fn chart(methods: &[Method<'_>], axis: Axis, (picture, metric): (PictureName, Metric)) -> Option<Chart> {
-    let means: Vec<BTreeMap<u32, f64>> = methods.iter().map(|method| means(method, axis, picture, metric)).collect();
-    let classes: BTreeSet<u32> = means.iter().flat_map(|means| means.keys().copied()).collect();
-    if classes.len() < 2 {
-        return None;
-    }
-    let values = || means.iter().flat_map(BTreeMap::values).copied();
-    let (low, high) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    let [width, height] = SIZE;
-    let (first, last) = (*classes.first()?, *classes.last()?);
-    let column = |class: u32| {
-        let share = f64::from(class - first) / f64::from(last - first);
-        rounded(MARGIN[0] + share * (width - 2.0 * MARGIN[0]))
-    };
-    let row = |value: f64| {
-        let share = if high > low { (high - value) / (high - low) } else { 0.5 };
-        rounded(MARGIN[1] + share * (height - 2.0 * MARGIN[1]))
-    };
-    let line = |(method, means): (&Method<'_>, &BTreeMap<u32, f64>)| {
-        let dots: Vec<[f64; 2]> = means.iter().map(|(class, value)| [column(*class), row(*value)]).collect();
-        Line {
-            name: method.name.to_owned(),
-            points: dots.iter().map(|[x, y]| format!("{x},{y}")).collect::<Vec<_>>().join(" "),
-            dots,
-            cells: classes.iter().map(|class| Some(metric.style().text(*means.get(class)?))).collect(),
-        }
-    };
-    Some(Chart {
-        title: format!("{}, {}", picture.kind.title(), metric.style().title),
-        classes: classes.iter().map(|class| class_title(axis, *class)).collect(),
-        columns: classes.iter().map(|class| column(*class)).collect(),
-        scale: [high, low].map(|value| (row(value), metric.style().text(value))),
-        lines: methods.iter().zip(&means).map(line).collect(),
-    })
+    let means: Vec<Values<'_>> =
+        methods.iter().map(|method| (method.name, means(method, axis, picture, metric))).collect();
+    let title = format!("{}, {}", picture.kind.title(), metric.style().title);
+    Chart::new(title, |class| class_title(axis, class), &means, |value| metric.style().text(value))
 }
 
 /// The mean of a method's values in each class.
@@ -148,10 +91,6 @@ fn class_title(axis: Axis, class: u32) -> String {
         Axis::Distance => format!("{:.2} m", f64::from(class) / 100.0),
         Axis::UnseenShare => format!("{} to {} %", 100 * class / SHARES, 100 * (class + 1) / SHARES),
     }
-}
-
-fn rounded(place: f64) -> f64 {
-    (10.0 * place).round() / 10.0
 }
 
 #[cfg(test)]
@@ -203,9 +142,5 @@ mod tests {
             (titles(&["0.00 m", "0.30 m", "1.00 m"]), titles(&["40.00", "25.00", "10.00"]))
         );
         assert_eq!(cells(Axis::UnseenShare), (titles(&["0 to 20 %", "80 to 100 %"]), titles(&["25.00", "10.00"])));
-        // The best is at the top, and the first class on the left.
-        let chart = &charts(&methods, Axis::Distance)[0];
-        assert_eq!(chart.lines[0].dots[0], MARGIN);
-        assert_eq!(chart.lines[0].dots[2], [SIZE[0] - MARGIN[0], SIZE[1] - MARGIN[1]]);
     }
 }

@@ -4,19 +4,12 @@ use std::collections::BTreeMap;
 
 use minijinja::context;
 use minijinja::value::Serde;
-use serde::Serialize;
 
 use super::board::Board;
+use super::chart::Section;
 use super::site::{Page, SiteWriter};
-use super::wide_curves::{Axis, Chart, Method, charts};
+use super::wide_curves::{Axis, Method, charts};
 use crate::error::ReportError;
-
-/// Charts over one axis.
-#[derive(Serialize)]
-struct Section {
-    title: &'static str,
-    charts: Vec<Chart>,
-}
 
 /// Whether any scene has wide views.
 pub(super) fn has_any(board: &Board<'_>) -> bool {
@@ -39,12 +32,10 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
         .collect();
     let scenes = methods.first().map(|method| method.wide_views);
     let sections = [
-        Section { title: "By distance from the input camera", charts: charts(&methods, Axis::Distance) },
-        Section {
-            title: "By the share of the picture that the input view does not show",
-            charts: charts(&methods, Axis::UnseenShare),
-        },
-    ];
+        ("By distance from the input camera", Axis::Distance),
+        ("By the share of the picture that the input view does not show", Axis::UnseenShare),
+    ]
+    .map(|(title, axis)| Section { title: title.to_owned(), charts: charts(&methods, axis) });
     site.page(&Page {
         file: "wide_views.html",
         template: "wide_views.j2",
