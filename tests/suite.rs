@@ -36,6 +36,7 @@ mod suite {
     mod partial;
     mod partial_board;
     mod perturb;
+    mod photo;
     mod planted;
     mod procedural;
     mod publish;

@@ -50,7 +50,11 @@ pub fn make_companions(
     if dataset.file.scored_renderer.is_none() && !changed.is_empty() {
         return Err(SceneError::Unfinished { path: root.to_owned(), scenes: changed }.into());
     }
-    let chosen = dataset.chosen_scenes(scenes)?;
+    let mut chosen = dataset.chosen_scenes(scenes)?;
+    for scene in chosen.extract_if(.., |scene| scene.photo.is_some()) {
+        let what = format!("{}: no companions, since the light of its photo is not known", scene.id);
+        progress(Report::Message(&what));
+    }
     for (at, scene) in chosen.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, chosen.len()));
         let work = || {

@@ -248,7 +248,7 @@ impl ScorePlan<'_> {
         predictions: &[PredictedScene],
         progress: Progress<'_>,
     ) -> Result<Vec<Vec<SceneScore>>, EvalError> {
-        let renderer = self.dataset.file.scored_renderer.as_ref();
+        let renderer = self.dataset.scored_renderer(scene);
         let OpenScene { folder, world, atlases } = OpenScene::read(self.dataset, scene, renderer)?;
         score_scene(&SceneTask {
             scene,
@@ -323,6 +323,9 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
     let ids: Vec<&SceneId> = scored.iter().map(|scene| &scene.id).collect();
     let lost = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| lost_light(protocol, scores));
     entry.findings.extend(lost);
+    if plan.protocols.iter().any(|protocol| !protocol.light.tracks.is_empty()) {
+        entry.findings.extend(scored.iter().filter(|scene| scene.photo.is_some()).map(|scene| unknown_light(scene)));
+    }
     let noisy = plan.protocols.iter().zip(&entry.scores).flat_map(|(protocol, scores)| noisy_truth(protocol, scores));
     entry.findings.extend(noisy);
     let protocols = plan.protocols.iter().zip(entry.scores).map(|(protocol, scores)| {
@@ -331,7 +334,7 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
         (protocol.name.clone(), protocol_result(protocol, fingerprint, scores))
     });
     let protocols: BTreeMap<String, ProtocolResult> = protocols.collect();
-    let missing = missing(plan);
+    let missing = missing(plan, scored);
     entry.findings.sort();
     ResultFile {
         format: RESULT_FORMAT.to_owned(),
@@ -350,6 +353,18 @@ fn finish(plan: &ScorePlan<'_>, scored: &[&SceneFile], mut entry: Entry) -> Resu
         protocols,
         missing,
         findings: entry.findings,
+    }
+}
+
+/// The finding about a scene with a photo from elsewhere.
+fn unknown_light(scene: &SceneFile) -> Finding {
+    Finding {
+        severity: Severity::Note,
+        code: "unknown_light".to_owned(),
+        file: format!("scenes/{}/scene.json", scene.id),
+        place: "/photo".to_owned(),
+        message: "the input picture is a photo from elsewhere, and the true light of the scene is not known".to_owned(),
+        action: "scored its materials and not its light".to_owned(),
     }
 }
 
@@ -388,7 +403,7 @@ fn noisy_truth(protocol: &Protocol, scores: &[(SceneId, SceneScore)]) -> Vec<Fin
 }
 
 /// The metrics that lack weights or renders.
-fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
+fn missing(plan: &ScorePlan<'_>, scored: &[&SceneFile]) -> Vec<MissingMetric> {
     let mut missing = Vec::new();
     if let LpipsWeights::Missing { reason, fix } = &plan.lpips {
         missing.push(MissingMetric {
@@ -397,7 +412,8 @@ fn missing(plan: &ScorePlan<'_>) -> Vec<MissingMetric> {
             fix: fix.clone(),
         });
     }
-    if plan.dataset.file.scored_renderer.is_none() {
+    let is_rendered = scored.iter().any(|scene| plan.dataset.scored_renderer(scene).is_some());
+    if !is_rendered && scored.iter().any(|scene| scene.photo.is_none()) {
         let mut tracks: Vec<Track> = plan.protocols.iter().flat_map(|p| p.light.tracks.clone()).collect();
         tracks.sort_unstable();
         tracks.dedup();

@@ -20,11 +20,11 @@ pub struct ShownView<'a> {
 /// The 8-bit sRGB picture of a view, relative to the dataset: that of the input view, or the reference picture of another
 /// view. None where it does not exist, as with withheld ground truth.
 pub fn picture(dataset: &Dataset, scene: &SceneFile, view: &View) -> Option<PathBuf> {
-    let renderer = dataset.file.scored_renderer.as_ref()?;
     let folder = dataset.folder(&scene.id);
-    let file = match view.id.as_str() {
-        INPUT => folder.view(&view.id),
-        _ => folder.render(renderer, &view.id),
+    let file = match (view.id.as_str(), dataset.scored_renderer(scene)) {
+        (INPUT, _) => folder.view(&view.id),
+        (_, Some(renderer)) => folder.render(renderer, &view.id),
+        (_, None) => return None,
     }
     .join("rgb.png");
     let relative = file.strip_prefix(&dataset.root).expect("a scene's files lie in the dataset").to_owned();

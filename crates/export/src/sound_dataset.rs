@@ -30,7 +30,10 @@ impl SoundDataset {
         } else if let Some(absence) = dataset.absence() {
             progress(Report::Message(&absence));
         }
-        if format.needs_pictures() && dataset.file.scored_renderer.is_none() {
+        if format.needs_pictures()
+            && dataset.file.scored_renderer.is_none()
+            && dataset.scenes.iter().all(|scene| scene.photo.is_none())
+        {
             return Err(ExportError::NoPictures { path: root.to_owned() });
         }
         progress(Report::step("hashes", 0, 1));

@@ -17,6 +17,7 @@ pub mod map_io;
 pub mod npy_header;
 mod npy_io;
 pub mod owner;
+pub mod photo;
 pub mod picture;
 pub mod png_header;
 pub mod png_io;

@@ -176,10 +176,16 @@ fn is_photo(path: &str) -> bool {
     path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
 }
 
-/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view; none where none has.
+/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no photo
+/// from elsewhere; none where none has, or where all scenes have one.
 fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
     let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
-    known.find(|renderer| dataset.scenes.iter().all(|id| is_complete(root, id, renderer)))
+    let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !has_photo(root, id)).cloned().collect();
+    known.find(|renderer| !rendered.is_empty() && rendered.iter().all(|id| is_complete(root, id, renderer)))
+}
+
+fn has_photo(root: &Path, id: &SceneId) -> bool {
+    json::read::<SceneFile>(&SceneFolder::of(root, id).scene_file()).is_ok_and(|scene| scene.photo.is_some())
 }
 
 /// The first renderer that has rendered every view of some scene.

@@ -49,6 +49,13 @@ impl Scene {
         self.source.file().exposure
     }
 
+    /// The source's file of the input picture, where that is a photo from elsewhere; None where it is rendered. The light
+    /// of a photo is not known, so such a scene is scored without its light.
+    #[getter]
+    fn photo(&self) -> Option<&str> {
+        self.source.file().photo.as_ref().map(|photo| photo.file.as_str())
+    }
+
     /// The objects that methods provide textures for, by id, in the order of their index.
     #[getter]
     fn instances(&self, py: Python<'_>) -> PyResult<Py<PyAny>> {

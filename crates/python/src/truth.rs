@@ -78,11 +78,12 @@ impl Truth {
         plane(py, &read_picture(py, self.path("specular_region.png"), &self.view().camera, png_io::read_mask)?)
     }
 
-    /// The scored renderer's picture, linear radiance in Rec. 709 before exposure: (height, width, 3), float32.
+    /// The scored renderer's picture, linear radiance in Rec. 709 before exposure: (height, width, 3), float32. Raises
+    /// MatEvalError where the scene is not rendered.
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let dataset = &self.source.dataset;
-        let Some(renderer) = &dataset.file.scored_renderer else {
+        let Some(renderer) = dataset.scored_renderer(self.source.file()) else {
             return Err(failed(EvalError::NoScoredRenderer { dataset: dataset.root.clone() }));
         };
         self.colours(py, self.source.folder().render(renderer, &self.view().id).join("rgb.exr"))

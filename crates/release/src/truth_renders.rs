@@ -79,9 +79,9 @@ fn add(all: &mut Vec<RenderedWith>, scene: &SceneId, file: RenderFile) {
     }
 }
 
-/// The noise of a scene's views; none where the dataset has no scored renderer.
+/// The noise of a scene's views; none where the scene is not rendered.
 pub(crate) fn noise(dataset: &Dataset, scene: &SceneFile) -> Result<Option<Vec<ViewNoise>>, ReleaseError> {
-    let Some(renderer) = &dataset.file.scored_renderer else { return Ok(None) };
+    let Some(renderer) = dataset.scored_renderer(scene) else { return Ok(None) };
     let mut views = Vec::new();
     for view in &scene.views {
         if let Some(file) = render_file(dataset, scene, renderer, &view.id)? {

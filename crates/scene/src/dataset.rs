@@ -98,6 +98,10 @@ pub struct SceneFile {
     pub materials: TrueMaterials,
     /// Multiplies every RGB picture before clipping.
     pub exposure: f64,
+    /// The file of the input picture, where that came from elsewhere; absent where it is rendered. The light of such a
+    /// picture is not known, so the scene has no renders and its light is not scored.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub photo: Option<Photo>,
     /// The input view first, then the novel ones.
     pub views: Vec<View>,
     /// In the order of their index.
@@ -125,6 +129,28 @@ pub struct SceneSource {
     pub states_metallic: bool,
     /// Every file that was read, sorted by path.
     pub files: Vec<SourceFile>,
+}
+
+/// An input picture that came from elsewhere.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Photo {
+    /// Its path, which `source.files` lists with its hash.
+    pub file: String,
+    /// Its columns and rows before it was reduced to the size of the camera's picture.
+    pub size: [u32; 2],
+    /// How its values were read.
+    pub encoding: PhotoEncoding,
+}
+
+/// How the values of a photo's file state radiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PhotoEncoding {
+    /// Integers: radiance times the scene's exposure, clipped to 0..1, sRGB.
+    Srgb,
+    /// Floating-point numbers: linear radiance before exposure.
+    Linear,
 }
 
 /// The materials of which a scene's truth is made.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::build_folder::BuildFolder;
 use crate::dataset::{DatasetFile, FORMAT, SceneFile, TargetsFile};
-use crate::ids::SceneId;
+use crate::ids::{RendererId, SceneId};
 use crate::layout::{DATASET, MANIFEST, SceneFolder, TARGETS};
 use crate::{Finding, SceneError, Severity, json, manifest};
 
@@ -97,6 +97,12 @@ impl Dataset {
     pub fn scene(&self, id: &SceneId) -> Result<&SceneFile, SceneError> {
         let chosen = self.chosen_scenes(std::slice::from_ref(id))?;
         Ok(chosen[0])
+    }
+
+    /// The renderer of the scene's reference pictures; none where the dataset has no scored renderer, or where the scene has
+    /// a photo from elsewhere, whose light is not known.
+    pub fn scored_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
+        self.file.scored_renderer.as_ref().filter(|_| scene.photo.is_none())
     }
 
     /// The scene's folder.

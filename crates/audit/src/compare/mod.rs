@@ -70,9 +70,13 @@ pub struct CompareOptions {
 /// that is every view.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
-    let scenes = dataset.chosen_scenes(&options.scenes)?;
+    let mut scenes = dataset.chosen_scenes(&options.scenes)?;
     if let Some(absence) = dataset.absence().filter(|_| options.scenes.is_empty()) {
         progress(Report::Message(&absence));
+    }
+    for scene in scenes.extract_if(.., |scene| scene.photo.is_some()) {
+        let what = format!("{}: not compared, since a scene with a photo from elsewhere is not rendered", scene.id);
+        progress(Report::Message(&what));
     }
     check_rendered(&dataset, &scenes)?;
     check_out(options)?;
@@ -121,7 +125,7 @@ fn rendered(folder: &SceneFolder, view: &View) -> Option<PathBuf> {
 fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), AuditError> {
     let has_any =
         |scene: &&&SceneFile| scene.views.iter().any(|view| rendered(&dataset.folder(&scene.id), view).is_some());
-    if scenes.iter().any(|scene| has_any(&scene)) {
+    if scenes.is_empty() || scenes.iter().any(|scene| has_any(&scene)) {
         return Ok(());
     }
     let scenes = scenes.iter().map(|scene| scene.id.clone()).collect();

@@ -39,6 +39,7 @@ fn scene(id: &str, kind: SourceKind, house: &str, things: &[Thing<'_>]) -> Scene
         lights: SceneLights::Own,
         materials: TrueMaterials::Converted,
         exposure: 1.0,
+        photo: None,
         views: Vec::new(),
         instances: things.iter().enumerate().map(|(at, thing)| instance(at, thing)).collect(),
         parts: Vec::new(),

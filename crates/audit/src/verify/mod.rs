@@ -1,6 +1,7 @@
 //! Checks a dataset against the rules of its format. Every fault is reported, none is fixed.
 
 mod geometry;
+mod photo;
 mod pictures;
 mod renders;
 mod scene_file;
@@ -194,7 +195,9 @@ fn check_scene(folder: &SceneFolder, dataset: &DatasetFile, id: &str, faults: &m
     };
     let Some(world) = faults.read("ground_truth/reference", world) else { return };
     pictures::check(folder, &scene, &meshes, &world, faults);
-    if let Some(renderer) = &dataset.scored_renderer {
-        renders::check(folder, &scene, renderer, faults);
+    match (&dataset.scored_renderer, &scene.photo) {
+        (_, Some(photo)) => photo::check(folder, &scene, photo, faults),
+        (Some(renderer), None) => renders::check(folder, &scene, renderer, faults),
+        (None, None) => {}
     }
 }

@@ -94,6 +94,7 @@ fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
         lights: SceneLights::Stage,
         materials: TrueMaterials::Converted,
         exposure: 1.0,
+        photo: None,
         views: vec![View { id: ViewId::new("input").unwrap(), x_deg: 0.0, y_deg: 0.0, camera: camera(), wide: None }],
         instances: roles.zip(1..).map(|(role, index)| instance(index, role)).collect(),
         parts: Vec::new(),

@@ -61,8 +61,9 @@ fn faults_of_all(
 }
 
 fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> {
-    let labels = scene.part_labels.values();
-    let labels = labels.map(|path| ("part_labels", scene.root(source).join(path), true));
+    let root = scene.root(source);
+    let labels = scene.part_labels.values().map(|path| ("part_labels", root.join(path), true));
+    let photo = scene.photo.iter().map(|path| ("photo", root.join(path), false));
     let paths =
         scene.source_paths().into_iter().map(|SourcePath { key, path, is_folder }| (key, source.join(path), is_folder));
     let fault = |(key, path, is_folder): (&'static str, PathBuf, bool)| {
@@ -70,7 +71,7 @@ fn missing_sources(scene: &RecipeScene, source: &Path) -> Vec<RecipeSceneFault> 
         let kind = if is_folder { "folder" } else { "file" };
         (!exists).then_some(RecipeSceneFault::MissingSource { key, kind, path })
     };
-    paths.chain(labels).filter_map(fault).collect()
+    paths.chain(labels).chain(photo).filter_map(fault).collect()
 }
 
 /// The pinned inputs that do not exist or have other bytes.

@@ -3,6 +3,7 @@
 use mateval_scene::Finding;
 use mateval_sources::front3d::camera_sampler::CameraError;
 
+pub use super::photo::PhotoFault;
 use crate::numbering::TooMany;
 use crate::part_labels::LabelFault;
 use crate::recipe::fault::RecipeSceneFault;
@@ -34,6 +35,9 @@ pub enum SceneFault {
         /// Each file that does not fit.
         faults: Vec<LabelFault>,
     },
+    /// The photo cannot be the input picture.
+    #[error("photo: {0}")]
+    Photo(PhotoFault),
     /// The input view shows no instance that has an atlas.
     #[error("the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera")]
     NothingSeen,

@@ -3,6 +3,7 @@
 pub mod fault;
 mod geometry;
 mod materials;
+mod photo;
 mod plan;
 mod scene_file;
 mod source;
@@ -64,6 +65,9 @@ pub fn build(
         seen = view_pictures::write(&plan, folder, &scored, progress)?.or_refuse(&entry.id)?;
     }
     plan.findings.extend(seen.findings);
+    if let Some(photo) = &plan.photo {
+        photo.write(folder, &plan.views[0], entry.exposure)?;
+    }
     for (view, unseen_share) in plan.views.iter_mut().zip(seen.unseen_shares) {
         view.wide.iter_mut().for_each(|wide| wide.unseen_share = unseen_share);
     }

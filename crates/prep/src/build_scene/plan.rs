@@ -13,6 +13,7 @@ use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
 use mateval_tracer::World;
 
 use super::fault::SceneFault;
+use super::photo::{self, ScenePhoto};
 use super::turned_views::views_of;
 use super::wide_views::wide_views;
 use crate::conversion::convert;
@@ -44,6 +45,8 @@ pub(super) struct Plan {
     /// classes.
     pub(super) classes: Option<Vec<ClassifiedPart>>,
     pub(super) views: Vec<View>,
+    /// The input picture, where it is not rendered.
+    pub(super) photo: Option<ScenePhoto>,
     pub(super) findings: Vec<Finding>,
     /// The file that findings refer to by default.
     pub(super) file: String,
@@ -76,6 +79,7 @@ pub(super) fn plan(
     let own = PartSplit::own(&read.scene, &read.origins, &instances).map_err(PrepError::scene(&entry.id))?;
     let classes = classified_parts(&own, &read.origins);
     let part_splits = part_splits(entry, source, &instances, own, &mut read)?;
+    let photo = photo::read(entry, source, &mut read)?;
     let mut views = views_of(recipe, read.camera);
     let SourceScene { kind, lights, states_roughness, states_metallic, file, files, absent, .. } = read;
     let mut findings = read.findings;
@@ -109,6 +113,7 @@ pub(super) fn plan(
         part_splits,
         classes,
         views,
+        photo,
         findings,
         file,
         files,

@@ -60,6 +60,7 @@ pub(super) fn write(
         lights: plan.lights,
         materials: recipe.materials,
         exposure: entry.exposure,
+        photo: plan.photo.map(|photo| photo.listed),
         views: plan.views,
         instances,
         parts,

@@ -157,6 +157,14 @@ pub enum RecipeSceneFault {
         /// The folder that the path must be relative to, as messages name it.
         root: &'static str,
     },
+    /// The photo lies elsewhere.
+    #[error("photo = '{}': expected a file below {root}, relative to it", file.display())]
+    PhotoPath {
+        /// The path in the recipe.
+        file: PathBuf,
+        /// The folder that the path must be relative to, as messages name it.
+        root: &'static str,
+    },
     /// An input's path leads elsewhere.
     #[error("inputs: '{file}': expected a path below the scene's folder")]
     InputPath {

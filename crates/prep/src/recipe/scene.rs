@@ -32,6 +32,8 @@ pub struct RecipeScene {
     pub house: Option<String>,
     /// The input camera; if absent, the camera of the Mitsuba scene or of the glTF.
     pub camera: Option<RecipeCamera>,
+    /// The input picture, where it is not rendered: a photo that the camera took.
+    pub photo: Option<PathBuf>,
     /// Other ways to split the instances into parts, by name: folders with `<instance>.npy`, a label for each triangle.
     #[serde(default)]
     pub part_labels: BTreeMap<PartSetId, PathBuf>,
@@ -177,6 +179,11 @@ impl RecipeScene {
             own.push(RecipeSceneFault::UnusedSeed);
         }
         self.check_label_folders(&mut own);
+        if let Some(photo) =
+            self.photo.as_ref().filter(|photo| SourceFolder::relative(&photo.to_string_lossy()).is_err())
+        {
+            own.push(RecipeSceneFault::PhotoPath { file: photo.clone(), root: self.root_name() });
+        }
         if !(self.exposure > 0.0 && self.exposure.is_finite()) {
             own.push(RecipeSceneFault::Exposure { found: self.exposure });
         }
@@ -199,12 +206,17 @@ impl RecipeScene {
         }
     }
 
-    fn check_label_folders(&self, faults: &mut Vec<RecipeSceneFault>) {
-        let root = match (&self.bitterli, &self.gltf) {
+    /// [`Self::root`], as messages name it.
+    fn root_name(&self) -> &'static str {
+        match (&self.bitterli, &self.gltf) {
             (Some(_), _) => "the XML's folder",
             (None, Some(_)) => "the glTF's folder",
             (None, None) => "the folder that the recipe's paths are relative to",
-        };
+        }
+    }
+
+    fn check_label_folders(&self, faults: &mut Vec<RecipeSceneFault>) {
+        let root = self.root_name();
         for (set, folder) in &self.part_labels {
             if SourceFolder::relative(&folder.to_string_lossy()).is_err() {
                 faults.push(RecipeSceneFault::LabelFolder { set: set.clone(), folder: folder.clone(), root });

@@ -18,8 +18,8 @@ pub(crate) mod store;
 use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
-use mateval_scene::dataset::DatasetFile;
-use mateval_scene::layout::{DATASET, MANIFEST};
+use mateval_scene::dataset::{DatasetFile, SceneFile};
+use mateval_scene::layout::{DATASET, MANIFEST, SceneFolder};
 use mateval_scene::open::chosen_ids;
 use mateval_scene::{Progress, SceneId, json};
 
@@ -108,6 +108,7 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
         check_strays(root, &dataset.scenes)?;
     }
     let wanted = chosen_ids(root, &dataset, &options.scenes)?;
+    let (wanted, photographed) = without_photos(root, wanted)?;
     let renderer = options.renderer.kind().id();
     let samples = match options.samples {
         Some(samples) => samples,
@@ -116,13 +117,32 @@ pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> R
     };
     let one_at_a_time = options.renderer.scenes_at_once() == 1;
     let run = RenderRun { root, renderer, samples, force: options.force, one_at_a_time };
-    let mut report = options.renderer.render_scenes(&run, &wanted, progress)?;
+    let mut report = match wanted.is_empty() {
+        true => RenderReport::default(),
+        false => options.renderer.render_scenes(&run, &wanted, progress)?,
+    };
+    report.remarks.extend(photographed.into_iter().map(|id| {
+        format!("{id}: not rendered, since its input picture is a photo from elsewhere, whose light is not known")
+    }));
     if options.scenes.is_empty() {
         let dataset = finish_again(root, progress)?;
-        if dataset.scored_renderer.is_none() {
+        if dataset.scored_renderer.is_none() && !wanted.is_empty() {
             let what = "some scenes have no pictures yet, so the dataset names no scored renderer";
             report.remarks.push(what.to_owned());
         }
     }
     Ok(report)
+}
+
+/// Those of the scenes that are rendered, then those that have a photo from elsewhere.
+fn without_photos<'a>(
+    root: &Path,
+    scenes: Vec<&'a SceneId>,
+) -> Result<(Vec<&'a SceneId>, Vec<&'a SceneId>), PrepError> {
+    let (mut rendered, mut photographed) = (Vec::new(), Vec::new());
+    for id in scenes {
+        let scene: SceneFile = json::read(&SceneFolder::of(root, id).scene_file())?;
+        if scene.photo.is_some() { photographed.push(id) } else { rendered.push(id) }
+    }
+    Ok((rendered, photographed))
 }
