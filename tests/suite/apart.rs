@@ -161,7 +161,7 @@ fn a_scene_that_was_left_out_is_taken_in_again() {
     run(&mut of_scene(build(&SERIAL.recipe, copy.path()), "first")).ends_with(0);
     run(of_scene(build(&SERIAL.recipe, copy.path()), "fourth").arg("--force")).ends_with(0);
     without("fourth").ends_with(0);
-    run(&mut finish(copy.path())).ends_with(0).prints("4 scenes, scored by no renderer");
+    run(&mut finish(copy.path())).ends_with(0).prints("4 scenes, without scored renders");
     run(&mut of_scene(render(copy.path(), 1), "fourth")).ends_with(0);
     run(&mut finish(copy.path())).ends_with(0).prints("scored by builtin");
     assert!(manifest(copy.path()) == manifest(&SERIAL.rendered));
@@ -247,6 +247,8 @@ fn scores_that_are_kept_are_put_together_and_missing_ones_are_named() {
         command.arg("--cache").arg(&cache).args(words);
         run(&mut command)
     };
+    scored(&merged, &["--only-cached"]).ends_with(2);
+    assert!(!cache.exists());
     let parts = ["first", "second"].map(|scene| {
         let mut command = score(&grey, &SERIAL.built, &folder.path().join(format!("{scene}.json")));
         command.arg("--cache").arg(&cache).args(["--scene", scene]);

@@ -69,7 +69,10 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let work = std::env::temp_dir();
     let opened = args.submissions.iter().map(|path| archive::open(path, &work)).collect::<Result<Vec<_>, _>>()?;
     let cache = args.cache.clone().unwrap_or_else(|| cache_beside(&args.out));
-    std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
+    if args.cache.is_some() && !args.only_cached {
+        // A folder that cannot be made is found before anything is scored.
+        std::fs::create_dir_all(&cache).with_context(|| format!("cannot create '{}'", cache.display()))?;
+    }
     let companions = weights::cache_folder().join("companions");
     let plan = ScorePlan {
         dataset: &dataset,
@@ -89,7 +92,7 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
         say_findings(&result.method, &result.findings);
         print(&format!("{}\n", out.display()))?;
     }
-    if args.cache.is_none() {
+    if args.cache.is_none() && cache.exists() {
         std::fs::remove_dir_all(&cache).with_context(|| format!("cannot remove '{}'", cache.display()))?;
     }
     Ok(Outcome::Good)
