@@ -160,7 +160,19 @@ fn submissions_are_scored_on_the_true_geometry() {
     );
     let shown = |summary: &Value| format!("<td>{:.2}</td>", psnr(summary));
     assert!(page.contains(&shown(&on_true)) && page.contains(&shown(&on_moved)), "{page}");
-    assert!(std::fs::read_to_string(site.join("index.html")).unwrap().contains("perturbed.html"));
+    let links = |site: &Path| std::fs::read_to_string(site.join("index.html")).unwrap().contains("perturbed.html");
+    assert!(links(&site));
+    let board_of = |name: &str| {
+        let site = path(&format!("site-{name}"));
+        let mut board = mateval();
+        run(board.args(["eval", "leaderboard"]).arg(path(name)).arg("--out").arg(&site)).ends_with(0);
+        site
+    };
+    // Of one level alone there is no curve, and without such submissions no page.
+    let alone = std::fs::read_to_string(board_of("fallen.json").join("perturbed.html")).unwrap();
+    assert!(alone.contains("no curve") && !alone.contains("<polyline"), "{alone}");
+    let plain = board_of("true.json");
+    assert!(!links(&plain) && !plain.join("perturbed.html").exists());
     // The truth's scores do not depend on what its submission states.
     run(&mut baseline("gt", dataset(), &path("gt"))).ends_with(0);
     copy_folder(&path("gt"), &path("stated"));

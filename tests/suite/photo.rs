@@ -1,5 +1,5 @@
-//! A scene with a photo from elsewhere in place of a rendered input picture: it takes part in every step that needs no light,
-//! and says where it does not.
+//! A scene with a photo from elsewhere in place of a rendered input picture: it takes part in every step that needs no
+//! light, and says where it does not.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -15,9 +15,9 @@ use super::sample::{json as json_of, write_source};
 const HEAD: &str = "resolution = [64, 48]\natlas_size = 128\nviews = [{ id = \"left\", x_deg = 0, y_deg = 5 }]\n";
 const EXPOSURE: f64 = 2.0;
 
-/// A picture of 8-bit sRGB that has every value and no two equal neighbours.
-fn photo(width: usize, height: usize) -> Picture<[u8; 3]> {
-    Picture::from_fn(width, height, |x, y| [(4 * x) as u8, (5 * y) as u8, (x * y) as u8])
+/// A picture of 8-bit sRGB without two equal neighbours.
+fn photo() -> Picture<[u8; 3]> {
+    Picture::from_fn(64, 48, |x, y| [(4 * x) as u8, (5 * y) as u8, (x * y) as u8])
 }
 
 /// Writes the sample's source with a recipe whose first scene, `photographed`, has this photo. The others have none.
@@ -27,7 +27,7 @@ fn source(folder: &Path, photo_line: &str, others: &[&str]) -> PathBuf {
     let text = std::fs::read_to_string(&recipe).unwrap();
     let with_photo = format!("bitterli = \"room/scene.xml\"\nexposure = {EXPOSURE}\n{photo_line}\n");
     std::fs::write(&recipe, text.replacen("bitterli = \"room/scene.xml\"\n", &with_photo, 1)).unwrap();
-    png_io::write_rgb_bytes(&folder.join("source/room/photo.png"), &photo(64, 48)).unwrap();
+    png_io::write_rgb_bytes(&folder.join("source/room/photo.png"), &photo()).unwrap();
     recipe
 }
 
@@ -53,9 +53,9 @@ fn dataset(name: &str) -> PathBuf {
 fn the_photo_is_the_input_picture() {
     let folder = dataset("mixed").join("scenes/photographed");
     let shown = png_io::read_rgb_bytes(&folder.join("views/input/rgb.png")).unwrap();
-    assert_eq!(shown, photo(64, 48));
+    assert_eq!(shown, photo());
     let linear = exr_io::read_linear(&folder.join("views/input/rgb.exr")).unwrap();
-    let expected = f64::from(linear_from_srgb(f32::from(photo(64, 48).get(9, 7)[0]) / 255.0)) / EXPOSURE;
+    let expected = f64::from(linear_from_srgb(f32::from(photo().get(9, 7)[0]) / 255.0)) / EXPOSURE;
     assert!((f64::from(linear.get(9, 7).0[0]) - expected).abs() < 1e-7);
     let scene = json_of(&folder.join("scene.json"));
     assert_eq!(scene["photo"], json!({ "file": "photo.png", "size": [64, 48], "encoding": "srgb" }));
@@ -65,6 +65,46 @@ fn the_photo_is_the_input_picture() {
     let plain = dataset("mixed").join("scenes/plain");
     assert!(json_of(&plain.join("scene.json")).get("photo").is_none());
     assert!(plain.join("ground_truth/renders/builtin/input/rgb.exr").is_file());
+}
+
+/// A photo of linear light, twice as wide and high as the camera's picture: exposure does not change its values.
+#[test]
+fn a_larger_photo_of_linear_light_is_reduced() {
+    let folder = kept_folder("photo_linear");
+    let recipe = source(&folder, "photo = \"photo.exr\"", &[]);
+    let large = Picture::from_fn(128, 96, |x, y| mateval_image::LinearRgb([(x % 2) as f32, (y / 2) as f32, 4.0]));
+    exr_io::write_linear(&folder.join("source/room/photo.exr"), &large, exr_io::Precision::Float).unwrap();
+    run(&mut build(&recipe, &folder.join("dataset"))).ends_with(0);
+    let scene = folder.join("dataset/scenes/photographed");
+    let shown = exr_io::read_linear(&scene.join("views/input/rgb.exr")).unwrap();
+    assert_eq!(shown, Picture::from_fn(64, 48, |_, y| mateval_image::LinearRgb([0.5, y as f32, 4.0])));
+    let listed = json!({ "file": "photo.exr", "size": [128, 96], "encoding": "linear" });
+    assert_eq!(json_of(&scene.join("scene.json"))["photo"], listed);
+}
+
+/// Before it is rendered, exports and scores of light lack the scene that has no photo.
+#[test]
+fn the_other_scenes_still_need_renders() {
+    let folder = kept_folder("photo_unrendered");
+    let unrendered = folder.join("dataset");
+    run(&mut build(&source(&folder, PHOTO, &["plain"]), &unrendered)).ends_with(0);
+    let words = ["prep", "export", "--as", "huggingface", "--out"].map(PathBuf::from);
+    run_words(words.into_iter().chain([folder.join("export"), unrendered.clone()])).ends_with(2).says("prep render");
+    let missing = result_of(&unrendered)["missing"].clone();
+    assert!(missing.as_array().unwrap().iter().any(|missing| missing["metric"] == "rgb_true"), "{missing}");
+}
+
+#[test]
+fn pictures_of_light_are_those_of_the_other_scenes() {
+    let folder = kept_folder("photo_pictures");
+    let grey = folder.join("grey");
+    run(&mut baseline("grey", &dataset("mixed"), &grey)).ends_with(0);
+    let mut pictures = mateval();
+    pictures.args(["eval", "pictures", "--samples", "4", "--picture", "albedo", "--picture", "rgb_true"]).arg(&grey);
+    pictures.arg("--dataset").arg(dataset("mixed")).arg("--out").arg(folder.join("pictures"));
+    run(&mut pictures).ends_with(0).says("have no pictures of light");
+    let has = |name: &str| folder.join("pictures").join(name).is_file();
+    assert!(has("photographed-albedo.png") && has("plain-rgb_true.png") && !has("photographed-rgb_true.png"));
 }
 
 #[test]
@@ -81,16 +121,22 @@ fn a_changed_photo_is_found() {
     let mut scene = json_of(&folder.join("scene.json"));
     scene["photo"]["file"] = "other.png".into();
     std::fs::write(folder.join("scene.json"), scene.to_string()).unwrap();
-    run(&mut verify(&twin)).ends_with(1).prints("unlisted_photo").prints("expected 64x48 pixels");
+    std::fs::create_dir(folder.join("ground_truth/renders")).unwrap();
+    let found = run(&mut verify(&twin)).ends_with(1);
+    found.prints("unlisted_photo").prints("expected 64x48 pixels").prints("unexpected_renders");
 }
 
-/// The result of `nn` of the photo itself.
+/// The result of `grey`.
 fn result(name: &str) -> Value {
-    let folder = kept_folder(&format!("photo_result_{name}"));
-    let (submission, result) = (folder.join("nn"), folder.join("nn.json"));
-    run(baseline("nn", &dataset(name), &submission).args(["--estimate", "input"])).ends_with(0);
+    result_of(&dataset(name))
+}
+
+fn result_of(dataset: &Path) -> Value {
+    let folder = kept_folder("photo_result");
+    let (submission, result) = (folder.join("grey"), folder.join("grey.json"));
+    run(&mut baseline("grey", dataset, &submission)).ends_with(0);
     let mut score = mateval();
-    score.args(["eval", "score"]).arg(&submission).arg("--dataset").arg(dataset(name)).arg("--out").arg(&result);
+    score.args(["eval", "score"]).arg(&submission).arg("--dataset").arg(dataset).arg("--out").arg(&result);
     run(&mut score).ends_with(0);
     json_of(&result)
 }
@@ -125,12 +171,14 @@ fn a_dataset_of_photos_alone_needs_no_renderer() {
         let name = dataset("alone");
         run_words([Path::new("prep"), Path::new(step), &name]).ends_with(0).says("photographed: no");
     }
+    let compared = run_words([Path::new("prep"), Path::new("compare"), &dataset("alone")]);
+    compared.prints("nothing was compared: every scene has a photo");
     let out = kept_folder("photo_export");
     let words = ["prep", "export", "--as", "huggingface", "--out"].map(PathBuf::from);
     run_words(words.into_iter().chain([out.join("export"), dataset("alone")])).ends_with(0);
 }
 
-/// Everything that is wrong with the recipe is said before the first scene is made.
+/// A missing photo is reported before the first scene is made, one that does not fit when its scene is.
 #[test]
 fn a_photo_that_does_not_fit_is_refused() {
     let refused = |line: &str| {

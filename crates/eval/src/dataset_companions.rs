@@ -31,7 +31,7 @@ pub struct CompanionsReport {
 }
 
 /// Renders the companions' pictures of these scenes (of all, if none is named) into the dataset in `root`, for every pass of
-/// the protocol that has companions. The manifest lists them once the dataset is finished again (`prep finish`).
+/// the protocol that has companions. Scenes with a photo from elsewhere have none. The manifest lists them once the dataset is finished again (`prep finish`).
 ///
 /// Pictures of the same inputs and rules are kept, so that a killed run resumes where it ended; others are replaced. As the
 /// manifest changes, results made before belong to another dataset. Several processes may work on different scenes at once.

@@ -40,6 +40,12 @@ pub enum EvalError {
         /// Its folder.
         dataset: PathBuf,
     },
+    /// The scene has a photo from elsewhere, so it has no renders.
+    #[error("scene '{scene}' has no renders: its input picture is a photo from elsewhere, whose light is not known")]
+    Photographed {
+        /// The scene.
+        scene: SceneId,
+    },
     /// No protocol has the name.
     #[error("cannot score: there is no protocol '{name}'; use one of: {}", known.join(", "))]
     UnknownProtocol {

@@ -71,6 +71,7 @@ pub struct ScorePlan<'a> {
     /// Number of scenes that are scored at once; each of them uses all threads anyway.
     pub jobs: usize,
     /// A folder in which scores of scenes are kept by the hash of everything they depend on, so that a killed run resumes.
+    /// It is made with the first score that is kept.
     pub cache: Option<&'a Path>,
     /// Take every score from the cache and compute none.
     pub only_cached: bool,
@@ -291,6 +292,8 @@ impl ScorePlan<'_> {
         prediction: &PredictedScene,
         scores: &[SceneScore],
     ) -> Result<(), EvalError> {
+        let Some(folder) = self.cache else { return Ok(()) };
+        std::fs::create_dir_all(folder).map_err(SceneError::io("make", folder))?;
         for (protocol, score) in self.protocols.iter().zip(scores) {
             if let Some(path) = self.cache_file(scene, prediction, protocol) {
                 json::write(&path, score)?;

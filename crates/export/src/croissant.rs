@@ -164,7 +164,8 @@ fn file_object(name: &str, place: &str, sha256: &str, facts: Value) -> Value {
 fn pictures(sound: &SoundDataset, tars: &[WrittenTar]) -> Value {
     let mut includes = vec![format!("scenes/*/views/{INPUT}/rgb.png")];
     if let Some(renderer) = &sound.dataset.file.scored_renderer {
-        let views = sound.dataset.scenes.iter().flat_map(|scene| scene.views.iter().map(|view| &view.id));
+        let rendered = sound.dataset.scenes.iter().filter(|scene| scene.photo.is_none());
+        let views = rendered.flat_map(|scene| scene.views.iter().map(|view| &view.id));
         let novel: std::collections::BTreeSet<&ViewId> = views.filter(|id| id.as_str() != INPUT).collect();
         includes.extend(novel.iter().map(|view| format!("scenes/*/ground_truth/renders/{renderer}/{view}/rgb.png")));
     }

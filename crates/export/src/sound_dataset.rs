@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::MANIFEST;
 use mateval_scene::manifest::{self, Entry, MISSING_FILE};
 use mateval_scene::open::{Dataset, is_below};
@@ -30,10 +31,8 @@ impl SoundDataset {
         } else if let Some(absence) = dataset.absence() {
             progress(Report::Message(&absence));
         }
-        if format.needs_pictures()
-            && dataset.file.scored_renderer.is_none()
-            && dataset.scenes.iter().all(|scene| scene.photo.is_none())
-        {
+        let is_rendered = |scene: &SceneFile| scene.photo.is_some() || dataset.scored_renderer(scene).is_some();
+        if format.needs_pictures() && !dataset.scenes.iter().all(is_rendered) {
             return Err(ExportError::NoPictures { path: root.to_owned() });
         }
         progress(Report::step("hashes", 0, 1));

@@ -13,20 +13,19 @@ use crate::{ImageError, LinearRgb, Picture, Texels, Texture, Wrap};
 
 /// A photo in linear light; alpha is dropped.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Photo {
+pub struct PhotoFile {
     pixels: Texture,
-    /// How the file states its values: integers are sRGB, floating-point numbers are linear.
-    pub encoding: Encoding,
+    encoding: Encoding,
 }
 
-impl Photo {
+impl PhotoFile {
     /// Reads a photo from a file's bytes. `path` serves for errors only. Fails where a value is negative, NaN or infinite,
-    /// and where the file asks to be turned or mirrored for display: its camera is that of the pixels as they are.
+    /// and where the file asks to be turned or mirrored for display: its camera is that of the stored pixels.
     pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, ImageError> {
         let invalid = |what: String| ImageError::Invalid { path: path.to_owned(), what };
         if bytes.starts_with(NPY_SIGNATURE) {
             let what =
-                "a NumPy array does not state whether it is sRGB or linear; expected PNG, JPEG or OpenEXR".to_owned();
+                "a NumPy array does not state whether it is sRGB or linear; expected PNG, JPEG, WebP, BMP, Radiance HDR or OpenEXR".to_owned();
             return Err(ImageError::Unsupported { path: path.to_owned(), what });
         }
         if is_turned(&bytes) {
@@ -44,6 +43,11 @@ impl Photo {
             }
         }
         Ok(Self { pixels, encoding })
+    }
+
+    /// How the file states its values: integers are sRGB, floating-point numbers are linear.
+    pub fn encoding(&self) -> Encoding {
+        self.encoding
     }
 
     /// Pixels in a row.
@@ -98,8 +102,8 @@ mod tests {
     use super::*;
     use crate::{exr_io, png_io};
 
-    fn read(path: &Path) -> Result<Photo, ImageError> {
-        Photo::of_bytes(path, std::fs::read(path).unwrap())
+    fn read(path: &Path) -> Result<PhotoFile, ImageError> {
+        PhotoFile::of_bytes(path, std::fs::read(path).unwrap())
     }
 
     #[test]
@@ -109,7 +113,7 @@ mod tests {
         let picture = Picture::from_fn(6, 4, |x, y| LinearRgb([x as f32, y as f32, 8.0]));
         exr_io::write_linear(&path, &picture, exr_io::Precision::Float).unwrap();
         let photo = read(&path).unwrap();
-        assert_eq!(photo.encoding, Encoding::Linear);
+        assert_eq!(photo.encoding(), Encoding::Linear);
         assert_eq!(photo.resized(6, 4), picture);
         // Pixels of 1.5 by 2 texels: 0, half of 1; half of 1, 2; and so on.
         let reduced = photo.resized(4, 2);
@@ -128,12 +132,12 @@ mod tests {
         png_io::write_rgb_bytes(&path, &Picture::filled(2, 2, [188, 0, 255])).unwrap();
         let photo = read(&path).unwrap();
         let LinearRgb(found) = photo.resized(1, 1).get(0, 0);
-        assert_eq!(photo.encoding, Encoding::Srgb);
+        assert_eq!(photo.encoding(), Encoding::Srgb);
         assert!((found[0] - 0.5029).abs() < 1e-3 && found[1..] == [0.0, 1.0], "{found:?}");
     }
 
     #[test]
-    fn what_is_no_light_is_refused() {
+    fn negative_and_non_finite_values_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.exr");
         for bad in [-0.5, f32::NAN, f32::INFINITY] {
@@ -150,13 +154,13 @@ mod tests {
         let mut jpeg = Vec::new();
         let encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
         image::ImageEncoder::write_image(encoder, &[90; 16 * 8 * 3], 16, 8, image::ExtendedColorType::Rgb8).unwrap();
-        assert!(Photo::of_bytes(Path::new("a.jpg"), jpeg.clone()).is_ok());
+        assert!(PhotoFile::of_bytes(Path::new("a.jpg"), jpeg.clone()).is_ok());
         // APP1 with a little-endian TIFF header and one entry: tag 0x0112, type SHORT, count 1, value 6.
         let tiff = [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0".as_slice(), &[0; 4]].concat();
         let length = u16::try_from(2 + 6 + tiff.len()).unwrap().to_be_bytes();
         let segment = [&[0xff, 0xe1][..], &length, b"Exif\0\0", &tiff].concat();
         jpeg.splice(2..2, segment);
-        let error = Photo::of_bytes(Path::new("a.jpg"), jpeg).unwrap_err().to_string();
+        let error = PhotoFile::of_bytes(Path::new("a.jpg"), jpeg).unwrap_err().to_string();
         assert!(error.contains("EXIF"), "{error}");
     }
 }

@@ -151,9 +151,11 @@ fn scene_hashes(
     for (at, id) in dataset.scenes.iter().enumerate() {
         progress(Report::step("hashes", at, dataset.scenes.len()));
         let mut list = SceneHashes::open(root, id)?;
-        let shown = shown.as_ref().filter(|renderer| can_show_input(&SceneFolder::of(root, id), renderer));
-        // The photo is a copy of that renderer's and is made again.
-        let is_remade = |path: &str| shown.is_some() && is_photo(path);
+        let can_show =
+            |renderer: &&RendererId| !is_photographed(root, id) && can_show_input(&SceneFolder::of(root, id), renderer);
+        let shown = shown.as_ref().filter(can_show);
+        // The input picture is a copy of that renderer's and is made again.
+        let is_remade = |path: &str| shown.is_some() && is_input_picture(path);
         findings.extend(list.check(|path| !is_remade(path))?);
         lists.push((id, shown, list));
     }
@@ -171,20 +173,21 @@ fn scene_hashes(
     Ok(entries.map(|(file, sha256)| (file.to_owned(), sha256.to_owned())).collect())
 }
 
-/// Whether a path in the dataset is that of a photo that methods see.
-fn is_photo(path: &str) -> bool {
+/// Whether a path in the dataset is that of an input picture.
+fn is_input_picture(path: &str) -> bool {
     path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
 }
 
-/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no photo
-/// from elsewhere; none where none has, or where all scenes have one.
+/// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no
+/// photo from elsewhere; none where none has, or where all scenes have one.
 fn scored_renderer(root: &Path, dataset: &DatasetFile) -> Option<RendererId> {
     let mut known = RendererKind::ALL.map(RendererKind::id).into_iter();
-    let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !has_photo(root, id)).cloned().collect();
+    let rendered: Vec<SceneId> = dataset.scenes.iter().filter(|id| !is_photographed(root, id)).cloned().collect();
     known.find(|renderer| !rendered.is_empty() && rendered.iter().all(|id| is_complete(root, id, renderer)))
 }
 
-fn has_photo(root: &Path, id: &SceneId) -> bool {
+/// Whether the scene's input picture is a photo from elsewhere.
+fn is_photographed(root: &Path, id: &SceneId) -> bool {
     json::read::<SceneFile>(&SceneFolder::of(root, id).scene_file()).is_ok_and(|scene| scene.photo.is_some())
 }
 

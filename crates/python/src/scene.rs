@@ -49,8 +49,8 @@ impl Scene {
         self.source.file().exposure
     }
 
-    /// The source's file of the input picture, where that is a photo from elsewhere; None where it is rendered. The light
-    /// of a photo is not known, so such a scene is scored without its light.
+    /// The source's file of the input picture, where that is a photo from elsewhere; None where it is rendered. The
+    /// light of a photo is not known, so such a scene is scored without its light.
     #[getter]
     fn photo(&self) -> Option<&str> {
         self.source.file().photo.as_ref().map(|photo| photo.file.as_str())

@@ -83,7 +83,11 @@ impl Truth {
     #[getter]
     fn rgb<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let dataset = &self.source.dataset;
-        let Some(renderer) = dataset.scored_renderer(self.source.file()) else {
+        let scene = self.source.file();
+        if scene.photo.is_some() {
+            return Err(failed(EvalError::Photographed { scene: scene.id.clone() }));
+        }
+        let Some(renderer) = dataset.scored_renderer(scene) else {
             return Err(failed(EvalError::NoScoredRenderer { dataset: dataset.root.clone() }));
         };
         self.colours(py, self.source.folder().render(renderer, &self.view().id).join("rgb.exr"))

@@ -44,6 +44,7 @@ def test_absent_scenes_are_not_in_the_mapping(root, tmp_path):
 def test_a_scene_is_its_file(root, scene):
     file = json.loads((root / "scenes/room/scene.json").read_text())
     assert (scene.id, scene.house, scene.exposure) == ("room", "sample", file["exposure"])
+    assert scene.photo is None
     assert list(scene.instances) == [instance["id"] for instance in file["instances"]]
     assert [part.index for part in scene.parts.values()] == [part["index"] for part in file["parts"]]
     assert list(scene.views) == [view["id"] for view in file["views"]]

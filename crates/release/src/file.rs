@@ -72,7 +72,8 @@ pub struct ReleasedDataset {
     pub version: String,
     /// SHA-256 of its manifest, in hexadecimal: its identity.
     pub manifest_sha256: String,
-    /// The renderer of the RGB truth; null where not all views are rendered.
+    /// The renderer of the RGB truth; null where not all scenes without a photo from elsewhere are rendered, and
+    /// where there are none.
     pub scored_renderer: Option<RendererId>,
 }
 
@@ -100,11 +101,13 @@ pub struct Verification {
 pub struct ReleasedScene {
     /// The scene.
     pub scene: SceneId,
+    /// Whether its input picture is a photo from elsewhere. Such a scene has no renders and cannot be compared.
+    pub photo: bool,
     /// A small picture of the input view; null where it is not rendered.
     pub picture: Option<Thumbnail>,
     /// Whether two renderers agree on it; null where no comparison was given.
     pub comparison: Option<SceneVerdict>,
-    /// The noise of the RGB truth; null where there is no scored renderer or the ground truth is withheld.
+    /// The noise of the RGB truth; null where the scene is not rendered or the ground truth is withheld.
     pub noise: Option<Vec<ViewNoise>>,
     /// What making it has cost; empty where that was not recorded.
     pub costs: Vec<StepCost>,

@@ -62,8 +62,13 @@ fn verified(file: &ReleaseFile) -> Headline {
     Headline { value, label: "prep verify".to_owned(), is_bad: errors > 0 }
 }
 
+/// The number of scenes that two renderers can be compared on.
+fn comparable(file: &ReleaseFile) -> usize {
+    file.scenes.iter().filter(|scene| !scene.photo).count()
+}
+
 fn compared(file: &ReleaseFile) -> Headline {
-    let (all, given) = (file.scenes.len(), file.comparisons().count());
+    let (all, given) = (comparable(file), file.comparisons().count());
     let agree = file.comparisons().filter(|verdict| verdict.agrees).count();
     match given {
         0 => plain("not compared".to_owned(), "two renderers, prep compare".to_owned()),
@@ -125,12 +130,12 @@ pub(crate) struct Missing {
 /// Everything that the page does not state because it was not given.
 pub(crate) fn not_given(file: &ReleaseFile) -> Vec<Missing> {
     let all = file.scenes.len();
-    let not_compared = all - file.comparisons().count();
+    let not_compared = comparable(file).saturating_sub(file.comparisons().count());
     let no_cost = file.scenes.iter().filter(|scene| scene.costs.is_empty()).count();
     let mut missing = Vec::new();
     if not_compared > 0 {
         missing.push(Missing {
-            what: format!("{not_compared} of {all} scenes are not compared"),
+            what: format!("{not_compared} of {} scenes are not compared", comparable(file)),
             commands: vec![
                 "mateval prep compare DATASET --scene ID --out compare/ID".to_owned(),
                 "mateval prep publish DATASET --report DIR --verdicts compare".to_owned(),

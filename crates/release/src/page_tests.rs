@@ -130,6 +130,7 @@ fn scene(at: usize) -> ReleasedScene {
     };
     ReleasedScene {
         scene: id(at),
+        photo: false,
         picture: None,
         comparison: (at % 10 != 3).then(|| SceneVerdict {
             tool: "mateval 0".to_owned(),

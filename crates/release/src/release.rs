@@ -129,6 +129,7 @@ impl<'a> CheckedRelease<'a> {
     fn scene(&self, scene: &SceneFile, out: &Path) -> Result<ReleasedScene, ReleaseError> {
         Ok(ReleasedScene {
             scene: scene.id.clone(),
+            photo: scene.photo.is_some(),
             picture: thumbnails::write(&self.dataset, scene, out)?,
             comparison: self.comparisons.get(&scene.id).cloned(),
             noise: noise(&self.dataset, scene)?,

@@ -30,11 +30,9 @@ fn silence(finding: &mut Finding) {
     finding.action = "run `mateval prep verify` on the whole dataset".to_owned();
 }
 
-/// The mean over one scene is that scene's score.
+/// Keeps means over two scenes or more: the mean over one scene is that scene's score.
 fn only_means(scores: &mut ReferenceScores) {
-    if scores.scenes_scored < 2 {
-        scores.summary.clear();
-    }
-    scores.scenes = None;
+    let scenes = scores.scenes.take().unwrap_or_default();
+    scores.summary.retain(|key, _| scenes.values().filter(|values| values.contains_key(key)).count() >= 2);
     scores.noise = None;
 }

@@ -26,7 +26,8 @@ pub struct DatasetFile {
     pub tool: String,
     /// Ids of its scenes, in the recipe's order; each is a folder in `scenes/`.
     pub scenes: Vec<SceneId>,
-    /// The renderer of the reference pictures, which are also shown as `input/rgb`; null until all are rendered.
+    /// The renderer of the reference pictures, which are also shown as `input/rgb`; null until all scenes without a photo
+    /// from elsewhere are rendered, and where all scenes have one.
     pub scored_renderer: Option<RendererId>,
     /// Licence and credit of every scene.
     pub licences: Vec<Licence>,

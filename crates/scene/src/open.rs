@@ -99,8 +99,8 @@ impl Dataset {
         Ok(chosen[0])
     }
 
-    /// The renderer of the scene's reference pictures; none where the dataset has no scored renderer, or where the scene has
-    /// a photo from elsewhere, whose light is not known.
+    /// The renderer of the scene's reference pictures; none where the dataset has no scored renderer, or where the scene
+    /// has a photo from elsewhere, whose light is not known.
     pub fn scored_renderer(&self, scene: &SceneFile) -> Option<&RendererId> {
         self.file.scored_renderer.as_ref().filter(|_| scene.photo.is_none())
     }

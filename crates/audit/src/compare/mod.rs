@@ -66,8 +66,8 @@ pub struct CompareOptions {
     pub force: bool,
 }
 
-/// Compares the pictures of the dataset's scenes. A view that Blender has not rendered is reported as `missing`; fails where
-/// that is every view.
+/// Compares the pictures of the dataset's scenes. Scenes with a photo from elsewhere are left out. A view that Blender has
+/// not rendered is reported as `missing`; fails where that is every view of the others.
 pub fn compare(options: &CompareOptions, tool: &str, progress: Progress<'_>) -> Result<CompareFile, AuditError> {
     let dataset = Dataset::open(&options.dataset)?;
     let mut scenes = dataset.chosen_scenes(&options.scenes)?;
@@ -121,7 +121,7 @@ fn rendered(folder: &SceneFolder, view: &View) -> Option<PathBuf> {
     place.join(RENDER_FILE).is_file().then_some(place)
 }
 
-/// Fails where Blender has rendered no view of any of the scenes.
+/// Fails where there are scenes and Blender has rendered no view of any.
 fn check_rendered(dataset: &Dataset, scenes: &[&SceneFile]) -> Result<(), AuditError> {
     let has_any =
         |scene: &&&SceneFile| scene.views.iter().any(|view| rendered(&dataset.folder(&scene.id), view).is_some());

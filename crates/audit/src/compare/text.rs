@@ -23,6 +23,9 @@ pub fn faults(file: &CompareFile) -> Vec<String> {
 
 /// The verdict in one line.
 pub fn verdict(file: &CompareFile) -> String {
+    if file.scenes.is_empty() {
+        return "nothing was compared: every scene has a photo from elsewhere".to_owned();
+    }
     let count = |state: State| file.checks().filter(|(_, _, check)| check.state == state).count();
     let all = file.checks().count();
     let others = [

@@ -5,11 +5,14 @@ use mateval_prep::faults::Faults;
 use mateval_scene::dataset::{Photo, SceneFile};
 use mateval_scene::layout::{INPUT, SceneFolder};
 
-/// Reports a photo whose file the source does not list, and an input picture that is missing, unreadable or of another size
-/// than the camera's.
+/// Reports a photo whose file the source does not list, renders that should not exist, and an input picture that is
+/// missing, unreadable or of another size than the camera's.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, photo: &Photo, faults: &mut Faults) {
     if !scene.source.files.iter().any(|file| file.path == photo.file) {
         faults.add("unlisted_photo", "scene.json", "/photo/file", "expected one of the files in /source/files");
+    }
+    if folder.truth().join("renders").exists() {
+        faults.add("unexpected_renders", "ground_truth/renders", "", "expected none, since the scene has a photo");
     }
     let Some(input) = scene.view(INPUT) else { return };
     let file = format!("views/{INPUT}/rgb.exr");

@@ -25,8 +25,8 @@ pub fn run(args: &FinishArgs) -> anyhow::Result<Outcome> {
         mateval_prep::finish::finish(&args.dataset, &args.without, TOOL, progress)
     };
     let dataset = with_progress(finish).context("cannot finish the dataset")?;
-    let renderer = dataset.scored_renderer.map_or("no renderer for all scenes".to_owned(), |id| id.to_string());
-    print(&format!("{}: {} scenes, scored by {renderer}\n", args.dataset.display(), dataset.scenes.len()))?;
+    let scored = dataset.scored_renderer.map_or("without scored renders".to_owned(), |id| format!("scored by {id}"));
+    print(&format!("{}: {} scenes, {scored}\n", args.dataset.display(), dataset.scenes.len()))?;
     Ok(Outcome::Good)
 }
 

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::photo::Photo as PhotoFile;
+use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::Encoding;
 use mateval_image::{ImageError, LinearRgb, Picture, png_io};
 use mateval_scene::Camera;
 use mateval_scene::dataset::{Photo, PhotoEncoding, View};
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::source_folder::{FileFault, SourceFolder};
 use mateval_sources::source_scene::SourceScene;
 
 use super::fault::SceneFault;
@@ -30,16 +30,16 @@ pub(super) struct ScenePhoto {
 /// Why a photo cannot be the input picture.
 #[derive(Debug, thiserror::Error)]
 pub enum PhotoFault {
-    /// The file cannot be read.
-    #[error("{0}")]
-    File(String),
+    /// The file lies outside the folder, cannot be read or is too large.
+    #[error(transparent)]
+    File(#[from] FileFault),
     /// The file is not a valid photo.
     #[error(transparent)]
     Picture(#[from] ImageError),
     /// The photo shows more or less than the camera, or is smaller than its picture.
     #[error(
-        "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; crop the photo, \
-         or state another `resolution`",
+        "'{file}' is {}x{}, expected the proportions of the camera's picture, {}x{}, and at least its size; \
+         crop the photo, or state another `resolution`",
         found[0], found[1], expected[0], expected[1]
     )]
     Size {
@@ -52,27 +52,27 @@ pub enum PhotoFault {
     },
 }
 
-/// Reads the scene's photo, if the recipe names one, and lists its file among the source's. `source` is the folder of the
-/// recipe's paths.
+/// Reads the scene's photo, if the recipe names one, and lists its file among the source's. `source` is the folder of
+/// the recipe's paths.
 pub(super) fn read(
     entry: &RecipeScene,
     source: &Path,
-    read: &mut SourceScene,
+    scene: &mut SourceScene,
 ) -> Result<Option<ScenePhoto>, PrepError> {
     let Some(path) = &entry.photo else { return Ok(None) };
     let root = entry.root(source);
     let mut folder = SourceFolder::new(&root, MAX_FILE_BYTES).map_err(PrepError::io("open", &root))?;
-    let photo = of_file(&mut folder, &path.to_string_lossy(), &read.camera, entry.exposure);
+    let photo = of_file(&mut folder, &path.to_string_lossy(), &scene.camera, entry.exposure);
     let photo = photo.map_err(|fault| PrepError::scene(&entry.id)(SceneFault::Photo(fault)))?;
-    read.files.extend(folder.into_files().hashes);
-    read.files.sort();
-    read.files.dedup();
+    scene.files.extend(folder.into_files().hashes);
+    scene.files.sort();
+    scene.files.dedup();
     Ok(Some(photo))
 }
 
 fn of_file(folder: &mut SourceFolder, path: &str, camera: &Camera, exposure: f64) -> Result<ScenePhoto, PhotoFault> {
-    let file = SourceFolder::relative(path).map_err(|fault| PhotoFault::File(fault.message))?;
-    let bytes = folder.read(&file).map_err(|fault| PhotoFault::File(fault.message))?;
+    let file = SourceFolder::relative(path)?;
+    let bytes = folder.read(&file)?;
     let photo = PhotoFile::of_bytes(Path::new(&file), bytes)?;
     let found = [photo.width() as u32, photo.height() as u32];
     let expected = [camera.intrinsics.width, camera.intrinsics.height];
@@ -80,7 +80,7 @@ fn of_file(folder: &mut SourceFolder, path: &str, camera: &Camera, exposure: f64
         return Err(PhotoFault::Size { file, found, expected });
     }
     let picture = photo.resized(expected[0] as usize, expected[1] as usize);
-    let (encoding, picture) = match photo.encoding {
+    let (encoding, picture) = match photo.encoding() {
         Encoding::Linear => (PhotoEncoding::Linear, picture),
         Encoding::Srgb => {
             let unexposed = |v: f32| (f64::from(v) / exposure) as f32;
@@ -90,8 +90,8 @@ fn of_file(folder: &mut SourceFolder, path: &str, camera: &Camera, exposure: f64
     Ok(ScenePhoto { listed: Photo { file, size: found, encoding }, picture })
 }
 
-/// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher or
-/// lower.
+/// Whether a photo is at least as large as the camera's picture and, reduced to its width, less than half a row higher
+/// or lower.
 fn fits(photo: [u32; 2], [width, height]: [u32; 2]) -> bool {
     let reduced = f64::from(photo[1]) * f64::from(width) / f64::from(photo[0]);
     photo[0] >= width && photo[1] >= height && (reduced - f64::from(height)).abs() < 0.5
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_photo_is_as_wide_as_the_camera_sees() {
+    fn a_photo_has_the_proportions_of_the_picture_and_at_least_its_size() {
         assert!(fits([64, 48], [64, 48]));
         assert!(fits([4000, 3000], [64, 48]));
         // A sensor of odd proportions, less than half a row off.

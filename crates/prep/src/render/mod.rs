@@ -1,4 +1,4 @@
-//! The RGB ground truth: every view rendered in two independent halves.
+//! The RGB ground truth: every view of every scene without a photo, rendered in two independent halves.
 //!
 //! In: a built dataset. Out: pictures in `ground_truth/renders/<renderer>/`, the scored renderer's name in `dataset.json`,
 //! its picture of the input view as the photo that methods see, and a new manifest (of chosen scenes, `finish` writes them).
@@ -93,7 +93,8 @@ impl Renderer {
 /// otherwise [`crate::finish`] does so, and several processes may render different scenes at once.
 ///
 /// Views that exist with the same settings are kept, so that a killed run resumes where it ended. A scene that Blender
-/// cannot render becomes a failure in the report; the others are still rendered.
+/// cannot render becomes a failure in the report; the others are still rendered. Scenes with a photo from elsewhere are not
+/// rendered, and a remark names each.
 pub fn render(root: &Path, options: &RenderOptions, progress: Progress<'_>) -> Result<RenderReport, PrepError> {
     let build_recipe = is_build(root).then(|| BuildFolder::of(root).recipe());
     if build_recipe.is_some() && !root.join(DATASET).is_file() {

@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_is_at_the_top_and_the_first_class_on_the_left() {
+    fn the_highest_is_at_the_top_and_the_first_class_on_the_left() {
         let methods = [("a", BTreeMap::from([(2, 30.0), (3, 25.0), (6, 10.0)])), ("b", BTreeMap::from([(2, 10.0)]))];
         let chart = Chart::new("t".to_owned(), |class| class.to_string(), &methods, |v| format!("{v:.1}")).unwrap();
         assert_eq!(chart.classes, ["2", "3", "6"]);

@@ -34,6 +34,10 @@ pub(super) fn write(board: &Board<'_>, site: &SiteWriter<'_>) -> Result<(), Repo
 
 /// The charts of one kind; none where no submission was made from such geometry.
 fn section(board: &Board<'_>, kind: PerturbationKind) -> Option<Section> {
+    let mut stated = board.results.iter().filter_map(|result| result.submission.geometry);
+    if !stated.any(|perturbation| perturbation.kind == kind) {
+        return None;
+    }
     let charts: Vec<Chart> = headlines(&board.columns)
         .into_iter()
         .filter_map(|column| {
@@ -47,7 +51,7 @@ fn section(board: &Board<'_>, kind: PerturbationKind) -> Option<Section> {
         PerturbationKind::Scale => "Furniture that is enlarged or reduced",
         PerturbationKind::Shape => "Furniture whose surface is bent",
     };
-    (!charts.is_empty()).then(|| Section { title: title.to_owned(), charts })
+    Some(Section { title: title.to_owned(), charts })
 }
 
 /// The values of the methods that have one of this kind, by level; level 0 is the true geometry.
@@ -65,7 +69,7 @@ fn by_level<'a>(board: &'a Board<'_>, kind: PerturbationKind, column: &Column) -
         if place == lines.len() {
             lines.push((&result.method, BTreeMap::new()));
         }
-        // Of several submissions of a method the best one counts.
+        // Of several submissions of a method at one level, the one that the board lists first counts.
         lines[place].1.entry(level).or_insert(*value);
     }
     lines.retain(|(_, values)| values.keys().any(|level| *level > 0));
