@@ -137,6 +137,10 @@ fn submissions_are_scored_on_the_true_geometry() {
         (result["protocols"]["mateval-2"]["summary"].clone(), result["submission"]["geometry"].clone())
     };
     perturb(dataset(), "pose", 3, &path("moved")).ends_with(0);
+    run(&mut baseline("nn", &path("moved"), &path("none")))
+        .ends_with(2)
+        .says("no ground truth")
+        .says("--estimate input");
     let estimate = true_estimate(folder.path());
     run(&mut nn(dataset(), &estimate, &path("true"))).ends_with(0);
     run(&mut nn(&path("moved"), &estimate, &path("fallen"))).ends_with(0);

@@ -64,6 +64,13 @@ pub enum BaselineError {
     /// The input picture is missing.
     #[error("'{}' does not exist: the scene has not been rendered; run `mateval prep render`", .0.display())]
     NoPhoto(PathBuf),
+    /// The ground truth of a scene is withheld.
+    #[error(
+        "'{}' does not exist: this copy of the dataset holds no ground truth, from which the estimate 'gt' (the default) is \
+         taken; give --estimate input, delight, or a folder of your method's pictures",
+        .0.display()
+    )]
+    TruthWithheld(PathBuf),
     /// A folder without any de-lit photo of the dataset.
     #[error("'{}' holds no folder <scene>/ for any scene of the dataset; expected the output of `mateval baseline delight`", .0.display())]
     NothingDelit(PathBuf),

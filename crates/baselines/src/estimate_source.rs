@@ -108,6 +108,9 @@ impl EstimateSource {
 
 fn truth(folder: &SceneFolder, view: &View) -> Result<Estimate, BaselineError> {
     let folder = folder.truth_view(&view.id);
+    if !folder.is_dir() {
+        return Err(BaselineError::TruthWithheld(folder));
+    }
     Ok(Estimate {
         base_color: Some(read_linear(&folder.join("albedo.exr"))?),
         roughness: Some(read_scalar(&folder.join("roughness.exr"))?),
