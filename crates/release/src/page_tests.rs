@@ -209,8 +209,25 @@ fn a_withheld_truth_leaves_verdicts_and_means() {
     for text in ["c0ffee", NOT_SHOWN, "1 error", "74 of 75 checks agree", "9.75 – 49.25"] {
         assert!(html.contains(text), "no '{text}'");
     }
-    // The mean over one scene is a score.
-    file.ceiling.as_mut().unwrap().scenes_scored = 1;
-    withhold(&mut file, "c0ffee".to_owned());
-    assert!(file.ceiling.unwrap().summary.is_empty() && !file.floor.unwrap().summary.is_empty());
+}
+
+/// The mean over one scene is that scene's score: of a value that one scene alone has, too.
+#[test]
+fn a_withheld_truth_leaves_no_mean_over_one_scene() {
+    let mut file = release();
+    let ceiling = file.ceiling.as_mut().unwrap();
+    let of_one = *ceiling.summary.keys().next().unwrap();
+    assert!(ceiling.summary.len() > 1);
+    let scenes = ceiling.scenes.as_mut().unwrap();
+    let first = scenes.keys().next().unwrap().clone();
+    scenes.iter_mut().filter(|(id, _)| **id != first).for_each(|(_, values)| values.retain(|key, _| *key != of_one));
+    let mut alone = release();
+    alone.ceiling.as_mut().unwrap().scenes.as_mut().unwrap().retain(|id, _| *id == first);
+    for file in [&mut file, &mut alone] {
+        withhold(file, "c0ffee".to_owned());
+        assert!(!file.floor.as_ref().unwrap().summary.is_empty());
+    }
+    let left = file.ceiling.unwrap().summary;
+    assert!(!left.is_empty() && !left.contains_key(&of_one), "{left:?}");
+    assert!(alone.ceiling.unwrap().summary.is_empty());
 }

@@ -32,7 +32,7 @@ fn silence(finding: &mut Finding) {
 
 /// Keeps means over two scenes or more: the mean over one scene is that scene's score.
 fn only_means(scores: &mut ReferenceScores) {
-    let scenes = scores.scenes.take().unwrap_or_default();
+    let Some(scenes) = scores.scenes.take() else { return };
     scores.summary.retain(|key, _| scenes.values().filter(|values| values.contains_key(key)).count() >= 2);
     scores.noise = None;
 }
