@@ -2,7 +2,8 @@
 //! `cargo bench --workspace --bench score_noise -- DATASET SCENE WEIGHTS SEEDS SAMPLES SUBMISSION...`, where WEIGHTS is the
 //! file with Alex' weights and SAMPLES the number per half, or 0 for the number that the pilot finds.
 //!
-//! Every submission is scored with SEEDS different seeds of paths and companions, and once with 256 samples per half and companions of 512 per
+//! Every submission is scored with SEEDS different seeds of paths and companions, of which each seed makes its own, as many
+//! samples as the protocol says, and once with 256 samples per half and companions of 512 per
 //! half, which are as certain as thousands without companions. A
 //! row is the mean of a metric over the views of one lighting. For PSNR it shows the ratio of the stated standard error
 //! (without the truth's, which all seeds share) to the spread over seeds; for every metric the distance of the seeds' mean
@@ -23,9 +24,6 @@ use mateval_scene::open::Dataset;
 
 /// Samples per half of the renders that count as converged.
 const CONVERGED: u32 = 256;
-
-/// Samples per half of the companions' pictures with each seed: each seed makes its own.
-const COMPANION_SAMPLES: u32 = 64;
 
 /// A picture's key, and its lighting.
 type Row = (ResultKey, String);
@@ -56,19 +54,20 @@ fn main() {
     };
     let (seeds, samples): (usize, u32) = (seeds.parse().unwrap(), samples.parse().unwrap());
     for name in Protocol::NAMES {
-        let with = |seed: &str, companion_samples: u32, samples: u32| {
+        let with = |seed: &str, companion_samples: Option<u32>, samples: u32| {
             let mut protocol = Protocol::named(name).unwrap();
             let noise = &mut protocol.light.noise;
-            (noise.seed, noise.companion_samples) = (seed.to_owned(), companion_samples);
+            noise.seed = seed.to_owned();
+            noise.companion_samples = companion_samples.unwrap_or(noise.companion_samples);
             if samples > 0 {
                 (noise.least_samples, noise.most_samples) = (samples, samples);
             }
             protocol.light.fit.samples = protocol.light.fit.samples.max(samples);
             scored(protocol)
         };
-        let converged = with("converged", 2 * CONVERGED, CONVERGED);
+        let converged = with("converged", Some(2 * CONVERGED), CONVERGED);
         let all: Vec<Vec<ProtocolResult>> =
-            (0..seeds).map(|seed| with(&format!("seed {seed}"), COMPANION_SAMPLES, samples)).collect();
+            (0..seeds).map(|seed| with(&format!("seed {seed}"), None, samples)).collect();
         for (at, submission) in submissions.iter().enumerate() {
             println!("\n{name}, {submission}");
             print_rows(&converged[at], &all.iter().map(|results| &results[at]).collect::<Vec<_>>());
