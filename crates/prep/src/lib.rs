@@ -23,6 +23,7 @@ pub mod numbering;
 pub mod part_labels;
 pub mod part_split;
 pub mod perturb;
+mod preview;
 pub mod recipe;
 pub mod render;
 pub mod scene_meshes;

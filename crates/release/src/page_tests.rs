@@ -209,6 +209,10 @@ fn a_withheld_truth_leaves_verdicts_and_means() {
     for text in ["c0ffee", NOT_SHOWN, "1 error", "74 of 75 checks agree", "9.75 – 49.25"] {
         assert!(html.contains(text), "no '{text}'");
     }
+    // The mean over one scene is a score.
+    file.ceiling.as_mut().unwrap().scenes_scored = 1;
+    withhold(&mut file, "c0ffee".to_owned());
+    assert!(file.ceiling.unwrap().summary.is_empty() && !file.floor.unwrap().summary.is_empty());
 }
 
 /// The mean over one scene is that scene's score: of a value that one scene alone has, too.

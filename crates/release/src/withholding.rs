@@ -32,7 +32,11 @@ fn silence(finding: &mut Finding) {
 
 /// Keeps means over two scenes or more: the mean over one scene is that scene's score.
 fn only_means(scores: &mut ReferenceScores) {
-    let Some(scenes) = scores.scenes.take() else { return };
-    scores.summary.retain(|key, _| scenes.values().filter(|values| values.contains_key(key)).count() >= 2);
+    if let Some(scenes) = scores.scenes.take() {
+        scores.summary.retain(|key, _| scenes.values().filter(|values| values.contains_key(key)).count() >= 2);
+    }
+    if scores.scenes_scored < 2 {
+        scores.summary.clear();
+    }
     scores.noise = None;
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::photo::PhotoFile;
 use mateval_image::texture_io::Encoding;
-use mateval_image::{ImageError, LinearRgb, Picture, png_io};
+use mateval_image::{ImageError, LinearRgb, Picture};
 use mateval_scene::Camera;
 use mateval_scene::dataset::{Photo, PhotoEncoding, View};
 use mateval_scene::layout::SceneFolder;
@@ -14,6 +14,7 @@ use mateval_sources::source_scene::SourceScene;
 
 use super::fault::SceneFault;
 use crate::error::PrepError;
+use crate::preview;
 use crate::recipe::RecipeScene;
 
 /// The largest file, in bytes: a photo of 64 million pixels of 32-bit numbers has 805 million.
@@ -102,8 +103,7 @@ impl ScenePhoto {
     pub(super) fn write(&self, folder: &SceneFolder, input: &View, exposure: f64) -> Result<(), PrepError> {
         let place = folder.view(&input.id);
         exr_io::write_linear(&place.join("rgb.exr"), &self.picture, Precision::Float)?;
-        let exposed = self.picture.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
-        Ok(png_io::write_srgb(&place.join("rgb.png"), &exposed.to_srgb())?)
+        preview::write(&place, &self.picture, exposure)
     }
 }
 

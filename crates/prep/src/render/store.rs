@@ -10,6 +10,7 @@ use mateval_scene::{RendererId, ViewId, json};
 use super::render_file::{RENDER_FILE, RenderFile};
 use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
+use crate::preview;
 
 /// The pictures of a view that are written.
 pub(super) struct ViewRender<'a> {
@@ -40,8 +41,7 @@ pub(super) fn write(place: &Path, render: &ViewRender<'_>, exposure: f64, file: 
         light(&format!("group_{at:02}_b"), b)?;
         light(&format!("group_{at:02}"), shown)?;
     }
-    let exposed = render.shown.rgb.map(|LinearRgb(rgb)| LinearRgb(rgb.map(|v| (f64::from(v) * exposure) as f32)));
-    png_io::write_srgb(&place.join("rgb.png"), &exposed.to_srgb())?;
+    preview::write(place, &render.shown.rgb, exposure)?;
     if let Some(view) = render.passes {
         write_passes(place, view)?;
     }
