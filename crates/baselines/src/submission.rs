@@ -69,7 +69,10 @@ pub fn write_scenes(
     for (at, scene) in dataset.scenes.iter().enumerate() {
         progress(Report::part(&format!("scene {}", scene.id), at, dataset.scenes.len()));
         // The submission names the dataset by its manifest, so the files that it is made from must match the manifest.
-        dataset.check_files(&scene.id, |path| !path.contains("/renders/"))?;
+        // Where the ground truth is withheld, only public files are checked: what reads the truth reports its absence.
+        let has_truth = dataset.folder(&scene.id).truth().exists();
+        let concerns = |path: &str| !path.contains("/renders/") && (has_truth || !path.starts_with("ground_truth/"));
+        dataset.check_files(&scene.id, concerns)?;
         let folder = scene_folder(work.path(), &scene.id);
         std::fs::create_dir_all(&folder).map_err(SceneError::io("make", &folder))?;
         instances += write_scene(scene, &folder)?;

@@ -10,6 +10,9 @@ use crate::submission::{self, Method};
 
 /// Copies the baked maps of every instance and returns the number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
+    for scene in &dataset.scenes {
+        dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;
+    }
     let method = Method::new("gt", "the true materials baked to the dataset's own atlases");
     submission::write(dataset, out, force, &method, &|_| (), |scene, instance, folder| {
         let truth = dataset.folder(&scene.id).truth_material(&instance.id);
