@@ -5,6 +5,12 @@
 set -eu
 cd "$(dirname "$0")/.."
 rooms=${1:-184}
+case $rooms in
+    '' | *[!0-9]*)
+        echo "usage: tools/test_cluster.sh [ROOMS] [FOLDER]; ROOMS is a number, not '$rooms'" >&2
+        exit 2
+        ;;
+esac
 work=${2:-$(mktemp -d)}
 mkdir -p "$work"
 work=$(realpath "$work")
