@@ -9,12 +9,14 @@ use std::sync::{Arc, LazyLock};
 use mateval_audit::compare::file::{CompareFile, Quantity, State};
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, Texels, Texture, png_io};
-use mateval_prep::render::{RenderFile, RenderNoise, RendererKind};
+use mateval_prep::render::RendererKind;
 use mateval_prep::views::{SeenTriangle, ViewScene, base_color_at_centres};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::material::{ColorInput, MaterialModel};
 use mateval_scene::reference::ReferenceScene;
+use mateval_scene::render_file::RenderFile;
+use mateval_scene::render_noise::RenderNoise;
 use mateval_scene::{RendererId, SceneId, reference_io};
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 

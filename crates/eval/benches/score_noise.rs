@@ -58,7 +58,9 @@ fn main() {
             let mut protocol = Protocol::named(name).unwrap();
             let noise = &mut protocol.light.noise;
             noise.seed = seed.to_owned();
-            noise.companion_samples = companion_samples.unwrap_or(noise.companion_samples);
+            if let Some(samples) = companion_samples {
+                (noise.least_companion_samples, noise.most_companion_samples) = (samples, samples);
+            }
             if samples > 0 {
                 (noise.least_samples, noise.most_samples) = (samples, samples);
             }

@@ -9,35 +9,16 @@ use std::path::{Path, PathBuf};
 
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{ImageError, LinearRgb, Picture};
+use mateval_scene::companions_file::{COMPANIONS_FORMAT, COMPANIONS_JSON, CompanionsFile};
 use mateval_scene::manifest::{sha256_of_bytes, sha256_of_file};
 use mateval_scene::{ViewId, json};
 use mateval_tracer::{LightMix, ViewsRender};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::companions::{COMPANION_LETTERS, COMPANIONS};
 use crate::error::EvalError;
 
-/// The version in `companions.json`.
-pub const COMPANIONS_FORMAT: &str = "mateval-companions/1";
-
-/// The name of the file that describes the pictures.
-pub const COMPANIONS_JSON: &str = "companions.json";
-
 /// Names of the halves, in files and seeds.
 pub(crate) const HALVES: [&str; 2] = ["a", "b"];
-
-/// `companions.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CompanionsFile {
-    /// [`COMPANIONS_FORMAT`].
-    pub format: String,
-    /// SHA-256, hex, of everything that the pictures depend on.
-    pub key: String,
-    /// SHA-256, hex, of each picture, by file name.
-    pub files: BTreeMap<String, String>,
-}
 
 /// The pictures of one pass in one folder, whose files have been checked.
 #[derive(Clone, Debug)]
@@ -105,8 +86,14 @@ impl CompanionPictures {
     }
 
     /// Writes `companions.json`, with which the pictures count as whole.
-    pub(crate) fn finish(folder: &Path, key: &str, files: BTreeMap<String, String>) -> Result<Self, EvalError> {
-        let file = CompanionsFile { format: COMPANIONS_FORMAT.to_owned(), key: key.to_owned(), files };
+    pub(crate) fn finish(
+        folder: &Path,
+        key: &str,
+        inputs_sha256: &str,
+        files: BTreeMap<String, String>,
+    ) -> Result<Self, EvalError> {
+        let (key, inputs_sha256) = (key.to_owned(), inputs_sha256.to_owned());
+        let file = CompanionsFile { format: COMPANIONS_FORMAT.to_owned(), key, inputs_sha256, files };
         json::write(&folder.join(COMPANIONS_JSON), &file)?;
         let sha256 = sha256_of_bytes(json::to_text(&file).as_bytes());
         Ok(Self { folder: folder.to_owned(), sha256 })

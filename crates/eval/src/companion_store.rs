@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use mateval_scene::bounded_cache::{keep_below, mark_used};
+use mateval_scene::companions_file::COMPANIONS_JSON;
 use mateval_scene::manifest::sha256_of_bytes;
 use mateval_scene::{Progress, Report, json};
 use tempfile::TempDir;
 
-use crate::companion_pictures::{COMPANIONS_JSON, CompanionPictures, HALVES};
+use crate::companion_pictures::{CompanionPictures, HALVES};
 use crate::companions::{COMPANION_SCALES, Companions};
 use crate::error::EvalError;
 use crate::light_pass::LightPass;
@@ -72,7 +73,8 @@ impl<'a> CompanionStore<'a> {
                 None => {}
             }
         }
-        let make = |folder: &Path| make(lit, rules, pass, companions, &key, folder);
+        let made_from = MadeFrom { key: &key, inputs_sha256: &self.inputs_sha256 };
+        let make = |folder: &Path| make(lit, rules, pass, companions, &made_from, folder);
         match (self.made_in, cached) {
             (MadeIn::Dataset, _) => make(&of_dataset),
             (_, None) => make(&self.temporary_folder(&key)?),
@@ -122,15 +124,25 @@ impl<'a> CompanionStore<'a> {
     /// The hash of everything that the pictures depend on.
     fn key(&self, lit: &LitScene<'_>, rules: &LightRules, pass: &LightPass<'_>) -> String {
         let settings = (rules.flavour, rules.max_bounces, rules.roulette_start, rules.roulette_survival, &rules.stage);
-        let definition = (SCORER_VERSION, &rules.noise.seed, COMPANION_SCALES, rules.noise.companion_samples);
+        let definition =
+            (SCORER_VERSION, &rules.noise.seed, COMPANION_SCALES, rules.noise.companion_samples(lit.truth_samples));
         let views: Vec<_> = lit.views.iter().map(|view| &view.id).collect();
         let of_scene = (&lit.scene.id, lit.scene.exposure, views, &self.inputs_sha256);
-        sha256_of_bytes(json::to_text(&(definition, settings, pass.name, of_scene, pass.companion_mixes())).as_bytes())
+        let lights = (pass.companion_mixes(), &pass.group_shares);
+        sha256_of_bytes(json::to_text(&(definition, settings, pass.name, of_scene, lights)).as_bytes())
     }
 }
 
 /// How the names of folders begin whose pictures are not whole yet.
 pub(crate) const UNFINISHED: &str = ".companions-";
+
+/// The hashes of what pictures are made from.
+struct MadeFrom<'a> {
+    /// Of everything that they depend on.
+    key: &'a str,
+    /// Of the scene's files alone.
+    inputs_sha256: &'a str,
+}
 
 /// Renders both halves into a new folder beside `folder`, which it becomes when it is whole.
 fn make(
@@ -138,7 +150,7 @@ fn make(
     rules: &LightRules,
     pass: &LightPass<'_>,
     companions: &Companions,
-    key: &str,
+    MadeFrom { key, inputs_sha256 }: &MadeFrom<'_>,
     folder: &Path,
 ) -> Result<CompanionPictures, EvalError> {
     let io = |action: &'static str, path: &Path| {
@@ -152,10 +164,11 @@ fn make(
     let mut files = std::collections::BTreeMap::new();
     for (half, name) in HALVES.iter().enumerate() {
         let stream = format!("companions_{name}");
-        let renders = pass.trace_companions(companions, rules.noise.companion_samples, &stream)?;
+        let samples = rules.noise.companion_samples(lit.truth_samples);
+        let renders = pass.trace_companions(companions, samples, &stream)?;
         files.extend(CompanionPictures::write_half(work.path(), &views, half, &renders, lit.scene.exposure)?);
     }
-    CompanionPictures::finish(work.path(), key, files)?;
+    CompanionPictures::finish(work.path(), key, inputs_sha256, files)?;
     // Another process may have made the same in the meantime; what cannot be used gives way.
     if let Some(Err(_)) = CompanionPictures::open(folder, key) {
         std::fs::remove_dir_all(folder).map_err(io("remove", folder))?;

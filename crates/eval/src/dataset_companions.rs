@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
+use mateval_scene::companions_file::{COMPANIONS_JSON, light_inputs_sha256};
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::manifest;
@@ -12,11 +13,10 @@ use mateval_scene::scene_change::change_scene;
 use mateval_scene::scene_cost::{self, Step, TimedStep};
 use mateval_scene::{Progress, Report, SceneError, SceneId};
 
-use crate::companion_pictures::COMPANIONS_JSON;
 use crate::companion_store::{MadeIn, UNFINISHED};
 use crate::error::EvalError;
 use crate::light_score::keep_companions;
-use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
+use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::view_set::ViewSet;
@@ -93,7 +93,7 @@ fn of_scene(
         lpips: None,
         renderer: Some(renderer),
         companions_made_in: MadeIn::Dataset,
-        inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
+        inputs_sha256: light_inputs_sha256(&dataset.root, &scene.id)?,
         progress,
     };
     let mut lists = BTreeMap::new();

@@ -26,6 +26,8 @@ pub(crate) struct LightPass<'a> {
     /// The name of each light.
     pub(crate) lights: Vec<String>,
     pub(crate) on_stage: bool,
+    /// How light samples are divided among the light groups; empty where solid angles alone decide.
+    pub(crate) group_shares: Vec<f64>,
     pub(crate) pictures: PassPictures,
     lit: &'a LitScene<'a>,
     rules: &'a LightRules,
@@ -61,7 +63,17 @@ impl<'a> LightPass<'a> {
     ) -> Self {
         let lights = lit.world.scene().lights.iter().map(|light| light.name.clone()).collect();
         let name = lit.set.pass(name);
-        Self { name, world: lit.world, lights, on_stage: false, pictures, lit, rules, progress }
+        Self {
+            name,
+            world: lit.world,
+            lights,
+            on_stage: false,
+            group_shares: Vec::new(),
+            pictures,
+            lit,
+            rules,
+            progress,
+        }
     }
 
     /// The picture under fitted lights of a stage, which are those of `world`.
@@ -73,7 +85,23 @@ impl<'a> LightPass<'a> {
         progress: Progress<'a>,
     ) -> Self {
         let name = lit.set.pass(PassName::Stage);
-        Self { name, world, lights, on_stage: true, pictures: PassPictures::Fitted, lit, rules, progress }
+        Self {
+            name,
+            world,
+            lights,
+            on_stage: true,
+            group_shares: Vec::new(),
+            pictures: PassPictures::Fitted,
+            lit,
+            rules,
+            progress,
+        }
+    }
+
+    /// The same pass, whose paths are traced in `world`: the same scene, whose light samples are divided among the groups by
+    /// `group_shares`.
+    pub(crate) fn sampled_in(self, world: &'a World, group_shares: Vec<f64>) -> Self {
+        Self { world, group_shares, ..self }
     }
 
     /// The weights of the lights under which converged pictures of the companions are kept: those of the pass's pictures, or

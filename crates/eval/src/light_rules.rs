@@ -94,8 +94,11 @@ pub struct NoiseRules {
     pub least_samples: u32,
     /// The largest number of samples.
     pub most_samples: u32,
-    /// Samples of the converged pictures of the companions.
-    pub companion_samples: u32,
+    /// The smallest number of samples of the converged pictures of the companions, which have as many as the truth: with
+    /// fewer their noise would lower SSIM, and with more the truth's noise would decide.
+    pub least_companion_samples: u32,
+    /// The largest number of samples of these pictures.
+    pub most_companion_samples: u32,
     /// The largest standard error of a scene's mean PSNR that the noise of our own paths may cause, in dB.
     pub target_db: f64,
     /// Where the noise of truth and companions is larger than that, ours may be this share of it; the state in a result counts
@@ -109,6 +112,11 @@ pub struct NoiseRules {
 }
 
 impl NoiseRules {
+    /// The number of samples of the companions' converged pictures, where the truth's halves have `truth` samples.
+    pub fn companion_samples(&self, truth: u32) -> u32 {
+        truth.max(self.least_companion_samples).min(self.most_companion_samples)
+    }
+
     /// The largest standard error of the mean PSNR of some pictures that is small enough, in dB: to first order that of
     /// `target_mse`, and at least `target_db`.
     pub fn allowed_db(&self, pictures: &[NoiseFreeMse]) -> f64 {
@@ -143,7 +151,8 @@ impl LightRules {
                 pilot_pixels: 2,
                 least_samples: 4,
                 most_samples: 64,
-                companion_samples: 128,
+                least_companion_samples: 128,
+                most_companion_samples: 256,
                 target_db: 0.02,
                 truth_share: 1.0,
                 target_mse: 2e-5,
@@ -161,5 +170,16 @@ impl LightRules {
             roulette_survival: self.roulette_survival,
             ..Default::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::protocol::Protocol;
+
+    #[test]
+    fn companions_have_as_many_samples_as_the_truth_within_bounds() {
+        let noise = Protocol::named("mateval-2").unwrap().light.noise;
+        assert_eq!([24, 200, 1000].map(|truth| noise.companion_samples(truth)), [128, 200, 256]);
     }
 }

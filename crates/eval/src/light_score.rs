@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 
 use mateval_image::{LinearRgb, Picture, SrgbRgb};
 use mateval_metrics::{MetricError, NoiseFreeMse, NoisyRender, psnr_mean_error};
-use mateval_scene::RendererId;
+use mateval_scene::dataset::View;
 use mateval_scene::layout::INPUT;
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
+use mateval_scene::{RendererId, json};
 use rayon::prelude::*;
 
 use crate::companion_store::CompanionStore;
@@ -19,7 +21,7 @@ use crate::lit_scene::{LitScene, Photo};
 use crate::noise_blocks::noise_blocks;
 use crate::predicted_light::{LitPicture, PredictedLight, predicted_light};
 use crate::protocol::Protocol;
-use crate::relit::{LightingName, RelitLighting, lightings};
+use crate::relit::{LightingName, RelitLighting, light_of, lightings};
 use crate::rendered_view::RenderedView;
 use crate::result::{NoiseState, PsnrNoise};
 use crate::result_key::{PictureKind, PictureName, Region, Views};
@@ -132,11 +134,9 @@ impl<'a> LightScorer<'a> {
     ) -> Result<Self, EvalError> {
         let own = task.views.iter().map(|view| RgbTruth::read(task.folder, renderer, view));
         let own = own.collect::<Result<Vec<_>, _>>()?;
-        let photo = photo(task, truths, &own)?;
+        let photo = photo(task, renderer, truths, &own)?;
         let lightings = if protocol.light.tracks.contains(&Track::Relit) {
-            let group = |group| RgbTruth::shown_of_group(task.folder, renderer, photo.view, group);
-            let groups = (0..task.world.emitters().groups()).map(group).collect::<Result<Vec<_>, EvalError>>()?;
-            lightings(&protocol.light.relit, &groups, photo.valid)
+            lightings(&protocol.light.relit, &photo.group_light)
         } else {
             Vec::new()
         };
@@ -166,6 +166,7 @@ impl<'a> LightScorer<'a> {
             set: task.set,
             truths,
             lights,
+            truth_samples: truth_samples(task, renderer)?,
             blocks: Vec::new(),
             photo,
             lightings,
@@ -304,12 +305,30 @@ struct ComparedLight {
     reference: LightReference,
 }
 
-fn photo<'a>(task: &SceneTask<'a>, truths: &'a [ViewTruth], own: &[RgbTruth]) -> Result<Photo<'a>, EvalError> {
+/// The smallest number of samples of the truth's halves.
+fn truth_samples(task: &SceneTask<'_>, renderer: &RendererId) -> Result<u32, EvalError> {
+    let of_view = |view: &&View| -> Result<u32, EvalError> {
+        let file: RenderFile = json::read(&task.folder.render(renderer, &view.id).join(RENDER_FILE))?;
+        Ok(file.samples_each_half)
+    };
+    let samples = task.views.iter().map(of_view).collect::<Result<Vec<_>, _>>()?;
+    Ok(samples.into_iter().min().unwrap_or(0))
+}
+
+fn photo<'a>(
+    task: &SceneTask<'a>,
+    renderer: &RendererId,
+    truths: &'a [ViewTruth],
+    own: &[RgbTruth],
+) -> Result<Photo<'a>, EvalError> {
     let scene = || task.scene.id.clone();
     let view = task.scene.view(INPUT).ok_or_else(|| EvalError::NoInputView { scene: scene() })?;
     let place = task.views.iter().position(|scored| scored.id == view.id);
     let place = place.ok_or_else(|| EvalError::InputNotTarget { scene: scene() })?;
-    Ok(Photo { view, place, light: own[place].shown.clone(), valid: &truths[place].valid })
+    let valid = &truths[place].valid;
+    let group = |group| Ok(light_of(&RgbTruth::shown_of_group(task.folder, renderer, view, group)?, valid));
+    let group_light = (0..task.world.emitters().groups()).map(group).collect::<Result<_, EvalError>>()?;
+    Ok(Photo { view, place, light: own[place].shown.clone(), valid, group_light })
 }
 
 /// The noise in the mean PSNR of some pictures, and why it is as large as it is.

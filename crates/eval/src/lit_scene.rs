@@ -29,6 +29,8 @@ pub(crate) struct LitScene<'a> {
     pub(crate) truths: &'a [ViewTruth],
     /// The true light of each view, by lighting (none: the scene's own lights).
     pub(crate) lights: BTreeMap<Option<LightingName>, Vec<TrueLight>>,
+    /// The smallest number of samples of the truth's halves.
+    pub(crate) truth_samples: u32,
     /// The noise blocks of each view, from [`crate::noise_blocks`].
     pub(crate) blocks: Vec<Picture<u32>>,
     /// The picture that radiances are fitted to.
@@ -52,6 +54,8 @@ pub(crate) struct Photo<'a> {
     pub(crate) light: Picture<LinearRgb>,
     /// The pixels that count.
     pub(crate) valid: &'a Mask,
+    /// The light of each light group in these pixels ([`crate::relit::light_of`]).
+    pub(crate) group_light: Vec<[f64; 3]>,
 }
 
 impl LitScene<'_> {

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use mateval_scene::companions_file::is_rendered;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
-use mateval_scene::manifest::{self, sha256_of_bytes};
 use mateval_scene::open::Dataset;
-use mateval_scene::{RendererId, SceneError, SceneId, TriangleMesh, glb, reference_io};
+use mateval_scene::render_file::RENDER_FILE;
+use mateval_scene::{RendererId, SceneError, TriangleMesh, glb, reference_io};
 use mateval_tracer::World;
 
 use crate::error::EvalError;
@@ -40,32 +41,18 @@ impl OpenScene {
         let is_light = |file: &str| {
             let name = file.rsplit('/').next().unwrap_or(file);
             render.as_ref().is_some_and(|render| file.starts_with(render.as_str()))
-                && name.ends_with(".exr")
-                && (name.starts_with("rgb") || name.starts_with("group_"))
+                && (name == RENDER_FILE
+                    || name.ends_with(".exr") && (name.starts_with("rgb") || name.starts_with("group_")))
         };
         // Numbers carry the dataset's fingerprint, so they must come from the files that it covers.
         // Companions' pictures are checked when they are used, against their own list.
-        let concerns = |file: &str| !is_derived(file) || is_light(file);
+        let concerns = |file: &str| !is_rendered(file) || is_light(file);
         dataset.check_files(&scene.id, concerns)?;
         let folder = dataset.folder(&scene.id);
         let world = World::new(Arc::new(reference_io::read(&folder)?))?;
         let atlases = read_atlases(&folder, scene, &world)?;
         Ok(Self { folder, world, atlases })
     }
-}
-
-/// Whether a file of a scene is made by rendering its other files.
-fn is_derived(file: &str) -> bool {
-    file.contains("/renders/") || file.contains("/companions/")
-}
-
-/// SHA-256, hex, of names and hashes of all files of a scene from which light is rendered.
-pub(crate) fn light_inputs_sha256(dataset: &Dataset, scene: &SceneId) -> Result<String, EvalError> {
-    let folder = format!("scenes/{scene}/");
-    let entries = manifest::entries(&dataset.root)?;
-    let inputs = entries.iter().filter(|entry| entry.file.starts_with(&folder) && !is_derived(&entry.file));
-    let lines: String = inputs.map(|entry| format!("{}  {}\n", entry.sha256, entry.file)).collect();
-    Ok(sha256_of_bytes(lines.as_bytes()))
 }
 
 /// The meshes of `instances.glb`; the instances of `scene.json` in its order, and the same triangles as the world's

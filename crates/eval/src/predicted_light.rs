@@ -29,7 +29,7 @@ use crate::light_rules::{LightRules, Track};
 use crate::lit_scene::LitScene;
 use crate::pilot::{Pilot, run_pilot};
 use crate::pilot_view::pilot_views;
-use crate::relit::LightingName;
+use crate::relit::{LightingName, group_shares};
 use crate::rendered_view::{RenderedView, of_companions, picture_of, without_companions};
 use crate::stored_light::StoredLight;
 use crate::view_set::PassName;
@@ -85,6 +85,9 @@ pub(crate) fn predicted_light(
     }
     if !fixed.is_empty() {
         let pass = LightPass::of_own_lights(PassName::Own, lit, rules, PassPictures::Fixed(fixed), progress);
+        let shares = group_shares(&pass.companion_mixes(), &lit.photo.group_light);
+        let world = &lit.world.with_group_shares(&lit.photo.view.camera, &shares);
+        let pass = pass.sampled_in(world, shares);
         Renderer { lit, rules, pass, predictions, find_companions }.render(each)?;
     }
     if has(Track::Fitted) && lit.scene.lights == SceneLights::Own {

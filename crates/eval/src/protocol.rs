@@ -43,7 +43,7 @@ pub struct Protocol {
 }
 
 /// Rises whenever a number could change for the same inputs; `dataset_spec/CHANGELOG.md` says what each version changed.
-pub const SCORER_VERSION: u32 = 8;
+pub const SCORER_VERSION: u32 = 9;
 
 impl Protocol {
     /// The names that [`Protocol::named`] knows.

@@ -84,15 +84,14 @@ pub struct RelitLighting {
 
 /// The lightings of a scene, by the rule of [`RelitRules`].
 ///
-/// `groups` are the truth's pictures of the input view, linear, one for each light group in the scene's order; `valid` is
-/// that view's mask. A scene whose groups light nothing there has no lightings.
-pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<RelitLighting> {
-    let sums: Vec<[f64; 3]> = groups.iter().map(|picture| sum_of(picture, valid)).collect();
-    let order = by_brightness(rules, &sums);
+/// `sums` holds [`light_of`] each light group, in the scene's order. A scene whose groups light nothing has no
+/// lightings.
+pub fn lightings(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<RelitLighting> {
+    let order = by_brightness(rules, sums);
     if order.is_empty() {
         return Vec::new();
     }
-    let mut warm_cool = vec![[1.0; 3]; groups.len()];
+    let mut warm_cool = vec![[1.0; 3]; sums.len()];
     for (place, &group) in order.iter().enumerate() {
         warm_cool[group] = if place % 2 == 0 { rules.warm } else { rules.cool };
     }
@@ -100,18 +99,33 @@ pub fn lightings(rules: &RelitRules, groups: &[Picture<LinearRgb>], valid: &Mask
     if order.len() > 1 {
         lightings.extend(order.iter().take(rules.alone_at_most).enumerate().map(|(place, &alone)| {
             let weight = |group: usize| if group == alone { [1.0; 3] } else { [0.0; 3] };
-            RelitLighting { name: LightingName::Alone(place + 1), weights: (0..groups.len()).map(weight).collect() }
+            RelitLighting { name: LightingName::Alone(place + 1), weights: (0..sums.len()).map(weight).collect() }
         }));
     }
-    lightings.iter_mut().for_each(|lighting| expose(&mut lighting.weights, &sums));
+    lightings.iter_mut().for_each(|lighting| expose(&mut lighting.weights, sums));
     lightings
+}
+
+/// How much each light group matters to the noise of pictures under `mixes`: the root of the sum over pictures of its squared
+/// share of their luminance. With light samples divided in these proportions, the sum of the pictures' variances is least if
+/// the variance of a group's light follows the square of the light (Cochran, "Sampling techniques", section 5.5).
+pub(crate) fn group_shares(mixes: &[LightMix], sums: &[[f64; 3]]) -> Vec<f64> {
+    let mut squares = vec![0.0; sums.len()];
+    for mix in mixes {
+        let of_groups: Vec<f64> = sums.iter().zip(mix).map(|(sum, weight)| weighted_luminance(sum, weight)).collect();
+        let total: f64 = of_groups.iter().sum();
+        if total > 0.0 {
+            squares.iter_mut().zip(of_groups).for_each(|(square, light)| *square += (light / total).powi(2));
+        }
+    }
+    squares.into_iter().map(f64::sqrt).collect()
 }
 
 /// Scales the weights so that the input view is as bright as under the scene's own lights.
 fn expose(weights: &mut LightMix, sums: &[[f64; 3]]) {
     let own: f64 = sums.iter().map(|sum| luminance(*sum)).sum();
     let pairs = sums.iter().zip(weights.iter());
-    let lit: f64 = pairs.map(|(sum, weight)| luminance([0, 1, 2].map(|c| sum[c] * weight[c]))).sum();
+    let lit: f64 = pairs.map(|(sum, weight)| weighted_luminance(sum, weight)).sum();
     let scale = own / lit;
     weights.iter_mut().flatten().for_each(|weight| *weight *= scale);
 }
@@ -125,9 +139,14 @@ fn by_brightness(rules: &RelitRules, sums: &[[f64; 3]]) -> Vec<usize> {
     order
 }
 
-fn sum_of(picture: &Picture<LinearRgb>, valid: &Mask) -> [f64; 3] {
+/// The linear light of a light group in the truth's input view, summed over its valid pixels, by channel.
+pub fn light_of(picture: &Picture<LinearRgb>, valid: &Mask) -> [f64; 3] {
     let lit = picture.pixels().iter().zip(valid.pixels()).filter(|(_, valid)| **valid);
     lit.fold([0.0; 3], |sum, (LinearRgb(rgb), _)| [0, 1, 2].map(|c| sum[c] + f64::from(rgb[c])))
+}
+
+fn weighted_luminance(sum: &[f64; 3], weight: &[f64; 3]) -> f64 {
+    luminance([0, 1, 2].map(|c| sum[c] * weight[c]))
 }
 
 fn luminance(rgb: [f64; 3]) -> f64 {
@@ -147,8 +166,12 @@ mod tests {
         Protocol::named("mateval-2").unwrap().light.relit
     }
 
+    fn sums(groups: &[Picture<LinearRgb>], valid: &Mask) -> Vec<[f64; 3]> {
+        groups.iter().map(|picture| light_of(picture, valid)).collect()
+    }
+
     fn names(groups: &[Picture<LinearRgb>]) -> Vec<String> {
-        lightings(&rules(), groups, &Mask::filled(2, 1, true))
+        lightings(&rules(), &sums(groups, &Mask::filled(2, 1, true)))
             .into_iter()
             .map(|lighting| lighting.name.to_string())
             .collect()
@@ -176,7 +199,7 @@ mod tests {
     #[test]
     fn groups_take_turns_by_brightness() {
         let groups = [flat(1.0), flat(4.0), flat(0.0), flat(2.0), flat(0.5)];
-        let all = lightings(&rules(), &groups, &Mask::filled(2, 1, true));
+        let all = lightings(&rules(), &sums(&groups, &Mask::filled(2, 1, true)));
         assert_eq!(names(&groups), ["warm_cool", "alone_1", "alone_2", "alone_3"]);
         let RelitRules { warm, cool, .. } = rules();
         let expected = [warm, warm, [1.0; 3], cool, cool].map(|rgb| rgb.map(|weight| weight / warm[0]));
@@ -203,13 +226,13 @@ mod tests {
             let pairs = groups.iter().zip(weights);
             pairs
                 .map(|(group, w)| {
-                    let s = sum_of(group, &mask);
+                    let s = light_of(group, &mask);
                     luminance([0, 1, 2].map(|c| s[c] * w[c]))
                 })
                 .sum()
         };
         let own = brightness(&[[1.0; 3]; 3]);
-        let all = lightings(&rules(), &groups, &mask);
+        let all = lightings(&rules(), &sums(&groups, &mask));
         assert_eq!(all.len(), 4);
         for lighting in &all {
             assert!((brightness(&lighting.weights) / own - 1.0).abs() < 1e-12, "{}", lighting.name);
@@ -224,6 +247,21 @@ mod tests {
         // What is not valid does not count.
         let groups = [flat(1.0), Picture::from_fn(2, 1, |x, _| LinearRgb([[9.0, 0.5][x]; 3]))];
         let valid = Mask::from_fn(2, 1, |x, _| x == 1);
-        assert_eq!(relative(&lightings(&rules(), &groups, &valid)[1])[0], [1.0; 3]);
+        assert_eq!(relative(&lightings(&rules(), &sums(&groups, &valid))[1])[0], [1.0; 3]);
+    }
+
+    /// A faint group that is once alone is sampled more often than its light in the other pictures would deserve.
+    #[test]
+    fn shares_follow_the_pictures() {
+        let sums = [[9.0; 3], [1.0; 3]];
+        let own = vec![[1.0; 3]; 2];
+        let shares = |mixes: &[LightMix]| {
+            let shares = group_shares(mixes, &sums);
+            shares[1] / shares[0]
+        };
+        assert!((shares(std::slice::from_ref(&own)) - 1.0 / 9.0).abs() < 1e-12);
+        let alone = vec![[0.0; 3], [10.0; 3]];
+        assert!((shares(&[own, alone]) - (1.01_f64.sqrt() / 0.9)).abs() < 1e-12);
+        assert_eq!(group_shares(&[vec![[0.0; 3]; 2]], &sums), [0.0; 2]);
     }
 }

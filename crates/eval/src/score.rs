@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use mateval_metrics::Lpips;
 use mateval_scene::build_folder::BuildFolder;
+use mateval_scene::companions_file::light_inputs_sha256;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::dataset_id::DatasetId;
 use mateval_scene::manifest::sha256_of_bytes;
@@ -18,7 +19,7 @@ use crate::companion_store::MadeIn;
 use crate::error::EvalError;
 use crate::light_rules::Track;
 use crate::metric::{LPIPS_NET, Metric};
-use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
+use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::result::{MissingMetric, MissingNumbers, ProtocolResult, RESULT_FORMAT, ResultFile, SubmissionId};
 use crate::result_writer::protocol_result;
@@ -263,7 +264,7 @@ impl ScorePlan<'_> {
             lpips: self.lpips.network(),
             renderer,
             companions_made_in: self.companion_cache.map_or(MadeIn::ThisRun, MadeIn::Cache),
-            inputs_sha256: light_inputs_sha256(self.dataset, &scene.id)?,
+            inputs_sha256: light_inputs_sha256(&self.dataset.root, &scene.id)?,
             progress,
         })
     }

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use mateval_image::{LinearRgb, Picture};
+use mateval_scene::companions_file::light_inputs_sha256;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::open::Dataset;
 use mateval_scene::{Progress, RendererId, TriangleMesh};
@@ -11,7 +12,7 @@ use crate::companion_store::MadeIn;
 use crate::error::EvalError;
 use crate::light_score::{ShownLight, shown_light};
 use crate::material_pictures::material_pictures;
-use crate::open_scene::{OpenScene, light_inputs_sha256, scored_views};
+use crate::open_scene::{OpenScene, scored_views};
 use crate::protocol::Protocol;
 use crate::scene_task::SceneTask;
 use crate::truth::ViewTruth;
@@ -85,7 +86,7 @@ pub fn scene_light(
         lpips: None,
         renderer: Some(renderer),
         companions_made_in: MadeIn::ThisRun,
-        inputs_sha256: light_inputs_sha256(dataset, &scene.id)?,
+        inputs_sha256: light_inputs_sha256(&dataset.root, &scene.id)?,
         progress,
     };
     let mut base_colors = vec![Vec::new(); predictions.len()];

@@ -130,12 +130,17 @@ impl Room {
             set: ViewSet::Turned,
             truths: &self.truths,
             lights: BTreeMap::from([(None, true_lights)]),
+            truth_samples: 0,
             blocks: noise_blocks(&rules("", samples).noise, &cameras),
             photo: Photo {
                 view: views[0],
                 place: 0,
                 light: self.lights[0].shown.clone(),
                 valid: &self.truths[0].valid,
+                // Unequal, so that light samples are divided in another way than by solid angles.
+                group_light: (0..self.opened.world.emitters().groups())
+                    .map(|group| [libm::pow(20.0, group as f64); 3])
+                    .collect(),
             },
             lightings: Vec::new(),
             companions: used.map(|[used, _]| used),
@@ -167,7 +172,7 @@ fn rules(seed: &str, samples: u32) -> LightRules {
     let mut rules = LightRules { tracks: vec![Track::True], ..Protocol::named("mateval-2").unwrap().light };
     rules.noise.seed = seed.to_owned();
     (rules.noise.least_samples, rules.noise.most_samples) = (samples, samples);
-    rules.noise.companion_samples = 32;
+    (rules.noise.least_companion_samples, rules.noise.most_companion_samples) = (32, 32);
     rules
 }
 

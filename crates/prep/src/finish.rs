@@ -8,6 +8,7 @@ use mateval_scene::build_folder::BuildFolder;
 use mateval_scene::dataset::{DatasetFile, FORMAT, SceneFile, Target, TargetsFile};
 use mateval_scene::layout::{DATASET, SceneFolder, TARGETS};
 use mateval_scene::open::check_whole;
+use mateval_scene::render_file::RENDER_FILE;
 use mateval_scene::scene_hashes::SceneHashes;
 use mateval_scene::work_folder::remove;
 use mateval_scene::{Progress, RendererId, Report, SceneError, SceneId, json, manifest};
@@ -17,7 +18,6 @@ use crate::build::start::is_build;
 use crate::error::PrepError;
 use crate::recipe::{self, RECIPE, Recipe};
 use crate::render::kind::RendererKind;
-use crate::render::render_file::RENDER_FILE;
 use crate::render::store::{can_show_input, show_input};
 
 /// Finishes the dataset that `prep build` makes in `root`, without the scenes `without`, which are put aside in `.build`

@@ -1,8 +1,9 @@
 //! How the RGB truth was rendered, and how noisy it is, from the `render.json` of each view.
 
-use mateval_prep::render::{RENDER_FILE, RenderFile, RendererKind};
+use mateval_prep::render::RendererKind;
 use mateval_scene::dataset::SceneFile;
 use mateval_scene::open::Dataset;
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
 use mateval_scene::{RendererId, SceneId, ViewId, json};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

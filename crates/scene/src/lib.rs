@@ -11,6 +11,7 @@
 pub mod bounded_cache;
 pub mod build_folder;
 pub mod camera;
+pub mod companions_file;
 pub mod dataset;
 pub mod dataset_id;
 pub mod error;
@@ -35,6 +36,8 @@ pub mod process_cpu;
 pub mod progress;
 pub mod reference;
 pub mod reference_io;
+pub mod render_file;
+pub mod render_noise;
 pub mod role;
 pub mod scene_change;
 pub mod scene_cost;

@@ -102,6 +102,7 @@ pub fn write_with(root: &Path, known: &BTreeMap<String, String>) -> Result<Strin
     let mut text = String::new();
     remove_abandoned(&root.join("scenes"))?;
     for file in list_files(root)?.into_iter().filter(|file| !file.split('/').any(is_temporary)) {
+        refuse_linked_folder(root, &file)?;
         match known.get(&file) {
             Some(sha256) => text.push_str(&format!("{sha256}  {file}\n")),
             None => text.push_str(&format!("{}  {file}\n", sha256_of_file(&root.join(&file))?)),
@@ -171,10 +172,27 @@ pub fn check_those(root: &Path, concerns: impl Fn(&str) -> bool) -> Result<Vec<F
     }
     for file in list_files(root)? {
         if concerns(&file) && !listed.contains(&file) {
-            findings.push(unlisted_file(&file));
+            findings.push(unlisted_file(root, &file));
         }
     }
     Ok(findings)
+}
+
+const LINKED_FOLDER: &str = "a link to a folder, whose files no manifest lists";
+const NO_LINKED_FOLDER: &str = "put the folder itself in the link's place, or mount it there";
+
+/// Whether a file that was found is a link to a folder: folders themselves are walked through.
+fn is_linked_folder(root: &Path, file: &str) -> bool {
+    root.join(file).is_dir()
+}
+
+/// Fails if a file that was found is a link to a folder.
+pub(crate) fn refuse_linked_folder(root: &Path, file: &str) -> Result<(), SceneError> {
+    if !is_linked_folder(root, file) {
+        return Ok(());
+    }
+    let what = format!("{LINKED_FOLDER}; {NO_LINKED_FOLDER}");
+    Err(SceneError::Unsupported { path: root.join(file), what })
 }
 
 fn is_inside(file: &str) -> bool {
@@ -189,7 +207,11 @@ pub(crate) fn changed_file(file: &str, found: &str, expected: &str) -> Finding {
     fault("changed_file", file, String::new(), &format!("SHA-256 is {found}, expected {expected}"))
 }
 
-pub(crate) fn unlisted_file(file: &str) -> Finding {
+pub(crate) fn unlisted_file(root: &Path, file: &str) -> Finding {
+    if is_linked_folder(root, file) {
+        let fault = fault("linked_folder", file, String::new(), LINKED_FOLDER);
+        return Finding { action: NO_LINKED_FOLDER.to_owned(), ..fault };
+    }
     fault("unlisted_file", file, String::new(), "not listed in the manifest")
 }
 
@@ -240,5 +262,21 @@ mod tests {
         std::fs::write(root.join("d"), "new").unwrap();
         let codes: Vec<String> = check(root).unwrap().into_iter().map(|f| format!("{} {}", f.code, f.file)).collect();
         assert_eq!(codes, ["missing_file scenes/a", "changed_file scenes/b", "unlisted_file d"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn linked_folders_are_refused_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        std::fs::create_dir_all(root.join("scenes/a")).unwrap();
+        std::fs::write(root.join("scenes/a/x"), "x").unwrap();
+        write(root).unwrap();
+        std::os::unix::fs::symlink(root.join("scenes/a"), root.join("scenes/b")).unwrap();
+        let found = check(root).unwrap();
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!((found[0].code.as_str(), found[0].file.as_str()), ("linked_folder", "scenes/b"));
+        let error = write(root).unwrap_err().to_string();
+        assert!(error.contains("scenes/b") && error.contains("a link to a folder"), "{error}");
     }
 }

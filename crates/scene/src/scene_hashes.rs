@@ -94,7 +94,7 @@ impl SceneHashes {
             }
         }
         let unlisted = self.found()?.into_iter().filter(|file| concerns(file) && !self.files.contains_key(file));
-        findings.extend(unlisted.map(|file| manifest::unlisted_file(&file)));
+        findings.extend(unlisted.map(|file| manifest::unlisted_file(&self.root, &file)));
         findings.sort();
         Ok(findings.into_iter().map(with_advice).collect())
     }
@@ -104,6 +104,7 @@ impl SceneHashes {
     pub fn update(&mut self) -> Result<(), SceneError> {
         let mut files = BTreeMap::new();
         for file in self.found()? {
+            manifest::refuse_linked_folder(&self.root, &file)?;
             let path = self.root.join(&file);
             let stamp = Stamp::of(&path);
             let known = self.files.get(&file).filter(|listed| stamp.is_some() && listed.stamp == stamp);

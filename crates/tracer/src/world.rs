@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 use mateval_image::Texture;
-use mateval_scene::TriangleMesh;
 use mateval_scene::material::{CUT_OUT_BELOW_OPACITY, FRACTIONAL_OPACITY, Lookup, Material};
 use mateval_scene::reference::{ReferenceScene, Surface, SurfaceIndex};
+use mateval_scene::{Camera, Intrinsics, TriangleMesh};
 use rayon::prelude::*;
 
 use crate::accel::{Accel, Hit, TriangleIndex, move_to_huge_pages, on_huge_pages, prefetch, prefetch_line};
@@ -19,7 +19,7 @@ use crate::surface_hit::SurfaceHit;
 use crate::triangle_record::TriangleRecord;
 
 /// A scene with its hierarchy, emitters and material tables.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct World {
     scene: Arc<ReferenceScene>,
     textures: Vec<Texture>,
@@ -36,6 +36,9 @@ pub struct World {
 
 /// Textures with fewer bytes stay on small pages: huge pages would save little and cost more.
 const SMALL_TEXTURE: usize = 1 << 16;
+
+/// Rows and columns of the rays that find what a camera sees, for [`World::with_group_shares`].
+const PROBES: u32 = 32;
 
 impl World {
     /// Checks the scene and builds the hierarchy over all surfaces.
@@ -117,6 +120,23 @@ impl World {
             records: self.records.clone(),
             lookups: self.lookups.clone(),
         })
+    }
+
+    /// The same world, whose light samples are divided among the light groups' surfaces in proportion to `shares`, one for
+    /// each group, on average over what `camera` sees. Lamps that are nearer to a point are still sampled more often there.
+    /// The expectation of every picture is unchanged; groups with larger shares have less noise. Emitters at infinity keep their
+    /// share of the samples. The world has no stage lights.
+    pub fn with_group_shares(&self, camera: &Camera, shares: &[f64]) -> Self {
+        let Intrinsics { width, height, .. } = camera.intrinsics;
+        let probe = |at: u32, pixels: u32| f64::from(pixels) * (f64::from(at) + 0.5) / f64::from(PROBES);
+        let grid = (0..PROBES).flat_map(|y| (0..PROBES).map(move |x| DVec2::new(probe(x, width), probe(y, height))));
+        let origin = camera.position().as_vec3();
+        let rays: Vec<Ray> = grid.map(|pixel| Ray::endless(origin, camera.direction(pixel).as_vec3())).collect();
+        let mut hits = Vec::new();
+        self.first_hits(&rays, &mut hits);
+        let points: Vec<Vec3> = hits.iter().flatten().map(|hit| self.surface_hit(hit).position).collect();
+        let emitters = self.emitters.with_group_shares(&points, shares);
+        Self { emitters, ..self.clone() }
     }
 
     /// The scene.

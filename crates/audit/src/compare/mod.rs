@@ -40,7 +40,8 @@ use file::{COMPARE_FORMAT, CompareFile, ComparedDataset, LightComparison, SceneC
 use geometry::{OurGeometry, TheirGeometry};
 use kind::MaterialKind;
 use light::ShownKinds;
-use mateval_prep::render::{RENDER_FILE, RendererKind};
+use mateval_prep::render::RendererKind;
+use mateval_scene::render_file::RENDER_FILE;
 use ours::OurLight;
 use previews::ViewPreviews;
 use samples::PILOT;

@@ -2,8 +2,8 @@
 //!
 //! A pilot of few samples measures our noise in each tile. It falls in proportion to the number of samples.
 
-use mateval_prep::render::{RENDER_FILE, RenderFile};
 use mateval_scene::json;
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
 
 use super::bounds::STANDARD_ERRORS;
 use super::light::ShownKinds;

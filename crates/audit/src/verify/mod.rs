@@ -1,5 +1,6 @@
 //! Checks a dataset against the rules of its format. Every fault is reported, none is fixed.
 
+mod companions;
 mod geometry;
 mod photo;
 mod pictures;
@@ -59,6 +60,7 @@ pub fn verify(root: &Path, progress: Progress<'_>) -> Result<Vec<Finding>, Audit
             let folder = SceneFolder::of(root, id);
             faults.prefix = format!("scenes/{id}/");
             check_scene(&folder, dataset, id.as_str(), &mut faults);
+            companions::check(root, &folder, id, &mut faults);
             faults.prefix.clear();
         }
         check_targets(root, dataset, &absent, &mut faults);

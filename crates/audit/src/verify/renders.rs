@@ -7,7 +7,7 @@ use mateval_scene::layout::{INPUT, SceneFolder};
 
 use super::schema;
 use mateval_prep::faults::Faults;
-use mateval_prep::render::RenderFile;
+use mateval_scene::render_file::RenderFile;
 
 /// Reports every view whose renders are missing, unreadable or of another size than its camera's picture.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {

@@ -4,13 +4,15 @@
 use std::path::{Path, PathBuf};
 use std::sync::{LazyLock, Mutex};
 
-use mateval_eval::companion_pictures::COMPANIONS_JSON;
 use mateval_eval::dataset_companions::{CompanionsReport, make_companions};
 use mateval_eval::protocol::Protocol;
 use mateval_eval::result::PictureValue;
 use mateval_eval::score::{ScorePlan, score};
+use mateval_scene::companions_file::COMPANIONS_JSON;
+use mateval_scene::dataset::DatasetFile;
 use mateval_scene::open::Dataset;
-use mateval_scene::{Report, SceneId};
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
+use mateval_scene::{Report, SceneId, Severity};
 use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
 use super::sample::{dataset, hasty, plan, write_grey};
@@ -58,6 +60,14 @@ fn make(root: &Path, protocol: &Protocol) -> CompanionsReport {
     report
 }
 
+/// Writes the manifest of changed files.
+fn rehash(root: &Path) {
+    let path = root.join("dataset.json");
+    let file: DatasetFile = mateval_scene::json::read(&path).unwrap();
+    let manifest_sha256 = mateval_scene::manifest::write(root).unwrap();
+    mateval_scene::json::write(&path, &DatasetFile { manifest_sha256, ..file }).unwrap();
+}
+
 /// A copy of the dataset.
 fn copied() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
@@ -93,16 +103,49 @@ fn a_dataset_carries_them() {
 
     // Of other rules: replaced.
     let mut other = hasty();
-    other.light.noise.companion_samples = 2;
+    (other.light.noise.least_companion_samples, other.light.noise.most_companion_samples) = (2, 2);
     assert_eq!(make(copy.path(), &other), CompanionsReport { made: 1, kept: 0 });
     let said = same_scores(&Dataset::open(copy.path()).unwrap(), None);
     assert!(said.len() == 1 && said[0].contains("was made from other inputs or rules"), "{said:?}");
     assert_eq!(make(copy.path(), &hasty()), CompanionsReport { made: 1, kept: 0 });
 
+    // As many samples as the truth: fewer of those, and the pictures are made anew.
+    let mut following = hasty();
+    following.light.noise.most_companion_samples = 1000;
+    assert_eq!(make(copy.path(), &following), CompanionsReport { made: 1, kept: 0 });
+    assert_eq!(make(copy.path(), &following), CompanionsReport { made: 0, kept: 1 });
+    for view in &dataset.scenes.iter().find(|scene| scene.id.as_str() == SCENE).unwrap().views {
+        let scene = dataset.folder(&SceneId::new(SCENE).unwrap());
+        let path = scene.render(dataset.file.scored_renderer.as_ref().unwrap(), &view.id).join(RENDER_FILE);
+        let file: RenderFile = mateval_scene::json::read(&path).unwrap();
+        mateval_scene::json::write(&path, &RenderFile { samples_each_half: 16, ..file }).unwrap();
+    }
+    rehash(copy.path());
+    assert_eq!(make(copy.path(), &following), CompanionsReport { made: 1, kept: 0 });
+    assert_eq!(make(copy.path(), &hasty()), CompanionsReport { made: 1, kept: 0 });
+    let dataset = Dataset::open(copy.path()).unwrap();
+
     // A swapped picture: named, and not used.
     std::fs::copy(pass.join("input_a.exr"), pass.join("input_b.exr")).unwrap();
     let said = same_scores(&dataset, None);
     assert!(said.len() == 1 && said[0].contains("input_b.exr' is not the file that"), "{said:?}");
+
+    // Companions of other files of the scene: `prep verify` warns.
+    let stale = || {
+        let found = mateval_audit::verify::verify(copy.path(), &|_| ()).unwrap();
+        found.into_iter().filter(|finding| finding.code == "stale_companions").collect::<Vec<_>>()
+    };
+    assert_eq!(stale(), []);
+    let scene_json = dataset.folder(&SceneId::new(SCENE).unwrap()).scene_file();
+    let text = std::fs::read_to_string(&scene_json).unwrap();
+    std::fs::write(&scene_json, format!("{text}\n")).unwrap();
+    rehash(copy.path());
+    let found = stale();
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(
+        found[0].severity == Severity::Warning
+            && found[0].file.ends_with("room/ground_truth/companions/own/companions.json")
+    );
 }
 
 #[test]

@@ -11,7 +11,6 @@ use mateval_eval::pilot::samples_under_bound;
 use mateval_eval::protocol::Protocol;
 use mateval_eval::relit::lightings;
 use mateval_eval::score::{ScorePlan, score};
-use mateval_image::{LinearRgb, Mask, Picture};
 use mateval_light::light_stage;
 use mateval_metrics::{NoiseFreeMse, NoisePsnr};
 use mateval_scene::Camera;
@@ -28,7 +27,7 @@ use mateval_testkit::sample_dataset::built_with_wide_views;
 type Reading = (&'static str, fn(&Protocol) -> Value);
 
 /// What shows that a part of a protocol is read, by the start of its JSON pointers. A leaf under none of these fails.
-const READINGS: [Reading; 20] = [
+const READINGS: [Reading; 21] = [
     ("/name", scores),
     ("/mask_rule", scores),
     ("/albedo_space", scores),
@@ -45,7 +44,8 @@ const READINGS: [Reading; 20] = [
     ("/light/noise/seed", light),
     ("/light/noise/block_pixels", blocks),
     ("/light/noise/least_samples", light),
-    ("/light/noise/companion_samples", light),
+    ("/light/noise/least_companion_samples", companion_samples),
+    ("/light/noise/most_companion_samples", companion_samples),
     ("/light/noise/", samples),
     ("/fixed/", refusal),
     ("/scorer_version", refusal),
@@ -152,10 +152,14 @@ fn stage(protocol: &Protocol) -> Value {
     json!(format!("{lights:?}"))
 }
 
+/// Samples of companions, for truths of few and of many.
+fn companion_samples(protocol: &Protocol) -> Value {
+    json!([1, 1 << 20].map(|truth| protocol.light.noise.companion_samples(truth)))
+}
+
 /// Lightings of five groups, each half as bright as the one before.
 fn relit(protocol: &Protocol) -> Value {
-    let groups = [16.0, 8.0, 4.0, 2.0, 1.0].map(|light| Picture::filled(2, 1, LinearRgb([light; 3])));
-    json!(format!("{:?}", lightings(&protocol.light.relit, &groups, &Mask::filled(2, 1, true))))
+    json!(format!("{:?}", lightings(&protocol.light.relit, &[16.0, 8.0, 4.0, 2.0, 1.0].map(|light| [light; 3]))))
 }
 
 fn blocks(protocol: &Protocol) -> Value {

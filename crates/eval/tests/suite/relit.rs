@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use mateval_eval::relit::{RelitLighting, lightings};
+use mateval_eval::relit::{RelitLighting, light_of, lightings};
 use mateval_eval::truth::{RgbTruth, TrueLight, ViewTruth};
 use mateval_image::{LinearRgb, Picture};
 use mateval_scene::RendererId;
@@ -25,7 +25,8 @@ fn groups_and_lightings(scene: &SceneFile) -> (Vec<Picture<LinearRgb>>, Vec<Reli
     let group = |group| RgbTruth::shown_of_group(&folder, &renderer(), view, group).unwrap();
     let groups: Vec<_> = (0..count).map(group).collect();
     let valid = ViewTruth::read(&folder, view).unwrap().valid;
-    let lightings = lightings(&hasty().light.relit, &groups, &valid);
+    let light: Vec<[f64; 3]> = groups.iter().map(|picture| light_of(picture, &valid)).collect();
+    let lightings = lightings(&hasty().light.relit, &light);
     (groups, lightings)
 }
 

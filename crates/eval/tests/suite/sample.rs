@@ -38,7 +38,8 @@ pub fn hasty() -> Protocol {
     protocol.light.noise.pilot_samples = 2;
     protocol.light.noise.least_samples = 2;
     protocol.light.noise.most_samples = 4;
-    protocol.light.noise.companion_samples = 8;
+    protocol.light.noise.least_companion_samples = 8;
+    protocol.light.noise.most_companion_samples = 8;
     protocol
 }
 

@@ -11,10 +11,10 @@ use std::time::Duration;
 
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
+use mateval_scene::render_file::RenderFile;
+use mateval_scene::render_noise::RenderNoise;
 use mateval_scene::{Finding, Progress, Report, SceneId, Severity, json, reference_io};
 
-use super::noise::RenderNoise;
-use super::render_file::RenderFile;
 use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
 use super::report::RenderReport;
 use super::store::{self, ViewRender};

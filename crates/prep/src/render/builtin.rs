@@ -6,12 +6,12 @@ use std::sync::Arc;
 use mateval_image::{ImageError, Picture, exr_io, png_io};
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::SceneFolder;
+use mateval_scene::render_file::RenderFile;
+use mateval_scene::render_noise::RenderNoise;
 use mateval_scene::{Progress, Report, SceneId, json, reference_io};
 use mateval_tracer::noise_filter::{self, Surfaces, filtered_mean};
 use mateval_tracer::{LightBasis, LightGroups, RenderSettings, RenderStats, World, render_views};
 
-use super::noise::RenderNoise;
-use super::render_file::RenderFile;
 use super::render_run::{MAX_BOUNCES, RenderRun, seed, seed_texts};
 use super::report::RenderReport;
 use super::store::{self, ViewRender};

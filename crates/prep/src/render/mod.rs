@@ -9,8 +9,6 @@
 mod blender_scene;
 mod builtin;
 pub(crate) mod kind;
-mod noise;
-pub(crate) mod render_file;
 mod render_run;
 mod report;
 pub(crate) mod store;
@@ -30,8 +28,6 @@ use crate::finish::{check_strays, finish_again};
 use crate::recipe::{self, RECIPE};
 pub use blender_scene::BlenderOptions;
 pub use kind::{RendererKind, UnknownRenderer};
-pub use noise::RenderNoise;
-pub use render_file::{RENDER_FILE, RenderFile};
 pub use render_run::MAX_BOUNCES;
 use render_run::RenderRun;
 pub use report::RenderReport;

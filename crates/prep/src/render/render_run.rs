@@ -5,11 +5,11 @@ use std::path::Path;
 use mateval_scene::dataset::View;
 use mateval_scene::layout::{INPUT, SceneFolder};
 use mateval_scene::manifest::sha256_of_bytes;
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
 use mateval_scene::scene_change::change_scene;
 use mateval_scene::scene_cost::{self, Step, TimedStep};
 use mateval_scene::{RendererId, SceneId, json};
 
-use super::render_file::{RENDER_FILE, RenderFile};
 use crate::error::PrepError;
 
 /// Number of scatterings after the first hit after which a path is cut.

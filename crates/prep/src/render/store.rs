@@ -5,9 +5,9 @@ use std::path::Path;
 use mateval_image::exr_io::{self, Precision};
 use mateval_image::{LinearRgb, Picture, png_io};
 use mateval_scene::layout::{INPUT, SceneFolder};
+use mateval_scene::render_file::{RENDER_FILE, RenderFile};
 use mateval_scene::{RendererId, ViewId, json};
 
-use super::render_file::{RENDER_FILE, RenderFile};
 use crate::blender::{BlenderView, LightPictures};
 use crate::error::PrepError;
 use crate::preview;

@@ -1,5 +1,7 @@
 //! Emitting surfaces.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::{LightIndex, ReferenceScene, SurfaceIndex};
@@ -55,7 +57,7 @@ pub(crate) struct Outline {
 }
 
 /// The outlines of all emitters as arrays of components, so that eight are evaluated at once.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Outlines(Vec<EightOutlines>);
 
 /// The number of emitters evaluated at once.
@@ -103,13 +105,22 @@ impl EightOutlines {
 }
 
 impl Outlines {
-    pub(crate) fn new(areas: &[AreaEmitter]) -> Self {
-        let eight = |chunk: &[AreaEmitter]| {
+    pub(crate) fn new(areas: &[Arc<AreaEmitter>]) -> Self {
+        let eight = |chunk: &[Arc<AreaEmitter>]| {
             let mut eight = EightOutlines::NONE;
             chunk.iter().enumerate().for_each(|(lane, area)| eight.put(lane, &area.outline));
             eight
         };
         Self(areas.chunks(LANES).map(eight).collect())
+    }
+
+    /// The same, with the solid angle of emitter k multiplied by `factors[k]`.
+    pub(crate) fn scaled(&self, factors: &[f32]) -> Self {
+        let mut scaled = self.clone();
+        for (eight, factors) in scaled.0.iter_mut().zip(factors.chunks(LANES)) {
+            eight.area.iter_mut().zip(factors).for_each(|(area, factor)| *area *= factor);
+        }
+        scaled
     }
 
     /// An estimate of each emitter's solid angle seen from `from`; 0 from behind. Eight at a time; the last eight are

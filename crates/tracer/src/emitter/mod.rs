@@ -3,13 +3,17 @@
 //! Sampling chooses an emitter, then a point on it or a direction towards it. The choice depends on geometry alone, never
 //! on radiance: among area emitters on estimated solid angles, with a share of 0.2 spread evenly, and between these and
 //! emitters at infinity on the share of rays that leave the scene. So pictures of each light group alone, and of any
-//! weighting of the groups, can come from the same paths.
+//! weighting of the groups, can come from the same paths. A caller that knows which groups matter in its pictures can
+//! change how often each is chosen (`group_shares`).
 
 mod area;
 mod distribution;
 mod environment;
 mod escape;
+mod group_shares;
 mod radiance_map;
+
+use std::sync::Arc;
 
 use glam::Vec3;
 use mateval_image::Texture;
@@ -26,15 +30,15 @@ pub(crate) use escape::escape_share;
 use radiance_map::RadianceMap;
 
 /// The emitters of all light groups of a scene.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Emitters {
-    areas: Vec<AreaEmitter>,
+    areas: Vec<Arc<AreaEmitter>>,
     /// Of `areas`.
     outlines: Outlines,
     /// For each surface its index in `areas`, if it emits.
     area_of: Vec<Option<usize>>,
     /// The stage lights as surfaces, in the order of `areas`.
-    stage: Option<Accel>,
+    stage: Option<Arc<Accel>>,
     /// The place of the first stage light in `areas`.
     first_on_stage: usize,
     distant: Vec<DistantEmitter>,
@@ -45,7 +49,7 @@ pub struct Emitters {
     scene_size: f32,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct DistantEmitter {
     light: LightIndex,
     kind: DistantKind,
@@ -53,9 +57,9 @@ struct DistantEmitter {
     probability: f32,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum DistantKind {
-    Map(Box<EnvironmentMap>),
+    Map(Arc<EnvironmentMap>),
     Constant(Vec3),
 }
 
@@ -194,11 +198,12 @@ impl Emitters {
                 return Err(located(LightFault::NoTriangles).into());
             }
             let emission = SurfaceEmission { radiance: Vec3::from_array(light.radiance), map: None, two_sided: false };
-            self.areas.push(AreaEmitter::on_stage(LightIndex(groups + index), emission, &light.mesh, self.scene_size));
+            let area = AreaEmitter::on_stage(LightIndex(groups + index), emission, &light.mesh, self.scene_size);
+            self.areas.push(Arc::new(area));
         }
         self.outlines = Outlines::new(&self.areas);
         self.camera_visible.extend(stage.iter().map(|_| false));
-        self.stage = Some(accel);
+        self.stage = Some(Arc::new(accel));
         Ok(self)
     }
 
@@ -229,7 +234,8 @@ impl Emitters {
                         part.iter().for_each(|surface| self.area_of[surface.0] = None);
                         continue;
                     }
-                    self.areas.push(AreaEmitter::new(scene, light, emission.clone(), part.to_vec(), self.scene_size));
+                    let area = AreaEmitter::new(scene, light, emission.clone(), part.to_vec(), self.scene_size);
+                    self.areas.push(Arc::new(area));
                 }
             }
             Emission::Environment { texture, scale, world_from_environment } => {
@@ -241,7 +247,7 @@ impl Emitters {
                 if !world_from_environment.as_flattened().iter().all(|v| v.is_finite()) {
                     return Err(LightFault::EnvironmentRotation(*world_from_environment));
                 }
-                let map = Box::new(EnvironmentMap::new(map, *scale, *world_from_environment));
+                let map = Arc::new(EnvironmentMap::new(map, *scale, *world_from_environment));
                 self.distant.push(DistantEmitter { light, kind: DistantKind::Map(map), probability: 0.0 });
             }
             Emission::Constant { radiance } => {

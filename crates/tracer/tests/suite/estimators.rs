@@ -119,7 +119,8 @@ fn ways_of_sampling_agree() {
 
 /// Sampled directions to lights follow the density reported for them. The density of a direction is the sum over all
 /// emitters on a ray along it, integrated over cells of the sphere and compared with 40,000 samples by Pearson's
-/// chi-square. The twin: the density for a point 10 cm away.
+/// chi-square, also where the lamps' groups have other shares. The twins: the density for a point 10 cm away, and that of
+/// other shares.
 #[test]
 fn directions_to_lights_follow_their_density() {
     let mut scene = scene(1.0);
@@ -139,13 +140,21 @@ fn directions_to_lights_follow_their_density() {
     lit.lights.push(map);
     let world = World::new(Arc::new(lit)).unwrap();
     let from = Vec3::new(0.1, 0.05, 0.2);
+    let shared = world.with_group_shares(&view(), &[0.2, 5.0, 1.0, 1.0]);
     let [expected, elsewhere] = [from, from + Vec3::X * 0.1].map(|place| light_density(&world, place));
-    let z = |expected: &[f64]| chi_square_of_lights(&world, from, expected);
+    let expected_shared = light_density(&shared, from);
     // The remaining probability falls on the backs of lamps.
     let total: f64 = expected.iter().sum();
     assert!((0.7..1.0).contains(&total), "{total}");
-    assert!(z(&expected) < 5.0, "{}", z(&expected));
-    assert!(z(&elsewhere) > 5.0, "the twin passes: {}", z(&elsewhere));
+    let z = |world: &World, expected: &[f64]| chi_square_of_lights(world, from, expected);
+    for (world, expected) in [(&world, &expected), (&shared, &expected_shared)] {
+        let z = z(world, expected);
+        assert!(z < 5.0, "{z}");
+    }
+    for (world, expected) in [(&world, &elsewhere), (&shared, &expected)] {
+        let z = z(world, expected);
+        assert!(z > 5.0, "the twin passes: {z}");
+    }
 }
 
 const ROWS: usize = 12;

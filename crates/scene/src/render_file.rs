@@ -1,10 +1,10 @@
 //! `render.json`: how a view's pictures were made.
 
-use mateval_scene::RendererId;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::noise::RenderNoise;
+use crate::RendererId;
+use crate::render_noise::RenderNoise;
 
 /// The name of the file. It is written last, so its presence means that a view's pictures are complete.
 pub const RENDER_FILE: &str = "render.json";
