@@ -10,7 +10,8 @@ use crate::submission::{self, Method};
 
 /// Copies the baked maps of every instance and returns the number of instances.
 pub fn write(dataset: &Dataset, out: &Path, force: bool) -> Result<usize, BaselineError> {
-    for scene in &dataset.scenes {
+    // A public tree is refused before anything is written.
+    for scene in dataset.scenes.iter().filter(|scene| !dataset.folder(&scene.id).truth().exists()) {
         dataset.check_files(&scene.id, |path| path.starts_with("ground_truth/materials/"))?;
     }
     let method = Method::new("gt", "the true materials baked to the dataset's own atlases");

@@ -110,16 +110,8 @@ impl World {
     pub fn on_stage(&self, stage: &[StageLight]) -> Result<Self, TracerError> {
         let [low, high] = self.accel.bounds();
         let size = low.abs().max(high.abs()).max_element();
-        Ok(Self {
-            scene: self.scene.clone(),
-            textures: self.textures.clone(),
-            accel: self.accel.clone(),
-            emitters: Emitters::on_stage(stage, self.scene.surfaces.len(), size)?,
-            tables: self.tables.clone(),
-            masked: self.masked,
-            records: self.records.clone(),
-            lookups: self.lookups.clone(),
-        })
+        let emitters = Emitters::on_stage(stage, self.scene.surfaces.len(), size)?;
+        Ok(Self { emitters, ..self.clone() })
     }
 
     /// The same world, whose light samples are divided among the light groups' surfaces in proportion to `shares`, one for
