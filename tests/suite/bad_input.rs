@@ -216,7 +216,7 @@ fn cameras_that_see_nothing() {
     assert!(!built_from(towards, "views = []").ends_with(0).stderr.contains("nothing_seen"));
 }
 
-/// Half a millimetre above the floor, where xatlas once aborted the program for lack of a fixed atlas size.
+/// Half a millimetre above the floor, where unwrapping once aborted the program for lack of a fixed atlas size.
 #[test]
 fn a_camera_that_is_too_near() {
     let above =

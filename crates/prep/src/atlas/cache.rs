@@ -12,19 +12,12 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::bounded_cache::{keep_below, mark_used};
 use mateval_scene::manifest::sha256_of_bytes;
 
-use super::error::AtlasError;
 use super::layout::AtlasLayout;
-use super::size::SizeWish;
+use super::packing::{AtlasError, SizeWish};
 
 /// What makes layouts. A cache never holds what another version made.
-const MAKERS: [&str; 6] = [
-    "xatlas-rs-v2 0.1.4",
-    include_str!("charts.rs"),
-    include_str!("layout.rs"),
-    include_str!("mod.rs"),
-    include_str!("scale_search.rs"),
-    include_str!("size.rs"),
-];
+const MAKERS: [&str; 4] =
+    ["uvunwrap 0.2.0", include_str!("layout.rs"), include_str!("mod.rs"), include_str!("packing.rs")];
 /// Size of the largest file that is read, in bytes.
 const MAX_FILE_BYTES: u64 = 1 << 30;
 /// The largest size of a cache, in bytes.
@@ -129,7 +122,7 @@ fn parse(bytes: &[u8]) -> Option<Made> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::charts::with_charts;
+    use super::super::packing::packed;
     use super::super::tests::cuboid;
     use super::super::{Wanted, unwrap_copies};
     use super::*;
@@ -173,7 +166,7 @@ mod tests {
         let mesh = cuboid(glam::Vec3::ONE);
         let fewer = TriangleMesh { triangles: mesh.triangles[1..].to_vec(), ..mesh.clone() };
         let [small, large] = [256, 512].map(SizeWish::Fixed);
-        let made = with_charts(&fewer, |charts| charts.packed(small)).unwrap();
+        let made = packed(&fewer, small);
         let key = ShapeKey::of(&mesh);
         cache.keep(&key, small, &made);
         assert_eq!(cache.read(&key, small, &fewer), Some(made));

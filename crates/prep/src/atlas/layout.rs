@@ -12,7 +12,7 @@ pub(super) struct AtlasLayout {
     pub(super) size: u32,
     /// Number of charts.
     pub(super) charts: u32,
-    /// Number of triangles that xatlas left out since their area is negligible.
+    /// Number of triangles without a chart, since their area is negligible.
     pub(super) unmapped: usize,
     /// The same triangles in the same order. Vertices are split at the borders of charts.
     pub(super) triangles: Vec<[u32; 3]>,
@@ -35,7 +35,7 @@ pub struct Unwrapped {
     pub coverage: f64,
     /// Length of a texel's side on the surface in metres, averaged over the area.
     pub texel_m: f64,
-    /// Number of triangles that xatlas left out since their area is negligible. All three corners of each lie on one point of
+    /// Number of triangles without a chart, since their area is negligible. All three corners of each lie on one point of
     /// another chart.
     pub unmapped: usize,
 }

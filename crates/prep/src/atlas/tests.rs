@@ -159,7 +159,7 @@ fn soup(corners: &[[f32; 3]], count: u32, size: Vec3) -> TriangleMesh {
     }
 }
 
-/// The wish of a camera close to a wall. xatlas once aborted the program on it.
+/// The wish of a camera close to a wall.
 #[test]
 fn a_wish_beyond_the_largest_atlas_gets_the_largest() {
     for mesh in [cuboid(Vec3::new(4.0, 2.6, 0.1)), cells(40, 1.0, 1.0), cells(200, 2.0, 0.01), hoop(64, 0.01)] {
