@@ -1,24 +1,33 @@
 #!/bin/sh
 # Builds the wheel of the Python package and tests it in fresh environments of Python 3.9, 3.11 and 3.13, where they are found.
-# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters; those that pyenv keeps are found too. MATEVAL_PROFILE=dev builds with the tests'
-# profile, which shares its libraries with tools/test.sh.
+# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters; those that pyenv keeps are found too.
+# MATEVAL_PROFILE=dev builds with the tests' profile, which shares its libraries with tools/test.sh. MATEVAL_WHEELS=FOLDER
+# builds nothing: it tests the wheel for this processor in FOLDER, whose own command then makes the dataset.
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh python3-venv
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-profile="${MATEVAL_PROFILE:-release}"
-# The folder of the profile `dev` has another name.
-folder="$(echo "$profile" | sed 's/^dev$/debug/')"
-# Named together with the extension module, so that both use the libraries with the same features.
-cargo build --profile "$profile" --package mateval --package mateval-python --bin mateval
-mateval="${CARGO_TARGET_DIR:-$PWD/target}/$folder/mateval"
+if [ -n "${MATEVAL_WHEELS:-}" ]; then
+    dist=$(realpath "$MATEVAL_WHEELS")
+    python3 -m venv "$work/wheel"
+    "$work/wheel/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl
+    mateval="$work/wheel/bin/mateval"
+else
+    dist="$work/dist"
+    profile="${MATEVAL_PROFILE:-release}"
+    # The folder of the profile `dev` has another name.
+    folder="$(echo "$profile" | sed 's/^dev$/debug/')"
+    # Named together with the extension module, so that both use the libraries with the same features.
+    cargo build --profile "$profile" --package mateval --package mateval-python --bin mateval
+    mateval="${CARGO_TARGET_DIR:-$PWD/target}/$folder/mateval"
 
-python3 -m venv "$work/maturin"
-"$work/maturin/bin/pip" install --quiet 'maturin>=1.9.4,<2'
-"$work/maturin/bin/maturin" build --profile "$profile" --manifest-path crates/python/Cargo.toml --out "$work/dist"
-ls -l "$work/dist"
+    python3 -m venv "$work/maturin"
+    "$work/maturin/bin/pip" install --quiet 'maturin>=1.9.4,<2'
+    "$work/maturin/bin/maturin" build --profile "$profile" --manifest-path crates/python/Cargo.toml --out "$dist"
+fi
+ls -l "$dist"
 
 # One scene of the built-in sample, small enough to be rendered in seconds.
 "$mateval" sample "$work/source"
@@ -45,8 +54,8 @@ for name in ${PYTHONS:-python3.9 python3.11 python3.13}; do
     [ -n "$python" ] || { echo "$name was not found, and is not tested"; continue; }
     "$python" --version
     "$python" -m venv "$work/env$tested"
-    "$work/env$tested/bin/pip" install --quiet "$work"/dist/*.whl pytest mypy trimesh
-    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$work/dist" \
+    "$work/env$tested/bin/pip" install --quiet "$dist"/*_"$(uname -m)".whl pytest mypy trimesh
+    MATEVAL_COMMAND="$mateval" MATEVAL_DATASET="$work/dataset" MATEVAL_EIGHT_SCENES="$work/eight" MATEVAL_WHEELS="$dist" \
         "$work/env$tested/bin/python" -m pytest -q -p no:cacheprovider crates/python/tests "$@"
     tested=$((tested + 1))
 done
