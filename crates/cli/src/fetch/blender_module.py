@@ -1,32 +1,71 @@
 #!/usr/bin/env python3
-"""Installs Blender 4.5 LTS as a Python module (0.8 GB) where `mateval` searches for it.
+"""Installs Blender 4.5 LTS as a Python module (0.8 GB) where `mateval` searches for it, or checks such a module.
 
 Input: the cache folder, and pip's requirements. Output: a virtual environment in `CACHE/blender`, and on stdout the
-path of its Python. An environment that was installed from the same requirements is kept.
+path of its Python. An environment that was installed from the same requirements is kept; an incomplete one is made
+again.
 
-Blender's wheels are for Python 3.11 only, and are linked to libraries of X and GL. At the end the script tests whether
-the module can be imported.
+Blender's wheels are for Python 3.11 only, and are linked to libraries of X and GL, which pip does not install. The
+script ends with the test whether the module can be imported. With `--check` it does nothing else, for the Python that
+runs it.
 
-Exit code 0: the module works; 2: it could not be installed, or it lacks a library.
+Exit code 0: the module works; 2: it could not be downloaded, or cannot be imported; 130: interrupted.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+from pip_call import FetchError, call_pip, exit_code
+
 PYTHON = "python3.11"
-LIBRARIES = "libxrender1 libxfixes3 libxi6 libxkbcommon0 libsm6 libgl1"
-INSTEAD = "or set MATEVAL_BLENDER to a Blender 4.5 of your own"
+BUILTIN = "or use --renderer builtin, which needs no Blender"
 # Written last, so that it marks a complete installation.
 MARK = "requirements.txt"
+# The libraries of the system that Blender's are linked to, and their packages in Debian. `tools/setup.sh` reads them.
+PACKAGES = {
+    "libGL.so.1": "libgl1",
+    "libICE.so.6": "libice6",
+    "libSM.so.6": "libsm6",
+    "libX11.so.6": "libx11-6",
+    "libXext.so.6": "libxext6",
+    "libXfixes.so.3": "libxfixes3",
+    "libXi.so.6": "libxi6",
+    "libXrender.so.1": "libxrender1",
+    "libxkbcommon.so.0": "libxkbcommon0",
+}
+# Prints the module's file, and why it cannot be imported. bpy 4.5 may hang in an ordinary exit.
+PROBE = """
+import importlib.util, os
+spec = importlib.util.find_spec("bpy")
+print(spec.origin if spec else "", flush=True)
+try:
+    import bpy, numpy
+except Exception as problem:
+    print(f"{type(problem).__name__}: {problem}", flush=True)
+    os._exit(1)
+os._exit(0)
+"""
 
 
-class FetchError(Exception):
-    """An error with a message for the user."""
+def run_quietly(*, command: list[str]) -> subprocess.CompletedProcess:
+    """Runs a command that does not ask, and keeps what it prints."""
+    return subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace", check=False
+    )
+
+
+def last_line(result: subprocess.CompletedProcess) -> str:
+    """Returns the last line of a command that failed, or how it ended."""
+    if result.returncode < 0:
+        return f"signal {-result.returncode}"
+    lines = (result.stderr + result.stdout).strip().split("\n")
+    return lines[-1] or f"exit code {result.returncode}"
 
 
 def python_3_11() -> str:
@@ -34,56 +73,74 @@ def python_3_11() -> str:
     if sys.version_info[:2] == (3, 11):
         return sys.executable
     found = shutil.which(PYTHON)
-    if found is None:
+    # A program of that name may be pyenv's, which only says that no such version is chosen.
+    if found is None or run_quietly(command=[found, "-c", ""]).returncode != 0:
         running = ".".join(map(str, sys.version_info[:2]))
         raise FetchError(
-            f"Blender's module needs Python 3.11; this is {running}, and no {PYTHON} is on the PATH; "
-            f"install {PYTHON}, {INSTEAD}"
+            f"Blender's module needs Python 3.11; this is {running}, and no {PYTHON} is on the PATH; install it "
+            f"(`uv python install 3.11`, or on Debian 12, as root: apt-get install {PYTHON}-venv), or set "
+            f"MATEVAL_BLENDER to a Blender 4.5 of your own, {BUILTIN}"
         )
     return found
-
-
-def run(*, command: list[str], problem: str) -> None:
-    """Runs a command whose messages go to stderr; raises `problem` if it fails."""
-    result = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=sys.stderr, check=False)
-    if result.returncode != 0:
-        raise FetchError(f"{problem} (exit code {result.returncode}, its messages are above)")
 
 
 def install(*, folder: Path, requirements: str) -> None:
     """Makes the virtual environment, in place of an incomplete or older one."""
     python = python_3_11()
+    inside = str(folder / "bin" / "python")
+    pip = [inside, "-m", "pip"]
+    venv = [python, "-m", "venv", str(folder)]
+    # Debian keeps pip's installer apart, in python3-venv; then a pip outside installs into the environment.
+    if run_quietly(command=[python, "-c", "import ensurepip"]).returncode != 0:
+        pip = [python, "-m", "pip", "--python", inside]
+        venv.append("--without-pip")
+        if run_quietly(command=[python, "-m", "pip", "--version"]).returncode != 0:
+            package = f"on Debian, as root: apt-get install {PYTHON}-venv"
+            raise FetchError(f"'{python}' has no pip, with which Blender is downloaded; {package}; {BUILTIN}")
     if folder.exists():
         shutil.rmtree(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    print(f"installing Blender into '{folder}'", file=sys.stderr)
-    problem = "cannot make a virtual environment; on Debian, apt-get install python3-venv"
-    run(command=[python, "-m", "venv", str(folder)], problem=problem)
+    made = run_quietly(command=venv)
+    if made.returncode != 0:
+        raise FetchError(f"cannot make a virtual environment in '{folder}': {last_line(made)}; {BUILTIN}")
+    print(f"downloading Blender 4.5 (0.4 GB, 0.8 GB unpacked) into '{folder}'", file=sys.stderr, flush=True)
     unmarked = folder / f"{MARK}.partial"
     unmarked.write_text(requirements, encoding="utf-8")
-    command = [str(folder / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    run(command=[*command, "--requirement", str(unmarked)], problem="pip could not install Blender")
+    command = [*pip, "install", "--quiet", "--disable-pip-version-check", "--requirement", str(unmarked)]
+    call_pip(command=command, what="Blender", instead=f"run this again, {BUILTIN}")
     unmarked.rename(folder / MARK)
 
 
 def is_installed(*, folder: Path, requirements: str) -> bool:
-    """Returns whether the environment was installed from these requirements, and completely."""
+    """Returns whether the environment was installed from these requirements, completely, and its Python exists."""
     mark = folder / MARK
-    return mark.is_file() and mark.read_text(encoding="utf-8") == requirements
+    is_complete = mark.is_file() and mark.read_text(encoding="utf-8") == requirements
+    return is_complete and (folder / "bin" / "python").exists()
 
 
-def check_import(*, python: Path) -> None:
-    """Raises an error that names what is missing if the module cannot be imported."""
-    result = subprocess.run(
-        [str(python), "-c", "import bpy"], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-    )
+def missing_libraries(*, module: str, problem: str) -> list[str]:
+    """Returns the libraries that the module lacks: those that ldd does not find, or else the one that Python names."""
+    ldd = shutil.which("ldd")
+    listed = run_quietly(command=[ldd, module]).stdout if ldd else ""
+    missing = re.findall(r"^\s*(\S+) => not found", listed, re.MULTILINE)
+    return sorted(set(missing)) or re.findall(r"(\S+): cannot open shared object file", problem)
+
+
+def check_import(*, python: str) -> None:
+    """Raises an error that names everything that is missing if the module cannot be imported."""
+    result = run_quietly(command=[python, "-I", "-B", "-c", PROBE])
     if result.returncode == 0:
         return
-    lines = result.stderr.strip().splitlines() or [f"exit code {result.returncode}"]
-    raise FetchError(
-        f"Blender's module is installed but cannot be imported: {lines[-1]}; "
-        f"on Debian, apt-get install {LIBRARIES}, then run this again; {INSTEAD}"
-    )
+    module, _, problem = result.stdout.partition("\n")
+    if result.returncode == 1 and not module:
+        expected = "expected a Python 3.11 with Blender 4.5, as mateval fetch blender installs it"
+        raise FetchError(f"'{python}' has no module bpy; {expected}, {BUILTIN}")
+    missing = missing_libraries(module=module, problem=problem)
+    if not missing:
+        raise FetchError(f"Blender cannot be imported by '{python}': {last_line(result)}; install it again, {BUILTIN}")
+    packages = " ".join(PACKAGES[name] for name in missing if name in PACKAGES)
+    how = f"(on Debian, as root: apt-get install {packages}, then run this again)" if packages else "and run this again"
+    raise FetchError(f"Blender lacks these libraries: {', '.join(missing)}; install them {how}, {BUILTIN}")
 
 
 def fetch(*, cache: Path, requirements: str) -> Path:
@@ -92,25 +149,29 @@ def fetch(*, cache: Path, requirements: str) -> Path:
     if not is_installed(folder=folder, requirements=requirements):
         install(folder=folder, requirements=requirements)
     python = folder / "bin" / "python"
-    check_import(python=python)
+    try:
+        check_import(python=str(python))
+    except FetchError as problem:
+        raise FetchError(f"downloaded into '{folder}', but {problem}") from None
     return python
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the tool with command-line arguments and returns the exit code."""
     parser = argparse.ArgumentParser(prog="blender_module", description="install Blender 4.5 for MatEval")
-    parser.add_argument("--cache", type=Path, required=True, metavar="DIR", help="MatEval's cache folder")
-    parser.add_argument("--requirements", required=True, metavar="TEXT", help="the text of pip's requirements file")
+    parser.add_argument("--check", action="store_true", help="only check the module of the Python that runs this")
+    parser.add_argument("--cache", type=Path, metavar="DIR", help="MatEval's cache folder")
+    parser.add_argument("--requirements", metavar="TEXT", help="the text of pip's requirements file")
     words = parser.parse_args(arguments)
-    try:
+    if words.check:
+        return exit_code(work=lambda: check_import(python=sys.executable), folder=Path(sys.prefix))
+    if words.cache is None or words.requirements is None:
+        parser.error("expected --check, or --cache and --requirements")
+
+    def work() -> None:
         print(fetch(cache=words.cache, requirements=words.requirements.strip() + "\n"))
-    except FetchError as problem:
-        print(f"error: {problem}", file=sys.stderr)
-        return 2
-    except OSError as problem:
-        print(f"error: cannot install into '{words.cache / 'blender'}': {problem}", file=sys.stderr)
-        return 2
-    return 0
+
+    return exit_code(work=work, folder=words.cache)
 
 
 if __name__ == "__main__":

