@@ -1,11 +1,10 @@
-//! Progress on stderr: one bar with the time that is left on a terminal, otherwise a line now and then.
+//! Progress on stderr: one bar on a terminal, otherwise a line now and then.
 
-use std::fmt::Write;
 use std::io::IsTerminal as _;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{HumanDuration, ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use mateval_scene::{Progress, Report};
 
 use crate::outcome::say;
@@ -31,17 +30,44 @@ struct State {
     parts: usize,
     /// What the last part is called.
     part: String,
+    /// What the bar counts, for the time that is left.
+    measure: Option<Measure>,
     /// When the last line was printed where stderr is no terminal.
     printed: Instant,
+}
+
+/// The pace of the pieces that the bar counts.
+struct Measure {
+    /// The name of the step, or none where the bar counts parts, each of which has a name of its own.
+    step: Option<String>,
+    /// Pieces that were finished when the first report came, such as those of an earlier run.
+    before: usize,
+    since: Instant,
+}
+
+/// The least number of pieces from whose pace the time that is left is reckoned: one piece says little about the next.
+const LEAST_MEASURED: usize = 10;
+
+impl Measure {
+    /// `, 20 seconds left`, or nothing as long as too few pieces were measured.
+    fn time_left(&self, done: usize, total: usize, now: Instant) -> String {
+        let measured = done.saturating_sub(self.before);
+        if measured < LEAST_MEASURED {
+            return String::new();
+        }
+        let seconds = (now - self.since).as_secs_f64() / measured as f64 * total.saturating_sub(done) as f64;
+        format!(", {:#} left", HumanDuration(Duration::from_secs_f64(seconds)))
+    }
 }
 
 impl Bars {
     fn new() -> Self {
         let bar = if std::io::stderr().is_terminal() { ProgressBar::new(1) } else { ProgressBar::hidden() };
-        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg:32!} {wide_bar} {pos}/{len}{left}") {
-            bar.set_style(style.with_key("left", write_time_left));
+        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg:32!} {wide_bar} {pos}/{len}{prefix}") {
+            bar.set_style(style);
         }
-        Self { bar, state: Mutex::new(State { parts: 1, part: String::new(), printed: Instant::now() }) }
+        let state = State { parts: 1, part: String::new(), measure: None, printed: Instant::now() };
+        Self { bar, state: Mutex::new(state) }
     }
 
     fn show(&self, report: Report<'_>) {
@@ -61,6 +87,11 @@ impl Bars {
         if matches!(report, Report::Part { .. }) || state.parts == 1 {
             self.bar.set_length(total as u64);
             self.bar.set_position(done as u64);
+            let step = matches!(report, Report::Step { .. }).then(|| name.to_owned());
+            let (now, measure) = (Instant::now(), state.measure.take().filter(|measure| measure.step == step));
+            let measure = measure.unwrap_or(Measure { step, before: done, since: now });
+            self.bar.set_prefix(measure.time_left(done, total, now));
+            state.measure = Some(measure);
         }
         if self.bar.is_hidden() && state.printed.elapsed() >= PAUSE {
             state.printed = Instant::now();
@@ -72,10 +103,17 @@ impl Bars {
     }
 }
 
-/// Nothing before the first part is done: until then there is nothing to reckon from.
-fn write_time_left(state: &ProgressState, text: &mut dyn Write) {
-    if state.pos() > 0 {
-        // Only a full line could fail, and the bar is then cut in any case.
-        let _ = write!(text, ", {:#} left", HumanDuration(state.eta()));
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_comes_from_ten_measured_pieces() {
+        let since = Instant::now();
+        let measure = Measure { step: None, before: 100, since };
+        let after = |seconds| since + Duration::from_secs(seconds);
+        assert_eq!(measure.time_left(109, 200, after(9)), "", "pieces of an earlier run took no time of this one");
+        assert_eq!(measure.time_left(110, 200, after(20)), ", 3m left");
+        assert_eq!(measure.time_left(200, 200, after(200)), ", 0s left");
     }
 }

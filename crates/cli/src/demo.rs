@@ -1,31 +1,48 @@
 //! `mateval demo`: every step from the built-in sample to a leaderboard.
 //!
-//! The steps are other commands, given as words, so that their defaults are those of the command line.
+//! Every step keeps what it finds finished in the demo's folder, so that a demo that failed or was killed resumes when it
+//! is run again with the same options, and one that was finished shows its table again.
 
-use std::ffi::OsString;
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context as _, bail};
+use serde::{Deserialize, Serialize};
 
+use mateval_baselines::adapter::Adapter;
+use mateval_baselines::delight::{self, DelightOptions};
+use mateval_baselines::estimate_source::EstimateSource;
+use mateval_baselines::nn::{self, NnOptions};
+use mateval_baselines::procedural::{self, ProceduralOptions};
+use mateval_baselines::{grey, homogeneous, truth};
+use mateval_eval::light_rules::Track;
+use mateval_eval::protocol::Protocol;
 use mateval_eval::result::ResultFile;
-use mateval_prep::render::RendererKind;
+use mateval_eval::score::{LpipsWeights, ScorePlan, score};
+use mateval_metrics::Net;
+use mateval_prep::build::{BuildOptions, build};
+use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
+use mateval_report::leaderboard::results_folder::ResultsFolder;
+use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
+use mateval_report::strips::Shown;
 use mateval_report::tables::{Grouping, TableFormat, headline, tables};
 use mateval_scene::open::Dataset;
-use mateval_scene::work_folder;
+use mateval_scene::{Finding, Severity, json, work_folder};
 
-use crate::baseline;
-use crate::eval::leaderboard::{self, LeaderboardArgs};
-use crate::eval::score::{self, ScoreArgs};
-use crate::outcome::{Outcome, print, say};
-use crate::parsing::{parse_args, parse_subcommand, path_option};
-use crate::prep::build::{self, BuildArgs};
-use crate::prep::render::{self, RenderArgs, RendererArgs};
+use crate::bars::with_progress;
+use crate::outcome::{Outcome, error_text, print, say};
+use crate::prep::blender::BlenderArgs;
+use crate::prep::render::{checked_renderer, renderer_parser};
+use crate::tool::TOOL;
+use crate::weights;
 
 /// The protocol whose numbers are printed.
 const PROTOCOL: &str = "mateval-2";
 
 /// A baseline of the demo.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 enum DemoBaseline {
     /// The ground truth, baked to the atlases.
     Gt,
@@ -53,59 +70,121 @@ impl DemoBaseline {
             Self::Grey => "grey",
         }
     }
-
-    /// Whether it starts from the de-lit photos.
-    fn needs_delit(self) -> bool {
-        matches!(self, Self::Procedural | Self::ProceduralKeepSeen)
-    }
-
-    /// The subcommand of `baseline` with its options, other than its places.
-    fn words(self, delit: &Path) -> Vec<OsString> {
-        let subcommand = if self.needs_delit() { "procedural" } else { self.name() };
-        let mut words = vec![OsString::from(subcommand)];
-        if self.needs_delit() {
-            words.extend([path_option("estimate", delit), "--adapter=delight".into()]);
-        }
-        words.extend((self == Self::ProceduralKeepSeen).then(|| OsString::from("--keep-seen")));
-        words
-    }
 }
 
 /// Arguments of `demo`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folder for everything that the demo makes.
+    /// Folder for everything that the demo makes. A demo that was interrupted there resumes.
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
     /// Samples per pixel of each half of a rendered picture [default: 24; with --full 64].
     #[arg(long)]
     samples: Option<u32>,
+    /// The renderer [default: blender, or builtin where Blender is not installed].
+    #[arg(long, value_parser = renderer_parser())]
+    renderer: Option<RendererKind>,
     #[command(flatten)]
-    by: RendererArgs,
+    blender: BlenderArgs,
     /// Baselines to make and score [default: gt, nn, grey; with --full all].
     #[arg(long, value_enum, value_delimiter = ',')]
     baselines: Vec<DemoBaseline>,
     /// Views of 320x240 pixels in place of 160x120, three more baselines, and every table.
     #[arg(long)]
     full: bool,
-    /// Replace what an earlier demo wrote.
+    /// Start anew: remove what an earlier demo wrote.
     #[arg(long)]
     force: bool,
 }
 
 /// Samples per pixel of the leaderboard's lit pictures: two for their two halves at least, and few at most, since noise is
 /// filtered for display.
-const LEAST_SHOWN_SAMPLES: u32 = 2;
-const MOST_SHOWN_SAMPLES: u32 = 16;
-
-/// Width and height of a view, unless everything is asked for: large enough to look at, and rendered in seconds.
+const SHOWN_SAMPLES: std::ops::RangeInclusive<u32> = 2..=16;
+/// Width and height of a view: large enough to look at, and rendered in seconds.
 const SMALL: [u32; 2] = [160, 120];
+const LARGE: [u32; 2] = [320, 240];
 
-impl Args {
-    fn samples(&self) -> u32 {
-        self.samples.unwrap_or(if self.full { 64 } else { 24 })
+/// What decides the content of a demo's folder.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Options {
+    tool: String,
+    renderer: RendererKind,
+    samples: u32,
+    resolution: [u32; 2],
+    baselines: Vec<DemoBaseline>,
+    /// Whether the weights of LPIPS were found.
+    lpips: bool,
+}
+
+/// The folders and files in a demo's folder.
+struct Places {
+    out: PathBuf,
+    options: PathBuf,
+    source: PathBuf,
+    dataset: PathBuf,
+    submissions: PathBuf,
+    delit: PathBuf,
+    results: PathBuf,
+    scores: PathBuf,
+    leaderboard: PathBuf,
+}
+
+impl Places {
+    fn of(out: &Path) -> Self {
+        let place = |name| out.join(name);
+        Self {
+            out: out.to_owned(),
+            options: place("demo.json"),
+            source: place("source"),
+            dataset: place("dataset"),
+            submissions: place("submissions"),
+            delit: place("delit"),
+            results: place("results"),
+            scores: place("results.scenes"),
+            leaderboard: place("leaderboard"),
+        }
     }
 
+    fn submission(&self, baseline: DemoBaseline) -> PathBuf {
+        self.submissions.join(baseline.name())
+    }
+
+    fn result(&self, baseline: DemoBaseline) -> PathBuf {
+        self.results.join(format!("{}.json", baseline.name()))
+    }
+}
+
+/// Runs the steps one after the other and prints the results.
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let places = Places::of(&args.out);
+    let lpips = weights::load(Net::Alex);
+    let (kind, renderer) = choose_renderer(args, &places)?;
+    let options = Options {
+        tool: TOOL.to_owned(),
+        renderer: kind,
+        samples: args.samples.unwrap_or(if args.full { 64 } else { 24 }),
+        resolution: if args.full { LARGE } else { SMALL },
+        baselines: args.baselines(),
+        lpips: matches!(lpips, LpipsWeights::Loaded(_)),
+    };
+    begin(&places, &options, args.force)?;
+    json::write(&places.options, &options).context("cannot begin the demo")?;
+
+    step(1, "sample", || {
+        mateval_sample::write_at(&places.source, options.resolution).context("cannot write the sample")?;
+        Ok("2 source scenes, a house and a room, and their recipe".to_owned())
+    })?;
+    step(2, "prep build", || build_dataset(&places))?;
+    step(3, "prep render", || render_dataset(&places, &options, renderer))?;
+    let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
+    step(4, "baseline", || make_submissions(&places, &options, &dataset))?;
+    step(5, "eval score", || score_submissions(&places, &options, &dataset, lpips))?;
+    step(6, "leaderboard", || write_leaderboard(&places, &options, &dataset))?;
+    close(&places, &options, &dataset, args.full)?;
+    Ok(Outcome::Good)
+}
+
+impl Args {
     fn baselines(&self) -> Vec<DemoBaseline> {
         use DemoBaseline::{Grey, Gt, Median, Nn, Procedural, ProceduralKeepSeen};
         match (self.baselines.is_empty(), self.full) {
@@ -116,125 +195,263 @@ impl Args {
     }
 }
 
-/// The arguments of all steps.
-struct Plan {
-    build: BuildArgs,
-    render: RenderArgs,
-    baselines: Vec<baseline::Command>,
-    score: ScoreArgs,
-    leaderboard: LeaderboardArgs,
-    board: Board,
-}
-
-/// The results of a demo: those of methods, and that of the truth.
-struct Board {
-    results: Vec<PathBuf>,
-    ceiling: Option<PathBuf>,
-}
-
-/// Runs the steps one after the other and prints the results in tables.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let out = args.out.as_path();
-    if out.exists() && !args.force {
-        bail!("'{}' already exists; choose another --out, or add --force to replace what a demo left", out.display());
+/// The renderer that was named, else the one that an earlier demo in this folder used, else Blender where it can be used.
+fn choose_renderer(args: &Args, places: &Places) -> anyhow::Result<(RendererKind, Renderer)> {
+    let earlier = || json::read::<Options>(&places.options).ok().filter(|_| !args.force);
+    if let Some(kind) = args.renderer.or_else(|| earlier().map(|options| options.renderer)) {
+        return Ok((kind, checked_renderer(kind, &args.blender)?));
     }
-    args.by.clone().or(RendererKind::Blender).checked()?;
-    let plan = plan(args)?;
-    say(
-        "1/6 sample: the source scenes, a house and a room that the program generates; the house has faults that are planted \
-         on purpose, which later steps report as notes",
-    );
-    let source = out.join("source");
-    let written = if args.full { mateval_sample::write(&source) } else { mateval_sample::write_at(&source, SMALL) };
-    written.context("cannot write the sample")?;
-    say("2/6 prep build: geometry, atlases and the pictures of five views");
-    build::run(&plan.build)?;
-    say("3/6 prep render: RGB truth");
-    render::run(&plan.render)?;
-    say("4/6 baselines");
-    let submissions = out.join("submissions");
-    std::fs::create_dir_all(&submissions).with_context(|| format!("cannot create '{}'", submissions.display()))?;
-    // De-lit photos are never replaced by their own command; these are the demo's.
-    work_folder::remove(&out.join("delit"))?;
-    for baseline in &plan.baselines {
-        baseline::run(baseline)?;
+    match checked_renderer(RendererKind::Blender, &args.blender) {
+        Ok(renderer) => Ok((RendererKind::Blender, renderer)),
+        Err(reason) => {
+            say(&format!(
+                "{}\nThe demo uses the built-in renderer instead; scores of light are then other numbers.\n",
+                error_text(&reason)
+            ));
+            Ok((RendererKind::Builtin, Renderer::Builtin))
+        }
     }
-    say("5/6 eval score");
-    score::run(&plan.score)?;
-    say("6/6 eval leaderboard");
-    leaderboard::run(&plan.leaderboard)?;
-    print_closing(out, &plan.board, args.full)?;
-    Ok(Outcome::Good)
 }
 
-fn plan(args: &Args) -> anyhow::Result<Plan> {
-    let [source, dataset, results] = ["source", "dataset", "results"].map(|name| args.out.join(name));
-    let submission = |baseline: &DemoBaseline| args.out.join("submissions").join(baseline.name());
-    let baselines = args.baselines();
-    let submissions: Vec<PathBuf> = baselines.iter().map(submission).collect();
-    // The demo's own folder is checked once; a file of an earlier demo is replaced.
-    let words = |options: Vec<OsString>, paths: &[PathBuf]| -> Vec<OsString> {
-        let force = args.force.then(|| OsString::from("--force"));
-        let separator = OsString::from("--");
-        let paths = paths.iter().map(|path| path.as_os_str().to_owned());
-        options.into_iter().chain(force).chain([separator]).chain(paths).collect()
+/// Checks that the folder is new or holds a demo of these options; with `force`, removes an earlier demo.
+fn begin(places: &Places, options: &Options, force: bool) -> anyhow::Result<()> {
+    let out = places.out.display();
+    let is_empty = |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    if !places.out.exists() || is_empty(&places.out) {
+        return std::fs::create_dir_all(&places.out).with_context(|| format!("cannot create '{out}'"));
+    }
+    let Ok(earlier) = json::read::<Options>(&places.options) else {
+        bail!("'{out}' exists and does not hold a demo of this version; choose another --out");
     };
-    let delit = args.out.join("delit");
-    let baseline = |baseline: &DemoBaseline| {
-        let places = vec![path_option("dataset", &dataset), path_option("out", &submission(baseline))];
-        parse_subcommand(&[baseline.words(&delit), words(places, &[])].concat())
+    if force {
+        let Places { source, dataset, submissions, delit, results, scores, leaderboard, .. } = places;
+        for folder in [source, dataset, submissions, delit, results, scores, leaderboard] {
+            work_folder::remove(folder)?;
+        }
+    } else if earlier != *options {
+        bail!(
+            "'{out}' holds a demo that was run with other options or another version ({}); run it again with those, add \
+             --force to replace it, or choose another --out",
+            earlier.in_words()
+        );
+    }
+    Ok(())
+}
+
+impl Options {
+    fn in_words(&self) -> String {
+        let names: Vec<&str> = self.baselines.iter().map(|baseline| baseline.name()).collect();
+        let [width, height] = self.resolution;
+        let lpips = if self.lpips { "with" } else { "without" };
+        format!(
+            "{}, {}, {} samples, {width}x{height} pixels, {}, {lpips} LPIPS",
+            self.tool,
+            self.renderer.name(),
+            self.samples,
+            names.join(","),
+        )
+    }
+}
+
+/// Runs a step and prints a line about what it made and the time that it took.
+fn step(number: u8, name: &str, work: impl FnOnce() -> anyhow::Result<String>) -> anyhow::Result<()> {
+    let start = Instant::now();
+    let made = work()?;
+    say(&format!("{number}/6 {name:<12} {made:<52} {:>6.1} s", start.elapsed().as_secs_f64()));
+    Ok(())
+}
+
+/// Prints warnings and errors; the sample has none.
+fn say_warnings(title: &str, findings: &[Finding]) {
+    for finding in findings.iter().filter(|finding| finding.severity != Severity::Note) {
+        say(&format!("{title}: {finding}"));
+    }
+}
+
+fn build_dataset(places: &Places) -> anyhow::Result<String> {
+    let options = BuildOptions {
+        recipe: places.source.join("recipe.toml"),
+        source: None,
+        out: places.dataset.clone(),
+        scenes: Vec::new(),
+        force: false,
+        atlas_cache: Some(weights::cache_folder().join("atlases")),
     };
-    let delight = baselines
-        .iter()
-        .any(|baseline| baseline.needs_delit())
-        .then(|| parse_subcommand(&["delight".into(), path_option("dataset", &dataset), path_option("out", &delit)]));
-    let score_words = words(vec![path_option("dataset", &dataset), path_option("out", &results)], &submissions);
-    let score: ScoreArgs = parse_args(&score_words)?;
-    let board = board(&baselines, score.result_paths());
-    let mut shown = vec![path_option("dataset", &dataset), path_option("out", &args.out.join("leaderboard"))];
-    let samples = args.samples().clamp(LEAST_SHOWN_SAMPLES, MOST_SHOWN_SAMPLES);
-    shown.push(format!("--samples={samples}").into());
-    shown.extend(board.ceiling.iter().map(|ceiling| path_option("ceiling", ceiling)));
-    let ranked = baselines.iter().filter(|baseline| board.ceiling.is_none() || **baseline != DemoBaseline::Gt);
-    shown.extend(ranked.map(|baseline| path_option("submission", &submission(baseline))));
-    let render_words = words(vec![format!("--samples={}", args.samples()).into()], std::slice::from_ref(&dataset));
-    let mut render: RenderArgs = parse_args(&render_words)?;
-    render.by = args.by.clone().or(RendererKind::Blender);
-    Ok(Plan {
-        build: parse_args(&words(vec![path_option("out", &dataset)], &[source.join("recipe.toml")]))?,
-        render,
-        baselines: delight.into_iter().chain(baselines.iter().map(baseline)).collect::<anyhow::Result<_>>()?,
-        leaderboard: parse_args(&words(shown, &board.results))?,
-        score,
-        board,
-    })
+    let report = with_progress(|progress| build(&options, TOOL, progress)).context("cannot build the dataset")?;
+    for (scene, findings) in &report.findings {
+        say_warnings(scene.as_str(), findings);
+    }
+    let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
+    let instances: usize = dataset.scenes.iter().map(|scene| scene.instances.len()).sum();
+    let views: usize = dataset.scenes.iter().map(|scene| scene.views.len()).sum();
+    Ok(format!("{} scenes, {instances} objects, {views} views", dataset.scenes.len()))
 }
 
-/// The truth is the ceiling, unless there is nothing below it.
-fn board(baselines: &[DemoBaseline], mut results: Vec<PathBuf>) -> Board {
-    let truth = baselines.iter().position(|baseline| *baseline == DemoBaseline::Gt);
-    let ceiling = truth.filter(|_| results.len() > 1).map(|at| results.remove(at));
-    Board { results, ceiling }
+fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> anyhow::Result<String> {
+    let render_options = RenderOptions { renderer, samples: Some(options.samples), scenes: Vec::new(), force: false };
+    let report = with_progress(|progress| render(&places.dataset, &render_options, progress))
+        .context("cannot render the dataset")?;
+    report.remarks.iter().for_each(|line| say(line));
+    if !report.failures.is_empty() {
+        report.failures.iter().for_each(|failure| say(&failure.to_string()));
+        bail!("{} scenes could not be rendered; run the demo again to try these again", report.failures.len());
+    }
+    let (by, samples) = (options.renderer.name(), options.samples);
+    let kept = if report.kept > 0 { format!(", {} kept", report.kept) } else { String::new() };
+    Ok(format!("{} pictures by {by}{kept}, 2 x {samples} samples", report.rendered))
 }
 
-/// Prints one table and where the site is; in full all tables, and where to find everything that was made.
-fn print_closing(out: &Path, board: &Board, full: bool) -> anyhow::Result<()> {
-    let ceiling = board.ceiling.as_deref().map(ResultFile::read).transpose()?;
-    let results = board.results.iter().map(|path| ResultFile::read(path)).collect::<Result<Vec<_>, _>>()?;
-    print("\n")?;
-    let site = format!("leaderboard:    {}\n", out.join("leaderboard/index.html").display());
-    if !full {
-        print(&headline(&results, ceiling.as_ref(), PROTOCOL)?)?;
-        return print(&site);
+/// Makes the submissions that do not exist yet. They appear whole or not at all.
+fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
+    std::fs::create_dir_all(&places.submissions)
+        .with_context(|| format!("cannot create '{}'", places.submissions.display()))?;
+    for &baseline in &options.baselines {
+        let out = places.submission(baseline);
+        if out.exists() {
+            continue;
+        }
+        match baseline {
+            DemoBaseline::Gt => truth::write(dataset, &out, false)?,
+            DemoBaseline::Grey => grey::write(dataset, &out, false)?,
+            DemoBaseline::Nn => with_progress(|progress| {
+                nn::write(dataset, &out, false, &EstimateSource::Truth, &NnOptions::default(), progress)
+            })?,
+            DemoBaseline::Median => with_progress(|progress| {
+                homogeneous::write_by_instance(dataset, &out, false, &EstimateSource::Input, progress)
+            })?,
+            DemoBaseline::Procedural | DemoBaseline::ProceduralKeepSeen => {
+                if !places.delit.exists() {
+                    with_progress(|progress| {
+                        delight::write(dataset, &places.delit, &DelightOptions::default(), progress)
+                    })?;
+                }
+                let adapter = Box::new(Adapter::find("delight")?);
+                let source = EstimateSource::Files { folder: places.delit.clone(), adapter };
+                let keep_seen = baseline == DemoBaseline::ProceduralKeepSeen;
+                let procedural = ProceduralOptions { keep_seen, ..ProceduralOptions::default() };
+                with_progress(|progress| procedural::write(dataset, &out, false, &source, &procedural, progress))?
+            }
+        };
     }
-    print(&tables(&results, ceiling.as_ref(), PROTOCOL, Grouping::Dataset, TableFormat::Markdown)?)?;
-    let dataset = Dataset::open(&out.join("dataset"))?;
-    for id in &dataset.file.scenes {
-        let scene = dataset.folder(id);
-        print(&format!("input picture:  {}\n", scene.path().join("views/input/rgb.png").display()))?;
-        print(&format!("all pictures:   {}\n", scene.path().join("views").display()))?;
-        print(&format!("truth:          {}\n", scene.truth().display()))?;
+    let names: Vec<&str> = options.baselines.iter().map(|baseline| baseline.name()).collect();
+    Ok(format!("{} submissions: {}", names.len(), names.join(", ")))
+}
+
+/// Scores the submissions that have no result yet.
+fn score_submissions(
+    places: &Places,
+    options: &Options,
+    dataset: &Dataset,
+    lpips: LpipsWeights,
+) -> anyhow::Result<String> {
+    std::fs::create_dir_all(&places.results)
+        .with_context(|| format!("cannot create '{}'", places.results.display()))?;
+    let missing: Vec<DemoBaseline> =
+        options.baselines.iter().copied().filter(|baseline| !places.result(*baseline).exists()).collect();
+    if !missing.is_empty() {
+        let submissions: Vec<PathBuf> = missing.iter().map(|baseline| places.submission(*baseline)).collect();
+        let companions = weights::cache_folder().join("companions");
+        let plan = ScorePlan {
+            dataset,
+            submissions: submissions.iter().map(PathBuf::as_path).collect(),
+            protocols: vec![Protocol::named(PROTOCOL)?],
+            scenes: Vec::new(),
+            lpips,
+            tool: TOOL.to_owned(),
+            jobs: 1,
+            cache: Some(&places.scores),
+            only_cached: false,
+            companion_cache: Some(&companions),
+        };
+        let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
+        for (result, baseline) in results.iter().zip(missing) {
+            json::write(&places.result(baseline), result)?;
+            say_warnings(&result.method, &result.findings);
+        }
+        work_folder::remove(&places.scores)?;
     }
-    print(&format!("results:        {}\n", out.join("results").display()))?;
-    print(&site)
+    Ok(format!("{} results", options.baselines.len()))
+}
+
+/// The results of methods and, unless there is nothing below it, that of the truth.
+fn results_and_ceiling(places: &Places, options: &Options) -> (Vec<DemoBaseline>, Option<PathBuf>) {
+    let has_ceiling = options.baselines.len() > 1 && options.baselines.contains(&DemoBaseline::Gt);
+    let ranked = options.baselines.iter().copied().filter(|baseline| !has_ceiling || *baseline != DemoBaseline::Gt);
+    (ranked.collect(), has_ceiling.then(|| places.result(DemoBaseline::Gt)))
+}
+
+fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> anyhow::Result<String> {
+    let (ranked, ceiling) = results_and_ceiling(places, options);
+    let results = ranked.iter().map(|baseline| places.result(*baseline)).collect();
+    let entries = entries::read(&ResultsFolder { results, ceiling, errata: None })?;
+    let samples = options.samples.clamp(*SHOWN_SAMPLES.start(), *SHOWN_SAMPLES.end()) / 2;
+    let plan = LeaderboardPlan {
+        results: &entries.results,
+        ceiling: entries.ceiling.as_ref(),
+        verified: entries.verified.clone(),
+        protocol: PROTOCOL,
+        partial: false,
+        errata: None,
+        pictures: None,
+        submissions: Some(Submissions {
+            dataset,
+            folders: ranked.iter().map(|baseline| places.submission(*baseline)).collect(),
+            shown: vec![Shown::Albedo, Shown::Light { track: Track::True, samples }],
+        }),
+        tool: TOOL.to_owned(),
+    };
+    with_progress(|progress| leaderboard::write(&plan, &places.leaderboard, true, progress))
+        .context("cannot write the leaderboard")?;
+    Ok(format!("{} methods, pictures of {} scenes", ranked.len(), dataset.scenes.len()))
+}
+
+/// Prints the results, where the page is, and what to try next.
+fn close(places: &Places, options: &Options, dataset: &Dataset, full: bool) -> anyhow::Result<()> {
+    let (ranked, ceiling) = results_and_ceiling(places, options);
+    let read = |path: PathBuf| ResultFile::read(&path);
+    let results = ranked.iter().map(|baseline| read(places.result(*baseline))).collect::<Result<Vec<_>, _>>()?;
+    let ceiling = ceiling.map(read).transpose()?;
+    let format = TableFormat::Text { bold: std::io::stdout().is_terminal() };
+    let shown = match full {
+        true => tables(&results, ceiling.as_ref(), PROTOCOL, Grouping::Dataset, format)?,
+        false => headline(&results, ceiling.as_ref(), PROTOCOL, format)?,
+    };
+    let page = std::path::absolute(places.leaderboard.join("index.html"))?;
+    print(&format!("\n{shown}\nThe leaderboard, with pictures: file://{}\n", page.display()))?;
+    if full {
+        let rooms = dataset.file.scenes.iter().map(|id| dataset.folder(id).path().join("views").display().to_string());
+        print(&format!("The rooms' pictures: {}\n", rooms.collect::<Vec<_>>().join(", ")))?;
+    }
+    print(&next_commands(places, options))
+}
+
+/// Three commands that add a method to the leaderboard.
+fn next_commands(places: &Places, options: &Options) -> String {
+    let (ranked, ceiling) = results_and_ceiling(places, options);
+    let [dataset, submission, result, board] = [
+        places.dataset.clone(),
+        places.submissions.join("median-photo"),
+        places.results.join("median-photo.json"),
+        places.out.join("board"),
+    ]
+    .map(|path| quoted(&path));
+    let others: Vec<String> = ranked.iter().map(|baseline| quoted(&places.result(*baseline))).collect();
+    let ceiling = ceiling.map_or_else(String::new, |ceiling| format!(" --ceiling {}", quoted(&ceiling)));
+    format!(
+        "\nNext, score one more method and put it on a board:\n\n  \
+         mateval baseline median --dataset {dataset} --out {submission}\n  \
+         mateval eval score {submission} --dataset {dataset} --out {result}\n  \
+         mateval eval leaderboard {} {result}{ceiling} --out {board}\n",
+        others.join(" ")
+    )
+}
+
+/// A path as a word of a shell.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let is_plain = |c: char| c.is_alphanumeric() || "/._-+".contains(c);
+    match text.chars().all(is_plain) && !text.starts_with('-') {
+        true => text,
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
 }

@@ -17,7 +17,6 @@ mod graph;
 mod open_dataset;
 mod outcome;
 mod output_file;
-mod parsing;
 mod prep;
 mod sample;
 mod schema;

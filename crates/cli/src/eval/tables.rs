@@ -1,5 +1,6 @@
 //! `mateval eval tables`: tables of several results.
 
+use std::io::IsTerminal as _;
 use std::path::PathBuf;
 
 use mateval_eval::result::ResultFile;
@@ -40,6 +41,7 @@ enum FormatName {
     Markdown,
     Latex,
     Csv,
+    Text,
 }
 
 /// Prints the tables, and a warning for each metric that a result lacks.
@@ -49,6 +51,7 @@ pub fn run(args: &TablesArgs) -> anyhow::Result<Outcome> {
         FormatName::Markdown => TableFormat::Markdown,
         FormatName::Latex => TableFormat::Latex,
         FormatName::Csv => TableFormat::Csv,
+        FormatName::Text => TableFormat::Text { bold: std::io::stdout().is_terminal() },
     };
     let grouping = match args.by {
         None => Grouping::Dataset,

@@ -17,8 +17,11 @@ use crate::outcome::{Outcome, print, say};
 pub struct RenderArgs {
     /// Folder of the dataset.
     dataset: PathBuf,
+    /// The renderer.
+    #[arg(long, value_parser = renderer_parser(), default_value = "builtin")]
+    renderer: RendererKind,
     #[command(flatten)]
-    pub by: RendererArgs,
+    blender: BlenderArgs,
     /// Samples per pixel of each of the two halves of a picture [default: the recipe's].
     #[arg(long)]
     samples: Option<u32>,
@@ -30,47 +33,30 @@ pub struct RenderArgs {
     force: bool,
 }
 
-/// Which program renders, and how.
-#[derive(clap::Args, Clone)]
-pub struct RendererArgs {
-    /// The renderer [default: builtin; of the demo: blender].
-    #[arg(long, value_parser = renderer_parser())]
-    renderer: Option<RendererKind>,
-    #[command(flatten)]
-    blender: BlenderArgs,
-}
-
 /// Reads a renderer's name; the help lists every renderer with its summary.
-fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
+pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
     let names = RendererKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.summary()));
     PossibleValuesParser::new(names).try_map(|name| name.parse::<RendererKind>())
 }
 
-impl RendererArgs {
-    /// These arguments, with `default` where no renderer was named.
-    pub fn or(mut self, default: RendererKind) -> Self {
-        self.renderer.get_or_insert(default);
-        self
-    }
-
-    /// The renderer; fails where Blender is to render and cannot be found, or is a module that cannot be imported.
-    pub fn checked(&self) -> anyhow::Result<Renderer> {
-        Ok(match self.renderer.unwrap_or(RendererKind::Builtin) {
-            RendererKind::Builtin => Renderer::Builtin,
-            RendererKind::Blender => {
-                let options = self.blender.options()?;
-                if options.program.is_python() {
-                    check_blender(&options.program.0).context("cannot render with Blender")?;
-                }
-                Renderer::Blender(options)
+/// The renderer with its options; fails where Blender is to render and cannot be found, or is a module that cannot be
+/// imported.
+pub fn checked_renderer(kind: RendererKind, blender: &BlenderArgs) -> anyhow::Result<Renderer> {
+    Ok(match kind {
+        RendererKind::Builtin => Renderer::Builtin,
+        RendererKind::Blender => {
+            let options = blender.options()?;
+            if options.program.is_python() {
+                check_blender(&options.program.0).context("cannot render with Blender")?;
             }
-        })
-    }
+            Renderer::Blender(options)
+        }
+    })
 }
 
 /// Renders the dataset.
 pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
-    let renderer = args.by.checked()?;
+    let renderer = checked_renderer(args.renderer, &args.blender)?;
     let options = RenderOptions { renderer, samples: args.samples, scenes: args.scenes.clone(), force: args.force };
     let report = with_progress(|progress| mateval_prep::render::render(&args.dataset, &options, progress))
         .context("cannot render the dataset")?;

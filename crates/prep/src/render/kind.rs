@@ -5,7 +5,8 @@ use std::str::FromStr;
 use mateval_scene::RendererId;
 
 /// A renderer, by its name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum RendererKind {
     /// Blender's Cycles.
     Blender,

@@ -14,6 +14,7 @@ mod rows;
 mod table;
 #[cfg(test)]
 mod tests;
+mod text;
 pub(crate) mod value;
 
 pub use grouping::Grouping;
@@ -31,6 +32,8 @@ pub enum TableFormat {
     Latex,
     /// Comma-separated values with all digits and without marks; standard errors have columns of their own.
     Csv,
+    /// Aligned text without standard errors; best bold on a terminal, by ANSI escape sequences.
+    Text { bold: bool },
 }
 
 /// Puts the results side by side under one protocol. Results with different fingerprints or scenes are refused. A
@@ -50,10 +53,15 @@ pub fn tables(
     filled(&layouts, results, ceiling, protocol, grouping, format)
 }
 
-/// The one table that says most: PSNR of albedo, under true light and relit, of the input view and novel ones, as Markdown.
-/// Otherwise like [`tables()`].
-pub fn headline(results: &[ResultFile], ceiling: Option<&ResultFile>, protocol: &str) -> Result<String, ReportError> {
-    filled(&[layouts::headline()], results, ceiling, protocol, Grouping::Dataset, TableFormat::Markdown)
+/// The one table that says most: PSNR of albedo, under true light and relit, of the input view and novel ones. Otherwise
+/// like [`tables()`].
+pub fn headline(
+    results: &[ResultFile],
+    ceiling: Option<&ResultFile>,
+    protocol: &str,
+    format: TableFormat,
+) -> Result<String, ReportError> {
+    filled(&[layouts::headline()], results, ceiling, protocol, Grouping::Dataset, format)
 }
 
 fn filled(
@@ -72,6 +80,7 @@ fn filled(
             TableFormat::Markdown => markdown::text(&table),
             TableFormat::Latex => latex::text(&table),
             TableFormat::Csv => csv::text(&table),
+            TableFormat::Text { bold } => text::text(&table, bold),
         })
         .collect();
     if text.is_empty() {

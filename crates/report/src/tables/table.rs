@@ -174,7 +174,19 @@ impl Column {
 impl Cell {
     /// The rounded value between its marks, and its standard error after `plus_minus`.
     pub(super) fn text(&self, best: (&str, &str), second: (&str, &str), plus_minus: &str) -> String {
-        let Some(Value { value, standard_error, .. }) = self.value else {
+        let (value, digits) = (self.marked_value(best, second), self.digits);
+        let standard_error = self.value.and_then(|value| value.standard_error);
+        let error = standard_error.map_or_else(String::new, |error| format!(" {plus_minus} {error:.digits$}"));
+        format!("{value}{error}")
+    }
+
+    /// The rounded value without its standard error; marked if it is the best.
+    pub(super) fn value_text(&self, best: (&str, &str)) -> String {
+        self.marked_value(best, ("", ""))
+    }
+
+    fn marked_value(&self, best: (&str, &str), second: (&str, &str)) -> String {
+        let Some(Value { value, .. }) = self.value else {
             return if self.has_rivals { "missing" } else { "-" }.to_owned();
         };
         let digits = self.digits;
@@ -183,7 +195,6 @@ impl Cell {
             Mark::Second => second,
             Mark::None => ("", ""),
         };
-        let error = standard_error.map_or_else(String::new, |error| format!(" {plus_minus} {error:.digits$}"));
-        format!("{before}{value:.digits$}{after}{error}")
+        format!("{before}{value:.digits$}{after}")
     }
 }

@@ -99,6 +99,34 @@ fn markdown_by_the_byte() {
     assert_eq!(shown(&three(), Grouping::Dataset, TableFormat::Markdown), expected);
 }
 
+/// The twin is bold: its lines have the same letters between escape sequences.
+#[test]
+fn text_is_aligned_and_fits_a_terminal() {
+    let expected = "\
+RGB, true light
+
+                        Novel
+         Input   Input  views
+          view    view    MSE
+Method  PSNR ↑  SSIM ↑  (1e-3) ↓
+a|1      10.00  0.5000   100.000
+b_2      40.00  missing   25.000
+c\"3      20.00  0.5000    50.000
+";
+    let text = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: false });
+    assert_eq!(text, expected);
+    let bold = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: true });
+    assert!(bold.contains("\x1b[1m40.00\x1b[0m"), "{bold}");
+    assert_eq!(bold.replace("\x1b[1m", "").replace("\x1b[0m", ""), text);
+
+    let scores =
+        ["albedo", "rgb_true", "rgb_relit"].map(|kind| [format!("{kind}.input.psnr"), format!("{kind}.novel.psnr")]);
+    let all: Vec<(&str, f64)> = scores.as_flattened().iter().map(|key| (key.as_str(), 12.345)).collect();
+    let wide = result("a-method-with-a-name", &all);
+    let text = headline(&[wide], None, "paper", TableFormat::Text { bold: false }).unwrap();
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+}
+
 /// `result` with this noise of the truth in its only scene that has scores.
 fn with_truth_noise(mut result: ResultFile, truth_db: f64) -> ResultFile {
     let scores = result.protocols.get_mut("paper").unwrap();
