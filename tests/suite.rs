@@ -17,6 +17,7 @@ mod suite {
     mod compare;
     mod converted;
     mod delighting;
+    mod demo;
     mod determinism;
     mod estimates;
     mod fetching;

@@ -14,7 +14,7 @@ pub const ARROWS: [(&str, &[&str]); 18] = [
     ("mateval-light", &["scene", "image", "tracer"]),
     ("mateval-sample", &["scene", "image"]),
     ("mateval-sources", &["scene", "image", "tracer"]),
-    ("mateval-prep", &["sources", "sample", "scene", "image", "tracer"]),
+    ("mateval-prep", &["sources", "scene", "image", "tracer"]),
     ("mateval-audit", &["prep", "scene", "image", "metrics", "tracer"]),
     ("mateval-export", &["scene", "image"]),
     ("mateval-baselines", &["scene", "image", "tracer", "light", "procedural"]),

@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 
 use mateval_scene::layout::SceneFolder;
 use mateval_scene::{SceneId, reference_io};
+use mateval_testkit::faulty_house;
 use serde_json::{Value, json};
 
 use super::blender::blender;
-use super::command::{Run, build, mateval, render, run, run_words};
+use super::command::{Run, build, mateval, render, run};
 use super::planted::{edit_json, rehash};
 
 const SAMPLES: u32 = 96;
 
-/// The built-in library: its mat lies in the floor, and its basket has a painted shadow.
+/// The library of the test kit's house: its mat lies in the floor, and its basket has a painted shadow.
 const RECIPE: &str = r#"name = "library"
 resolution = [96, 72]
 atlas_size = 64
@@ -57,7 +58,7 @@ fn both_renderers_show_the_same() {
     let Some((python, _turn)) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let [source, dataset] = ["source", "dataset"].map(|name| folder.path().join(name));
-    run_words([Path::new("sample"), &source]).ends_with(0);
+    faulty_house::write(&source);
     let recipe: PathBuf = source.join("recipe.toml");
     std::fs::write(&recipe, RECIPE).unwrap();
     run(&mut build(&recipe, &dataset)).ends_with(0);
@@ -126,7 +127,7 @@ fn a_floor_of_two_sheets() {
     let Some((python, _turn)) = blender() else { return };
     let folder = tempfile::tempdir().unwrap();
     let [source, dataset] = ["source", "dataset"].map(|name| folder.path().join(name));
-    run_words([Path::new("sample"), &source]).ends_with(0);
+    faulty_house::write(&source);
     plant_a_second_sheet(&source);
     let recipe: PathBuf = source.join("recipe.toml");
     let camera = "position = [2.5, 1.5, 5.6], target = [3.0, 0.0, 7.9]";

@@ -1,4 +1,4 @@
-//! The built-in 3D-FRONT house from survey to score: accepted and rejected rooms, a recipe with hashes, a dataset, and
+//! The built-in 3D-FRONT house, with a third room and faults, from survey to score: accepted and rejected rooms, a recipe with hashes, a dataset, and
 //! the scores of its ceiling and floor baselines.
 
 use std::path::{Path, PathBuf};
@@ -7,11 +7,12 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::command::{Run, baseline, build, mateval, run, run_words, score, stats, verify};
+use super::command::{Run, baseline, build, mateval, run, score, stats, verify};
 use super::sample::json;
+use mateval_testkit::faulty_house;
 use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
-/// The sample's source and the survey of its house.
+/// The house and its survey.
 struct Surveyed {
     source: PathBuf,
     survey: PathBuf,
@@ -20,7 +21,7 @@ struct Surveyed {
 static SURVEYED: LazyLock<Surveyed> = LazyLock::new(|| {
     let folder = kept_folder("house");
     let (source, survey) = (folder.join("source"), folder.join("survey"));
-    run_words([Path::new("sample"), &source]).ends_with(0);
+    faulty_house::write(&source);
     run(&mut survey_of(&source, &survey)).ends_with(0);
     Surveyed { source, survey }
 });

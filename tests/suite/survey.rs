@@ -267,7 +267,7 @@ fn room_with_moved(record: &str, room: usize, position: [f64; 3]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("source");
     copy_folder(&SERIAL.source, &source);
-    let mut house = mateval_sample::house::sound_house();
+    let mut house = read_json(&source.join("house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json"));
     let children = house["scene"]["room"][room]["children"].as_array_mut().unwrap();
     let piece = children.iter_mut().find(|child| child["ref"] == format!("{record}/model")).unwrap();
     piece["pos"] = json!(position);

@@ -1,6 +1,6 @@
 //! Where the time of a 3D-FRONT scene goes: reading the JSON, reading models and textures, the hierarchy, what the views
-//! see, atlases, baking. `cargo bench -p mateval-prep --bench front3d [-- ROUNDS]`: the built-in house, and the houses of
-//! the shared data where they are. CPU seconds of the whole process; medians.
+//! see, atlases, baking. `cargo bench -p mateval-prep --bench front3d [-- ROUNDS]`: the test kit's house of three
+//! rooms, and the houses of the shared data where they are. CPU seconds of the whole process; medians.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark prints")]
 
 use std::path::Path;
@@ -13,6 +13,7 @@ use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_sources::front3d::room_scene::room_scene;
 use mateval_sources::front3d::{AppearanceRule, HouseFiles, Limits, furnish, read_house};
 use mateval_testkit::data::shared_data;
+use mateval_testkit::faulty_house;
 use mateval_tracer::World;
 
 const STAGES: [&str; 6] =
@@ -22,7 +23,7 @@ fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     let rounds: usize = words.first().map_or(3, |word| word.parse().unwrap());
     let sample = tempfile::tempdir().unwrap();
-    mateval_sample::write(sample.path()).unwrap();
+    faulty_house::write(sample.path());
     measure(&files(&sample.path().join("house"), "cc000000-5a3b-4e00-8000-000000000001", true), rounds);
     let Some(shared) = shared_data("3d-front") else { return };
     for uid in ["07700701-1835-4532-8af0-bd8c7f624b1b", "dc74ad5c-34cf-4237-a3f3-a94297a907c8"] {

@@ -94,9 +94,9 @@ mod tests {
 
     /// In a whole house the ids of instances and parts are unique, and every instance has the parts that its source states.
     #[test]
-    fn ids_of_the_sample_house_are_unique() {
+    fn ids_of_a_whole_house_are_unique() {
         let folder = tempfile::tempdir().unwrap();
-        mateval_sample::house::write_without_pictures(folder.path()).unwrap();
+        mateval_testkit::faulty_house::write_without_pictures(folder.path());
         let files = HouseFiles {
             root: folder.path().to_owned(),
             house: "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json".into(),

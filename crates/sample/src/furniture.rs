@@ -54,7 +54,7 @@ pub(super) fn sofa_feet() -> Solid {
 }
 
 /// A low open shelf, 1.2 m wide, 0.8 m high and 0.35 m deep, its back towards -z.
-pub(super) fn shelf() -> Solid {
+pub fn shelf() -> Solid {
     let plank = |shelf: Solid, low, high| shelf.boxed(low, high, tile::WOOD);
     let mut shelf = plank(Solid::default(), v(-0.6, 0.0, -0.175), v(0.6, 0.8, -0.165));
     for x in [-0.6, -0.0125, 0.575] {

@@ -2,27 +2,26 @@
 //!
 //! The input is a folder. Written into it are `recipe.toml`, which lists both scenes, and two sources:
 //! - `room/`, a Mitsuba scene laid out as Bitterli's are: `scene.xml`, OBJ files, textures, `LICENSE.txt`;
-//! - `house/`, three rooms in the layout of 3D-FRONT and 3D-FUTURE, with planted faults.
+//! - `house/`, two rooms in the layout of 3D-FRONT and 3D-FUTURE.
 //!
 //! The bytes are the same on every machine.
 //!
 //! `solid` builds meshes, `furniture` combines them into objects, `pattern` paints the textures, and `room` places the
 //! objects and writes the XML. `house` uses the first three.
 
-mod error;
-mod furniture;
+mod files;
+pub mod furniture;
 pub mod house;
-mod pattern;
+pub mod pattern;
 mod room;
-mod solid;
-mod text_file;
+pub mod solid;
 
 use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
 
-pub use error::SampleError;
-use text_file::write_text;
+pub use files::SampleError;
+use files::{create_folder, write_text};
 
 /// The room's licence file: CC0 1.0.
 const LICENSE: &str = "This is the Mitsuba version of 'The Sample Room' by the MatEval authors, made by `mateval sample`\n\n\
@@ -66,7 +65,7 @@ pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError
     write_text(&out.join("recipe.toml"), &recipe)
 }
 
-/// The rooms of which scenes of varied houses are made, with a designer's camera of each.
+/// The rooms of which scenes of varied houses are made, and the start of the scenes' ids.
 const VARIED_ROOMS: [(&str, &str); 2] = [("living", "LivingDiningRoom-101"), ("bedroom", "MasterBedroom-102")];
 
 /// Writes `count` houses made of the built-in one into the folder `out`, with a recipe of one scene a house. The same
@@ -87,8 +86,7 @@ pub fn write_houses(out: &Path, count: u32, seed: u64) -> Result<(), SampleError
 fn write_room(out: &Path) -> Result<(), SampleError> {
     let room = out.join("room");
     for folder in ["models", "textures"] {
-        let path = room.join(folder);
-        std::fs::create_dir_all(&path).map_err(SampleError::io("create", &path))?;
+        create_folder(&room.join(folder))?;
     }
     for (name, picture) in pattern::all() {
         write_rgb_bytes(&room.join("textures").join(format!("{name}.png")), &picture)?;

@@ -16,10 +16,10 @@ pub(super) fn all() -> Vec<(&'static str, Picture<[u8; 3]>)> {
 }
 
 /// An sRGB-encoded colour, 0 to 1.
-pub(super) type Color = [f64; 3];
+pub type Color = [f64; 3];
 
 /// A picture whose texels are the colours that `color_at` gives at their centres.
-pub(super) fn paint(width: usize, height: usize, color_at: impl Fn(f64, f64) -> Color) -> Picture<[u8; 3]> {
+pub fn paint(width: usize, height: usize, color_at: impl Fn(f64, f64) -> Color) -> Picture<[u8; 3]> {
     Picture::from_fn(width, height, |x, y| {
         let color = color_at((x as f64 + 0.5) / width as f64, (y as f64 + 0.5) / height as f64);
         color.map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
@@ -42,7 +42,7 @@ pub(super) fn random(x: i64, y: i64, seed: u32) -> f64 {
 }
 
 /// Smooth noise of 0 to 1 with `nx` by `ny` cells over the picture. It repeats without a seam.
-pub(super) fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
+pub fn noise(u: f64, v: f64, nx: i64, ny: i64, seed: u32) -> f64 {
     let (x, y) = (u * nx as f64, v * ny as f64);
     let (i, j) = (x.floor() as i64, y.floor() as i64);
     let smooth = |t: f64| t * t * (3.0 - 2.0 * t);
@@ -57,7 +57,7 @@ fn mix1(a: f64, b: f64, t: f64) -> f64 {
 }
 
 /// Linear interpolation from `a` to `b`; `t` is clamped to 0 to 1.
-pub(super) fn mix(a: Color, b: Color, t: f64) -> Color {
+pub fn mix(a: Color, b: Color, t: f64) -> Color {
     std::array::from_fn(|c| mix1(a[c], b[c], t.clamp(0.0, 1.0)))
 }
 
@@ -67,7 +67,7 @@ pub(super) fn triangle(t: f64) -> f64 {
 }
 
 /// 0 below `from`, 1 above `to`, linear in between.
-pub(super) fn ramp(from: f64, to: f64, value: f64) -> f64 {
+pub fn ramp(from: f64, to: f64, value: f64) -> f64 {
     ((value - from) / (to - from)).clamp(0.0, 1.0)
 }
 

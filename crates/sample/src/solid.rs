@@ -7,12 +7,12 @@ use glam::{DVec2, DVec3};
 
 /// A mesh under construction. Faces share no vertices.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Solid {
-    pub(super) positions: Vec<DVec3>,
-    pub(super) normals: Vec<DVec3>,
-    pub(super) uvs: Vec<DVec2>,
+pub struct Solid {
+    pub positions: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+    pub uvs: Vec<DVec2>,
     /// Vertex indices of each face, three or four, counter-clockwise seen from outside.
-    pub(super) faces: Vec<Vec<usize>>,
+    pub faces: Vec<Vec<usize>>,
 }
 
 /// Position, normal and texture coordinates of a corner of a face.
@@ -21,7 +21,7 @@ type Corner = (DVec3, DVec3, DVec2);
 impl Solid {
     /// The number of triangles once quads are split.
     #[cfg(test)]
-    pub(super) fn triangle_count(&self) -> usize {
+    pub fn triangle_count(&self) -> usize {
         self.faces.iter().map(|face| face.len() - 2).sum()
     }
 
@@ -37,7 +37,7 @@ impl Solid {
 
     /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. One unit of uv is `tile`
     /// metres.
-    pub(super) fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, tile: DVec2) -> Self {
+    pub fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, tile: DVec2) -> Self {
         let normal = right.cross(up).normalize();
         let size = DVec2::new(right.length(), up.length()) / tile;
         let at = |u: f64, v: f64| (corner + right * u + up * v, normal, size * DVec2::new(u, v));
@@ -46,7 +46,7 @@ impl Solid {
     }
 
     /// Adds a box between two corners. The texture's u runs along the longest edge of each side.
-    pub(super) fn boxed(mut self, low: DVec3, high: DVec3, tile: f64) -> Self {
+    pub fn boxed(mut self, low: DVec3, high: DVec3, tile: f64) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
             let (right, up) = longest_first(normal, right, up, half);
@@ -57,7 +57,7 @@ impl Solid {
     }
 
     /// Adds a box whose edges are rounded by `radius`.
-    pub(super) fn cushion(mut self, low: DVec3, high: DVec3, radius: f64, tile: f64) -> Self {
+    pub fn cushion(mut self, low: DVec3, high: DVec3, radius: f64, tile: f64) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
             // Grid lines across the side, denser where the edges are round.
@@ -84,7 +84,7 @@ impl Solid {
 
     /// Adds the surface of revolution of a profile of (radius, height), given from bottom to top, about the vertical axis
     /// through `foot`. It faces outwards.
-    pub(super) fn turned(mut self, foot: DVec3, profile: &[(f64, f64)], segments: usize, tile: f64) -> Self {
+    pub fn turned(mut self, foot: DVec3, profile: &[(f64, f64)], segments: usize, tile: f64) -> Self {
         let turn = |step: usize| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * (step % segments) as f64 / segments as f64);
             DVec3::new(sin, 0.0, cos)
@@ -118,7 +118,7 @@ impl Solid {
     }
 
     /// The solid as Wavefront OBJ text with four decimals. Every corner of a face has uv and normal.
-    pub(super) fn to_obj(&self) -> String {
+    pub fn to_obj(&self) -> String {
         let mut text = String::from("# made by MatEval, CC0 1.0\n");
         // Writing to a String cannot fail. Adding 0 turns a rounded -0 into 0.
         let round = |v: f64| (v * 1e4).round() / 1e4 + 0.0;
@@ -143,7 +143,7 @@ impl Solid {
 }
 
 /// Normal, right and up of the six sides of a box; the cross product of right and up is the normal.
-pub(super) fn sides() -> [(DVec3, DVec3, DVec3); 6] {
+pub fn sides() -> [(DVec3, DVec3, DVec3); 6] {
     let (x, y, z) = (DVec3::X, DVec3::Y, DVec3::Z);
     [(x, -z, y), (-x, z, y), (y, x, -z), (-y, x, z), (z, x, y), (-z, -x, y)]
 }

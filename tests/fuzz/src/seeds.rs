@@ -1,6 +1,6 @@
 //! Writes the initial corpus of the targets to `CORPUS/<target>/`, from the built-in sample and from generated files.
 
-use mateval_testkit::packed;
+use mateval_testkit::{faulty_house, packed};
 
 use std::path::{Path, PathBuf};
 
@@ -33,6 +33,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let work = tempfile::tempdir()?;
     let source = work.path().join("source");
     mateval_sample::write(&source)?;
+    // Its house replaces the sample's, which is sound.
+    faulty_house::write(&source);
     for (name, bytes) in packed::files(&source) {
         let target = match name.rsplit('.').next() {
             Some("xml") => "bitterli_xml",

@@ -1,12 +1,12 @@
 //! Letters and arrows of five by seven dots. They show which way up a texture is and whether it is mirrored.
 
 /// Dots from the left edge of a letter to that of the next.
-pub(super) const ADVANCE: usize = 6;
+const ADVANCE: usize = 6;
 /// Dots from the top of a line to that of the next.
-pub(super) const LINE: usize = 9;
+const LINE: usize = 9;
 
 /// Characters and their rows from the top. Bit 4 of a row is the leftmost dot.
-const GLYPHS: [(char, [u8; 7]); 32] = [
+const GLYPHS: [(char, [u8; 7]); 29] = [
     ('A', [0x0e, 0x11, 0x11, 0x1f, 0x11, 0x11, 0x11]),
     ('B', [0x1e, 0x11, 0x11, 0x1e, 0x11, 0x11, 0x1e]),
     ('C', [0x0e, 0x11, 0x10, 0x10, 0x10, 0x11, 0x0e]),
@@ -33,9 +33,6 @@ const GLYPHS: [(char, [u8; 7]); 32] = [
     ('X', [0x11, 0x11, 0x0a, 0x04, 0x0a, 0x11, 0x11]),
     ('Y', [0x11, 0x11, 0x0a, 0x04, 0x04, 0x04, 0x04]),
     ('Z', [0x1f, 0x01, 0x02, 0x04, 0x08, 0x10, 0x1f]),
-    ('0', [0x0e, 0x11, 0x13, 0x15, 0x19, 0x11, 0x0e]),
-    ('1', [0x04, 0x0c, 0x04, 0x04, 0x04, 0x04, 0x0e]),
-    ('3', [0x1f, 0x02, 0x04, 0x02, 0x01, 0x11, 0x0e]),
     ('^', [0x04, 0x0e, 0x15, 0x04, 0x04, 0x04, 0x04]),
     ('>', [0x00, 0x04, 0x02, 0x1f, 0x02, 0x04, 0x00]),
     ('_', [0x04, 0x04, 0x04, 0x04, 0x15, 0x0e, 0x04]),
@@ -51,19 +48,19 @@ fn is_inked(line: &str, column: usize, row: usize) -> bool {
 
 /// Text in a picture. Lengths are fractions of the picture, measured from its upper left corner.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lettering {
+pub struct Lettering {
     /// Lines from the top down.
-    pub(super) lines: &'static [&'static str],
+    pub lines: &'static [&'static str],
     /// Upper left corner of the first letter.
-    pub(super) at: [f64; 2],
+    pub at: [f64; 2],
     /// Width and height of a dot.
-    pub(super) dot: [f64; 2],
+    pub dot: [f64; 2],
 }
 
 impl Lettering {
     /// Text in the middle of the rectangle from `low` to `high`, as large as fits with square dots. `aspect` is the width
     /// of the surface that shows the picture divided by its height.
-    pub(super) fn fitted(lines: &'static [&'static str], low: [f64; 2], high: [f64; 2], aspect: f64) -> Self {
+    pub fn fitted(lines: &'static [&'static str], low: [f64; 2], high: [f64; 2], aspect: f64) -> Self {
         let longest = lines.iter().map(|line| line.chars().count()).max().unwrap_or(1);
         let columns = (longest * ADVANCE - 1) as f64;
         let rows = (lines.len() * LINE - 2) as f64;
@@ -75,7 +72,7 @@ impl Lettering {
     }
 
     /// Whether a point of the picture is inked.
-    pub(super) fn covers(&self, u: f64, v: f64) -> bool {
+    pub fn covers(&self, u: f64, v: f64) -> bool {
         let (x, y) = ((u - self.at[0]) / self.dot[0], (v - self.at[1]) / self.dot[1]);
         if x < 0.0 || y < 0.0 {
             return false;

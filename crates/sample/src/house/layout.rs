@@ -1,104 +1,70 @@
-//! The three rooms of the house: floors, walls, ceilings, openings and fittings.
+//! The rooms of the built-in house: floors, walls, ceilings, openings and fittings, furniture and cameras.
 //!
-//! Metres, +y up, the floor at y = 0. On a plan with -z at the top, the living room is in the north-west, the bedroom is
-//! east of it behind an opening without a door, and the library is south of it behind a door.
+//! Metres, +y up, the floor at y = 0. On a plan with -z at the top, the living room is in the west and the bedroom is east
+//! of it behind an opening without a door. The door in the living room's south wall is shut, and the outer wall behind it
+//! has no opening, so that no light comes in around the door.
 
 use glam::{DVec2, DVec3};
 
-use super::surfaces::{ArchitectureMesh, WallHole};
+use super::architecture::{ArchitectureMesh, WallHole};
+use super::plan::{EAST, Furniture, NORTH, Room, SOUTH, Snapshot};
 
 /// Height of the ceiling.
-pub(super) const HEIGHT: f64 = 2.8;
+pub const HEIGHT: f64 = 2.8;
 /// Thickness of the walls.
-pub(super) const THICKNESS: f64 = 0.2;
+pub const THICKNESS: f64 = 0.2;
 
-/// A rectangular room between two corners (x, z).
+/// The inner outline of a rectangular room between two corners (x, z), and the materials of its shell.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Room {
-    /// The data's type of room.
-    pub(super) kind: &'static str,
-    /// The data's instanceid.
-    pub(super) name: &'static str,
-    pub(super) low: DVec2,
-    pub(super) high: DVec2,
-    /// Materials of the floor, the walls and the baseboards.
-    floor: &'static str,
-    walls: &'static str,
-    trim: &'static str,
+pub struct Outline {
+    pub low: DVec2,
+    pub high: DVec2,
+    pub floor: &'static str,
+    pub walls: &'static str,
+    /// The baseboards' material.
+    pub trim: &'static str,
 }
 
-/// The three rooms. Most faults are planted in the last.
-pub(super) const ROOMS: [Room; 3] = [
-    Room {
-        kind: "LivingDiningRoom",
-        name: "LivingDiningRoom-101",
-        low: DVec2::new(0.0, 0.0),
-        high: DVec2::new(6.0, 4.4),
-        floor: "floor",
-        walls: "wallpaper",
-        trim: "trim",
-    },
-    Room {
-        kind: "MasterBedroom",
-        name: "MasterBedroom-102",
-        low: DVec2::new(6.2, 0.0),
-        high: DVec2::new(10.0, 4.4),
-        floor: "floor",
-        walls: "bedroom_wallpaper",
-        trim: "trim",
-    },
-    Room {
-        kind: "OtherRoom",
-        name: "OtherRoom-103",
-        low: DVec2::new(0.0, 4.6),
-        high: DVec2::new(5.6, 8.2),
-        floor: "library_floor",
-        walls: "library_wall",
-        trim: "library_trim",
-    },
-];
+const LIVING_ROOM: Outline =
+    Outline { low: DVec2::new(0.0, 0.0), high: DVec2::new(6.0, 4.4), floor: "floor", walls: "wallpaper", trim: "trim" };
+const BEDROOM: Outline = Outline {
+    low: DVec2::new(6.2, 0.0),
+    high: DVec2::new(10.0, 4.4),
+    floor: "floor",
+    walls: "bedroom_wallpaper",
+    trim: "trim",
+};
 
 const fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// Lowest and highest corners of the openings, each as deep as its wall.
-const PASSAGE: [DVec3; 2] = [v(6.0, 0.0, 1.5), v(6.2, 2.2, 2.9)];
-const DOOR: [DVec3; 2] = [v(4.6, 0.0, 4.4), v(5.5, 2.1, 4.6)];
-const LIVING_WINDOW: [DVec3; 2] = [v(1.4, 0.9, -0.2), v(4.2, 2.3, 0.0)];
-const BEDROOM_WINDOW: [DVec3; 2] = [v(10.0, 0.9, 1.4), v(10.2, 2.3, 3.2)];
-const LIBRARY_WINDOW: [DVec3; 2] = [v(-0.2, 1.2, 5.8), v(0.0, 2.2, 6.8)];
-const HOLES: [[DVec3; 2]; 5] = [PASSAGE, DOOR, LIVING_WINDOW, BEDROOM_WINDOW, LIBRARY_WINDOW];
+/// An opening through a wall, between its lowest and its highest corner; it is as deep as the wall.
+pub type Opening = [DVec3; 2];
 
-/// The meshes of the room with this index in [`ROOMS`]. The library has no ceiling.
-pub(super) fn meshes(room: usize) -> Vec<ArchitectureMesh> {
-    let mut meshes = shell(&ROOMS[room]);
-    meshes.retain(|mesh| room < 2 || mesh.kind != "Ceiling");
-    meshes.extend(outside(room));
-    meshes.extend(match room {
-        0 => living_room(),
-        1 => bedroom(),
-        _ => library(),
-    });
-    meshes
-}
+const PASSAGE: Opening = [v(6.0, 0.0, 1.5), v(6.2, 2.2, 2.9)];
+/// The door in the living room's south wall.
+pub const DOOR: Opening = [v(4.6, 0.0, 4.4), v(5.5, 2.1, 4.6)];
+const LIVING_WINDOW: Opening = [v(1.4, 0.9, -0.2), v(4.2, 2.3, 0.0)];
+const BEDROOM_WINDOW: Opening = [v(10.0, 0.9, 1.4), v(10.2, 2.3, 3.2)];
+const OPENINGS: [Opening; 4] = [PASSAGE, DOOR, LIVING_WINDOW, BEDROOM_WINDOW];
 
-/// The openings in the wall that starts at `foot` and runs along `along`.
-fn holes_of(foot: DVec3, along: DVec3) -> Vec<WallHole> {
+/// Those openings that lie in the wall that starts at `foot` and runs along `along`.
+fn holes_of(foot: DVec3, along: DVec3, openings: &[Opening]) -> Vec<WallHole> {
     let (length, right) = (along.length(), along.normalize());
     let normal = right.cross(DVec3::Y);
-    let within = |[low, high]: &[DVec3; 2]| {
+    let within = |[low, high]: &Opening| {
         let (a, b) = ((low - foot).dot(right), (high - foot).dot(right));
         let off = ((low + high) / 2.0 - foot).dot(normal).abs();
         let (left, right) = (a.min(b), a.max(b));
         let here = off < THICKNESS * 0.6 && left >= 0.0 && right <= length;
         here.then_some(WallHole { left, right, bottom: low.y, top: high.y })
     };
-    HOLES.iter().filter_map(within).collect()
+    openings.iter().filter_map(within).collect()
 }
 
 /// The four walls of a room, each as its start on the floor and its extent, which runs to the right seen from inside.
-fn wall_lines(room: &Room) -> [(DVec3, DVec3); 4] {
+fn wall_lines(room: &Outline) -> [(DVec3, DVec3); 4] {
     let (low, high) = (room.low, room.high);
     let size = high - low;
     [
@@ -110,13 +76,13 @@ fn wall_lines(room: &Room) -> [(DVec3, DVec3); 4] {
 }
 
 /// Floor, ceiling, four walls and their baseboards.
-fn shell(room: &Room) -> Vec<ArchitectureMesh> {
+pub fn shell(room: &Outline, openings: &[Opening]) -> Vec<ArchitectureMesh> {
     let mut meshes = vec![
         ArchitectureMesh::new("Floor", room.floor).facing_up(room.low, room.high, 0.0),
         ArchitectureMesh::new("Ceiling", "ceiling").facing_down(room.low, room.high, HEIGHT),
     ];
     for (foot, along) in wall_lines(room) {
-        let holes = holes_of(foot, along);
+        let holes = holes_of(foot, along, openings);
         meshes.push(ArchitectureMesh::new("WallInner", room.walls).wall(foot, along, HEIGHT, &holes));
         meshes.push(baseboard(room.trim, foot, along, &holes));
     }
@@ -138,38 +104,19 @@ fn baseboard(material: &'static str, foot: DVec3, along: DVec3, holes: &[WallHol
     board
 }
 
-/// The outer walls of a room, and the tops and bottoms of its walls.
-fn outside(room: usize) -> Vec<ArchitectureMesh> {
-    // Start and extent of the outer sides, which run to the right seen from outside.
-    let lines: &[(DVec3, DVec3)] = &match room {
-        0 => vec![(v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)), (v(-0.2, 0.0, -0.2), v(0.0, 0.0, 4.7))],
-        1 => vec![
-            (v(5.8, 0.0, 4.6), v(4.4, 0.0, 0.0)),
-            (v(10.2, 0.0, 4.6), v(0.0, 0.0, -4.8)),
-            (v(10.2, 0.0, -0.2), v(-4.1, 0.0, 0.0)),
-        ],
-        _ => vec![
-            (v(-0.2, 0.0, 4.5), v(0.0, 0.0, 3.9)),
-            (v(-0.2, 0.0, 8.4), v(6.0, 0.0, 0.0)),
-            (v(5.8, 0.0, 8.4), v(0.0, 0.0, -3.8)),
-        ],
-    };
-    // Corners (x, z) of the walls on the plan.
-    let plans: &[[f64; 4]] = match room {
-        0 => &[[-0.2, -0.2, 6.1, 0.0], [-0.2, 0.0, 0.0, 4.4], [6.0, 0.0, 6.2, 4.4], [-0.2, 4.4, 6.1, 4.6]],
-        1 => &[[6.1, -0.2, 10.2, 0.0], [10.0, 0.0, 10.2, 4.4], [6.1, 4.4, 10.2, 4.6]],
-        _ => &[[-0.2, 4.6, 0.0, 8.2], [5.6, 4.6, 5.8, 8.2], [-0.2, 8.2, 5.8, 8.4]],
-    };
-    // The outer sides with their openings; a top and a bottom for every wall.
+/// Outer walls, and the tops and bottoms of walls. An outer wall is given by its start and its extent, which runs to the
+/// right seen from outside; `plans` are corners (x, z) of walls on the plan.
+pub fn outside(lines: &[(DVec3, DVec3)], plans: &[[f64; 4]], openings: &[Opening]) -> Vec<ArchitectureMesh> {
     let outer = lines.iter().map(|&(foot, along)| {
-        ArchitectureMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along))
+        ArchitectureMesh::new("WallOuter", "outer_wall").wall(foot, along, HEIGHT, &holes_of(foot, along, openings))
     });
     let levels = plans.iter().flat_map(|&[x0, z0, x1, z1]| {
         let (low, high) = (DVec2::new(x0, z0), DVec2::new(x1, z1));
         let bottom = ArchitectureMesh::new("WallBottom", "outer_wall");
+        let on_the_floor = on_the_floor(low, high, openings);
         [
             ArchitectureMesh::new("WallTop", "outer_wall").facing_up(low, high, HEIGHT),
-            on_the_floor(low, high).into_iter().fold(bottom, |mesh, (low, high)| mesh.facing_down(low, high, 0.0)),
+            on_the_floor.into_iter().fold(bottom, |mesh, (low, high)| mesh.facing_down(low, high, 0.0)),
         ]
     });
     outer.chain(levels).collect()
@@ -177,8 +124,8 @@ fn outside(room: usize) -> Vec<ArchitectureMesh> {
 
 /// The parts of a wall's plan that touch the floor: all of it except an opening that reaches down to the floor. A wall
 /// has at most one such opening.
-fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
-    for [from, to] in HOLES.iter().filter(|[from, _]| from.y == 0.0) {
+fn on_the_floor(low: DVec2, high: DVec2, openings: &[Opening]) -> Vec<(DVec2, DVec2)> {
+    for [from, to] in openings.iter().filter(|[from, _]| from.y == 0.0) {
         let (from, to) = (DVec2::new(from.x, from.z), DVec2::new(to.x, to.z));
         if from.cmpge(low).all() && to.cmple(high).all() {
             let along_x = high.x - low.x > high.y - low.y;
@@ -190,22 +137,51 @@ fn on_the_floor(low: DVec2, high: DVec2) -> Vec<(DVec2, DVec2)> {
     vec![(low, high)]
 }
 
-/// The opening to the bedroom, the door to the library, the window and the suspended ceiling.
-fn living_room() -> Vec<ArchitectureMesh> {
-    let mut meshes = vec![
+pub(super) fn living_room() -> Room {
+    Room {
+        kind: "LivingDiningRoom",
+        name: "LivingDiningRoom-101",
+        low: LIVING_ROOM.low,
+        high: LIVING_ROOM.high,
+        meshes: living_room_meshes(),
+        furniture: living_room_furniture(),
+        cameras: vec![
+            Snapshot::new([5.5, 1.5, 3.9], [1.8, 0.85, 1.7], 60.0),
+            Snapshot::new([0.6, 1.5, 2.2], [6.1, 1.0, 2.0], 55.0),
+            Snapshot::new([3.6, 1.45, 0.5], [1.2, 0.7, 3.6], 62.0),
+        ],
+    }
+}
+
+/// The living room's shell and outer sides, the opening to the bedroom, the door, the window and the suspended ceiling. The
+/// last mesh closes the house behind the door.
+fn living_room_meshes() -> Vec<ArchitectureMesh> {
+    let mut meshes = shell(&LIVING_ROOM, &OPENINGS);
+    meshes.extend(outside(
+        &[(v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)), (v(-0.2, 0.0, -0.2), v(0.0, 0.0, 4.8))],
+        &[[-0.2, -0.2, 6.1, 0.0], [-0.2, 0.0, 0.0, 4.4], [6.0, 0.0, 6.2, 4.4], [-0.2, 4.4, 6.1, 4.6]],
+        &OPENINGS,
+    ));
+    meshes.extend([
         ArchitectureMesh::new("Hole", "trim").reveal(PASSAGE[0], PASSAGE[1], true),
         ArchitectureMesh::new("Door", "door").reveal(DOOR[0], DOOR[1], true),
         ArchitectureMesh::new("Door", "door").boxed(DOOR[0].with_z(4.48), DOOR[1].with_z(4.52)),
         door_trim(4.388, 4.4),
         ArchitectureMesh::new("Window", "trim").reveal(LIVING_WINDOW[0], LIVING_WINDOW[1], true),
         window_bars(),
-    ];
+    ]);
     meshes.extend(hung_ceiling());
+    meshes.push(ArchitectureMesh::new("WallOuter", "outer_wall").wall(
+        v(-0.2, 0.0, 4.6),
+        v(6.0, 0.0, 0.0),
+        HEIGHT,
+        &[],
+    ));
     meshes
 }
 
 /// Trim on three sides of the door from z = `back` to z = `front`.
-fn door_trim(back: f64, front: f64) -> ArchitectureMesh {
+pub fn door_trim(back: f64, front: f64) -> ArchitectureMesh {
     let ([low, high], w) = (DOOR, 0.06);
     ArchitectureMesh::new("Pocket", "door")
         .boxed(v(low.x - w, 0.0, back), v(low.x, high.y, front))
@@ -231,7 +207,7 @@ fn window_bars() -> ArchitectureMesh {
 /// A suspended ceiling: four boxes whose tops lie in the ceiling, a sheet just below the ceiling, and light strips along
 /// the inner edges.
 fn hung_ceiling() -> Vec<ArchitectureMesh> {
-    let (low, high, wide, bottom) = (ROOMS[0].low, ROOMS[0].high, 0.5, 2.55);
+    let (low, high, wide, bottom) = (LIVING_ROOM.low, LIVING_ROOM.high, 0.5, 2.55);
     let mut frame = ArchitectureMesh::new("CustomizedCeiling", "ceiling");
     let mut band = ArchitectureMesh::new("LightBand", "light_band");
     let strip = |mesh: ArchitectureMesh, x0: f64, y0: f64, z0: f64, x1: f64, y1: f64, z1: f64| {
@@ -254,27 +230,68 @@ fn hung_ceiling() -> Vec<ArchitectureMesh> {
     vec![frame, sheet, band]
 }
 
-/// A panel on the wall behind the bed, the window's inner sides and its sill.
-fn bedroom() -> Vec<ArchitectureMesh> {
-    let (low, high) = (v(6.95, 0.12, 0.0), v(9.25, 2.4, 0.03));
+/// The upper ends of the lamps touch the ceiling.
+const PENDANT_Y: f64 = HEIGHT - 0.95;
+const CEILING_LAMP_Y: f64 = HEIGHT - 0.15;
+
+fn living_room_furniture() -> Vec<Furniture> {
     vec![
-        ArchitectureMesh::new("CustomizedFeatureWall", "panel").boxed(low, high),
-        ArchitectureMesh::new("BayWindow", "trim").reveal(BEDROOM_WINDOW[0], BEDROOM_WINDOW[1], true),
-        ArchitectureMesh::new("BayWindow", "trim").boxed(v(9.94, 0.87, 1.35), v(10.0, 0.9, 3.25)),
+        Furniture::new("1001/model", "l_sofa", "sofa/l-shaped sofa", [1.6, 0.0, 3.59], NORTH),
+        Furniture::new("1002/model", "coffee_table", "table/coffee table", [1.75, 0.0, 2.35], SOUTH),
+        Furniture::new("1003/model", "tv_stand", "cabinet/tv stand", [1.75, 0.0, 0.25], SOUTH),
+        Furniture::new("1004/model", "dining_table", "table/dining table", [4.4, 0.0, 1.6], SOUTH),
+        Furniture::new("1005/model", "dining_chair", "chair/dining chair", [4.0, 0.0, 0.85], SOUTH),
+        Furniture::new("1006/model", "dining_chair", "chair/dining chair", [4.8, 0.0, 0.85], SOUTH),
+        Furniture::new("1007/model", "dining_chair", "chair/dining chair", [4.0, 0.0, 2.35], NORTH),
+        Furniture::new("1008/model", "dining_chair", "", [4.8, 0.0, 2.35], NORTH),
+        Furniture::new("1009/model", "pendant_lamp", "lighting/pendant light", [4.4, PENDANT_Y, 1.6], SOUTH),
+        Furniture::new("1010/model", "floor_lamp", "lighting/floor lamp", [3.15, 0.0, 4.05], SOUTH),
+        Furniture::new("1011/model", "picture", "accessory/picture", [0.025, 1.3, 1.9], EAST),
     ]
 }
 
-/// A wall cabinet of three meshes, a cornice, a pipe and the door's trim on this side. The window is an open hole.
-fn library() -> Vec<ArchitectureMesh> {
+pub(super) fn bedroom() -> Room {
+    Room {
+        kind: "MasterBedroom",
+        name: "MasterBedroom-102",
+        low: BEDROOM.low,
+        high: BEDROOM.high,
+        meshes: bedroom_meshes(),
+        furniture: bedroom_furniture(),
+        cameras: vec![Snapshot::new([6.5, 1.55, 3.9], [8.5, 0.75, 0.9], 62.0)],
+    }
+}
+
+/// The bedroom's shell and outer sides, a panel on the wall behind the bed, the window's inner sides and its sill.
+fn bedroom_meshes() -> Vec<ArchitectureMesh> {
+    let mut meshes = shell(&BEDROOM, &OPENINGS);
+    meshes.extend(outside(
+        &[
+            (v(5.8, 0.0, 4.6), v(4.4, 0.0, 0.0)),
+            (v(10.2, 0.0, 4.6), v(0.0, 0.0, -4.8)),
+            (v(10.2, 0.0, -0.2), v(-4.1, 0.0, 0.0)),
+        ],
+        &[[6.1, -0.2, 10.2, 0.0], [10.0, 0.0, 10.2, 4.4], [6.1, 4.4, 10.2, 4.6]],
+        &OPENINGS,
+    ));
+    meshes.extend([
+        ArchitectureMesh::new("CustomizedFeatureWall", "panel").boxed(v(6.95, 0.12, 0.0), v(9.25, 2.4, 0.03)),
+        ArchitectureMesh::new("BayWindow", "trim").reveal(BEDROOM_WINDOW[0], BEDROOM_WINDOW[1], true),
+        ArchitectureMesh::new("BayWindow", "trim").boxed(v(9.94, 0.87, 1.35), v(10.0, 0.9, 3.25)),
+    ]);
+    meshes
+}
+
+/// The nightstand is placed twice.
+fn bedroom_furniture() -> Vec<Furniture> {
+    let mut nightstand = Furniture::new("2002/model", "nightstand", "cabinet/nightstand", [6.8, 0.0, 0.25], SOUTH);
+    nightstand.pieces.push(([9.4, 0.0, 0.25], SOUTH));
     vec![
-        ArchitectureMesh::new("Cabinet", "cabinet").boxed(v(2.0, 1.5, 7.86), v(4.6, 2.2, 8.19)),
-        ArchitectureMesh::new("Front", "cabinet")
-            .boxed(v(2.02, 1.52, 7.84), v(3.29, 2.18, 7.86))
-            .boxed(v(3.31, 1.52, 7.84), v(4.58, 2.18, 7.86)),
-        ArchitectureMesh::new("Back", "cabinet").boxed(v(2.0, 1.5, 8.19), v(4.6, 2.2, 8.2)),
-        ArchitectureMesh::new("Cornice", "library_trim").boxed(v(5.54, 2.7, 4.6), v(5.6, 2.8, 8.2)),
-        ArchitectureMesh::new("SewerPipe", "library_trim").boxed(v(5.44, 0.0, 8.04), v(5.6, 2.8, 8.2)),
-        door_trim(4.6, 4.612),
+        Furniture::new("2001/model", "bed", "bed/double bed", [8.1, 0.0, 1.125], SOUTH),
+        nightstand,
+        Furniture::new("2003/model", "wardrobe", "cabinet/wardrobe", [8.6, 0.0, 4.07], NORTH),
+        Furniture::new("2004/model", "bed_end_stool", "stool/bed end stool", [8.1, 0.0, 2.5], SOUTH),
+        Furniture::new("2005/model", "ceiling_lamp", "lighting/ceiling light", [8.1, CEILING_LAMP_Y, 2.3], SOUTH),
     ]
 }
 
@@ -282,29 +299,26 @@ fn library() -> Vec<ArchitectureMesh> {
 mod tests {
     use super::*;
 
-    /// Every opening is cut into the walls on both of its sides and into no other wall.
+    /// Every opening is cut into the walls on both of its sides, except the door, which is blind, and into no other wall.
     #[test]
     fn holes_go_through() {
-        let lines = ROOMS.iter().flat_map(wall_lines);
-        assert_eq!(lines.map(|(foot, along)| holes_of(foot, along).len()).sum::<usize>(), 7);
-        let windows = [
-            (v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)),
-            (v(10.2, 0.0, 4.6), v(0.0, 0.0, -4.8)),
-            (v(-0.2, 0.0, 4.5), v(0.0, 0.0, 3.9)),
-        ];
-        assert!(windows.iter().all(|&(foot, along)| holes_of(foot, along).len() == 1));
+        let lines = [LIVING_ROOM, BEDROOM].into_iter().flat_map(|room| wall_lines(&room));
+        assert_eq!(lines.map(|(foot, along)| holes_of(foot, along, &OPENINGS).len()).sum::<usize>(), 5);
+        // The outer walls that hold the windows.
+        let windows = [(v(6.1, 0.0, -0.2), v(-6.3, 0.0, 0.0)), (v(10.2, 0.0, 4.6), v(0.0, 0.0, -4.8))];
+        assert!(windows.iter().all(|&(foot, along)| holes_of(foot, along, &OPENINGS).len() == 1));
     }
 
     /// Floors face up, ceilings down, inner walls into their room.
     #[test]
     fn the_shell_faces_the_room() {
-        for (room, shell) in ROOMS.iter().map(|room| (room, shell(room))) {
+        for room in [LIVING_ROOM, BEDROOM] {
             let middle = ((room.low + room.high) / 2.0).extend(HEIGHT / 2.0);
             let middle = v(middle.x, middle.z, middle.y);
-            for mesh in shell.iter().filter(|mesh| mesh.kind != "Baseboard") {
+            for mesh in shell(&room, &OPENINGS).iter().filter(|mesh| mesh.kind != "Baseboard") {
                 for &[a, b, c] in &mesh.faces {
                     let p = |i: usize| mesh.positions[i];
-                    assert!((p(b) - p(a)).cross(p(c) - p(a)).dot(middle - p(a)) > 0.0, "{} {}", room.name, mesh.kind);
+                    assert!((p(b) - p(a)).cross(p(c) - p(a)).dot(middle - p(a)) > 0.0, "{room:?} {}", mesh.kind);
                 }
             }
         }

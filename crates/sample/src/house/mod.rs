@@ -1,39 +1,35 @@
-//! The built-in house, under CC0, in the layout of 3D-FRONT and 3D-FUTURE and with one of each fault that their files
-//! show. The reader of 3D-FRONT is tested on it without a download.
+//! The built-in house, under CC0, in the layout of 3D-FRONT and 3D-FUTURE: a living room and a bedroom.
 //!
 //! The input is a folder. Written into it is `house/` with `3D-FRONT/UID.json`, `3D-FRONT-texture/JID/texture.png`,
-//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json`, `LICENSE.txt` and
-//! `FAULTS.txt`. The bytes are the same on every machine.
+//! `3D-FUTURE-model/JID/` (`raw_model.obj`, `model.mtl`, `texture.png`), `model_info.json` and `LICENSE.txt`. The bytes are
+//! the same on every machine.
 //!
-//! `layout` defines the rooms and builds them with `surfaces`; their appearance is in `materials` and `textures`. The
-//! furniture's geometry is in `shapes`, its library in `models`, its textures in `swatches`, and `pieces` places it.
-//! `font` draws the letters in all textures. `house_json` makes the JSON of a sound house, `faults` plants the faults,
-//! `variants` makes other houses of it, and `model_files` writes the models.
+//! `plan` describes a house as data. `layout` builds and furnishes the rooms with `architecture`; their appearance is in
+//! `materials`. The furniture's geometry is in `shapes`, its library in `models` and its textures in `swatches`. `font`
+//! draws the letters in all textures. `house_json` makes the JSON of a house, `model_files` writes its models, and
+//! `variants` makes other houses of it.
 //!
-//! The first two rooms are sound except for the normals of two walls. All other faults are in the third room.
+//! The house is sound. The test kit's faulty house is made of the same blocks, which are public for its sake.
 
-pub mod faults;
-mod font;
-mod house_json;
-mod json_number;
-mod layout;
-mod materials;
+pub mod architecture;
+pub mod font;
+pub mod house_json;
+pub mod layout;
+pub mod materials;
 mod model_files;
-mod models;
-mod pieces;
-mod shapes;
-mod surfaces;
-mod swatches;
-mod textures;
-mod uids;
+pub mod models;
+pub mod plan;
+pub mod shapes;
+pub mod swatches;
 mod variants;
 
 use std::path::Path;
 
 use mateval_image::png_io::write_rgb_bytes;
 
-use crate::SampleError;
-use crate::text_file::write_text;
+use crate::files::{SampleError, create_folder, write_text};
+use house_json::HOUSE_ID;
+use plan::House;
 
 /// The house's licence file: CC0 1.0.
 const LICENSE: &str = "This is 'The Sample House' by the MatEval authors, made by `mateval sample`: made up, in the layout\n\
@@ -44,27 +40,32 @@ attribution.\n\n\
 For more information about the license, please see\n\
 https://creativecommons.org/publicdomain/zero/1.0/\n";
 
-/// Writes the house into the folder `out`; files of the same name are replaced.
-pub fn write(out: &Path) -> Result<(), SampleError> {
-    let (models, textures) = (models::all(), textures::all());
-    for texture in &textures {
-        let folder = out.join("house/3D-FRONT-texture").join(uids::texture(texture.number));
-        std::fs::create_dir_all(&folder).map_err(SampleError::io("create", &folder))?;
-        write_rgb_bytes(&folder.join("texture.png"), &texture.file())?;
+/// The built-in house.
+pub fn built_in() -> House {
+    House {
+        rooms: vec![layout::living_room(), layout::bedroom()],
+        materials: materials::materials(),
+        textures: materials::textures(),
+        models: models::all(),
     }
-    write_shapes(out, &models, &textures)?;
-    models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
+}
+
+/// Writes the built-in house into the folder `out`; files of the same name are replaced.
+pub fn write(out: &Path) -> Result<(), SampleError> {
+    let house = built_in();
+    write_shapes(&house, out)?;
+    write_pictures(&house, out)
 }
 
 /// Writes the houses with the numbers `0..count` into the folder `out`, with the library and the textures of the built-in
 /// house. Returns their files, relative to `out`.
 pub fn write_variants(out: &Path, count: u32, seed: u64) -> Result<Vec<String>, SampleError> {
     write(out)?;
-    let (models, textures) = (models::all(), textures::all());
+    let built_in = house_json::house_json(&built_in());
     (0..count)
         .map(|number| {
-            let mut house = house_json::house(&models, &textures);
-            variants::vary(&mut house, &models, number, seed);
+            let mut house = built_in.clone();
+            variants::vary(&mut house, number, seed);
             let file = format!("house/3D-FRONT/{}.json", variants::uid(number));
             write_text(&out.join(&file), &house_json::text(house))?;
             Ok(file)
@@ -72,43 +73,28 @@ pub fn write_variants(out: &Path, count: u32, seed: u64) -> Result<Vec<String>, 
         .collect()
 }
 
-/// As [`write()`], but without textures, which take most of the time.
-pub fn write_without_pictures(out: &Path) -> Result<(), SampleError> {
-    write_shapes(out, &models::all(), &textures::all())
-}
-
-fn write_shapes(
-    out: &Path,
-    models: &[models::Model],
-    textures: &[textures::ArchitectureTexture],
-) -> Result<(), SampleError> {
-    let house = out.join("house");
-    let (layouts, library) = (house.join("3D-FRONT"), house.join("3D-FUTURE-model"));
-    for folder in [&layouts, &library, &house.join("3D-FRONT-texture")] {
-        std::fs::create_dir_all(folder).map_err(SampleError::io("create", folder))?;
+/// Writes everything but the textures, which take most of the time.
+pub fn write_shapes(house: &House, out: &Path) -> Result<(), SampleError> {
+    let root = out.join("house");
+    let (layouts, library) = (root.join("3D-FRONT"), root.join("3D-FUTURE-model"));
+    for folder in [&layouts, &library, &root.join("3D-FRONT-texture")] {
+        create_folder(folder)?;
     }
-    models.iter().try_for_each(|model| model_files::write_shape(&library, model))?;
-    write_text(&library.join("model_info.json"), &model_files::info(models))?;
-    let json = house_json::text(with_faults(models, textures));
-    write_text(&layouts.join(format!("{}.json", uids::HOUSE)), &json)?;
-    write_text(&house.join("FAULTS.txt"), &faults::text())?;
-    write_text(&house.join("LICENSE.txt"), LICENSE)
+    house.models.iter().try_for_each(|model| model_files::write_shape(&library, model))?;
+    write_text(&library.join("model_info.json"), &model_files::info(&house.models))?;
+    let json = house_json::text(house_json::house_json(house));
+    write_text(&layouts.join(format!("{HOUSE_ID}.json")), &json)?;
+    write_text(&root.join("LICENSE.txt"), LICENSE)
 }
 
-/// The house's JSON without the faults that [`faults`] plants.
-pub fn sound_house() -> serde_json::Value {
-    house_json::house(&models::all(), &textures::all())
-}
-
-/// The house's JSON with its faults, as [`write()`] writes it.
-pub fn faulty_house() -> serde_json::Value {
-    with_faults(&models::all(), &textures::all())
-}
-
-fn with_faults(models: &[models::Model], textures: &[textures::ArchitectureTexture]) -> serde_json::Value {
-    let mut house = house_json::house(models, textures);
-    faults::plant(&mut house);
-    house
+/// Writes the textures of the architecture and of the models, whose folders exist.
+pub fn write_pictures(house: &House, out: &Path) -> Result<(), SampleError> {
+    for texture in &house.textures {
+        let folder = out.join("house/3D-FRONT-texture").join(texture.jid());
+        create_folder(&folder)?;
+        write_rgb_bytes(&folder.join("texture.png"), &texture.file())?;
+    }
+    house.models.iter().try_for_each(|model| model_files::write_picture(&out.join("house/3D-FUTURE-model"), model))
 }
 
 #[cfg(test)]

@@ -9,31 +9,34 @@ use crate::furniture;
 use crate::solid::Solid;
 
 /// Texture fields and the solids that they cover.
-pub(super) type Parts = Vec<(usize, Solid)>;
+pub type Parts = Vec<(usize, Solid)>;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-fn boxed(low: DVec3, high: DVec3) -> Solid {
+/// A box between two corners.
+pub fn boxed(low: DVec3, high: DVec3) -> Solid {
     Solid::default().boxed(low, high, 1.0)
 }
 
-fn cushion(low: DVec3, high: DVec3, radius: f64) -> Solid {
+/// A box whose edges are rounded by `radius`.
+pub fn cushion(low: DVec3, high: DVec3, radius: f64) -> Solid {
     Solid::default().cushion(low, high, radius, 1.0)
 }
 
-fn turned(profile: &[(f64, f64)]) -> Solid {
+/// The surface of revolution of a profile of (radius, height) about the vertical axis through the origin.
+pub fn turned(profile: &[(f64, f64)]) -> Solid {
     Solid::default().turned(DVec3::ZERO, profile, 20, 1.0)
 }
 
 /// A rectangle that shows a whole field of letters.
-fn label(corner: DVec3, right: DVec3, up: DVec3) -> Solid {
+pub fn label(corner: DVec3, right: DVec3, up: DVec3) -> Solid {
     Solid::default().rectangle(corner, right, up, DVec2::new(right.length(), up.length()))
 }
 
 /// Four square legs `wide` metres across and `top` metres high, in the corners of a footprint of half size `x`, `z`.
-fn legs(x: f64, z: f64, wide: f64, top: f64) -> Solid {
+pub fn legs(x: f64, z: f64, wide: f64, top: f64) -> Solid {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].into_iter().fold(Solid::default(), |legs, (sx, sz)| {
         let middle = v(sx * (x - wide / 2.0), top / 2.0, sz * (z - wide / 2.0));
         let half = v(wide / 2.0, top / 2.0, wide / 2.0);
@@ -58,18 +61,6 @@ pub(super) fn l_sofa() -> Parts {
         (0, cushion(v(0.305, 0.25, -0.55), v(1.195, 0.44, 0.775), 0.05)),
         (2, cushion(v(-0.9, 0.44, -0.55), v(-0.45, 0.84, -0.42), 0.05)),
         (3, label(v(-0.85, 0.49, -0.418), v(0.35, 0.0, 0.0), v(0.0, 0.3, 0.0))),
-    ]
-}
-
-/// An armchair, 0.8 m wide and deep.
-pub(super) fn armchair() -> Parts {
-    vec![
-        (1, legs(0.36, 0.36, 0.05, 0.12)),
-        (0, boxed(v(-0.38, 0.12, -0.38), v(0.38, 0.26, 0.36))),
-        (0, cushion(v(-0.4, 0.12, -0.4), v(-0.26, 0.58, 0.4), 0.05)),
-        (0, cushion(v(0.26, 0.12, -0.4), v(0.4, 0.58, 0.4), 0.05)),
-        (0, cushion(v(-0.26, 0.12, -0.4), v(0.26, 0.88, -0.22), 0.06)),
-        (0, cushion(v(-0.255, 0.25, -0.22), v(0.255, 0.44, 0.38), 0.05)),
     ]
 }
 
@@ -186,93 +177,4 @@ pub(super) fn bed_end_stool() -> Parts {
         (1, boxed(v(-0.59, 0.28, -0.19), v(0.59, 0.33, 0.19))),
         (0, cushion(v(-0.6, 0.32, -0.2), v(0.6, 0.45, 0.2), 0.05)),
     ]
-}
-
-/// A bookcase with books, 1 m wide and 2 m high.
-pub(super) fn bookcase() -> Parts {
-    let mut case = boxed(v(-0.5, 0.0, -0.16), v(0.5, 2.0, -0.15))
-        .boxed(v(-0.5, 0.0, -0.15), v(-0.475, 2.0, 0.16), 1.0)
-        .boxed(v(0.475, 0.0, -0.15), v(0.5, 2.0, 0.16), 1.0);
-    let mut books = [Solid::default(), Solid::default()];
-    for level in 0..5 {
-        let y = 0.05 + 0.39 * f64::from(level);
-        case = case.boxed(v(-0.475, y, -0.15), v(0.475, y + 0.025, 0.155), 1.0);
-        for book in 0..(4 + level) {
-            let x = -0.46 + 0.06 * f64::from(book);
-            let high = 0.22 + 0.02 * f64::from((book * 3 + level) % 5);
-            let pile = &mut books[usize::from((book + level) % 2 == 0)];
-            *pile = std::mem::take(pile).boxed(v(x, y + 0.025, -0.1), v(x + 0.05, y + 0.025 + high, 0.1), 1.0);
-        }
-    }
-    let [first, second] = books;
-    vec![(0, case.boxed(v(-0.475, 1.975, -0.15), v(0.475, 2.0, 0.155), 1.0)), (1, first), (2, second)]
-}
-
-/// A chest, 0.9 m wide, with three drawers and letters on the lowest.
-pub(super) fn chest() -> Parts {
-    let drawer = |y: f64| boxed(v(-0.42, y, 0.2), v(0.42, y + 0.22, 0.22));
-    vec![
-        (0, boxed(v(-0.45, 0.0, -0.225), v(0.45, 0.8, 0.2))),
-        (1, drawer(0.04)),
-        (1, drawer(0.29)),
-        (1, drawer(0.54)),
-        (2, label(v(-0.3, 0.08, 0.225), v(0.6, 0.0, 0.0), v(0.0, 0.14, 0.0))),
-    ]
-}
-
-/// An open shelf, 1.2 m wide and 0.8 m high, on a painted shadow 6 m wide.
-pub(super) fn shelf() -> Parts {
-    vec![(0, furniture::shelf()), (1, label(v(-3.0, 0.0, 3.0), v(6.0, 0.0, 0.0), v(0.0, 0.0, -6.0)))]
-}
-
-/// A basket, 0.5 m wide, and its painted shadow, which is a little wider.
-pub(super) fn basket() -> Parts {
-    let wall = [(0.0, 0.02), (0.2, 0.02), (0.25, 0.4), (0.23, 0.4), (0.18, 0.04), (0.0, 0.04)];
-    vec![
-        (0, turned(&wall)),
-        (0, turned(&[(0.0, 0.0), (0.15, 0.0), (0.15, 0.02), (0.0, 0.02)])),
-        (1, label(v(-0.3, 0.0, 0.3), v(0.6, 0.0, 0.0), v(0.0, 0.0, -0.6))),
-    ]
-}
-
-/// A black mat of no thickness, 1 m wide.
-pub(super) fn mat() -> Parts {
-    vec![(0, label(v(-0.5, 0.0, 0.35), v(1.0, 0.0, 0.0), v(0.0, 0.0, -0.7)))]
-}
-
-/// A sculpture on a dark plate of no thickness, which is as wide as the sculpture.
-pub(super) fn sculpture() -> Parts {
-    vec![
-        (1, label(v(-0.2, 0.0, 0.2), v(0.4, 0.0, 0.0), v(0.0, 0.0, -0.4))),
-        (0, cushion(v(-0.2, 0.0, -0.2), v(0.2, 0.7, 0.2), 0.15)),
-    ]
-}
-
-/// A side table: a round top on one leg.
-pub(super) fn side_table() -> Parts {
-    let foot = [(0.0, 0.0), (0.2, 0.0), (0.2, 0.02), (0.03, 0.04), (0.025, 0.5), (0.0, 0.5)];
-    vec![
-        (1, turned(&foot)),
-        (0, turned(&[(0.0, 0.5), (0.3, 0.5), (0.3, 0.525), (0.0, 0.525)])),
-        (0, boxed(v(-0.12, 0.525, -0.08), v(0.12, 0.555, 0.08))),
-    ]
-}
-
-/// A low lounge chair, 0.6 m wide.
-pub(super) fn lounge_chair() -> Parts {
-    vec![
-        (1, legs(0.28, 0.3, 0.04, 0.34)),
-        (0, cushion(v(-0.3, 0.32, -0.3), v(0.3, 0.42, 0.325), 0.04)),
-        (0, cushion(v(-0.28, 0.4, -0.325), v(0.28, 0.82, -0.22), 0.04)),
-    ]
-}
-
-/// A stool, 0.4 m wide.
-pub(super) fn stool() -> Parts {
-    vec![(1, legs(0.18, 0.18, 0.04, 0.4)), (0, cushion(v(-0.2, 0.38, -0.2), v(0.2, 0.45, 0.2), 0.03))]
-}
-
-/// A cube with sides of 0.5 m.
-pub(super) fn crate_box() -> Parts {
-    vec![(0, boxed(v(-0.25, 0.0, -0.25), v(0.25, 0.5, 0.25)))]
 }

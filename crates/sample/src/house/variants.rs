@@ -1,15 +1,10 @@
 //! Houses made of the built-in one, for rehearsals of a release at full size: of another extent, in other colours and
-//! wall coverings, and with some of the furniture left out or exchanged. No faults are planted in the houses; those of
-//! models and textures are in the library, which all houses share.
+//! wall coverings, and with some of the furniture left out. All houses share the library of models and textures.
 
 use mateval_scene::splitmix64;
 use serde_json::{Value, json};
 
-use super::json_number::number;
-use super::models::Model;
-
-/// Models that stand on the floor, need little room and may stand for one another.
-const SMALL: [&str; 3] = ["nightstand", "side_table", "stool"];
+use super::house_json::number;
 
 /// The most that a house is longer than the built-in one, in either direction.
 const STRETCH: f64 = 0.25;
@@ -44,12 +39,12 @@ impl Draws {
 }
 
 /// Changes the built-in house into the one with this number. Houses of the same seed and number are equal.
-pub(super) fn vary(house: &mut Value, models: &[Model], house_number: u32, seed: u64) {
+pub(super) fn vary(house: &mut Value, house_number: u32, seed: u64) {
     let mut draws = Draws { seed: splitmix64::number(seed, u64::from(house_number)), next: 0 };
     house["uid"] = uid(house_number).into();
     stretch(house, [1.0 + STRETCH * draws.share(), 1.0 + STRETCH * draws.share()]);
     recolour(house, &mut draws);
-    refurnish(house, models, &mut draws);
+    leave_out(house, &mut draws);
 }
 
 /// Stretches rooms along x and z. Furniture keeps its size and moves with the floor.
@@ -97,16 +92,7 @@ fn recolour(house: &mut Value, draws: &mut Draws) {
     }
 }
 
-fn refurnish(house: &mut Value, models: &[Model], draws: &mut Draws) {
-    let small: Vec<&Model> =
-        models.iter().filter(|model| SMALL.contains(&model.name) && model.quirk.is_none()).collect();
-    for record in items(&mut house["furniture"]) {
-        if small.iter().any(|model| record["jid"] == json!(model.jid())) {
-            let other = small[draws.integer(small.len() as u64) as usize];
-            record["jid"] = other.jid().into();
-            record["category"] = other.info[1].into();
-        }
-    }
+fn leave_out(house: &mut Value, draws: &mut Draws) {
     for room in items(&mut house["scene"]["room"]) {
         let children = room["children"].as_array_mut().expect("a room's children are a list");
         let is_furniture = |child: &Value| child["instanceid"].as_str().is_some_and(|id| id.starts_with("furniture/"));
@@ -126,13 +112,13 @@ fn items(list: &mut Value) -> &mut Vec<Value> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::super::{house_json, models, textures};
+    use super::super::built_in;
+    use super::super::house_json::house_json;
     use super::*;
 
     fn varied(number: u32, seed: u64) -> Value {
-        let models = models::all();
-        let mut house = house_json::house(&models, &textures::all());
-        vary(&mut house, &models, number, seed);
+        let mut house = house_json(&built_in());
+        vary(&mut house, number, seed);
         house
     }
 
@@ -144,14 +130,14 @@ mod tests {
         assert_ne!(varied(3, 1), varied(3, 2));
     }
 
-    /// Both rooms in use are furnished, and the furniture lies within the walls.
+    /// Both rooms are furnished, and the furniture lies within the walls.
     #[test]
     fn every_house_has_furnished_rooms_within_its_walls() {
         for at in 0..20 {
             let mut house = varied(at, 1);
             let high = house["scene"]["boundingBox"]["max"][0].as_f64().unwrap();
             assert!((10.2..=10.2 * 1.25).contains(&high), "{high}");
-            for room in items(&mut house["scene"]["room"]).iter_mut().take(2) {
+            for room in items(&mut house["scene"]["room"]) {
                 let pieces = items(&mut room["children"]);
                 let pieces: Vec<&Value> =
                     pieces.iter().filter(|c| c["instanceid"].as_str().unwrap().starts_with("furniture")).collect();

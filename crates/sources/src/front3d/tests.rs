@@ -1,4 +1,4 @@
-//! Tests the reader on the sample house and its faults, on generated houses, on hostile files, and on real data if it
+//! Tests the reader on the built-in house with faults, on generated houses, on hostile files, and on real data if it
 //! exists.
 
 mod appearances;
@@ -21,14 +21,14 @@ use serde_json::{Value, json};
 
 use super::*;
 use crate::SourceError;
-use mateval_sample::house as sample_house;
+use mateval_testkit::faulty_house;
 
-/// The sample's house, below the folder that [`sample_house::write`] fills.
+/// The house, below the folder that [`faulty_house::write`] fills.
 const HOUSE: &str = "house/3D-FRONT/cc000000-5a3b-4e00-8000-000000000001.json";
 const LIVING: usize = 0;
 const LIBRARY: usize = 2;
 
-/// The sample on disk, and its JSON.
+/// The faulty house on disk, and its JSON.
 struct Disk {
     folder: tempfile::TempDir,
     json: Value,
@@ -46,12 +46,8 @@ impl Disk {
 
     fn written(pictures: bool) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let written = if pictures {
-            sample_house::write(folder.path())
-        } else {
-            sample_house::write_without_pictures(folder.path())
-        };
-        written.unwrap();
+        let write = if pictures { faulty_house::write } else { faulty_house::write_without_pictures };
+        write(folder.path());
         let json = serde_json::from_slice(&std::fs::read(folder.path().join(HOUSE)).unwrap()).unwrap();
         Self { folder, json }
     }
@@ -84,7 +80,7 @@ impl Disk {
     }
 }
 
-/// The sample with all its faults, made once for each process.
+/// The house with all its faults, made once for each process.
 fn furnished() -> &'static FurnishedHouse {
     static HOUSE: OnceLock<FurnishedHouse> = OnceLock::new();
     HOUSE.get_or_init(|| Disk::new().furnish())

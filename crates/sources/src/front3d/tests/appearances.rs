@@ -94,9 +94,9 @@ fn texture_coordinates_that_spread_too_far_cost_a_model_the_classes_of_its_group
     assert_eq!(house.placed[1].origin.class_of_part, Some(vec![Some(MaterialClass::Stone); 2]));
 }
 
-/// The sample house: content types of its architecture, materials of its models, and groups of glass.
+/// The test kit's house: content types of its architecture, materials of its models, and groups of glass.
 #[test]
-fn the_sample_house_has_many_classes() {
+fn the_whole_house_has_many_classes() {
     let disk = Disk::bare();
     let house = stated(disk.files(), 0);
     assert_sound(&house);

@@ -1,9 +1,9 @@
-//! Every fault of the sample house has its expected finding, and there are no other findings.
+//! Every fault of the test kit's house has its expected finding, and there are no other findings.
 
 use std::collections::BTreeSet;
 
 use super::*;
-use mateval_sample::house::faults::{FAULTS, Fault, Place};
+use mateval_testkit::faulty_house::faults::{FAULTS, Fault, Place};
 
 /// The code of the expected finding, and where it is.
 enum Expected {
@@ -126,9 +126,7 @@ fn a_sound_house_has_no_warning() {
     for number in [15, 21] {
         std::fs::copy(disk.model(1).join("texture.png"), disk.model(number).join("texture.png")).unwrap();
     }
-    let mut json = sample_house::sound_house();
-    json["furniture"][27]["valid"] = false.into();
-    let house = disk.furnish_json(&json).unwrap();
+    let house = disk.furnish_json(&faulty_house::sound_json()).unwrap();
     assert_eq!(warnings(&house), [""; 0]);
     assert_sound(&house);
     let codes: BTreeSet<&str> = house.findings.iter().map(|finding| finding.code.as_str()).collect();

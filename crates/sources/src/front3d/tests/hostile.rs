@@ -129,9 +129,9 @@ fn assert_house_is_sound(json: &Value) {
     assert!(findings.iter().all(|finding| finding.message.len() < 1000));
 }
 
-fn sample_json() -> &'static Value {
+fn faulty_json() -> &'static Value {
     static JSON: OnceLock<Value> = OnceLock::new();
-    JSON.get_or_init(sample_house::faulty_house)
+    JSON.get_or_init(faulty_house::json)
 }
 
 proptest! {
@@ -156,8 +156,8 @@ proptest! {
     }
 
     #[test]
-    fn a_mutated_sample_is_an_error_or_sound((way, value) in any_mutation()) {
-        let mut json = sample_json().clone();
+    fn a_mutated_whole_house_is_an_error_or_sound((way, value) in any_mutation()) {
+        let mut json = faulty_json().clone();
         mutate(&mut json, &way, value);
         assert_house_is_sound(&json);
     }
@@ -266,7 +266,7 @@ fn deep_and_broken_files_are_refused_with_the_reason() {
     assert_eq!(furnish(&files, &Limits::default()).unwrap().scene.surfaces.len(), 1);
 }
 
-/// Every limit on counts refuses a sample that exceeds it.
+/// Every limit on counts refuses a house that exceeds it.
 #[test]
 fn limits_hold() {
     let disk = Disk::new();

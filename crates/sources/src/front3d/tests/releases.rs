@@ -80,7 +80,7 @@ fn summary(house: &House) -> (usize, usize, usize, Vec<Child>) {
 /// None of these keys affects the content or its placement, and none of them is required.
 #[test]
 fn optional_keys_may_be_missing() {
-    let whole = sample_house::sound_house();
+    let whole = faulty_house::sound_json();
     let (house, findings) = read_house(&whole);
     assert!(findings.is_empty(), "{findings:?}");
     let expected = summary(&house.unwrap());
@@ -110,7 +110,7 @@ fn optional_keys_may_be_missing() {
 /// The twin: these keys matter, and their absence is reported.
 #[test]
 fn missing_keys_that_matter_are_reported() {
-    let whole = sample_house::sound_house();
+    let whole = faulty_house::sound_json();
     let expected = summary(&read_house(&whole).0.unwrap());
     let keys = [("/furniture", "uid"), ("/mesh", "uid"), ("/mesh", "xyz"), ("/mesh", "faces"), ("/mesh", "material")];
     let more = [("/mesh", "uv"), ("/material", "uid")];
@@ -137,7 +137,7 @@ fn missing_keys_that_matter_are_reported() {
 /// The record already holds the jid of a replaced model.
 #[test]
 fn lists_of_replacements_are_ignored() {
-    let mut json = sample_house::sound_house();
+    let mut json = faulty_house::sound_json();
     let expected = summary(&read_house(&json).0.unwrap());
     let more = json!({"replace_jid": "x", "replace_bbox": {"xLen": 100, "yLen": 50, "zLen": 1}, "componentModifiers": [],
         "components": [], "uv_override": {}, "material": "m", "parentJid": "p"});

@@ -14,7 +14,7 @@ use mateval_tracer::{Ray, RenderSettings, World, render};
 use super::*;
 use crate::source_scene::SourceScene;
 
-/// A designer's camera of the sample.
+/// A designer's camera of the house.
 fn snapshot(number: usize) -> Camera {
     let own = &furnished().cameras[number];
     let intrinsics = Intrinsics::from_fov_y(48, 32, own.fov_y_deg.to_radians());
@@ -149,7 +149,7 @@ fn lights_are_ceilings_lamps_and_the_world() {
                     assert_eq!(*radiance, [7.0; 3]);
                     let material = &scene.scene.materials[scene.scene.surfaces[lamp].material.0];
                     let MaterialModel::Principled { base_color, .. } = material.model else { panic!("{material:?}") };
-                    let map = map.expect("a lamp of the sample has a texture");
+                    let map = map.expect("a lamp of the house has a texture");
                     assert_eq!(base_color, ColorInput::Texture { texture: map.texture, uv: map.uv });
                     continue;
                 }

@@ -7,36 +7,36 @@ use crate::solid::sides;
 
 /// A mesh of the architecture.
 #[derive(Clone, Debug)]
-pub(super) struct ArchitectureMesh {
+pub struct ArchitectureMesh {
     /// The data's type of mesh, as in "WallInner".
-    pub(super) kind: &'static str,
+    pub kind: &'static str,
     /// The name of its material in `materials`.
-    pub(super) material: &'static str,
-    pub(super) positions: Vec<DVec3>,
-    pub(super) normals: Vec<DVec3>,
-    pub(super) uvs: Vec<DVec2>,
-    pub(super) faces: Vec<[usize; 3]>,
+    pub material: &'static str,
+    pub positions: Vec<DVec3>,
+    pub normals: Vec<DVec3>,
+    pub uvs: Vec<DVec2>,
+    pub faces: Vec<[usize; 3]>,
 }
 
 /// A rectangular hole in a wall, in metres from the wall's start on the floor.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WallHole {
+pub struct WallHole {
     /// Along the wall.
-    pub(super) left: f64,
-    pub(super) right: f64,
+    pub left: f64,
+    pub right: f64,
     /// Above the floor.
-    pub(super) bottom: f64,
-    pub(super) top: f64,
+    pub bottom: f64,
+    pub top: f64,
 }
 
 impl ArchitectureMesh {
-    pub(super) fn new(kind: &'static str, material: &'static str) -> Self {
+    pub fn new(kind: &'static str, material: &'static str) -> Self {
         Self { kind, material, positions: vec![], normals: vec![], uvs: vec![], faces: vec![] }
     }
 
     /// Adds a rectangle that spans `right` and `up` from `corner` and faces their cross product. The corner's texture
     /// coordinates are `uv`. The two triangles share no vertices.
-    pub(super) fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, uv: DVec2) -> Self {
+    pub fn rectangle(mut self, corner: DVec3, right: DVec3, up: DVec3, uv: DVec2) -> Self {
         let (width, height) = (right.length(), up.length());
         for (u, v) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)] {
             self.positions.push(corner + right * u + up * v);
@@ -49,7 +49,7 @@ impl ArchitectureMesh {
     }
 
     /// Adds a box between two corners. The two triangles of a side share vertices.
-    pub(super) fn boxed(mut self, low: DVec3, high: DVec3) -> Self {
+    pub fn boxed(mut self, low: DVec3, high: DVec3) -> Self {
         let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         for (normal, right, up) in sides() {
             let first = self.positions.len();
@@ -66,7 +66,7 @@ impl ArchitectureMesh {
 
     /// Adds an upright wall that starts at `foot` and runs along `along`, to the right seen from its front. u is measured
     /// from the start, v downwards from the top.
-    pub(super) fn wall(self, foot: DVec3, along: DVec3, height: f64, holes: &[WallHole]) -> Self {
+    pub fn wall(self, foot: DVec3, along: DVec3, height: f64, holes: &[WallHole]) -> Self {
         let (length, right) = (along.length(), along.normalize());
         let mut holes = holes.to_vec();
         holes.sort_by(|a, b| a.left.total_cmp(&b.left));
@@ -87,14 +87,14 @@ impl ArchitectureMesh {
     }
 
     /// Adds a horizontal rectangle between two corners (x, z) that faces up. u runs along +x, v along -z.
-    pub(super) fn facing_up(self, low: DVec2, high: DVec2, y: f64) -> Self {
+    pub fn facing_up(self, low: DVec2, high: DVec2, y: f64) -> Self {
         let size = high - low;
         let (right, up) = (DVec3::X * size.x, DVec3::NEG_Z * size.y);
         self.rectangle(DVec3::new(low.x, y, high.y), right, up, DVec2::new(0.0, -size.y))
     }
 
     /// Adds a horizontal rectangle between two corners (x, z) that faces down. u runs along +x, v along +z.
-    pub(super) fn facing_down(self, low: DVec2, high: DVec2, y: f64) -> Self {
+    pub fn facing_down(self, low: DVec2, high: DVec2, y: f64) -> Self {
         let size = high - low;
         let (right, up) = (DVec3::X * size.x, DVec3::Z * size.y);
         self.rectangle(DVec3::new(low.x, y, low.y), right, up, DVec2::new(0.0, -size.y))
@@ -102,7 +102,7 @@ impl ArchitectureMesh {
 
     /// Adds the inner sides of a hole through a wall, between two corners, facing into the hole: the left, right and upper
     /// sides and, with `sill`, the lower one. The hole passes through the wall along the shorter of x and z.
-    pub(super) fn reveal(mut self, low: DVec3, high: DVec3, sill: bool) -> Self {
+    pub fn reveal(mut self, low: DVec3, high: DVec3, sill: bool) -> Self {
         let size = high - low;
         let through_x = size.x < size.z;
         let (middle, half) = ((low + high) / 2.0, size / 2.0);

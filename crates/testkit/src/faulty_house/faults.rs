@@ -1,10 +1,14 @@
-//! The faults of the house, at least one of each kind found in the data: a table of where they are, and the code that
-//! plants those of the JSON in a sound house. Faults of the models' files are the `Quirk`s of `models`.
+//! The faults, at least one of each kind found in the data: a table of where they are, and the code that plants them in
+//! the JSON and in the files of sound rooms.
 
+use std::path::Path;
+
+use mateval_image::Picture;
+use mateval_image::png_io::{write_grey_alpha_bytes, write_rgba_bytes};
+use mateval_sample::house::house_json::number;
+use mateval_sample::house::plan::House;
+use mateval_sample::house::swatches;
 use serde_json::{Value, json};
-
-use super::materials;
-use super::uids;
 
 /// The location of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,107 +117,201 @@ pub const FAULTS: [Fault; 46] = [
     ),
 ];
 
-/// Plants the faults of the JSON, except those that the lists of pieces and rooms already contain.
+/// Plants the faults of the JSON.
 pub(super) fn plant(house: &mut Value) {
     for fault in FAULTS {
         if let Place::Json { pointer } = fault.place {
-            plant_one(house, fault.name, pointer);
+            plant_in_json(house, fault.name, pointer);
         }
     }
 }
 
-fn plant_one(house: &mut Value, name: &str, pointer: &str) {
-    let push = |house: &mut Value, key: &str, entry: Value| {
-        house[key].as_array_mut().expect("the house has these lists").push(entry);
+fn plant_in_json(house: &mut Value, name: &str, pointer: &str) {
+    fn list<'a>(house: &'a mut Value, pointer: &str) -> &'a mut Vec<Value> {
+        house.pointer_mut(pointer).unwrap().as_array_mut().unwrap()
+    }
+    let remove = |house: &mut Value, key: &str| {
+        house.pointer_mut(pointer).unwrap().as_object_mut().unwrap().remove(key).unwrap();
     };
     match name {
-        // Faults that add or remove an entry.
         "furniture_uid_repeated" => {
             let mut again = house["furniture"][21].clone();
             again["jid"] = house["furniture"][20]["jid"].clone();
-            push(house, "furniture", again);
+            list(house, "/furniture").push(again);
         }
         "material_uid_repeated" => {
             let mut again = house["material"][0].clone();
             again["color"] = json!([255, 0, 255, 255]);
             again["jid"] = "local".into();
-            push(house, "material", again);
+            list(house, "/material").push(again);
         }
         "child_without_record" => {
-            let children = house["scene"]["room"][2]["children"].as_array_mut().expect("rooms have children");
+            let children = list(house, "/scene/room/2/children");
             let mut child = children[24].clone();
             child["ref"] = "9999/model".into();
             child["instanceid"] = "furniture/199".into();
             children.push(child);
         }
-        "category_missing" => {
-            let record = house.pointer_mut(pointer).and_then(Value::as_object_mut);
-            record.expect("the table's pointers resolve in the house").remove("category");
+        "category_missing" => remove(house, "category"),
+        "valid_missing" => remove(house, "valid"),
+        // Its model is not in the library in any case.
+        "model_folder_missing" => house["furniture"][27]["valid"] = true.into(),
+        "mesh_normals_not_unit" => {
+            let mesh = &house.pointer(pointer.strip_suffix("/normal").unwrap()).unwrap();
+            let moved = shifted_positions(mesh);
+            *list(house, pointer) = moved;
         }
-        // Faults that change a value in its place.
-        _ => {
-            let normals = pointer.strip_suffix("/normal").and_then(|mesh| house.pointer(mesh)).map(shifted_positions);
-            let place = house.pointer_mut(pointer).expect("the table's pointers resolve in the house");
-            spoil(place, name, normals);
+        "mesh_normals_short" => {
+            let normals = list(house, pointer);
+            normals.truncate(normals.len() - 3);
         }
+        "mesh_uv_null" => list(house, pointer)[..2].fill(Value::Null),
+        "mesh_index_out_of_range" => list(house, pointer)[5] = json!(999),
+        // One triangle names a vertex twice, the other has two vertices at one position.
+        "mesh_zero_area" => list(house, pointer).extend([0, 0, 1, 2, 3, 4].map(Value::from)),
+        // Sound houses have these too.
+        "valid_false" | "material_jid_local" | "room_without_ceiling" => {}
+        _ => *house.pointer_mut(pointer).unwrap() = faulty_value(name),
     }
 }
 
 /// A mesh's positions moved by one along z, which some walls of the data have as normals.
-fn shifted_positions(mesh: &Value) -> Value {
+fn shifted_positions(mesh: &Value) -> Vec<Value> {
     let moved = |(place, value): (usize, &Value)| {
-        let value = value.as_f64().expect("positions are numbers");
-        super::json_number::number(if place % 3 == 2 { value - 1.0 } else { value })
+        let value = value.as_f64().unwrap();
+        number(if place % 3 == 2 { value - 1.0 } else { value })
     };
-    mesh["xyz"].as_array().into_iter().flatten().enumerate().map(moved).collect()
+    mesh["xyz"].as_array().unwrap().iter().enumerate().map(moved).collect()
 }
 
-/// Replaces a value by a faulty one. `name` is the fault's.
-fn spoil(value: &mut Value, name: &str, normals: Option<Value>) {
-    let spoilt = match name {
+/// The value that stands in the place of a sound one.
+fn faulty_value(name: &str) -> Value {
+    match name {
         "category_chinese" => json!("抽屉柜"),
         "category_null" => Value::Null,
         "material_texture_object" => json!({"value": ""}),
         "material_normal_texture" => json!("https://example.invalid/normal.png"),
         "material_use_color" => json!(true),
-        "material_folder_missing" => uids::texture(900).into(),
+        "material_folder_missing" => json!("cc0a0000-5a3b-4e00-8000-000000000900"),
         "material_jid_empty" | "mesh_type_empty" => json!(""),
-        "mesh_normals_not_unit" => normals.expect("the pointer names normals"),
         "mesh_aid_text" => json!("101000000005"),
-        "mesh_material_dangles" => format!("{}9", materials::uid("cabinet")).into(),
+        "mesh_material_dangles" => json!("101000000003/000119"),
         "mesh_without_faces" => json!([]),
         "scale_uneven" => json!([1.3, 1, 0.9]),
         "rotation_not_unit" => json!([0, 0.5, 0, 1.5]),
         "pieces_intersect" => json!([4.95, 0, 7.5]),
         "scale_mirrors" => json!([-1, 1, 1]),
         "scale_tiny" => json!([1e-6, 1e-6, 1e-6]),
-        _ => return spoil_list(value, name),
-    };
-    *value = spoilt;
+        _ => panic!("no code plants the fault {name}"),
+    }
 }
 
-/// Changes some numbers of a list. Does nothing for faults that the sound house already contains.
-fn spoil_list(value: &mut Value, name: &str) {
-    let Some(list) = value.as_array_mut() else { return };
+/// Damages the files of models below `root`, which are sound. Textures that were not written stay missing.
+pub(super) fn damage_files(house: &House, root: &Path) {
+    for fault in FAULTS {
+        let Place::File { path } = fault.place else { continue };
+        let path = root.join(path);
+        let texture = path.with_file_name("texture.png");
+        match fault.name {
+            "model_drop_shadow" | "texture_alpha_zero" | "texture_grey_alpha" | "texture_missing"
+            | "texture_truncated" => {
+                if texture.exists() {
+                    damage_texture(house, fault.name, &texture);
+                }
+            }
+            _ => {
+                let text = std::fs::read_to_string(&path).unwrap();
+                std::fs::write(&path, damaged_text(fault.name, &text)).unwrap();
+            }
+        }
+    }
+}
+
+fn damage_texture(house: &House, name: &str, path: &Path) {
+    let jid = path.parent().unwrap().file_name().unwrap().to_str().unwrap();
+    let model = house.models.iter().find(|model| model.jid() == jid).unwrap();
+    let picture = swatches::picture(&model.swatches, model.side);
     match name {
-        "mesh_uv_null" => list[..2].fill(Value::Null),
-        "mesh_index_out_of_range" => list[5] = json!(999),
-        // One triangle names a vertex twice, the other has two vertices at one position.
-        "mesh_zero_area" => list.extend([0, 0, 1, 2, 3, 4].map(Value::from)),
-        "mesh_normals_short" => list.truncate(list.len() - 3),
-        _ => {}
+        "texture_alpha_zero" => write_rgba_bytes(path, &picture.map(|[r, g, b, _]| [r, g, b, 0])).unwrap(),
+        "texture_grey_alpha" => write_grey_alpha_bytes(path, &picture.map(|[r, _, _, a]| [r, a])).unwrap(),
+        "texture_missing" => std::fs::remove_file(path).unwrap(),
+        "texture_truncated" => {
+            let bytes = std::fs::read(path).unwrap();
+            std::fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+        }
+        // The shadow is the second field, at the upper right.
+        "model_drop_shadow" => {
+            let half = model.side / 2;
+            let at = |texel: usize| ((texel % half) as f64 + 0.5) / half as f64;
+            let painted = Picture::from_fn(model.side, model.side, |x, y| {
+                if x >= half && y < half { [0, 0, 0, shadow_opacity(at(x), at(y))] } else { picture.get(x, y) }
+            });
+            write_rgba_bytes(path, &painted).unwrap();
+        }
+        _ => panic!("no code plants the fault {name}"),
     }
 }
 
-/// The text of `FAULTS.txt`.
-pub(super) fn text() -> String {
-    let mut text = String::from(
-        "What is wrong with this house, on purpose: one of each kind that 3D-FRONT and 3D-FUTURE show.\n\
-         Places are JSON pointers into the house's file, or files.\n\n",
-    );
-    for Fault { name, place, what } in FAULTS {
-        let (Place::Json { pointer: place } | Place::File { path: place }) = place;
-        text.push_str(&format!("{name}\n    {place}\n    {what}\n"));
+/// The opacity of a painted shadow. As in the data: 40 to 51 nearly everywhere, less at the edge, more under the middle.
+fn shadow_opacity(u: f64, v: f64) -> u8 {
+    let edge = u.min(1.0 - u).min(v.min(1.0 - v));
+    if edge < 0.08 {
+        (edge / 0.08 * 45.0) as u8
+    } else if edge > 0.4 {
+        193
+    } else {
+        45
     }
-    text
+}
+
+/// The text of an OBJ, of an MTL or of the list of models with a fault.
+fn damaged_text(name: &str, text: &str) -> String {
+    let lines = |change: &dyn Fn(&str) -> String| text.lines().map(|line| change(line) + "\n").collect::<String>();
+    match name {
+        "model_not_listed" => {
+            let mut list: Vec<Value> = serde_json::from_str(text).unwrap();
+            list.retain(|entry| entry["model_id"] != "cc0f0000-5a3b-4e00-8000-000000000021");
+            mateval_scene::json::to_text(&list)
+        }
+        "mtl_misleads" => {
+            let black = text.replace("Ka 0.588 0.588 0.588", "Ka 0 0 0").replace("Kd 0.588 0.588 0.588", "Kd 0 0 0");
+            black.replace("Tf 0 0 0", "Tf 1 1 1").replace("Ke 0 0 0", "Ke 1 1 1")
+        }
+        "model_shadow" => text.replace("g solid_002\n", "g Shadow_001\n"),
+        "model_centimetres" => lines(&|line| {
+            let Some(metres) = line.strip_prefix("v ") else { return line.to_owned() };
+            let metres = metres.split(' ').map(|number| number.parse::<f64>().unwrap());
+            metres.fold("v".to_owned(), |line, metres| format!("{line} {:.5}", 100.0 * metres))
+        }),
+        "obj_quads" => with_quads(text),
+        "obj_blanks" => text.replace("\nv ", "\nv  ").replace("\nf ", "\nf  "),
+        "obj_three_uvs" => {
+            lines(&|line| if line.starts_with("vt ") { format!("{line} 0.00000\r") } else { format!("{line}\r") })
+        }
+        "obj_without_materials" => {
+            let names_one = |line: &&str| ["mtllib ", "usemtl ", "s "].iter().any(|word| line.starts_with(word));
+            text.split_inclusive('\n').filter(|line| !names_one(line)).collect()
+        }
+        // The mat's shape is flat.
+        "model_flat" => text.to_owned(),
+        _ => panic!("no code plants the fault {name}"),
+    }
+}
+
+/// Joins two triangles that follow each other to a quad if they are the two of a fan.
+fn with_quads(text: &str) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for line in text.lines() {
+        let words = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        if let Some(last) = lines.last_mut()
+            && let ([f, a, _, b], [g, c, d, e]) = (&words(last)[..], &words(line)[..])
+            && [f, g] == ["f", "f"]
+            && [a, b] == [c, d]
+        {
+            *last = format!("{last} {e}");
+            continue;
+        }
+        lines.push(line.to_owned());
+    }
+    lines.join("\n") + "\n"
 }
