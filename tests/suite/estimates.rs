@@ -124,7 +124,9 @@ fn encodings_that_authors_do_not_state_are_in_submission_json() {
         png_io::write_rgb_bytes(&room.join(name), &bytes).unwrap();
     }
     let [marked, plain] = ["marked", "plain"].map(|name| folder.path().join(name));
-    nn(folder.path(), "mvinverse", &marked).ends_with(0);
+    nn(folder.path(), "mvinverse", &marked)
+        .ends_with(0)
+        .says("the adapter 'mvinverse' reads base_color as linear, roughness as linear, metallic as linear");
     let file = json(&marked.join("submission.json"));
     let expected = json!({ "base_color": "linear", "roughness": "linear", "metallic": "linear" });
     assert_eq!(file["assumed_encodings"], expected);
@@ -134,7 +136,9 @@ fn encodings_that_authors_do_not_state_are_in_submission_json() {
     let found = lint(&marked);
     assert!(!found.stdout.contains("assumed_encodings"), "{}", found.stdout);
     // Twin: the encodings of `plain` are stated, and another word is an error.
-    nn(folder.path(), "plain", &plain).ends_with(0);
+    nn(folder.path(), "plain", &plain)
+        .ends_with(0)
+        .says("the adapter 'plain' reads base_color as srgb, roughness as linear, metallic as linear");
     assert!(json(&plain.join("submission.json")).get("assumed_encodings").is_none());
     let wrong = file.to_string().replace("\"linear\"", "\"log\"");
     std::fs::write(marked.join("submission.json"), wrong).unwrap();

@@ -104,6 +104,12 @@ impl Adapter {
         assumed.map(|(map, file, _)| (map, file.encoding)).collect()
     }
 
+    /// The encoding by which each map is decoded, such as `base_color as srgb, roughness as linear`.
+    pub fn encodings(&self) -> String {
+        let words = self.maps().map(|(map, file, _)| format!("{} as {}", map.stem(), file.encoding));
+        words.collect::<Vec<_>>().join(", ")
+    }
+
     /// The number of scenes that have each map, such as `base_color of 2 scenes, roughness of none`.
     pub fn inventory(&self, folder: &Path, scenes: &[&str]) -> String {
         let count = |file: &AdaptedFile| scenes.iter().filter(|scene| file.path(folder, scene).is_ok()).count();

@@ -7,6 +7,8 @@ use mateval_baselines::adapter::Adapter;
 use mateval_baselines::delight::CandidateLights;
 use mateval_baselines::estimate_source::EstimateSource;
 
+use crate::outcome::say;
+
 /// An estimate and the format of its files.
 #[derive(clap::Args)]
 pub struct EstimateArgs {
@@ -28,7 +30,8 @@ impl EstimateArgs {
         self.estimate.is_some()
     }
 
-    /// The chosen source; `default` where none was given.
+    /// The chosen source; `default` where none was given. Of a folder, the encodings that its files are read with are
+    /// printed: a wrong one leaves every map valid.
     pub fn source(&self, default: EstimateSource) -> anyhow::Result<EstimateSource> {
         let named = self.estimate.as_ref().map(|path| path.to_string_lossy());
         let source = match (named.as_deref(), &self.adapter) {
@@ -48,6 +51,13 @@ impl EstimateArgs {
                         "--estimate '{shown}' does not exist; expected gt, input, delight or a folder of a method's pictures"
                     );
                 }
+                say(&format!(
+                    "'{}': the adapter '{}' reads {}; `mateval baseline encoding` checks this where the ground truth is at \
+                     hand",
+                    folder.display(),
+                    adapter.name,
+                    adapter.encodings()
+                ));
                 EstimateSource::Files { folder, adapter }
             }
         };

@@ -5,8 +5,8 @@
 //!
 //! Between: `tree` lists the folder; `submission_json` and `layout` compare names with the dataset; `map_remarks`
 //! judges the headers of maps that can be read. The maps are then compared with the input picture: `sight` finds which
-//! texel each pixel shows, `looks` what the maps hold there, and `orientation`, `colours`, `shading`, `scalars`,
-//! `unobserved` and `copies` judge that. `scene` runs all of this for one scene, `whole_submission` for all.
+//! texel each pixel shows, `looks` what the maps hold there, and `orientation`, `colours`, `readings`, `shading`,
+//! `scalars`, `unobserved` and `copies` judge that. `scene` runs all of this for one scene, `whole_submission` for all.
 //!
 //! An error is something that scoring refuses or replaces by a default. A warning is scored, but probably a mistake. A
 //! note is for information. Evidence from pictures is never an error; the message states it.
@@ -26,6 +26,7 @@ mod map_remarks;
 mod names;
 mod orientation;
 mod plan;
+mod readings;
 mod scalars;
 mod scene;
 mod shading;

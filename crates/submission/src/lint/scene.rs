@@ -12,6 +12,7 @@ use super::finding::{error, note};
 use super::instance_facts::InstanceFacts;
 use super::looks::{Look, looks, scalar_looks};
 use super::plan::LintPlan;
+use super::readings::{Readings, readings};
 use super::sight::{InstanceSight, Sight};
 use super::unobserved::fill;
 use super::{map_remarks, orientation, scalars, shading, unobserved};
@@ -32,8 +33,9 @@ pub(super) struct SceneFindings {
     pub(super) findings: Vec<Finding>,
     /// How many maps could be decoded.
     pub(super) maps: usize,
-    /// Not among the findings: it is judged over all scenes.
+    /// Not among the findings: both are judged over all scenes.
     pub(super) decoding: Decoding,
+    pub(super) readings: Readings,
 }
 
 /// Checks one scene. A scene that the submission leaves out has no findings here.
@@ -51,12 +53,12 @@ pub(super) fn check(plan: &LintPlan<'_>, scene: &SceneFile) -> Result<SceneFindi
     }
     let maps = all.iter().map(|facts| facts.maps).sum();
     let mut findings: Vec<Finding> = all.iter_mut().flat_map(|facts| std::mem::take(&mut facts.findings)).collect();
-    let (together, decoding) = together(scene, &sight, &all);
+    let (together, decoding, readings) = together(scene, &sight, &all);
     findings.extend(together);
-    Ok(SceneFindings { findings, maps, decoding })
+    Ok(SceneFindings { findings, maps, decoding, readings })
 }
 
-fn together(scene: &SceneFile, sight: &Sight, all: &[InstanceFacts]) -> (Vec<Finding>, Decoding) {
+fn together(scene: &SceneFile, sight: &Sight, all: &[InstanceFacts]) -> (Vec<Finding>, Decoding, Readings) {
     let place = format!("scenes/{}", scene.id);
     let mut findings = Vec::new();
     if all.iter().map(|facts| facts.bytes).sum::<usize>() > MAX_SCENE_BYTES {
@@ -78,7 +80,7 @@ fn together(scene: &SceneFile, sight: &Sight, all: &[InstanceFacts]) -> (Vec<Fin
     findings.extend(scalars::check(&place, all));
     findings.extend(unobserved::check(&place, all.iter().filter_map(|facts| facts.fill.as_ref())));
     findings.extend(copies(&place, all.iter().map(|facts| facts.copies)));
-    (findings, decoding)
+    (findings, decoding, readings(&looks))
 }
 
 fn instance(

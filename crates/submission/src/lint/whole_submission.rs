@@ -7,7 +7,7 @@ use mateval_scene::{Finding, Progress, Report};
 use super::file::LintFile;
 use super::plan::LintPlan;
 use super::tree::Tree;
-use super::{colours, fold, layout, scene, submission_json};
+use super::{colours, fold, layout, readings, scene, submission_json};
 use crate::error::SubmissionError;
 
 /// Checks a submission. Fails where its folder or the dataset's public files cannot be read.
@@ -24,15 +24,21 @@ pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, Sub
     }
     let scenes = &plan.dataset.scenes;
     let mut maps = 0;
-    let mut decodings = Vec::new();
+    let (mut decodings, mut all_readings) = (Vec::new(), Vec::new());
     for (at, scene) in scenes.iter().enumerate() {
         progress(Report::part("scenes checked", at, scenes.len()));
         let found = scene::check(plan, scene)?;
         findings.extend(found.findings);
         decodings.push(found.decoding);
+        all_readings.push(found.readings);
         maps += found.maps;
     }
-    findings.extend(colours::mostly_wrong(decodings));
+    let wrong = colours::mostly_wrong(decodings);
+    if wrong.is_empty() {
+        // Hues, where they decide, also say which kind of file is wrong.
+        findings.extend(readings::check(&all_readings));
+    }
+    findings.extend(wrong);
     progress(Report::part("scenes checked", scenes.len(), scenes.len()));
     Ok(report(plan.dataset, &plan.tool, method, maps, findings))
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mateval_image::exr_io::{self, Precision};
-use mateval_image::transfer::linear_from_srgb;
+use mateval_image::transfer::{linear_from_srgb, srgb_from_linear};
 use mateval_image::{LinearRgb, Picture, png_io};
 
 use super::{Fault, NOTE, WARNING, every};
@@ -48,6 +48,15 @@ fn swap_files(root: &Path) {
     }
 }
 
+/// Writes every base colour as an EXR whose values are `linear` of the encoded ones.
+fn into_exr(root: &Path, linear: fn(f32) -> f32) {
+    for path in every(root, "base_color.png") {
+        let values = bytes(&path).map(|rgb| LinearRgb(rgb.map(|byte| linear(f32::from(byte) / 255.0))));
+        std::fs::remove_file(&path).unwrap();
+        exr_io::write_linear(&path.with_extension("exr"), &values, Precision::Half).unwrap();
+    }
+}
+
 /// Replaces the good submission by another one.
 fn instead(root: &Path, write: impl Fn(&Path)) {
     std::fs::remove_dir_all(root).unwrap();
@@ -64,13 +73,13 @@ pub const FAULTS: &[Fault] = &[
         let linear = |byte: u8| (linear_from_srgb(f32::from(byte) / 255.0) * 255.0).round() as u8;
         change(root, |picture| picture.map(|rgb| rgb.map(linear)));
     }),
-    ("srgb_in_exr", WARNING, |root| {
-        for path in every(root, "base_color.png") {
-            let stored = bytes(&path).map(|rgb| LinearRgb(rgb.map(|byte| f32::from(byte) / 255.0)));
-            std::fs::remove_file(&path).unwrap();
-            exr_io::write_linear(&path.with_extension("exr"), &stored, Precision::Half).unwrap();
-        }
+    ("srgb_in_exr", WARNING, |root| into_exr(root, |encoded| encoded)),
+    // As lifted from a float picture of sRGB numbers by an adapter that states linear ones, and the reverse.
+    ("encoded_twice", WARNING, |root| {
+        let encoded = |byte: u8| (srgb_from_linear(f32::from(byte) / 255.0) * 255.0).round() as u8;
+        change(root, |picture| picture.map(|rgb| rgb.map(encoded)));
     }),
+    ("decoded_twice", WARNING, |root| into_exr(root, |encoded| linear_from_srgb(linear_from_srgb(encoded)))),
     ("shading_baked_in", WARNING, |root| instead(root, write_from_photo)),
     ("swapped_roughness_metallic", WARNING, swap_files),
     ("same_roughness_metallic", WARNING, |root| {
