@@ -35,7 +35,8 @@ fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     assert_eq!(std::fs::read(&result).unwrap(), whole);
 
     // The three commands that it ends with.
-    let commands: Vec<&str> = first.stdout.lines().filter(|line| line.starts_with("  mateval ")).collect();
+    let whole = first.stdout.replace(" \\\n", " ");
+    let commands: Vec<&str> = whole.lines().filter(|line| line.starts_with("  mateval ")).collect();
     assert_eq!(commands.len(), 3, "{}", first.stdout);
     for line in commands {
         run(mateval().args(line.split_whitespace().skip(1))).ends_with(0);

@@ -437,13 +437,26 @@ fn next_commands(places: &Places, options: &Options) -> String {
     .map(|path| quoted(&path));
     let others: Vec<String> = ranked.iter().map(|baseline| quoted(&places.result(*baseline))).collect();
     let ceiling = ceiling.map_or_else(String::new, |ceiling| format!(" --ceiling {}", quoted(&ceiling)));
-    format!(
-        "\nNext, score one more method and put it on a board:\n\n  \
-         mateval baseline median --dataset {dataset} --out {submission}\n  \
-         mateval eval score {submission} --dataset {dataset} --out {result}\n  \
-         mateval eval leaderboard {} {result}{ceiling} --out {board}\n",
-        others.join(" ")
-    )
+    let commands = [
+        format!("mateval baseline median --dataset {dataset} --out {submission}"),
+        format!("mateval eval score {submission} --dataset {dataset} --out {result}"),
+        format!("mateval eval leaderboard {} {result}{ceiling} --out {board}", others.join(" ")),
+    ];
+    let shown: String = commands.iter().map(|command| continued(command)).collect();
+    format!("\nNext, score one more method and put it on a board:\n\n{shown}")
+}
+
+/// A command, indented, over as many lines of a terminal of 80 columns as it needs.
+fn continued(command: &str) -> String {
+    let (mut text, mut line) = (String::new(), " ".to_owned());
+    for word in command.split(' ') {
+        if line.chars().count() + word.chars().count() > 76 {
+            text.push_str(&format!("{line} \\\n"));
+            line = "     ".to_owned();
+        }
+        line.push_str(&format!(" {word}"));
+    }
+    format!("{text}{line}\n")
 }
 
 /// A path as a word of a shell.
