@@ -117,7 +117,11 @@ fn pack(mesh: &TriangleMesh, size: u32) -> Result<AtlasLayout, AtlasError> {
         unmapped: 0,
         triangles: unwrapped.indices.as_chunks::<3>().0.to_vec(),
         source_vertices: unwrapped.vertices.iter().map(|vertex| vertex.xref).collect(),
-        uvs: unwrapped.vertices.iter().map(|vertex| [vertex.uv[0] * texels[0], 1.0 - vertex.uv[1] * texels[1]]).collect(),
+        uvs: unwrapped
+            .vertices
+            .iter()
+            .map(|vertex| [vertex.uv[0] * texels[0], 1.0 - vertex.uv[1] * texels[1]])
+            .collect(),
     };
     let has_chart: Vec<bool> = unwrapped.vertices.iter().map(|vertex| vertex.chart.is_some()).collect();
     place_unmapped(&mut layout, &has_chart);

@@ -102,9 +102,8 @@ fn brightness(looks: &[Look]) -> Option<[f64; 3]> {
     let coloured: Vec<[f32; 3]> =
         looks.iter().map(Look::own).filter(|rgb| Reading::AsTheyAre.luminance(*rgb) < WHITE).collect();
     let count = coloured.len() as f64;
-    let mean = |reading: Reading| {
-        coloured.iter().map(|rgb| reading.luminance(*rgb).max(DARKEST).ln()).sum::<f64>() / count
-    };
+    let mean =
+        |reading: Reading| coloured.iter().map(|rgb| reading.luminance(*rgb).max(DARKEST).ln()).sum::<f64>() / count;
     (count >= LEAST_COLOURED * looks.len() as f64).then(|| Reading::ALL.map(mean))
 }
 
@@ -167,9 +166,8 @@ pub(super) fn check(scenes: &[Readings]) -> Option<Finding> {
 
 /// The mean of each reading's numbers; none without any.
 fn means(scenes: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
-    let (sums, count) = scenes.fold(([0.0; 3], 0), |(sums, count), numbers| {
-        (std::array::from_fn(|at| sums[at] + numbers[at]), count + 1)
-    });
+    let (sums, count) = scenes
+        .fold(([0.0; 3], 0), |(sums, count), numbers| (std::array::from_fn(|at| sums[at] + numbers[at]), count + 1));
     (count > 0).then(|| sums.map(|sum| sum / f64::from(count)))
 }
 
