@@ -199,8 +199,8 @@ fn shows_in_file(name: &str, path: &Path) -> bool {
     };
     match name {
         "model_not_listed" => {
-            !text().contains(&"cc0f0000-5a3b-4e00-8000-000000000021")
-                && text().contains(&"cc0f0000-5a3b-4e00-8000-000000000020")
+            !text().contains("cc0f0000-5a3b-4e00-8000-000000000021")
+                && text().contains("cc0f0000-5a3b-4e00-8000-000000000020")
         }
         "texture_alpha_zero" => alphas(path).iter().all(|alpha| *alpha == 0),
         "texture_grey_alpha" => png_reader(path).info().color_type == png::ColorType::GrayscaleAlpha,
