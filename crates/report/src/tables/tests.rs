@@ -105,13 +105,13 @@ fn text_is_aligned_and_fits_a_terminal() {
     let expected = "\
 RGB, true light
 
-                        Novel
-         Input   Input  views
-          view    view    MSE
-Method  PSNR ↑  SSIM ↑  (1e-3) ↓
-a|1      10.00  0.5000   100.000
-b_2      40.00  missing   25.000
-c\"3      20.00  0.5000    50.000
+                            Novel
+         Input    Input     views
+          view     view       MSE
+Method  PSNR ↑   SSIM ↑  (1e-3) ↓
+a|1      10.00   0.5000   100.000
+b_2      40.00  missing    25.000
+c\"3      20.00   0.5000    50.000
 ";
     let text = shown(&three(), Grouping::Dataset, TableFormat::Text { bold: false });
     assert_eq!(text, expected);
