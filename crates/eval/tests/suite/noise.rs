@@ -132,7 +132,8 @@ fn of_several_views_too() {
         let [ratio, twin] = [&together as &dyn Fn(&[NoiseFreeMse]) -> f64, &apart]
             .map(|error| Found::new(all.iter().map(|views| (db(views), error(views)))).ratio());
         println!("{} samples: {ratio:.2}, views apart {twin:.2}", level.samples);
-        assert!((0.8..=1.25).contains(&ratio) && twin < 0.95 * ratio, "{} samples: {ratio}, {twin}", level.samples);
+        // A spread over forty seeds has a standard error of 11 %, and three of them are allowed.
+        assert!((0.7..=1.45).contains(&ratio) && twin < 0.95 * ratio, "{} samples: {ratio}, {twin}", level.samples);
     }
 }
 
