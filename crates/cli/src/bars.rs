@@ -30,26 +30,26 @@ struct State {
     parts: usize,
     /// What the last part is called.
     part: String,
-    /// What the bar counts, for the time that is left.
+    /// The pace of the pieces that the bar counts, from which the remaining time is estimated.
     measure: Option<Measure>,
     /// When the last line was printed where stderr is no terminal.
     printed: Instant,
 }
 
-/// The pace of the pieces that the bar counts.
+/// Progress since the first report of a step.
 struct Measure {
-    /// The name of the step, or none where the bar counts parts, each of which has a name of its own.
+    /// The name of the step; absent if the bar counts parts, which have names of their own.
     step: Option<String>,
-    /// Pieces that were finished when the first report came, such as those of an earlier run.
+    /// Pieces that were finished at the first report, such as those of an earlier run.
     before: usize,
     since: Instant,
 }
 
-/// The least number of pieces from whose pace the time that is left is reckoned: one piece says little about the next.
+/// Fewest measured pieces that allow an estimate of the remaining time, since single pieces differ.
 const LEAST_MEASURED: usize = 10;
 
 impl Measure {
-    /// `, 20 seconds left`, or nothing as long as too few pieces were measured.
+    /// `, 20 seconds left`, or an empty text while too few pieces were measured.
     fn time_left(&self, done: usize, total: usize, now: Instant) -> String {
         let measured = done.saturating_sub(self.before);
         if measured < LEAST_MEASURED {

@@ -1,7 +1,7 @@
 //! `mateval demo`: every step from the built-in sample to a leaderboard.
 //!
-//! Every step keeps what it finds finished in the demo's folder, so that a demo that failed or was killed resumes when it
-//! is run again with the same options, and one that was finished shows its table again.
+//! Every step keeps the finished files in the demo's folder. So a demo that failed or was killed resumes when it is run
+//! again with the same options, and a finished one shows its table again.
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -104,7 +104,7 @@ const SHOWN_SAMPLES: std::ops::RangeInclusive<u32> = 2..=16;
 const SMALL: [u32; 2] = [160, 120];
 const LARGE: [u32; 2] = [320, 240];
 
-/// What decides the content of a demo's folder.
+/// The options on which the content of a demo's folder depends.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Options {
     tool: String,
@@ -195,7 +195,7 @@ impl Args {
     }
 }
 
-/// The renderer that was named, else the one that an earlier demo in this folder used, else Blender where it can be used.
+/// The named renderer, else that of an earlier demo in this folder, else Blender if it can be used, else the built-in one.
 fn choose_renderer(args: &Args, places: &Places) -> anyhow::Result<(RendererKind, Renderer)> {
     let earlier = || json::read::<Options>(&places.options).ok().filter(|_| !args.force);
     if let Some(kind) = args.renderer.or_else(|| earlier().map(|options| options.renderer)) {
@@ -373,7 +373,7 @@ fn score_submissions(
     Ok(format!("{} results", options.baselines.len()))
 }
 
-/// The results of methods and, unless there is nothing below it, that of the truth.
+/// The baselines that are ranked, and the result of the truth as their ceiling, if it is not the only baseline.
 fn results_and_ceiling(places: &Places, options: &Options) -> (Vec<DemoBaseline>, Option<PathBuf>) {
     let has_ceiling = options.baselines.len() > 1 && options.baselines.contains(&DemoBaseline::Gt);
     let ranked = options.baselines.iter().copied().filter(|baseline| !has_ceiling || *baseline != DemoBaseline::Gt);
@@ -405,7 +405,7 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
     Ok(format!("{} methods, pictures of {} scenes", ranked.len(), dataset.scenes.len()))
 }
 
-/// Prints the results, where the page is, and what to try next.
+/// Prints the table, the address of the leaderboard and the next commands.
 fn close(places: &Places, options: &Options, dataset: &Dataset, full: bool) -> anyhow::Result<()> {
     let (ranked, ceiling) = results_and_ceiling(places, options);
     let read = |path: PathBuf| ResultFile::read(&path);

@@ -65,7 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     bail!(last)
 }
 
-/// Fails with the reason where this Python has no module of Blender that can be imported.
+/// Fails with the reason if this Python cannot import Blender's module.
 pub fn check_blender(python: &Path) -> anyhow::Result<()> {
     run_script(python, BLENDER, &["--check".into()], "correct --blender or MATEVAL_BLENDER").map(drop)
 }
@@ -92,8 +92,8 @@ fn fetch(args: &Args, download: Download, python: &Path) -> anyhow::Result<()> {
     print(&run_script(python, script, &words, without)?)
 }
 
-/// Runs a script and returns what it printed to stdout. Its messages are passed on to stderr, except for its error, which
-/// is returned. `without` says what to do where this Python does not exist.
+/// Runs a script and returns its stdout. Its messages are passed on to stderr, except for its error, which is returned.
+/// `without` is the hint if this Python does not exist.
 fn run_script(python: &Path, script: &str, words: &[OsString], without: &str) -> anyhow::Result<String> {
     let shown = python.display();
     let mut command = Command::new(python);

@@ -30,8 +30,8 @@ impl EstimateArgs {
         self.estimate.is_some()
     }
 
-    /// The chosen source; `default` where none was given. Of a folder, the encodings that its files are read with are
-    /// printed: a wrong one leaves every map valid.
+    /// The chosen source; `default` if none was given. For a folder it prints the encodings by which files are read,
+    /// because maps that are read by a wrong one are valid too.
     pub fn source(&self, default: EstimateSource) -> anyhow::Result<EstimateSource> {
         let named = self.estimate.as_ref().map(|path| path.to_string_lossy());
         let source = match (named.as_deref(), &self.adapter) {

@@ -39,7 +39,7 @@ PACKAGES = {
     "libXrender.so.1": "libxrender1",
     "libxkbcommon.so.0": "libxkbcommon0",
 }
-# Prints the module's file, and why it cannot be imported. bpy 4.5 may hang in an ordinary exit.
+# Prints the module's file, and the reason if it cannot be imported. bpy 4.5 may hang in an ordinary exit.
 PROBE = """
 import importlib.util, os
 spec = importlib.util.find_spec("bpy")
@@ -73,7 +73,7 @@ def python_3_11() -> str:
     if sys.version_info[:2] == (3, 11):
         return sys.executable
     found = shutil.which(PYTHON)
-    # A program of that name may be pyenv's, which only says that no such version is chosen.
+    # A program of that name may be a shim of pyenv's that only reports that no such version is selected.
     if found is None or run_quietly(command=[found, "-c", ""]).returncode != 0:
         running = ".".join(map(str, sys.version_info[:2]))
         raise FetchError(
@@ -119,7 +119,7 @@ def is_installed(*, folder: Path, requirements: str) -> bool:
 
 
 def missing_libraries(*, module: str, problem: str) -> list[str]:
-    """Returns the libraries that the module lacks: those that ldd does not find, or else the one that Python names."""
+    """Returns the missing libraries of the module: those that ldd does not find, or else the one that Python names."""
     ldd = shutil.which("ldd")
     listed = run_quietly(command=[ldd, module]).stdout if ldd else ""
     missing = re.findall(r"^\s*(\S+) => not found", listed, re.MULTILINE)

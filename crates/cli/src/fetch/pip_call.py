@@ -1,4 +1,4 @@
-"""Calls pip, and ends a script: what `lpips_weights.py` and `blender_module.py` share.
+"""Calls pip and turns errors into exit codes, for `lpips_weights.py` and `blender_module.py`.
 
 `mateval` gives Python the scripts as text, and this text as their module `pip_call`.
 """
@@ -16,12 +16,12 @@ NO_PIP = (
     "'{python}' has no pip; install it (on Debian, as root: apt-get install python3-pip), or set MATEVAL_PYTHON to a "
     "Python that has it"
 )
-# Words in pip's messages, in lower case, and the cause that they point to. The first that occurs counts.
+# Words in pip's messages, in lower case, and their cause. The first that occurs counts.
 CAUSES = (
     ("no module named pip", NO_PIP),
     ("no space left on device", "the disk is full"),
     ("sslerror", "the package index was not reached: its certificate is not trusted here"),
-    ("connection broken", "the package index was not reached (is there a network?)"),
+    ("connection broken", "the package index was not reached (check the network)"),
     ("timed out", "the connection to the package index was lost"),
 )
 

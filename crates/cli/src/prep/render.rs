@@ -39,8 +39,7 @@ pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
     PossibleValuesParser::new(names).try_map(|name| name.parse::<RendererKind>())
 }
 
-/// The renderer with its options; fails where Blender is to render and cannot be found, or is a module that cannot be
-/// imported.
+/// The renderer with its options. For Blender, fails if it cannot be found, or is a module that cannot be imported.
 pub fn checked_renderer(kind: RendererKind, blender: &BlenderArgs) -> anyhow::Result<Renderer> {
     Ok(match kind {
         RendererKind::Builtin => Renderer::Builtin,

@@ -69,7 +69,7 @@ pub(super) fn packed(mesh: &TriangleMesh, wish: SizeWish) -> Result<AtlasLayout,
             packed => return packed,
         },
     };
-    // A texel of the wanted length fits as often as this along the side of a square that the charts fill.
+    // The search starts at the side of a square that the charts would fill up to `MOST_COVERAGE`.
     let mut size = ((area / MOST_COVERAGE).sqrt() / texel_m).clamp(f64::from(least), f64::from(most)) as u32;
     size = size.next_power_of_two();
     loop {
@@ -128,8 +128,8 @@ fn pack(mesh: &TriangleMesh, size: u32) -> Result<AtlasLayout, AtlasError> {
     Ok(layout)
 }
 
-/// Counts the triangles whose area is negligible, which have no chart, and moves all corners of each to one place: where
-/// none of its vertices has a chart, that of the first vertex that has one.
+/// Moves vertices without a chart, those of triangles whose area is negligible, to the first vertex that has one. Counts
+/// the triangles whose corners are at one point.
 fn place_unmapped(layout: &mut AtlasLayout, has_chart: &[bool]) {
     let first = has_chart.iter().position(|has| *has).map_or([0.0, 1.0], |vertex| layout.uvs[vertex]);
     for (vertex, _) in has_chart.iter().enumerate().filter(|(_, has)| !**has) {

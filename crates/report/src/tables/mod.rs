@@ -53,7 +53,7 @@ pub fn tables(
     filled(&layouts, results, ceiling, protocol, grouping, format)
 }
 
-/// The one table that says most: PSNR of albedo, under true light and relit, of the input view and novel ones. Otherwise
+/// The most informative table: PSNR of albedo, under true light and relit, of the input view and novel ones. Otherwise
 /// like [`tables()`].
 pub fn headline(
     results: &[ResultFile],

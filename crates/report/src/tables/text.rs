@@ -25,6 +25,7 @@ pub(super) fn text(table: &Table<'_>, bold: bool) -> String {
             })
         })
         .collect();
+    // Every column is as wide as its longest cell.
     let name_heads: Vec<&str> = table.group_head.into_iter().chain(["Method"]).collect();
     let name_widths: Vec<usize> = (0..name_heads.len())
         .map(|at| names.iter().map(|row| width(&row[at])).chain([width(name_heads[at])]).max().unwrap_or(0))
@@ -52,6 +53,7 @@ pub(super) fn text(table: &Table<'_>, bold: bool) -> String {
         });
         push_line(&mut text, names.chain(values));
     }
+    // The rows: names to the left, values to the right.
     for (row, row_names) in names.iter().enumerate() {
         let names = row_names.iter().zip(&name_widths).map(|(name, &wide)| padded(name, name, wide, false));
         let values = widths.iter().enumerate().map(|(at, &wide)| {

@@ -1,16 +1,15 @@
-//! Base colours that were encoded or decoded once too often, whatever file they are in, judged by what rooms have.
+//! Base colours that were encoded or decoded once too often, in files of any kind, found by comparison with typical rooms.
 //!
 //! If a method's pictures hold sRGB numbers and are lifted as if they were linear, or the reverse, all maps are valid and
-//! far too bright or too dark. [`super::colours`] compares hues and names the kind of file that was written wrongly. Here
-//! brightness decides, so that the kind of file does not matter and rooms without strong hues are judged too.
+//! far too bright or too dark. [`super::colours`] compares hues and names the kind of file that was written wrongly. This
+//! check compares brightness, so that the kind of file does not matter and rooms without strong hues are judged too.
 //!
 //! Base colours are read in three ways: as they are, decoded once more, and encoded once more. Two numbers of each
 //! reading are compared with those of rooms:
 //!
 //! - the mean of ln(luminance). Few surfaces of a room are nearly black or nearly white: for rooms that are lit by
 //!   electric light EN 12464-1 recommends reflectances of 0.7 to 0.9 for ceilings, 0.5 to 0.8 for walls, 0.2 to 0.7 for
-//!   furniture and 0.2 to 0.4 for floors. Encoding turns 0.3 into 0.58, and decoding
-//!   turns it into 0.07.
+//!   furniture and 0.2 to 0.4 for floors. Encoding turns 0.3 into 0.58, and decoding turns it into 0.07.
 //! - the slope of ln(picture) over ln(base colour), pixel by pixel. It is near 1, because light hardly depends on the base
 //!   colour that it falls on, and a little less, because glossy reflections brighten dark surfaces most. Encoding is close
 //!   to a power of 1 / 2.2 and doubles the slope; decoding halves it. Noise in the picture does not change it.
@@ -41,7 +40,7 @@ const DARKEST: f64 = 2e-3;
 const LEAST_CORRELATION: f64 = 0.35;
 const LEAST_CONTRAST: f64 = 0.05;
 
-/// What rooms have.
+/// The distribution of a number over rooms.
 struct Typical {
     mean: f64,
     deviation: f64,
@@ -51,8 +50,8 @@ struct Typical {
 /// built-in sample, six rooms of two 3D-FRONT houses, and three of Bitterli's scenes, at 96x72 and 320x240 pixels.
 const BRIGHTNESS: Typical = Typical { mean: -1.38, deviation: 0.37 };
 const SLOPE: Typical = Typical { mean: -0.18, deviation: 0.23 };
-/// Numbers further from [`Typical::mean`] count as this number of deviations. Alone, one that is typical in another
-/// reading then gains at most half the square of it, which is [`LEAST_GAIN`].
+/// Numbers further from [`Typical::mean`] count as this number of deviations. So a number that is typical in another
+/// reading gains at most half the square of it, which is [`LEAST_GAIN`], and does not suffice alone.
 const MOST_DEVIATIONS: f64 = 3.0;
 /// How much larger the log-likelihood of another reading must be for a warning.
 const LEAST_GAIN: f64 = 4.5;
@@ -81,11 +80,11 @@ impl Reading {
 /// The two numbers of a scene in each of [`Reading::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Readings {
-    /// How many pixels were measured.
+    /// Measured pixels.
     pixels: usize,
-    /// The mean of ln(luminance); none for a scene that is white.
+    /// The mean of ln(luminance); absent for a scene that is white.
     brightness: Option<[f64; 3]>,
-    /// ln of the slope; none without a picture, or where the base colours do not explain it.
+    /// ln of the slope; absent without a picture, or if the base colours do not explain it.
     slope: Option<[f64; 3]>,
 }
 
@@ -98,7 +97,7 @@ pub(super) fn readings(looks: &[Look]) -> Readings {
 }
 
 fn brightness(looks: &[Look]) -> Option<[f64; 3]> {
-    // Which pixels count must not depend on the reading.
+    // All readings use the same pixels.
     let coloured: Vec<[f32; 3]> =
         looks.iter().map(Look::own).filter(|rgb| Reading::AsTheyAre.luminance(*rgb) < WHITE).collect();
     let count = coloured.len() as f64;
@@ -133,14 +132,14 @@ fn against_photo(looks: &[Look], reading: Reading) -> Pairs {
     pairs
 }
 
-/// A finding where the base colours of the whole submission fit rooms clearly better in another reading. Numbers are means
-/// over scenes: a script that is wrong is wrong in all of them, and the accidents of single rooms cancel.
+/// A finding if the base colours of the whole submission are clearly closer to rooms in another reading. Numbers are means
+/// over scenes: a wrong script is wrong in all of them, and the peculiarities of single rooms cancel.
 pub(super) fn check(scenes: &[Readings]) -> Option<Finding> {
     let pixels: usize = scenes.iter().map(|scene| scene.pixels).sum();
     let brightness = means(scenes.iter().filter_map(|scene| scene.brightness))?;
     let slope = means(scenes.iter().filter_map(|scene| scene.slope))?;
     let fit = |at: usize| log_likelihood(brightness[at], &BRIGHTNESS) + log_likelihood(slope[at], &SLOPE);
-    // In the order of `Reading::ALL`, after the reading as they are.
+    // In the order of `Reading::ALL`, without `AsTheyAre`.
     let changes = [
         ("encoded_twice", "decoded once more (from sRGB to linear)"),
         ("decoded_twice", "encoded once more (from linear to sRGB)"),
@@ -154,8 +153,8 @@ pub(super) fn check(scenes: &[Readings]) -> Option<Finding> {
         format!("{own:.2} as they are, {then:.2} then, {rooms:.2} in rooms")
     };
     let message = format!(
-        "base colours fit what rooms have clearly better if they are {change}: their geometric mean luminance is {}; the slope \
-         of log picture over log base colour is {} (over {pixels} pixels)",
+        "base colours are clearly closer to those of rooms if they are {change}: their geometric mean luminance is {}; the \
+         slope of log picture over log base colour is {} (over {pixels} pixels)",
         shown(brightness, &BRIGHTNESS),
         shown(slope, &SLOPE)
     );
@@ -164,7 +163,7 @@ pub(super) fn check(scenes: &[Readings]) -> Option<Finding> {
     Some(warning(code, "scenes", message, action))
 }
 
-/// The mean of each reading's numbers; none without any.
+/// The mean of each reading's numbers; absent without numbers.
 fn means(scenes: impl Iterator<Item = [f64; 3]>) -> Option<[f64; 3]> {
     let (sums, count) = scenes
         .fold(([0.0; 3], 0), |(sums, count), numbers| (std::array::from_fn(|at| sums[at] + numbers[at]), count + 1));
@@ -214,7 +213,7 @@ mod tests {
         assert_eq!(code(&room(|truth, _| linear_from_srgb(truth))).as_deref(), Some("decoded_twice"));
     }
 
-    /// Far from what rooms have in one of the numbers, and not in both.
+    /// Base colours that are untypical of rooms in one of the numbers only.
     #[test]
     fn one_number_alone_is_not_enough() {
         // A dark picture as base colour, a single colour, and colours that are half as bright as they should be.

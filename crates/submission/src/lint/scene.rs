@@ -33,7 +33,7 @@ pub(super) struct SceneFindings {
     pub(super) findings: Vec<Finding>,
     /// How many maps could be decoded.
     pub(super) maps: usize,
-    /// Not among the findings: both are judged over all scenes.
+    /// Not among the findings, since both are judged over all scenes.
     pub(super) decoding: Decoding,
     pub(super) readings: Readings,
 }

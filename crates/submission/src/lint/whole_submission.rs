@@ -35,7 +35,7 @@ pub fn lint(plan: &LintPlan<'_>, progress: Progress<'_>) -> Result<LintFile, Sub
     }
     let wrong = colours::mostly_wrong(decodings);
     if wrong.is_empty() {
-        // Hues, where they decide, also say which kind of file is wrong.
+        // Findings by hue are more precise: they name the kind of file that is wrong.
         findings.extend(readings::check(&all_readings));
     }
     findings.extend(wrong);
