@@ -29,10 +29,12 @@ fi
 # Waits up to ten minutes for apt's lists and archives; apt-get itself waits for dpkg's lock.
 seconds=600
 apt() {
-    until said=$($as_root env LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600 "$@" 2>&1); do
-        case $said in
+    until output=$(
+        $as_root env LC_ALL=C DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600 "$@" 2>&1
+    ); do
+        case $output in
         *"Could not get lock"*) [ "$seconds" -gt 0 ] || give_up "another program has used apt for ten minutes" ;;
-        *) give_up "apt-get $1 failed ($({ echo "$said" | grep '^E:' || echo "$said"; } | tail -n 1))" ;;
+        *) give_up "apt-get $1 failed ($({ echo "$output" | grep '^E:' || echo "$output"; } | tail -n 1))" ;;
         esac
         [ "$seconds" -lt 600 ] || echo "setup: waiting for another program that uses apt" >&2
         sleep 5

@@ -4,9 +4,10 @@
 #   tools/build_wheels.sh [--out FOLDER] [x86_64|aarch64|sdist ...]
 #
 # A wheel serves every Python from 3.9 and every glibc from 2.17: Zig, which PyPI has, links against the stubs of that
-# glibc, for either processor, so neither a container nor a cross compiler is needed. Without names, all three are made,
-# except wheels for which Rust's standard library is not installed; what is named must be made. FOLDER is `dist` unless it is
-# given. auditwheel checks what a wheel asks of a system, twine the description; the licences must be in every file.
+# glibc, for either processor, so neither a container nor a cross compiler is needed. Without names, all three files are
+# made, except wheels for which Rust's standard library is not installed; for a named wheel that is an error. FOLDER is
+# `dist` by default. auditwheel checks which system libraries a wheel needs, twine checks its description, and every file
+# must hold the licences.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -25,7 +26,7 @@ while [ $# -gt 0 ]; do
     shift
 done
 
-# Before anything is built: which wheels can be.
+# Checked before anything is built: the wheels that can be made.
 for part in ${named:-x86_64 aarch64 sdist}; do
     target=$part-unknown-linux-gnu
     if [ "$part" = sdist ] || [ -d "$(rustc --print target-libdir --target "$target")" ]; then
@@ -64,7 +65,8 @@ for part in $wanted; do
             --manifest-path crates/python/Cargo.toml --out "$out"
         file=$(ls "$out/mateval-$version-cp39-abi3-"*"manylinux_2_17_$part.whl")
         "$bin/auditwheel" show "$file" | tee "$target_folder/auditwheel.txt"
-        grep -q "\"manylinux_2_17_$part\"" "$target_folder/auditwheel.txt" || fail "'$file' needs a newer system than its name states"
+        grep -q "\"manylinux_2_17_$part\"" "$target_folder/auditwheel.txt" ||
+            fail "'$file' needs a newer system than its name states"
         listing=$("$bin/python" -m zipfile --list "$file")
     fi
     for licence in MIT APACHE THIRD-PARTY; do

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Installs what MatEval needs besides Rust and Python on Debian-like systems: a linker, pip, the LPIPS weights and
-# Blender. Does nothing if all of them are installed, and needs root only where a package is missing.
+# Blender. Does nothing if all of them are installed, and needs root only if a package is missing.
 set -eu
 cd "$(dirname "$0")/.."
 fetch=crates/cli/src/fetch

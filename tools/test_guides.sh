@@ -1,13 +1,13 @@
 #!/bin/sh
-# Runs every command of the guides (dataset_spec/guides/*.md), literally and in order, and checks that readers find what the
-# guides state: figures, files and lines of output. Arguments name guides: tools/test_guides.sh harder_tasks
+# Runs every command of the guides (dataset_spec/guides/*.md), literally and in order, and checks the figures, files and
+# lines of output that they state. Arguments name guides: tools/test_guides.sh harder_tasks
 #
 # - A block ```sh is run; a block ```toml is written to the file that its first line names (`# FILE.toml`).
 # - A block that begins with `# Not run:` is listed as skipped.
-# - A table below `<!-- figures: RESULT.json KEY... -->` states values of these keys; the first column replaces `{}` in the
-#   file's name.
+# - A table below `<!-- figures: RESULT.json KEY... -->` states values of these keys; the first column replaces `{}` in
+#   the file's name.
 # - Files that the text names with their folder must exist afterwards; `<scene>` and the like stand for any name.
-# - What follows the word "prints" must have been printed.
+# - The code after the word "prints" must have been printed.
 #
 # MATEVAL names the command; by default it is the tests' build.
 set -eu
@@ -127,7 +127,7 @@ def follow(guide, work):
 
 def main(work, *names):
     if {path.stem for path in GUIDES.glob("*.md")} != set(EXPECTED):
-        sys.exit(f"'{GUIDES}' holds other guides than this script follows")
+        sys.exit(f"'{GUIDES}' and EXPECTED in this script list different guides")
     folders = {EXPECTED[name][0] for name in names or EXPECTED}
     for guide in EXPECTED:
         if EXPECTED[guide][0] in folders:

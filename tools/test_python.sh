@@ -1,8 +1,9 @@
 #!/bin/sh
-# Builds the wheel of the Python package and tests it in fresh environments of Python 3.9, 3.11 and 3.13, where they are found.
-# Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters; those that pyenv keeps are found too.
-# MATEVAL_PROFILE=dev builds with the tests' profile, which shares its libraries with tools/test.sh. MATEVAL_WHEELS=FOLDER
-# builds nothing: it tests the wheel for this processor in FOLDER, whose own command then makes the dataset.
+# Builds the wheel of the Python package and tests it in fresh environments of those of Python 3.9, 3.11 and 3.13 that are
+# found. Arguments are passed to pytest. PYTHONS="python3.11 ..." chooses interpreters; those that pyenv keeps are found
+# too. MATEVAL_PROFILE=dev builds with the tests' profile, which shares its libraries with tools/test.sh.
+# MATEVAL_WHEELS=FOLDER builds nothing: it tests the wheel for this processor in FOLDER, whose own command then makes the
+# dataset.
 set -eu
 cd "$(dirname "$0")/.."
 tools/apt_install.sh python3-venv

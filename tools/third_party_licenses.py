@@ -27,7 +27,7 @@ of them.
 
 
 def read_metadata(*, targets: list[str]) -> dict[str, Any]:
-    """What `cargo metadata` reports for the workspace of this file, as Cargo.lock fixes it."""
+    """Returns the output of `cargo metadata` for this workspace, with the versions of Cargo.lock."""
     command = ["cargo", "metadata", "--format-version", "1", "--locked"]
     for target in targets:
         command += ["--filter-platform", target]
@@ -35,7 +35,7 @@ def read_metadata(*, targets: list[str]) -> dict[str, Any]:
 
 
 def linked_packages(*, metadata: dict[str, Any]) -> list[dict[str, Any]]:
-    """The packages of others that `mateval-python` depends on when it runs, sorted by name and version."""
+    """Returns the packages of others that `mateval-python` depends on when it runs, sorted by name and version."""
     packages = {package["id"]: package for package in metadata["packages"]}
     nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
     pending = [name for name, package in packages.items() if package["name"] == ROOT]
@@ -46,7 +46,7 @@ def linked_packages(*, metadata: dict[str, Any]) -> list[dict[str, Any]]:
             continue
         found.add(current)
         for dependency in nodes[current]["deps"]:
-            # No kind: neither for builds nor for tests.
+            # Dependencies for builds and tests have a kind; those that are linked have none.
             if any(kind["kind"] is None for kind in dependency["dep_kinds"]):
                 pending.append(dependency["pkg"])
     others = [packages[name] for name in found if packages[name]["source"] is not None]
@@ -54,7 +54,7 @@ def linked_packages(*, metadata: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def licence_texts(*, package: dict[str, Any]) -> list[str]:
-    """The texts of the licence files beside the package's manifest."""
+    """Returns the texts of the licence files beside the package's manifest."""
     folder = Path(package["manifest_path"]).parent
     files = {path for path in folder.iterdir() if path.is_file() and LICENCE_FILE.fullmatch(path.name)}
     if package["license_file"]:

@@ -24,7 +24,7 @@ fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     let table = first.stdout.split("The leaderboard").next().unwrap();
     assert!(table.lines().all(|line| line.chars().count() <= 80) && table.contains("gt (ceiling)"), "{table}");
 
-    // Interrupted after the baselines: the rest is made again, and the same.
+    // As after an interruption: only missing files are made again, with the same bytes.
     let result = out.join("results/grey.json");
     let whole = std::fs::read(&result).unwrap();
     std::fs::remove_file(&result).unwrap();

@@ -1,5 +1,5 @@
-//! The built-in 3D-FRONT house, with a third room and faults, from survey to score: accepted and rejected rooms, a recipe with hashes, a dataset, and
-//! the scores of its ceiling and floor baselines.
+//! The built-in 3D-FRONT house, with a third room and faults, from survey to score: accepted and rejected rooms, a recipe
+//! with hashes, a dataset, and the scores of its ceiling and floor baselines.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

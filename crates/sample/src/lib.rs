@@ -65,7 +65,7 @@ pub fn write_at(out: &Path, [width, height]: [u32; 2]) -> Result<(), SampleError
     write_text(&out.join("recipe.toml"), &recipe)
 }
 
-/// The rooms of which scenes of varied houses are made, and the start of the scenes' ids.
+/// The start of the ids of varied houses' scenes, and their room.
 const VARIED_ROOMS: [(&str, &str); 2] = [("living", "LivingDiningRoom-101"), ("bedroom", "MasterBedroom-102")];
 
 /// Writes `count` houses made of the built-in one into the folder `out`, with a recipe of one scene a house. The same

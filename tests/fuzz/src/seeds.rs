@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let work = tempfile::tempdir()?;
     let source = work.path().join("source");
     mateval_sample::write(&source)?;
-    // Its house replaces the sample's, which is sound.
+    // The test kit's house replaces the sample's, so that the corpus holds faults.
     faulty_house::write(&source);
     for (name, bytes) in packed::files(&source) {
         let target = match name.rsplit('.').next() {

@@ -5,7 +5,6 @@ use glam::{DVec2, DVec3};
 
 use crate::solid::sides;
 
-/// A mesh of the architecture.
 #[derive(Clone, Debug)]
 pub struct ArchitectureMesh {
     /// The data's type of mesh, as in "WallInner".

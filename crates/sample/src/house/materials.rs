@@ -6,7 +6,6 @@ use mateval_image::Picture;
 use super::font::Lettering;
 use crate::pattern::{self, Color, noise, paint, random};
 
-/// A material of the architecture.
 pub struct ArchitectureMaterial {
     /// The name by which meshes refer to it.
     pub name: &'static str,

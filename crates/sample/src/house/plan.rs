@@ -9,7 +9,6 @@ use super::architecture::ArchitectureMesh;
 use super::materials::{ArchitectureMaterial, ArchitectureTexture};
 use super::models::Model;
 
-/// A house.
 pub struct House {
     pub rooms: Vec<Room>,
     /// The materials that the rooms' meshes name. A material's id follows from its position.

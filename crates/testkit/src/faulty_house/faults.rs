@@ -25,23 +25,19 @@ pub enum Place {
     },
 }
 
-/// A fault planted on purpose.
 #[derive(Clone, Copy, Debug)]
 pub struct Fault {
-    /// A short name.
     pub name: &'static str,
-    /// Its location.
     pub place: Place,
-    /// A description.
-    pub what: &'static str,
+    pub description: &'static str,
 }
 
-const fn json_fault(name: &'static str, pointer: &'static str, what: &'static str) -> Fault {
-    Fault { name, place: Place::Json { pointer }, what }
+const fn json_fault(name: &'static str, pointer: &'static str, description: &'static str) -> Fault {
+    Fault { name, place: Place::Json { pointer }, description }
 }
 
-const fn file_fault(name: &'static str, path: &'static str, what: &'static str) -> Fault {
-    Fault { name, place: Place::File { path }, what }
+const fn file_fault(name: &'static str, path: &'static str, description: &'static str) -> Fault {
+    Fault { name, place: Place::File { path }, description }
 }
 
 /// The folder of a model by the last two digits of its id.
@@ -184,7 +180,7 @@ fn shifted_positions(mesh: &Value) -> Vec<Value> {
     mesh["xyz"].as_array().unwrap().iter().enumerate().map(moved).collect()
 }
 
-/// The value that stands in the place of a sound one.
+/// The value that replaces a sound one.
 fn faulty_value(name: &str) -> Value {
     match name {
         "category_chinese" => json!("抽屉柜"),

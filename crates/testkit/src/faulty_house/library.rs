@@ -1,7 +1,7 @@
-//! The third room while it is sound: its architecture, materials, furniture and models, and their shapes.
+//! The third room before faults are planted: its architecture, materials, furniture and models, and their shapes.
 //!
-//! It lies south of the living room behind the door, and its window is an open hole. It has no ceiling, which is one of the
-//! faults.
+//! It lies south of the living room behind the door, and its window is an open hole. One fault is here already: it has no
+//! ceiling.
 
 use glam::{DVec2, DVec3};
 use mateval_sample::furniture;
@@ -30,7 +30,7 @@ const fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// Adds the room, and what it shows, to the end of the house's lists.
+/// Adds the room and its materials, texture and models to the ends of the house's lists.
 pub(super) fn add(house: &mut House) {
     let (pictured, plain) = (ArchitectureMaterial::pictured, ArchitectureMaterial::plain);
     house.materials.extend([

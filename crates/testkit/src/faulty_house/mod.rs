@@ -1,10 +1,10 @@
-//! The built-in house with a third room, a library, and with one of each fault that files of 3D-FRONT and 3D-FUTURE show.
+//! The built-in house with a third room, a library, and with every kind of fault found in 3D-FRONT and 3D-FUTURE.
 //! The reader of 3D-FRONT is tested on it without a download.
 //!
-//! The input is a folder. Written into it is `house/` as `mateval_sample` writes it, but for the faults: the layout's JSON
-//! is changed before it is written, models and textures are damaged afterwards. The bytes are the same on every machine.
+//! The input is a folder. Written into it is `house/`, as by `mateval_sample` except for the faults: the layout's JSON is
+//! changed before it is written, models and textures are damaged afterwards. The bytes are the same on every machine.
 //!
-//! `library` is the third room while it is sound; `faults` lists the faults and plants them. The first two rooms stay
+//! `library` builds the third room without faults; `faults` lists the faults and plants them. The first two rooms stay
 //! sound except for the normals of two walls and, in `/material/7`, the outer walls' "local"; all other faults are in the
 //! third room.
 
@@ -60,7 +60,7 @@ pub fn sound_json() -> Value {
     json
 }
 
-/// The three rooms and their sound library.
+/// The three rooms and their models, without faults.
 fn house() -> House {
     let mut house = built_in();
     // The library's own walls close the house in the south.

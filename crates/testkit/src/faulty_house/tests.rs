@@ -1,4 +1,4 @@
-//! The house as it lies on disk, read back by the plainest means.
+//! The written house, read back without the reader of 3D-FRONT.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ impl Files {
     }
 }
 
-/// What is wrong with a mesh's lists, by the names of `FAULTS`.
+/// The faults of a mesh's lists, by their names in `FAULTS`.
 fn mesh_faults(mesh: &Value, materials: &BTreeSet<&str>) -> Vec<&'static str> {
     let list = |key: &str| mesh[key].as_array().unwrap();
     let numbers = |key: &str| -> Vec<f64> { list(key).iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect() };
@@ -80,7 +80,7 @@ fn mesh_faults(mesh: &Value, materials: &BTreeSet<&str>) -> Vec<&'static str> {
 
 /// Every fault of a mesh is in the table, at its place, and the table has no other.
 #[test]
-fn meshes_are_sound_but_where_the_table_says() {
+fn meshes_have_exactly_the_listed_faults() {
     let house = Layout::new();
     let materials: BTreeSet<&str> = house.list("/material").iter().map(|m| m["uid"].as_str().unwrap()).collect();
     let mut found = BTreeSet::new();
@@ -99,16 +99,16 @@ fn meshes_are_sound_but_where_the_table_says() {
         .collect();
     assert!(described.len() > 10, "{described:?}");
     assert_eq!(found, described);
-    // They are in the third room, but for normals.
+    // All are in the third room, except for normals.
     let third: Vec<&Value> = house.list("/scene/room/2/children").iter().map(|child| &child["ref"]).collect();
     let elsewhere = described.iter().filter(|(place, _)| !third.contains(&&house.list("/mesh")[*place]["uid"]));
     assert!(elsewhere.map(|(_, name)| *name).all(|name| name == "mesh_normals_not_unit"));
 }
 
-/// Meshes are children of one room each; pieces name records, records models, materials pictures; as far as the table
-/// lets them.
+/// Each mesh is the child of one room. Pieces refer to records, records to models and materials to textures, and the only
+/// exceptions are those of the table.
 #[test]
-fn references_resolve_but_where_the_table_says() {
+fn only_the_listed_references_are_broken() {
     let (house, files) = (Layout::new(), Files::new());
     let records: BTreeMap<&str, &Value> =
         house.list("/furniture").iter().rev().map(|record| (record["uid"].as_str().unwrap(), record)).collect();
@@ -126,9 +126,8 @@ fn references_resolve_but_where_the_table_says() {
     assert_eq!(without, BTreeSet::from(["", "local", "cc0a0000-5a3b-4e00-8000-000000000900"]));
 }
 
-/// Every fault of the table is at its place.
 #[test]
-fn each_fault_is_where_the_table_says() {
+fn each_fault_is_at_its_listed_place() {
     let (house, files) = (Layout::new(), Files::new());
     let mut checked = 0;
     for fault in FAULTS {
