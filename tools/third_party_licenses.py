@@ -14,6 +14,7 @@ import argparse
 import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +64,7 @@ def licence_texts(*, package: dict[str, Any]) -> list[str]:
 
 
 def document(*, packages: list[dict[str, Any]]) -> str:
-    """The whole file."""
+    """Returns the whole file. A package without any licence ends the program."""
     lines = [INTRODUCTION]
     # Texts that differ in white space only are one; the first is kept as it is written.
     texts: dict[str, str] = {}
@@ -72,7 +73,9 @@ def document(*, packages: list[dict[str, Any]]) -> str:
         title = f"{package['name']} {package['version']}"
         found = licence_texts(package=package)
         by = "" if found or not package["authors"] else f", by {', '.join(package['authors'])}"
-        lines.append(f"{title}: {package['license']}{by}")
+        if not found and not package["license"]:
+            sys.exit(f"error: {title} states no licence and has no licence file; ask its authors, or do without it")
+        lines.append(f"{title}: {package['license'] or 'the licence whose text follows'}{by}")
         for text in found:
             key = " ".join(text.split())
             texts.setdefault(key, text.strip())
