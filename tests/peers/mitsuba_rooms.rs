@@ -16,7 +16,7 @@ fn case(name: &str, scene: ReferenceScene, camera: Camera, samples: u32) -> Case
 
 /// A Mitsuba scene, read by our reader, with a picture `width` pixels wide.
 fn source(name: &str, xml: &Path, width: u32, samples: u32) -> Case {
-    let read = bitterli::read(xml, &Limits::default()).unwrap();
+    let read = bitterli::read(xml, None, &Limits::default()).unwrap();
     let mut camera = read.camera;
     let scale = f64::from(width) / f64::from(camera.intrinsics.width);
     let k = &mut camera.intrinsics;

@@ -93,7 +93,7 @@ fn job_of(scene: &ReferenceScene, folder: &Path, format: &str, out: &Path) -> Va
 }
 
 fn read(path: &Path) -> GltfScene {
-    gltf::read(path, &Limits::default()).unwrap()
+    gltf::read(path, None, &Limits::default()).unwrap()
 }
 
 /// The surface of this name, and its index.

@@ -45,7 +45,7 @@ fn staircase2_is_built_verified_and_scored() {
 #[test]
 fn bathroom_names_exactly_what_is_missing() {
     let Some(file) = shared_data("bitterli/bathroom/scene.xml") else { return };
-    let read = bitterli::read(&file, &bitterli::Limits::default()).unwrap();
+    let read = bitterli::read(&file, None, &bitterli::Limits::default()).unwrap();
     let warnings = read.findings.iter().filter(|finding| finding.severity != Severity::Note);
     let missing: Vec<(&str, &str)> = warnings.map(|f| (f.code.as_str(), f.file.as_str())).collect();
     let expected = ["models/Mesh206.obj", "models/Mesh263.obj", "models/Mesh381.obj", "textures/rug.png"];
@@ -57,7 +57,7 @@ fn bathroom_names_exactly_what_is_missing() {
 fn the_other_scenes_are_whole() {
     for name in ["staircase2/scene.xml", "living-room/scene.xml", "living-room/scene_v0.6_dppm.xml"] {
         let Some(file) = shared_data(&format!("bitterli/{name}")) else { return };
-        let read = bitterli::read(&file, &bitterli::Limits::default()).unwrap();
+        let read = bitterli::read(&file, None, &bitterli::Limits::default()).unwrap();
         let above_note = read.findings.iter().filter(|finding| finding.severity != Severity::Note);
         assert_eq!(above_note.count(), 0, "{name}");
     }

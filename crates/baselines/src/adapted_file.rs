@@ -17,6 +17,11 @@ const SCENE: &str = "{scene}";
 /// 255, have another range than the adapter states.
 const LARGEST: f32 = 16.0;
 
+/// Numbers below this, in the adapter's range, are more than the noise of a network.
+const LEAST: f32 = -0.1;
+/// A larger share of pixels below [`LEAST`] has another range than the adapter states.
+const MOST_BELOW: f64 = 0.01;
+
 /// The files of one map.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -93,6 +98,11 @@ impl AdaptedFile {
         channel: Option<Channel>,
     ) -> Result<Option<Picture<LinearRgb>>, BaselineError> {
         let Some(Stored { path, numbers }) = self.stored(folder, scene, channel)? else { return Ok(None) };
+        let below = numbers.pixels().iter().filter(|rgb| rgb.iter().any(|value| *value < LEAST)).count();
+        if below as f64 > MOST_BELOW * numbers.pixels().len() as f64 {
+            let value = numbers.pixels().iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f32::min);
+            return Err(BaselineError::TooSmall { path, value, share: below as f64 / numbers.pixels().len() as f64 });
+        }
         let picture = numbers.map(|rgb| LinearRgb(rgb.map(|value| self.encoding.decode(value))));
         let picture = self.scale.apply(picture);
         let too_large = |rgb: &LinearRgb| rgb.0.into_iter().find(|value| value.is_finite() && value.abs() > LARGEST);

@@ -3,7 +3,7 @@
 //! `adapters/` holds those of known methods. Support for another method needs another file, and no code.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mateval_image::LinearRgb;
 use mateval_scene::stored_encoding::StoredEncoding;
@@ -31,6 +31,9 @@ const BUILT_IN: [(&str, &str); 13] = [
     ("plain", include_str!("../adapters/plain.toml")),
     ("rgbx", include_str!("../adapters/rgbx.toml")),
 ];
+
+/// The endings of files that may hold a map.
+const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "webp", "exr", "hdr", "npy"];
 
 /// The pictures of a method.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -121,6 +124,28 @@ impl Adapter {
         words.collect::<Vec<_>>().join(", ")
     }
 
+    /// Pictures and arrays below `folder`, or in the folders of the scenes, that the adapter does not read; sorted.
+    pub fn unread(&self, folder: &Path, scenes: &[&str]) -> Vec<String> {
+        let read: Vec<PathBuf> = self
+            .maps()
+            .flat_map(|(_, file, _)| {
+                scenes.iter().filter_map(|scene| file.path(folder, scene).ok()).collect::<Vec<_>>()
+            })
+            .collect();
+        let beside = scenes.iter().map(|scene| folder.join(scene)).chain([folder.to_owned()]);
+        let entries = beside.flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten().flatten());
+        let is_picture = |path: &PathBuf| {
+            let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_lowercase();
+            PICTURES.contains(&ending.as_str())
+                && !path.file_name().is_some_and(|name| name.as_encoded_bytes()[0] == b'.')
+        };
+        let unread = entries.map(|entry| entry.path()).filter(is_picture).filter(|path| !read.contains(path));
+        let mut names: Vec<String> =
+            unread.map(|path| path.strip_prefix(folder).unwrap_or(&path).display().to_string()).collect();
+        names.sort();
+        names
+    }
+
     /// Reads a scene's pictures below `folder`, which must all have one size.
     pub fn read(&self, folder: &Path, scene: &str) -> Result<Estimate, BaselineError> {
         let mut estimate = Estimate { placement: Some(self.placement), ..Estimate::default() };
@@ -163,6 +188,21 @@ mod tests {
         let channel = "name = \"x\"\n[base_color]\nfiles = [\"a\"]\nencoding = \"srgb\"\nchannel = \"g\"";
         assert!(refused(channel).contains("a `channel`"));
         assert!(Adapter::find("no-such").unwrap_err().to_string().contains("marigold"));
+    }
+
+    #[test]
+    fn files_that_are_not_read_are_listed() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("s")).unwrap();
+        for name in ["rgb_albedo.png", "rgb_material.png", "rgb_normals.png", "notes.txt", "._rgb_albedo.png"] {
+            std::fs::write(folder.path().join("s").join(name), "").unwrap();
+        }
+        let adapter = Adapter::find("marigold").unwrap();
+        assert_eq!(adapter.unread(folder.path(), &["s"]), ["s/rgb_normals.png"]);
+        assert_eq!(
+            adapter.inventory(folder.path(), &["s"]),
+            "base_color of 1 scene, roughness of 1 scene, metallic of 1 scene"
+        );
     }
 
     /// Green must not affect the scale of roughness in red, and numbers that decoding makes infinite are refused.

@@ -17,9 +17,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::adapted_file::{AdaptedFile, Channel};
 use crate::adapter::Adapter;
-use crate::encoding_fit::{Candidate, FittedEncoding, Sample, Verdict, fit};
+use crate::encoding_fit::{Candidate, EncodingFit, FittedEncoding, Sample, Verdict, fit};
 use crate::error::BaselineError;
 use crate::geometry::input_view;
+use crate::placement::Placement;
 
 /// The value of `format` for this version of the report.
 pub const ENCODING_FORMAT: &str = "mateval-encoding/1";
@@ -68,15 +69,100 @@ pub struct MapEncoding {
     pub instances: usize,
     /// Number of pixels that are compared; those of base_color count for each channel.
     pub samples: usize,
-    /// What the numbers show.
+    /// How the files must be read for the numbers to fit best; `as_stated` unless another reading is clearly better.
+    pub reading: Reading,
+    /// What the numbers show, read in this way.
     pub verdict: Verdict,
     /// The encodings that the numbers fit, the best first.
     pub fits: Vec<FittedEncoding>,
-    /// Whether the adapter's encoding is one of `fits`, or the verdict is `too_little`.
+    /// Whether no other reading is better, and the adapter's encoding is one of `fits` or the verdict is `too_little`.
     pub agrees: bool,
     /// All encodings that were compared.
     pub candidates: Vec<Candidate>,
 }
+
+/// A way in which files are often written other than the adapter states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Reading {
+    /// As the adapter states.
+    AsStated,
+    /// The numbers -1 and 1 stand for 0 and 1, as diffusion networks put them out.
+    MinusOneToOne,
+    /// The numbers 0 and 255 stand for 0 and 1.
+    To255,
+    /// Red and blue are swapped, as OpenCV has them.
+    Bgr,
+    /// The last row is stored first.
+    FlippedRows,
+    /// The last column is stored first.
+    FlippedColumns,
+    /// The picture is turned by 180 degrees.
+    Turned,
+    /// The number is 1 minus the value, such as a glossiness.
+    Inverted,
+    /// The number is the square of the value, such as the alpha of a microfacet model in place of the roughness.
+    Squared,
+    /// The file's other channels: green in place of the stated one.
+    Green,
+    /// The file's other channels: blue in place of the stated one.
+    Blue,
+    /// The picture shows the middle of the view, in proportions of its own.
+    CentreCrop,
+}
+
+impl Reading {
+    /// All readings but the stated one.
+    const OTHERS: [Self; 11] = [
+        Self::MinusOneToOne,
+        Self::To255,
+        Self::Bgr,
+        Self::FlippedRows,
+        Self::FlippedColumns,
+        Self::Turned,
+        Self::Inverted,
+        Self::Squared,
+        Self::Green,
+        Self::Blue,
+        Self::CentreCrop,
+    ];
+
+    /// Whether the reading can apply to the map.
+    fn applies(self, map: Map) -> bool {
+        match self {
+            Self::Bgr => map == Map::BaseColor,
+            Self::Inverted | Self::Squared | Self::Green | Self::Blue => map != Map::BaseColor,
+            _ => true,
+        }
+    }
+
+    /// The place of the pixel that belongs at `(x, y)` of a picture of this size.
+    fn pixel(self, (width, height): (usize, usize), (x, y): (usize, usize)) -> (usize, usize) {
+        match self {
+            Self::FlippedRows => (x, height - 1 - y),
+            Self::FlippedColumns => (width - 1 - x, y),
+            Self::Turned => (width - 1 - x, height - 1 - y),
+            _ => (x, y),
+        }
+    }
+
+    /// The number after this reading of a channel of three.
+    fn number(self, stored: [f32; 3], channel: usize) -> f32 {
+        match self {
+            Self::MinusOneToOne => (stored[channel] + 1.0) / 2.0,
+            Self::To255 => stored[channel] / 255.0,
+            Self::Bgr => stored[2 - channel],
+            Self::Inverted => 1.0 - stored[channel],
+            Self::Squared => stored[channel].max(0.0).sqrt(),
+            Self::Green => stored[1],
+            Self::Blue => stored[2],
+            _ => stored[channel],
+        }
+    }
+}
+
+/// Another reading is reported if it leaves at most this share of the error of the stated one.
+const CLEARLY_BETTER: f64 = 0.5;
 
 /// Compares the files below `folder` with the truth. Fails where nothing can be compared: no scene has a file, or none
 /// of the scenes that have one states the map.
@@ -89,7 +175,9 @@ pub fn report(
     let mut maps = Vec::new();
     let (mut searched, mut unstated) = (Vec::new(), BTreeSet::new());
     for (map, file, channel) in adapter.maps() {
-        let mut samples = Samples::default();
+        let others = Reading::OTHERS.into_iter().filter(|reading| reading.applies(map));
+        let readings: Vec<Reading> = std::iter::once(Reading::AsStated).chain(others).collect();
+        let mut samples: Vec<Samples> = readings.iter().map(|_| Samples::default()).collect();
         for (done, scene) in dataset.scenes.iter().enumerate() {
             progress(Report::step(&format!("{} encoding", map.stem()), done, dataset.scenes.len()));
             match file.path(folder, scene.id.as_str()) {
@@ -98,12 +186,19 @@ pub fn report(
                 Ok(_) if !is_stated(scene, map) => {
                     unstated.insert(map.stem());
                 }
-                Ok(_) => samples.add(dataset, scene, folder, adapter, (map, file, channel))?,
+                Ok(_) => {
+                    let Some(picture) = ScenePicture::read(dataset, scene, folder, (map, file, channel))? else {
+                        continue;
+                    };
+                    for (samples, reading) in samples.iter_mut().zip(&readings) {
+                        samples.add(scene, &picture, adapter.placement, *reading)?;
+                    }
+                }
             }
         }
         progress(Report::step(&format!("{} encoding", map.stem()), dataset.scenes.len(), dataset.scenes.len()));
-        if samples.scenes > 0 {
-            maps.push(map_encoding(map, file, &samples));
+        if samples[0].scenes > 0 {
+            maps.push(map_encoding(map, file, &readings, &samples));
         }
     }
     if maps.is_empty() && !unstated.is_empty() {
@@ -126,24 +221,64 @@ fn is_stated(scene: &SceneFile, map: Map) -> bool {
     }
 }
 
-fn map_encoding(map: Map, file: &AdaptedFile, samples: &Samples) -> MapEncoding {
-    let found = fit(&samples.all);
+/// The result of the best reading: the stated one, unless another is clearly better.
+fn map_encoding(map: Map, file: &AdaptedFile, readings: &[Reading], samples: &[Samples]) -> MapEncoding {
+    // The error of a reading by its best encoding; infinite where the numbers do not follow the truth.
+    let error = |found: &EncodingFit| {
+        let best = |error: f64, candidate: &Candidate| {
+            if candidate.correlation > 0.5 { error.min(candidate.error) } else { error }
+        };
+        found.candidates.iter().filter(|c| c.encoding.stored().is_some()).fold(f64::INFINITY, best)
+    };
+    let fitted: Vec<EncodingFit> = samples.iter().map(|samples| fit(&samples.all)).collect();
+    let is_comparable = |at: &usize| 2 * samples[*at].all.len() >= samples[0].all.len() && samples[*at].scenes > 0;
+    let compared = (1..fitted.len()).filter(is_comparable).filter(|at| fitted[*at].verdict != Verdict::TooLittle);
+    let best = compared.min_by(|a, b| error(&fitted[*a]).total_cmp(&error(&fitted[*b])));
+    let is_better = |at: &usize| error(&fitted[*at]) < CLEARLY_BETTER * error(&fitted[0]);
+    let at = best.filter(|_| fitted[0].verdict != Verdict::TooLittle).filter(is_better).unwrap_or(0);
+    let found = fitted[at].clone();
     let is_named = found.fits.iter().any(|fitted| fitted.stored() == Some(file.encoding));
     MapEncoding {
         map,
         adapter_encoding: file.encoding,
         encoding_stated: file.encoding_stated,
-        scenes: samples.scenes,
+        scenes: samples[at].scenes,
         instances: found.instances,
-        samples: samples.all.len(),
+        samples: samples[at].all.len(),
+        reading: readings[at],
         verdict: found.verdict,
-        agrees: is_named || found.verdict == Verdict::TooLittle,
+        agrees: at == 0 && (is_named || found.verdict == Verdict::TooLittle),
         fits: found.fits,
         candidates: found.candidates,
     }
 }
 
-/// The samples of one map.
+/// A method's picture of a scene and the truth.
+struct ScenePicture {
+    map: Map,
+    channel: Option<Channel>,
+    /// All channels of the file, in the adapter's range.
+    stored: Picture<[f32; 3]>,
+    view: InputView,
+    most: usize,
+}
+
+impl ScenePicture {
+    /// None where an optional file is missing.
+    fn read(
+        dataset: &Dataset,
+        scene: &SceneFile,
+        folder: &Path,
+        (map, file, channel): (Map, &AdaptedFile, Option<Channel>),
+    ) -> Result<Option<Self>, BaselineError> {
+        let Some(stored) = file.stored(folder, scene.id.as_str(), None)? else { return Ok(None) };
+        let view = InputView::read(dataset, scene, map)?;
+        let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
+        Ok(Some(Self { map, channel, stored: stored.numbers, view, most }))
+    }
+}
+
+/// The samples of one map in one reading.
 #[derive(Default)]
 struct Samples {
     all: Vec<Sample>,
@@ -153,42 +288,46 @@ struct Samples {
 }
 
 impl Samples {
+    /// Adds those of a scene. Fails where the stated placement does not allow the picture's proportions.
     fn add(
         &mut self,
-        dataset: &Dataset,
         scene: &SceneFile,
-        folder: &Path,
-        adapter: &Adapter,
-        (map, file, channel): (Map, &AdaptedFile, Option<Channel>),
+        picture: &ScenePicture,
+        placement: Placement,
+        reading: Reading,
     ) -> Result<(), BaselineError> {
-        let Some(stored) = file.stored(folder, scene.id.as_str(), channel)? else { return Ok(()) };
-        let stored = stored.numbers;
-        let view = InputView::read(dataset, scene, map)?;
+        let ScenePicture { map, channel, stored, view, most } = picture;
         let (size, view_size) = ((stored.width(), stored.height()), (view.valid.width(), view.valid.height()));
-        let region = adapter.placement.region(size, view_size);
+        let placement = if reading == Reading::CentreCrop { Placement::CentreCrop } else { placement };
+        let region = placement.region(size, view_size);
         let region = region.ok_or_else(|| BaselineError::Proportions {
             scene: scene.id.to_string(),
             size,
             view: view_size,
             adapted: true,
         })?;
-        let channels = if map == Map::BaseColor { 3 } else { 1 };
-        let most = (MOST_PIXELS_TOGETHER / dataset.scenes.len().max(1)).clamp(FEWEST_PIXELS, MOST_PIXELS);
-        for (x, y) in view.pixels(most) {
-            let Some((sx, sy)) = region.pixel(size, DVec2::new(x as f64, y as f64) + 0.5) else { continue };
+        let channels: &[usize] = match (map, channel) {
+            (Map::BaseColor, _) => &[0, 1, 2],
+            (_, Some(Channel::G)) => &[1],
+            (_, Some(Channel::B)) => &[2],
+            _ => &[0],
+        };
+        for (x, y) in view.pixels(*most) {
+            let Some(at) = region.pixel(size, DVec2::new(x as f64, y as f64) + 0.5) else { continue };
+            let (sx, sy) = reading.pixel(size, at);
             let (truth, stored) = (view.truth.get(x, y).0, stored.get(sx, sy));
             let instance = self.instances + usize::from(view.instances.get(x, y));
-            for channel in 0..channels {
-                let (truth, stored) = (truth[channel], stored[channel]);
+            for (number, channel) in channels.iter().enumerate() {
+                let (truth, stored) = (truth[*channel], reading.number(stored, *channel));
                 if truth >= LEAST_TRUTH && stored.is_finite() && (stored - 1.0).abs() > CLIPPED {
                     let ln_truth = libm::log(f64::from(truth));
-                    let group = self.groups + channel;
+                    let group = self.groups + number;
                     self.all.push(Sample { ln_truth, stored: f64::from(stored), group, instance });
                 }
             }
         }
         self.scenes += 1;
-        self.groups += channels;
+        self.groups += channels.len();
         // Ids begin at 1.
         self.instances += scene.instances.len() + 1;
         Ok(())

@@ -136,6 +136,16 @@ pub enum BaselineError {
         /// The largest value that is accepted.
         largest: f32,
     },
+    /// Many values are far below 0.
+    #[error("'{}' holds {value}, and {:.0} % of its pixels are below 0, in the adapter's `range`; expected 0 to 1; if the numbers run from -1 to 1, write range = [-1.0, 1.0] below the map in the adapter", path.display(), 100.0 * share)]
+    TooSmall {
+        /// The picture.
+        path: PathBuf,
+        /// The smallest value.
+        value: f32,
+        /// The share of such pixels.
+        share: f64,
+    },
     /// An estimate has other proportions than the input view.
     #[error("the estimate of scene '{scene}' has {}x{} pixels, the input view {}x{}; expected the same proportions, within 5 %; {}", size.0, size.1, view.0, view.1, proportions_advice(*adapted))]
     Proportions {

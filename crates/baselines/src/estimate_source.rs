@@ -19,6 +19,9 @@ use crate::estimate::Estimate;
 use crate::geometry::{SceneGeometry, input_view};
 use crate::placement::Placement;
 
+/// The most files that are named as not read.
+const MOST_NAMED: usize = 5;
+
 /// Where an estimate comes from.
 #[derive(Clone, Debug)]
 pub enum EstimateSource {
@@ -64,6 +67,23 @@ impl EstimateSource {
                 format!("the pictures of {} ({inventory}{placement}{assumed})", adapter.name)
             }
         }
+    }
+
+    /// Which of a method's pictures are read for the dataset's scenes, and which lie beside them and are not; `None` for
+    /// other estimates.
+    pub fn files_read(&self, dataset: &Dataset) -> Option<String> {
+        let Self::Files { folder, adapter } = self else { return None };
+        let scenes: Vec<&str> = dataset.scenes.iter().map(|scene| scene.id.as_str()).collect();
+        let inventory = adapter.inventory(folder, &scenes);
+        let unread = adapter.unread(folder, &scenes);
+        let named = unread.iter().take(MOST_NAMED).cloned().collect::<Vec<_>>().join("', '");
+        Some(match unread.len() {
+            0 => format!("'{}': {inventory}", folder.display()),
+            count => {
+                let more = if count > MOST_NAMED { format!(" and {} more", count - MOST_NAMED) } else { String::new() };
+                format!("'{}': {inventory}; not read: '{named}'{more}", folder.display())
+            }
+        })
     }
 
     /// The encodings that the adapter of a method's pictures assumes, because its authors do not state them.

@@ -112,7 +112,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Nn(args) => nearest_neighbours(args),
         Command::Median(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
-            let dataset = places.open()?;
+            let dataset = places.open_for(&source)?;
             places.done(with_progress(|progress| {
                 homogeneous::write_by_instance(&dataset, &places.out, places.force, &source, progress)
             })?)
@@ -120,7 +120,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::MedianPart(args) => {
             let (places, source) = (&args.places, args.estimate.source(EstimateSource::Input)?);
             let set = args.part_set.as_ref();
-            let dataset = places.open()?;
+            let dataset = places.open_for(&source)?;
             places.done(with_progress(|progress| {
                 homogeneous::write_by_part(&dataset, &places.out, places.force, &source, set, progress)
             })?)
@@ -144,6 +144,6 @@ fn nearest_neighbours(args: &NnArgs) -> anyhow::Result<Outcome> {
     }
     let rule = FillRule { neighbours: args.neighbours.into(), normal_weight_m: args.normal_weight };
     let options = NnOptions { rule, any_instance: args.any_instance, atlas_size: args.atlas_size };
-    let dataset = places.open()?;
+    let dataset = places.open_for(&source)?;
     places.done(with_progress(|progress| nn::write(&dataset, &places.out, places.force, &source, &options, progress))?)
 }

@@ -7,10 +7,12 @@
 //! In between, [`limits`] are checked on a file's header before memory is taken, and [`transfer`] converts colours
 //! between sRGB and linear.
 
+mod color_profile;
 mod encoding;
 pub mod error;
 pub mod exr_header;
 pub mod exr_io;
+pub mod file_kind;
 pub mod jpeg_io;
 pub mod limits;
 pub mod map_io;

@@ -6,6 +6,7 @@ use std::path::Path;
 use image::metadata::Orientation;
 use image::{ImageDecoder as _, ImageReader};
 
+use crate::color_profile::Profile;
 use crate::encoding::Encoding;
 use crate::npy_header::NPY_SIGNATURE;
 use crate::texture_io::texture_and_alpha_of_bytes;
@@ -32,7 +33,11 @@ impl PhotoFile {
             let what = "its EXIF data asks to turn or mirror it for display; expected a photo that is stored upright";
             return Err(invalid(what.to_owned()));
         }
+        let profile = Profile::of(path, &bytes)?;
         let (pixels, _) = texture_and_alpha_of_bytes(path, bytes, Encoding::Srgb, Wrap::Clamp)?;
+        if let Some(pixels) = profile.and_then(|profile| converted(&pixels, &profile)).transpose()? {
+            return Ok(Self { pixels, encoding: Encoding::Srgb });
+        }
         let mut encoding = Encoding::Srgb;
         if let Texels::Linear(values) = pixels.texels() {
             encoding = Encoding::Linear;
@@ -45,7 +50,7 @@ impl PhotoFile {
         Ok(Self { pixels, encoding })
     }
 
-    /// How the file states its values: integers are sRGB, floating-point numbers are linear.
+    /// How the file states its values: integers are sRGB or by a colour profile, floating-point numbers are linear.
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }
@@ -75,6 +80,16 @@ impl PhotoFile {
             LinearRgb(mean.map(|v| v as f32))
         })
     }
+}
+
+/// The photo's linear colours by its profile; none for linear numbers, which no profile describes.
+fn converted(pixels: &Texture, profile: &Profile) -> Option<Result<Texture, ImageError>> {
+    let texels = match pixels.texels() {
+        Texels::Srgb8(bytes) => bytes.iter().map(|rgb| profile.linear(rgb.map(|v| f64::from(v) / 255.0))).collect(),
+        Texels::Srgb16(words) => words.iter().map(|rgb| profile.linear(rgb.map(|v| f64::from(v) / 65535.0))).collect(),
+        _ => return None,
+    };
+    Some(Texture::new(pixels.width(), pixels.height(), Texels::Linear(texels), pixels.wrap()))
 }
 
 /// The numbers of `from` that each of `to` covers when both span the same length, with their shares of it.

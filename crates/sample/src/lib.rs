@@ -112,7 +112,7 @@ mod tests {
     fn sample() -> BitterliScene {
         let folder = tempfile::tempdir().unwrap();
         write_room(folder.path()).unwrap();
-        bitterli::read(&folder.path().join("room/scene.xml"), &Limits::default()).unwrap()
+        bitterli::read(&folder.path().join("room/scene.xml"), None, &Limits::default()).unwrap()
     }
 
     #[test]

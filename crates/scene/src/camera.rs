@@ -83,6 +83,12 @@ impl Camera {
         Self { world_from_camera: matrix.transpose().to_cols_array_2d(), intrinsics }
     }
 
+    /// The camera moved by a vector.
+    pub fn moved(mut self, by: DVec3) -> Self {
+        self.world_from_camera.iter_mut().zip(by.to_array()).for_each(|(row, by)| row[3] += by);
+        self
+    }
+
     /// `world_from_camera` as a matrix.
     pub fn matrix(&self) -> DMat4 {
         DMat4::from_cols_array_2d(&self.world_from_camera).transpose()

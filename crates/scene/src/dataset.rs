@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::camera::Camera;
 use crate::findings::Finding;
 use crate::ids::{InstanceId, InstanceIndex, PartId, PartIndex, PartSetId, RendererId, SceneId, ViewId};
+use crate::material::MaterialParameter;
 use crate::perturbation::{Perturbation, PerturbedGeometry};
 use crate::role::{Role, SceneLights, SourceKind};
 
@@ -128,8 +129,15 @@ pub struct SceneSource {
     pub states_roughness: bool,
     /// Whether the source states which materials are metallic. Otherwise metallic is not scored.
     pub states_metallic: bool,
+    /// What was subtracted from the source's positions: whole metres for a source far from the origin, else zero.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub shift_m: [f64; 3],
     /// Every file that was read, sorted by path.
     pub files: Vec<SourceFile>,
+}
+
+fn is_zero(shift_m: &[f64; 3]) -> bool {
+    *shift_m == [0.0; 3]
 }
 
 /// An input picture that came from elsewhere.
@@ -220,6 +228,9 @@ pub struct Instance {
     pub super_category: Option<String>,
     /// Triangles in `instances.glb`.
     pub triangles: usize,
+    /// Parameters of its material that the source does not state; the truth has the default of the format or reader.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unstated: Vec<MaterialParameter>,
     /// Its uv atlas; null for glass and for shapes without area.
     pub atlas: Option<Atlas>,
 }

@@ -10,7 +10,7 @@ use gltf_json as json;
 use json::validation::{Checked, USize64};
 use mateval_image::store::write_whole;
 
-use crate::gltf_accessor::{floats, indices, parse, triangles};
+use crate::gltf_accessor::{indices, numbers, triangles};
 use crate::gltf_error::GltfError;
 use crate::mesh::TriangleMesh;
 use crate::{Finding, SceneError, Severity};
@@ -192,21 +192,21 @@ pub fn read(path: &Path) -> Result<Vec<GlbNode>, SceneError> {
         return Err(invalid(path, "", format!("{length} bytes; expected at most {MAX_GLB_BYTES}")));
     }
     let bytes = std::fs::read(path).map_err(SceneError::io("read", path))?;
-    let file = parse(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
-    let blob = file.blob.as_deref().unwrap_or_default();
+    let file = crate::gltf_file::parse(&bytes).map_err(|error| invalid(path, "", error.to_string()))?;
+    let blob = [file.blob.as_deref().unwrap_or_default()];
     file.document
         .nodes()
         .filter_map(|node| Some((node.clone(), node.mesh()?)))
         .map(|(node, mesh)| {
             let name = node.name().unwrap_or_default().to_owned();
-            read_mesh(&mesh, blob)
+            read_mesh(&mesh, &blob)
                 .map(|mesh| GlbNode { name: name.clone(), mesh })
                 .map_err(|error| invalid(path, &name, error.to_string()))
         })
         .collect()
 }
 
-fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, GltfError> {
+fn read_mesh(mesh: &gltf::Mesh<'_>, buffers: &[&[u8]]) -> Result<TriangleMesh, GltfError> {
     let mut primitives = mesh.primitives();
     let (Some(primitive), None) = (primitives.next(), primitives.next()) else {
         return Err(GltfError::NotOnePrimitive { found: mesh.primitives().count() });
@@ -215,11 +215,11 @@ fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, GltfErr
     let Some(positions) = accessor(gltf::Semantic::Positions) else {
         return Err(GltfError::Missing { attribute: "POSITION" });
     };
-    let positions: Vec<Vec3> = floats::<3>(&positions, blob)?.into_iter().map(Vec3::from_array).collect();
-    let normals = accessor(gltf::Semantic::Normals).map(|a| floats::<3>(&a, blob)).transpose()?;
-    let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| floats::<2>(&a, blob)).transpose()?;
+    let positions: Vec<Vec3> = finite::<3>(&positions, buffers)?.into_iter().map(Vec3::from_array).collect();
+    let normals = accessor(gltf::Semantic::Normals).map(|a| finite::<3>(&a, buffers)).transpose()?;
+    let uvs = accessor(gltf::Semantic::TexCoords(0)).map(|a| finite::<2>(&a, buffers)).transpose()?;
     let accessor = primitive.indices().ok_or(GltfError::Missing { attribute: "indices" })?;
-    let triangles = triangles(indices(&accessor, blob)?, positions.len())?;
+    let triangles = triangles(indices(&accessor, buffers)?, positions.len())?;
     let same_count = |count: Option<usize>| count.is_none_or(|count| count == positions.len());
     if !same_count(normals.as_ref().map(Vec::len)) || !same_count(uvs.as_ref().map(Vec::len)) {
         return Err(GltfError::CountsDiffer);
@@ -230,6 +230,15 @@ fn read_mesh(mesh: &gltf::Mesh<'_>, blob: &[u8]) -> Result<TriangleMesh, GltfErr
         uvs: uvs.map(|all| all.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()),
         triangles,
     })
+}
+
+/// The entries of an accessor, all of which must be finite.
+fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, buffers: &[&[u8]]) -> Result<Vec<[f32; N]>, GltfError> {
+    let values = numbers::<N>(accessor, buffers)?;
+    match values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {
+        None => Ok(values),
+        Some(entry) => Err(GltfError::NotFinite { accessor: accessor.index(), entry }),
+    }
 }
 
 fn invalid(path: &Path, node: &str, message: String) -> SceneError {

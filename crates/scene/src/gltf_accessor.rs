@@ -1,97 +1,54 @@
-//! glTF files and the contents of their accessors, for untrusted input: nothing is read outside a buffer, and every
-//! float must be finite.
+//! The contents of the accessors of an untrusted glTF: nothing is read outside a buffer. Accessors may be sparse, without
+//! a buffer view (all zeros), or quantized (`KHR_mesh_quantization`).
 
 use gltf::accessor::DataType;
-use gltf::json::camera::Type;
-use gltf::json::validation::Checked;
+use gltf::accessor::sparse::IndexType;
 
 use crate::gltf_error::GltfError;
 
-/// Length of a binary file's header, in bytes.
-const GLB_HEADER: u32 = 12;
+/// The most bytes of one accessor's contents. One without a buffer view takes none in the file.
+const MOST_BYTES: usize = 1 << 31;
 
-/// Parses and validates a glTF or GLB file.
-pub fn parse(bytes: &[u8]) -> Result<gltf::Gltf, GltfError> {
-    // The gltf crate subtracts the header from the length that a binary file states, without checking that length.
-    let stated = bytes.strip_prefix(b"glTF").and_then(|rest| rest.get(4..8)).map(word);
-    if let Some(length) = stated.filter(|length| *length < GLB_HEADER) {
-        return Err(GltfError::StatedLength { length });
-    }
-    let unchecked = gltf::Gltf::from_slice_without_validation(bytes)?;
-    // The gltf crate's own validation looks up the accessor of the positions before it checks that the accessor exists.
-    let root = unchecked.document.as_json();
-    let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
-    if primitives.flat_map(|primitive| primitive.attributes.values()).any(|at| at.value() >= root.accessors.len()) {
-        return Err(GltfError::NoAccessor);
-    }
-    check_sources(root)?;
-    Ok(gltf::Gltf::from_slice(bytes)?)
-}
-
-/// Fails where an image states no place of its bytes, or a camera no projection of its type. The gltf crate assumes
-/// that they do.
-fn check_sources(root: &gltf::json::Root) -> Result<(), GltfError> {
-    let has_source = |image: &gltf::json::Image| match image.buffer_view {
-        Some(_) => image.mime_type.is_some(),
-        None => image.uri.is_some(),
-    };
-    if let Some(image) = root.images.iter().position(|image| !has_source(image)) {
-        return Err(GltfError::NoImageSource { image });
-    }
-    let has_projection = |camera: &gltf::json::Camera| match camera.type_ {
-        Checked::Valid(Type::Perspective) => camera.perspective.is_some(),
-        Checked::Valid(Type::Orthographic) => camera.orthographic.is_some(),
-        Checked::Invalid => false,
-    };
-    match root.cameras.iter().position(|camera| !has_projection(camera)) {
-        Some(camera) => Err(GltfError::NoProjection { camera }),
-        None => Ok(()),
-    }
-}
-
-/// The entries of an accessor of floats, `N` an entry.
-pub fn floats<const N: usize>(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<[f32; N]>, GltfError> {
-    if accessor.data_type() != DataType::F32 || accessor.dimensions().multiplicity() != N {
-        return Err(GltfError::NotFloats { accessor: accessor.index(), expected: N });
-    }
-    let entry = |entry: &[u8]| std::array::from_fn(|c| f32::from_bits(word(&entry[4 * c..4 * c + 4])));
-    let values: Vec<[f32; N]> = entries(accessor, buffer, 4 * N)?.map(entry).collect();
-    finite(accessor, values)
-}
-
-/// The first `N` numbers of each entry of an accessor of floats, or of normalized integers, which stand for 0 to 1.
-pub fn floats_or_shares<const N: usize>(
+/// The entries of an accessor of `N` numbers each, which may be NaN. Normalized integers stand for 0 to 1, or for -1 to 1
+/// (glTF 2.0, section 3.6.2.2), other integers for themselves.
+pub fn numbers<const N: usize>(
     accessor: &gltf::Accessor<'_>,
-    buffer: &[u8],
+    buffers: &[impl AsRef<[u8]>],
 ) -> Result<Vec<[f32; N]>, GltfError> {
-    let (size, largest) = match accessor.data_type() {
-        DataType::F32 => (4, 1.0),
-        DataType::U16 if accessor.normalized() => (2, f32::from(u16::MAX)),
-        DataType::U8 if accessor.normalized() => (1, f32::from(u8::MAX)),
-        found => return Err(GltfError::NotShares { accessor: accessor.index(), found }),
-    };
+    let found = accessor.dimensions().multiplicity();
+    if found != N {
+        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
+    }
+    first_numbers(accessor, buffers)
+}
+
+/// As [`numbers`], of accessors that may have more than `N` numbers an entry, of which the first count.
+pub fn first_numbers<const N: usize>(
+    accessor: &gltf::Accessor<'_>,
+    buffers: &[impl AsRef<[u8]>],
+) -> Result<Vec<[f32; N]>, GltfError> {
     let found = accessor.dimensions().multiplicity();
     if found < N {
-        return Err(GltfError::TooFewNumbers { accessor: accessor.index(), expected: N, found });
+        return Err(GltfError::OtherNumbers { accessor: accessor.index(), expected: N, found });
     }
-    let number = |bytes: &[u8]| match size {
-        4 => f32::from_bits(word(bytes)),
-        _ => word(bytes) as f32 / largest,
+    let (data_type, normalized) = (accessor.data_type(), accessor.normalized());
+    let share = |value: f32, most: f32| if normalized { (value / most).max(-1.0) } else { value };
+    let number = |bytes: &[u8]| match data_type {
+        DataType::F32 => f32::from_bits(word(bytes)),
+        DataType::I8 => share(f32::from(bytes[0] as i8), 127.0),
+        DataType::U8 => share(f32::from(bytes[0]), 255.0),
+        DataType::I16 => share(f32::from(word(bytes) as i16), 32767.0),
+        DataType::U16 => share(f32::from(word(bytes) as u16), 65535.0),
+        DataType::U32 => word(bytes) as f32,
     };
+    let size = data_type.size();
+    let bytes = entries(accessor, buffers, size * found)?;
     let entry = |entry: &[u8]| std::array::from_fn(|c| number(&entry[size * c..size * (c + 1)]));
-    let values: Vec<[f32; N]> = entries(accessor, buffer, size * found)?.map(entry).collect();
-    finite(accessor, values)
-}
-
-fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, values: Vec<[f32; N]>) -> Result<Vec<[f32; N]>, GltfError> {
-    match values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {
-        None => Ok(values),
-        Some(entry) => Err(GltfError::NotFinite { accessor: accessor.index(), entry }),
-    }
+    Ok(bytes.chunks_exact(size * found).map(entry).collect())
 }
 
 /// The entries of an accessor of integers.
-pub fn indices(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<u32>, GltfError> {
+pub fn indices(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>]) -> Result<Vec<u32>, GltfError> {
     let size = match accessor.data_type() {
         DataType::U32 => 4,
         DataType::U16 => 2,
@@ -101,7 +58,7 @@ pub fn indices(accessor: &gltf::Accessor<'_>, buffer: &[u8]) -> Result<Vec<u32>,
     if accessor.dimensions().multiplicity() != 1 {
         return Err(GltfError::NotOneIndex { accessor: accessor.index() });
     }
-    Ok(entries(accessor, buffer, size)?.map(word).collect())
+    Ok(entries(accessor, buffers, size)?.chunks_exact(size).map(word).collect())
 }
 
 /// Splits indices into triangles. Fails where one is not below `vertices`, or their number is not a multiple of three.
@@ -114,8 +71,9 @@ pub fn triangles(indices: Vec<u32>, vertices: usize) -> Result<Vec<[u32; 3]>, Gl
 }
 
 /// The bytes of a buffer view. Fails where it reaches outside its buffer.
-pub fn view_bytes<'a>(view: &gltf::buffer::View<'_>, buffer: &'a [u8]) -> Result<&'a [u8], GltfError> {
+pub fn view_bytes<'a>(view: &gltf::buffer::View<'_>, buffers: &'a [impl AsRef<[u8]>]) -> Result<&'a [u8], GltfError> {
     let outside = || GltfError::ViewOutside { view: view.index() };
+    let buffer = buffers.get(view.buffer().index()).ok_or_else(outside)?.as_ref();
     let start = view.offset();
     start.checked_add(view.length()).and_then(|end| buffer.get(start..end)).ok_or_else(outside)
 }
@@ -125,48 +83,50 @@ fn word(bytes: &[u8]) -> u32 {
     bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte))
 }
 
-/// The accessor's entries, of `size` bytes each. Fails where they reach outside the buffer.
-fn entries<'a>(
-    accessor: &gltf::Accessor<'_>,
-    buffer: &'a [u8],
-    size: usize,
-) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, GltfError> {
-    let outside = || GltfError::AccessorOutside { accessor: accessor.index() };
-    let view = accessor.view().filter(|_| accessor.sparse().is_none()).ok_or(GltfError::Sparse)?;
-    let slice = view_bytes(&view, buffer).map_err(|_| outside())?;
-    let stride = view.stride().unwrap_or(size).max(size);
-    let count = accessor.count();
-    let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
-    let end = used.and_then(|used| used.checked_add(accessor.offset())).filter(|end| *end <= slice.len());
-    let data = slice.get(accessor.offset()..end.ok_or_else(outside)?).ok_or_else(outside)?;
-    Ok((0..count).map(move |index| &data[index * stride..index * stride + size]))
+/// The accessor's entries, of `size` bytes each, one after the other. Fails where they reach outside a buffer.
+fn entries(accessor: &gltf::Accessor<'_>, buffers: &[impl AsRef<[u8]>], size: usize) -> Result<Vec<u8>, GltfError> {
+    let (index, count) = (accessor.index(), accessor.count());
+    let too_large = || GltfError::AccessorTooLarge { accessor: index, most: MOST_BYTES };
+    let bytes = count.checked_mul(size).filter(|bytes| *bytes <= MOST_BYTES).ok_or_else(too_large)?;
+    // The entries of the buffer view, or zeros.
+    let mut all = match accessor.view() {
+        Some(view) => strided(index, &view, buffers, accessor.offset(), count, size)?,
+        None => vec![0; bytes],
+    };
+    // Those that a sparse accessor replaces.
+    if let Some(sparse) = accessor.sparse() {
+        let (numbers, values) = (sparse.indices(), sparse.values());
+        let number_size = match numbers.index_type() {
+            IndexType::U8 => 1,
+            IndexType::U16 => 2,
+            IndexType::U32 => 4,
+        };
+        let replaced = sparse.count();
+        let places = strided(index, &numbers.view(), buffers, numbers.offset(), replaced, number_size)?;
+        let values = strided(index, &values.view(), buffers, values.offset(), replaced, size)?;
+        for (place, value) in places.chunks_exact(number_size).map(word).zip(values.chunks_exact(size)) {
+            let start = place as usize * size;
+            let target = all.get_mut(start..start + size);
+            target.ok_or(GltfError::AccessorOutside { accessor: index })?.copy_from_slice(value);
+        }
+    }
+    Ok(all)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Found by fuzzing.
-    #[test]
-    fn a_binary_file_shorter_than_its_header_is_refused() {
-        for length in [0_u32, 11, 12, u32::MAX] {
-            let bytes = [&b"glTF"[..], &2_u32.to_le_bytes(), &length.to_le_bytes(), &[0; 8]].concat();
-            let found = parse(&bytes).unwrap_err();
-            assert_eq!(matches!(found, GltfError::StatedLength { .. }), length < 12, "{found}");
-        }
-    }
-
-    /// The gltf crate panics where these are looked up.
-    #[test]
-    fn images_and_cameras_without_content_are_refused() {
-        let view = r#""buffers":[{"byteLength":1}],"bufferViews":[{"buffer":0,"byteLength":1}]"#;
-        let with = |part: &str| parse(format!(r#"{{"asset":{{"version":"2.0"}},{view},{part}}}"#).as_bytes());
-        assert!(with(r#""images":[{"uri":"a"},{"bufferView":0,"mimeType":"image/png"}]"#).is_ok());
-        for image in [r#"{"bufferView":0}"#, "{}"] {
-            let error = with(&format!(r#""images":[{image}]"#)).unwrap_err();
-            assert!(error.to_string().starts_with("/images/0: "), "{error}");
-        }
-        let camera = r#""cameras":[{"type":"perspective","orthographic":{"xmag":1,"ymag":1,"zfar":9,"znear":0}}]"#;
-        assert!(with(camera).unwrap_err().to_string().starts_with("/cameras/0: "));
-    }
+/// `count` entries of `size` bytes from `offset` of a buffer view on, without the gaps between them.
+fn strided(
+    accessor: usize,
+    view: &gltf::buffer::View<'_>,
+    buffers: &[impl AsRef<[u8]>],
+    offset: usize,
+    count: usize,
+    size: usize,
+) -> Result<Vec<u8>, GltfError> {
+    let outside = || GltfError::AccessorOutside { accessor };
+    let slice = view_bytes(view, buffers).map_err(|_| outside())?;
+    let stride = view.stride().unwrap_or(size).max(size);
+    let used = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
+    let end = used.and_then(|used| used.checked_add(offset)).filter(|end| *end <= slice.len());
+    let data = slice.get(offset..end.ok_or_else(outside)?).ok_or_else(outside)?;
+    Ok((0..count).flat_map(|at| &data[at * stride..at * stride + size]).copied().collect())
 }

@@ -8,6 +8,23 @@ pub enum GltfError {
     /// The `gltf` crate refuses it.
     #[error("not valid glTF: {0}")]
     Unsound(#[from] gltf::Error),
+    /// It is not the JSON of a glTF.
+    #[error("not valid glTF: {reason}{hint}")]
+    NotJson {
+        /// The parser's reason.
+        reason: serde_json::Error,
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
+    },
+    /// The picture of a texture exists in a format that is not read.
+    #[error(
+        "/textures/{texture}: its only picture is KTX2 (KHR_texture_basisu), which is not read; convert the file with \
+         `gltf-transform ktxdecompress`"
+    )]
+    OnlyKtx2 {
+        /// The texture.
+        texture: usize,
+    },
     /// A binary file states a length that cannot hold its own header.
     #[error("not valid glTF: a binary file that states a length of {length} bytes; its header alone has 12")]
     StatedLength {
@@ -29,31 +46,23 @@ pub enum GltfError {
         /// The camera.
         camera: usize,
     },
-    /// An accessor that should hold floats holds something else.
-    #[error("accessor {accessor}: expected {expected} floats an entry")]
-    NotFloats {
-        /// The accessor.
-        accessor: usize,
-        /// Floats an entry.
-        expected: usize,
-    },
-    /// An accessor that should hold floats, or integers that stand for 0 to 1, holds something else.
-    #[error("accessor {accessor}: expected floats or normalized integers, found {found:?}")]
-    NotShares {
-        /// The accessor.
-        accessor: usize,
-        /// The type of its numbers.
-        found: DataType,
-    },
-    /// The entries of an accessor hold too few numbers.
+    /// The entries of an accessor hold another number of numbers.
     #[error("accessor {accessor}: expected {expected} numbers an entry, found {found}")]
-    TooFewNumbers {
+    OtherNumbers {
         /// The accessor.
         accessor: usize,
         /// Numbers an entry that are needed.
         expected: usize,
         /// Numbers an entry that it has.
         found: usize,
+    },
+    /// An accessor states too many entries.
+    #[error("accessor {accessor}: expected at most {most} bytes, found more")]
+    AccessorTooLarge {
+        /// The accessor.
+        accessor: usize,
+        /// The most bytes of its contents.
+        most: usize,
     },
     /// An entry of an accessor is NaN or infinite.
     #[error("accessor {accessor}: entry {entry} is not finite")]
@@ -105,9 +114,6 @@ pub enum GltfError {
         /// The accessor.
         accessor: usize,
     },
-    /// An accessor of a kind that is not supported.
-    #[error("sparse accessors are not supported")]
-    Sparse,
     /// A mesh of no primitive, or of several.
     #[error("expected one primitive per mesh, found {found}")]
     NotOnePrimitive {

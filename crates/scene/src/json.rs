@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mateval_image::file_kind::{hint, without_mark};
 use mateval_image::limits::read_at_most;
 use mateval_image::store::write_whole;
 use serde::de::DeserializeOwned;
@@ -47,7 +48,7 @@ pub fn read_format<T: DeserializeOwned>(path: &Path, expected: &'static str) -> 
 /// Parses the bytes of a file of the format `expected`; `path` is for the error alone.
 pub fn parse_format<T: DeserializeOwned>(path: &Path, text: &[u8], expected: &'static str) -> Result<T, SceneError> {
     // A text without a format, or without JSON, fails below.
-    match serde_json::from_slice::<Head>(text) {
+    match serde_json::from_slice::<Head>(without_mark(text)) {
         Ok(head) if head.format != expected => {
             Err(SceneError::Format { path: path.to_owned(), found: shortened(&head.format), expected })
         }
@@ -62,8 +63,9 @@ struct Head {
 
 /// Parses the bytes of a file; `path` is for the error alone.
 pub fn parse<T: DeserializeOwned>(path: &Path, text: &[u8]) -> Result<T, SceneError> {
+    let text = without_mark(text);
     // Following the JSON path costs time, so only a text that is known to be bad is parsed that way.
-    serde_json::from_slice(text).map_err(|error| invalid(path, pointer::<T>(text), error.to_string()))
+    serde_json::from_slice(text).map_err(|error| invalid(path, pointer::<T>(text), format!("{error}{}", hint(text))))
 }
 
 /// The JSON pointer of the first fault; empty where the text is no JSON at all, or the fault is in the whole of it.
@@ -112,6 +114,15 @@ mod tests {
         {
             assert_eq!(pointer::<Nested>(text.as_bytes()), expected, "{text}");
         }
+    }
+
+    #[test]
+    fn marks_are_skipped_and_other_files_named() {
+        let parsed = |bytes: &[u8]| parse::<Vec<u8>>(Path::new("a.json"), bytes).map_err(|error| error.to_string());
+        assert_eq!(parsed(b"\xef\xbb\xbf[1]").unwrap(), [1]);
+        let pointer = b"version https://git-lfs.github.com/spec/v1\n";
+        assert!(parsed(pointer).unwrap_err().contains("Git LFS pointer"));
+        assert!(parsed(b"\xff\xfe[\x001\0]\0").unwrap_err().contains("UTF-16"));
     }
 
     #[test]

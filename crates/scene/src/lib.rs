@@ -5,7 +5,7 @@
 //! [`ids`] and [`findings`] are used everywhere; [`camera`] is the camera model; [`mesh`], [`material`] and
 //! [`mod@reference`] describe a scene with its materials and lights; [`role`] states what its instances are;
 //! [`dataset`], [`layout`], [`manifest`] and [`open`] are the files of a dataset, [`submission`] those of a submission.
-//! [`bounded_cache`] keeps what later runs can use again. [`obj`], [`gltf_accessor`], [`gltf_webp`] and
+//! [`bounded_cache`] keeps what later runs can use again. [`obj`], [`gltf_accessor`], [`gltf_file`] and
 //! [`source_folder`] read untrusted files.
 
 pub mod bounded_cache;
@@ -19,7 +19,7 @@ pub mod findings;
 pub mod glb;
 pub mod gltf_accessor;
 pub mod gltf_error;
-pub mod gltf_webp;
+pub mod gltf_file;
 pub mod ids;
 pub mod json;
 pub mod layout;
@@ -44,6 +44,7 @@ pub mod scene_cost;
 pub mod scene_hashes;
 pub mod source_folder;
 pub mod source_materials;
+pub mod specular_glossiness;
 pub mod splitmix64;
 pub mod stored_encoding;
 pub mod submission;

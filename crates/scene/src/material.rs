@@ -241,6 +241,54 @@ pub struct Appearance {
     pub metallic: f32,
 }
 
+/// A parameter of a material that a method should recover, or emission.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MaterialParameter {
+    /// The base colour.
+    BaseColor,
+    /// The roughness.
+    Roughness,
+    /// The metallic.
+    Metallic,
+    /// The emission.
+    Emission,
+}
+
+/// Which parameters of a surface's material its source states. The others are defaults of the source's format or of the
+/// reader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StatedParameters {
+    /// The base colour.
+    pub base_color: bool,
+    /// The roughness.
+    pub roughness: bool,
+    /// The metallic.
+    pub metallic: bool,
+    /// The emission.
+    pub emission: bool,
+}
+
+impl Default for StatedParameters {
+    /// Everything is stated.
+    fn default() -> Self {
+        Self { base_color: true, roughness: true, metallic: true, emission: true }
+    }
+}
+
+impl StatedParameters {
+    /// The parameters that are not stated, sorted.
+    pub fn unstated(self) -> Vec<MaterialParameter> {
+        let all = [
+            (self.base_color, MaterialParameter::BaseColor),
+            (self.roughness, MaterialParameter::Roughness),
+            (self.metallic, MaterialParameter::Metallic),
+            (self.emission, MaterialParameter::Emission),
+        ];
+        all.into_iter().filter(|(is_stated, _)| !is_stated).map(|(_, parameter)| parameter).collect()
+    }
+}
+
 /// A texture of a material and how it is looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lookup {

@@ -1,12 +1,17 @@
 //! Reads untrusted OBJ and MTL files with tobj, after a check of every index and count, since tobj panics where an
 //! index overflows.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
+use mateval_image::file_kind::{hint, mistaken_for, without_mark};
 
 use crate::TriangleMesh;
 use crate::findings::shortened;
+
+/// Positions farther from the origin than this are not exact enough as 32-bit floats.
+const NEAR: f64 = 1000.0;
 
 /// Limits on a file's geometry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +84,12 @@ pub enum ObjFault {
         /// The material's name.
         material: String,
     },
+    /// It is a file of another kind.
+    #[error("expected text of an OBJ or MTL file{hint}")]
+    OtherKind {
+        /// What it is instead, and what to do.
+        hint: String,
+    },
     /// The `tobj` crate cannot read it.
     #[error(transparent)]
     Unsound(#[from] tobj::LoadError),
@@ -104,14 +115,19 @@ pub struct ObjGroup {
 /// A mesh in the file's own space, and what was left out of it.
 #[derive(Debug)]
 pub struct ObjMesh {
-    /// The triangles of all groups, group by group.
+    /// The triangles of all groups, group by group, relative to `base`.
     pub mesh: TriangleMesh,
+    /// What has been subtracted from the positions: whole units where the first of them is more than [`NEAR`] from the
+    /// origin, else nothing.
+    pub base: DVec3,
     /// Its objects and groups in their order.
     pub groups: Vec<ObjGroup>,
-    /// Whether only some faces have texture coordinates, which are then dropped for all.
-    pub mixed_uvs: bool,
-    /// Whether only some faces have normals, which are then dropped for all.
-    pub mixed_normals: bool,
+    /// Corners without texture coordinates where others have them; their uv is NaN.
+    pub corners_without_uv: usize,
+    /// Corners without normals where others have them; their normals are NaN.
+    pub corners_without_normal: usize,
+    /// The colour of each vertex (`v x y z r g b`) as the file has it; empty where no vertex has one.
+    pub colors: Vec<[f32; 3]>,
 }
 
 /// The properties of an MTL file's material that are read here.
@@ -157,16 +173,58 @@ struct Census {
 /// Reads an OBJ file: the faces of all groups as one mesh, with texture coordinates and normals. Polygons become fans
 /// of triangles.
 pub fn read(bytes: &[u8], limits: ObjLimits, materials: Materials) -> Result<ObjMesh, ObjError> {
-    let text = std::str::from_utf8(bytes).map_or_else(|_| String::from_utf8_lossy(bytes), std::borrow::Cow::Borrowed);
+    let text = text_of(bytes)?;
     let census = check(&text, limits)?;
-    let mixed = |some: usize| some != 0 && some != census.corners;
-    let (mixed_uvs, mixed_normals) = (mixed(census.corners_with_uv), mixed(census.corners_with_normal));
-    let (mesh, groups) = if mixed_uvs || mixed_normals {
-        load(&without_mixed(&text, mixed_uvs, mixed_normals), materials)?
+    let base = base(&text);
+    let text = if base == DVec3::ZERO { text } else { Cow::Owned(relative_to(&text, base)) };
+    let missing = |with: usize| if with == 0 { 0 } else { census.corners - with };
+    let (without_uv, without_normal) = (missing(census.corners_with_uv), missing(census.corners_with_normal));
+    let read = if without_uv > 0 || without_normal > 0 {
+        load(&with_all_indices(&text, without_uv > 0, without_normal > 0), materials)?
     } else {
         load(&text, materials)?
     };
-    Ok(ObjMesh { mesh, groups, mixed_uvs, mixed_normals })
+    Ok(ObjMesh { base, corners_without_uv: without_uv, corners_without_normal: without_normal, ..read })
+}
+
+/// The position of a line `v x y z ...`; none of any other line.
+fn position(line: &str) -> Option<DVec3> {
+    let mut numbers = line.trim_start().strip_prefix("v ")?.split_whitespace().map_while(|word| word.parse().ok());
+    Some(DVec3::new(numbers.next()?, numbers.next()?, numbers.next()?))
+}
+
+fn base(text: &str) -> DVec3 {
+    let first = text.lines().find_map(position).filter(|first| first.is_finite());
+    first.filter(|first| first.length() > NEAR).map_or(DVec3::ZERO, DVec3::round)
+}
+
+/// The text with all positions relative to `base`.
+fn relative_to(text: &str, base: DVec3) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.lines() {
+        match position(line) {
+            Some(position) => {
+                let [x, y, z] = (position - base).to_array();
+                out.push_str(&format!("v {x} {y} {z}"));
+                // Colours follow the position.
+                for word in line.split_whitespace().skip(4) {
+                    out.push(' ');
+                    out.push_str(word);
+                }
+            }
+            None => out.push_str(line),
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// The text without a byte order mark. Fails where the file is of another kind.
+fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ObjError> {
+    match mistaken_for(bytes) {
+        Some(_) if !bytes.is_empty() => Err(ObjFault::OtherKind { hint: hint(bytes).into_owned() }.into()),
+        _ => Ok(String::from_utf8_lossy(without_mark(bytes))),
+    }
 }
 
 fn check(text: &str, limits: ObjLimits) -> Result<Census, ObjError> {
@@ -229,21 +287,31 @@ fn check_corner(corner: &str, census: &mut Census) -> Result<(), ObjFault> {
     Ok(())
 }
 
-/// The text without the indices of texture coordinates or normals in its faces.
-fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
-    let mut out = String::with_capacity(text.len());
+/// The text with a uv or normal at every corner: NaN where the file has none. The NaN stands before all others, so that
+/// indices from the start grow by one.
+fn with_all_indices(text: &str, add_uvs: bool, add_normals: bool) -> String {
+    let mut out = String::with_capacity(text.len() + text.len() / 4);
+    out.push_str(if add_uvs { "vt nan nan\n" } else { "" });
+    out.push_str(if add_normals { "vn nan nan nan\n" } else { "" });
     for line in text.lines() {
         let mut words = line.split_whitespace();
         if words.next() != Some("f") {
             out.push_str(line);
-        } else {
-            out.push('f');
-            for corner in words {
-                let mut parts = corner.split('/');
-                let mut part = |dropped: bool| parts.next().filter(|_| !dropped).unwrap_or("");
-                let corner = format!(" {}/{}/{}", part(false), part(drop_uvs), part(drop_normals));
-                out.push_str(corner.trim_end_matches('/'));
-            }
+            out.push('\n');
+            continue;
+        }
+        out.push('f');
+        for corner in words {
+            let mut parts = corner.split('/');
+            let position = parts.next().unwrap_or("");
+            let mut index = |is_added: bool| match parts.next().unwrap_or("") {
+                "" if is_added => "1".to_owned(),
+                // Every index has been checked.
+                own if is_added && !own.starts_with('-') => format!("{}", own.parse::<u64>().map_or(1, |at| at + 1)),
+                own => own.to_owned(),
+            };
+            let (uv, normal) = (index(add_uvs), index(add_normals));
+            out.push_str(format!(" {position}/{uv}/{normal}").trim_end_matches('/'));
         }
         out.push('\n');
     }
@@ -252,14 +320,14 @@ fn without_mixed(text: &str, drop_uvs: bool, drop_normals: bool) -> String {
 
 /// The names of the material files that an OBJ file refers to.
 pub fn material_files(bytes: &[u8]) -> Vec<String> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = String::from_utf8_lossy(without_mark(bytes));
     let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("mtllib", line)).collect();
     names.into_iter().map(str::to_owned).collect()
 }
 
 /// Reads an MTL file. Every number must be finite; a single number after `Kd` stands for all three.
 pub fn read_materials(bytes: &[u8]) -> Result<Vec<ObjMaterial>, ObjError> {
-    let text = with_whole_colors(&String::from_utf8_lossy(bytes))?;
+    let text = with_whole_colors(&text_of(bytes)?)?;
     let (materials, _) = tobj::load_mtl_buf(&mut text.as_bytes()).map_err(ObjFault::Unsound)?;
     let number = |material: &tobj::Material, key: &'static str| {
         let Some(word) = material.unknown_param.get(key) else { return Ok(None) };
@@ -299,7 +367,7 @@ fn with_whole_colors(text: &str) -> Result<String, ObjError> {
     Ok(out)
 }
 
-fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>), ObjError> {
+fn load(text: &str, materials: Materials) -> Result<ObjMesh, ObjError> {
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ignore_points: true, ignore_lines: true };
     let names = match materials {
         Materials::Ignored => Vec::new(),
@@ -315,16 +383,19 @@ fn load(text: &str, materials: Materials) -> Result<(TriangleMesh, Vec<ObjGroup>
     let text = with_materials.as_deref().unwrap_or(text);
     let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, defined).map_err(ObjFault::Unsound)?;
     let mut mesh = TriangleMesh { uvs: Some(Vec::new()), normals: Some(Vec::new()), ..Default::default() };
-    let mut groups = Vec::new();
+    let (mut groups, mut colors) = (Vec::new(), Vec::new());
     for model in models.iter().filter(|model| !model.mesh.indices.is_empty()) {
         append(&mut mesh, &model.mesh);
+        colors.extend(model.mesh.vertex_color.as_chunks::<3>().0);
         let material = model.mesh.material_id.and_then(|at| names.get(at).cloned());
         groups.push(ObjGroup { name: model.name.clone(), material, triangles: model.mesh.indices.len() / 3 });
     }
     let count = mesh.positions.len();
     mesh.uvs = mesh.uvs.filter(|uvs| uvs.len() == count);
     mesh.normals = mesh.normals.filter(|normals| normals.len() == count);
-    Ok((mesh, groups))
+    // tobj has the colours of a group where each of its vertices has one.
+    colors.truncate(if colors.len() == count { count } else { 0 });
+    Ok(ObjMesh { mesh, base: DVec3::ZERO, groups, colors, corners_without_uv: 0, corners_without_normal: 0 })
 }
 
 fn without_material_files(text: &str) -> String {
@@ -414,11 +485,37 @@ mod tests {
     }
 
     #[test]
-    fn mixed_faces_lose_what_only_some_have() {
-        let read = read_text("f 1/1/1 2/2/1 3/3/1\nf 1//1 3//1 4//1").unwrap();
-        assert!(read.mixed_uvs && !read.mixed_normals);
-        assert!(read.mesh.uvs.is_none() && read.mesh.normals.is_some());
-        assert_eq!(read.mesh.triangles.len(), 2);
+    fn faces_without_uv_are_marked_and_others_keep_theirs() {
+        for with_uv in ["f 1/1/1 2/2/1 3/3/1", "f -4/-4/-1 -3/-3/-1 -2/-2/-1"] {
+            let read = read_text(&format!("{with_uv}\nf 1//1 3//1 4//1")).unwrap();
+            assert_eq!((read.corners_without_uv, read.corners_without_normal, read.mesh.triangles.len()), (3, 0, 2));
+            let uvs = read.mesh.uvs.unwrap();
+            assert_eq!(uvs[read.mesh.triangles[0][2] as usize], Vec2::ONE);
+            assert!(read.mesh.triangles[1].iter().all(|vertex| uvs[*vertex as usize].is_nan()));
+            assert!(read.mesh.normals.unwrap().iter().all(|normal| *normal == Vec3::Z));
+        }
+        let read = read_text("f 1//1 2//1 3//1\nf 1 3 4").unwrap();
+        assert_eq!((read.corners_without_uv, read.corners_without_normal, read.mesh.uvs), (0, 3, None));
+        let normals = read.mesh.normals.unwrap();
+        assert!(read.mesh.triangles[1].iter().all(|vertex| normals[*vertex as usize].is_nan()));
+    }
+
+    #[test]
+    fn far_positions_are_relative_to_whole_units() {
+        let text = "v 448231.251 120.125 -354123.5 1 0 0\nv 448232.251 120.125 -354123.5 0 1 0\nv 448231.251 121.125 -354123.5 0 0 1\nf 1 2 3\n";
+        let read = read(text.as_bytes(), LIMITS, Materials::Ignored).unwrap();
+        assert_eq!(read.base, DVec3::new(448_231.0, 120.0, -354_124.0));
+        assert_eq!((read.mesh.positions[1], read.colors[1]), (Vec3::new(1.251, 0.125, 0.5), [0.0, 1.0, 0.0]));
+    }
+
+    #[test]
+    fn marks_are_skipped_colours_are_read_and_other_files_named() {
+        let text = "\u{feff}v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n";
+        let mesh = read(text.as_bytes(), LIMITS, Materials::Ignored).unwrap();
+        assert_eq!((mesh.mesh.triangles.len(), mesh.colors[1]), (1, [0.0, 1.0, 0.0]));
+        assert_eq!(read_materials("\u{feff}newmtl a\nKd 1 0 0\n".as_bytes()).unwrap()[0].name, "a");
+        let other = read(b"\xff\xfev\0", LIMITS, Materials::Ignored).unwrap_err();
+        assert!(other.to_string().contains("UTF-16"), "{other}");
     }
 
     #[test]
@@ -431,7 +528,7 @@ mod tests {
     fn rubbish_is_a_fault_or_nothing() {
         assert!(read(b"v 1 2\nf 1 1 1", LIMITS, Materials::Ignored).is_err());
         assert!(read(b"v a b c", LIMITS, Materials::Ignored).is_err());
-        assert!(read(b"\xff\xfe\x00 v", LIMITS, Materials::Ignored).unwrap().mesh.triangles.is_empty());
+        assert!(read(b"\xff\x00 v", LIMITS, Materials::Ignored).unwrap().mesh.triangles.is_empty());
         assert!(read(b"", LIMITS, Materials::Ignored).unwrap().mesh.triangles.is_empty());
     }
 

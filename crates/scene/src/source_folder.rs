@@ -5,6 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mateval_image::file_kind::{hint, is_lfs_pointer};
+
 use crate::findings::shortened;
 use crate::manifest::sha256_of_bytes;
 
@@ -100,8 +102,17 @@ impl SourceFolder {
         if bytes.len() as u64 > self.file_bytes {
             return Err(self.too_large(relative));
         }
+        if is_lfs_pointer(&bytes) {
+            let message = format!("'{}' cannot be read{}", shortened(relative), hint(&bytes));
+            return Err(FileFault { code: "lfs_pointer", message });
+        }
         self.hashes.insert(relative.to_owned(), sha256_of_bytes(&bytes));
         Ok(bytes)
+    }
+
+    /// Whether the folder holds the file `relative`.
+    pub fn contains(&self, relative: &str) -> bool {
+        self.root.join(relative).is_file()
     }
 
     /// The path of the file `relative`. Fails unless it is an ordinary file inside the folder and within the limit.
@@ -176,6 +187,9 @@ mod tests {
         std::fs::write(folder.path().join("b"), "abcd").unwrap();
         assert_eq!(source.read("b").unwrap_err().code, "limit");
         assert_eq!(source.read("c").unwrap_err().code, "missing_file");
+        let mut pointers = SourceFolder::new(folder.path(), 1000).unwrap();
+        std::fs::write(folder.path().join("p.png"), "version https://git-lfs.github.com/spec/v1\n").unwrap();
+        assert_eq!(pointers.read("p.png").unwrap_err().code, "lfs_pointer");
         std::fs::create_dir(folder.path().join("d")).unwrap();
         assert_eq!(source.read("d").unwrap_err().code, "unreadable_file");
         let looked_for = source.into_files();

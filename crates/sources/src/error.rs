@@ -54,8 +54,11 @@ pub enum InvalidSource {
     #[error("{}", .0.message)]
     Unreadable(FileFault),
     /// The file is not text.
-    #[error("expected UTF-8, found other bytes")]
-    NotUtf8,
+    #[error("expected UTF-8, found other bytes{hint}")]
+    NotUtf8 {
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
+    },
     /// The file is not a Mitsuba scene.
     #[error(transparent)]
     Bitterli(BitterliError),

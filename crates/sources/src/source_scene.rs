@@ -4,7 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::{InvalidSource, SourceError};
+use crate::licence::is_optional;
 
+use glam::DVec3;
+use mateval_scene::material::StatedParameters;
 use mateval_scene::material_class::MaterialClass;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
@@ -33,9 +36,30 @@ pub struct InstanceOrigin {
     /// The class of material of each part, by its number in `part_of_triangle`, where the reader states it; none of a
     /// part whose triangles belong to several.
     pub class_of_part: Option<Vec<Option<MaterialClass>>>,
+    /// Which parameters of its material the source states.
+    pub stated: StatedParameters,
     /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal for all
     /// copies.
     pub shape: Option<Arc<TriangleMesh>>,
+}
+
+/// What a scene names and its folder does not hold.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Missing {
+    /// As in `models and textures`.
+    pub what: &'static str,
+    /// How many of them the scene names.
+    pub wanted: usize,
+    /// The paths of the missing ones.
+    pub files: Vec<String>,
+}
+
+impl Missing {
+    /// Of the files that a scene names, those that do not exist.
+    pub fn files(read: &[(String, String)], absent: &[String]) -> Self {
+        let files: Vec<String> = absent.iter().filter(|file| !is_optional(file)).cloned().collect();
+        Self { what: "files that the scene names", wanted: read.len().saturating_sub(1) + files.len(), files }
+    }
 }
 
 /// A scene read from any source.
@@ -59,6 +83,8 @@ pub struct SourceScene {
     pub origins: Vec<InstanceOrigin>,
     /// The camera of the input view.
     pub camera: Camera,
+    /// What was subtracted from the source's positions, in metres.
+    pub shift_m: DVec3,
     /// Faults of the input; sorted.
     pub findings: Vec<Finding>,
     /// The licence beside the source, if any.
@@ -67,6 +93,8 @@ pub struct SourceScene {
     pub files: Vec<(String, String)>,
     /// Every file that was looked for but is missing; sorted.
     pub absent: Vec<String>,
+    /// What the scene cannot do without and is missing.
+    pub missing: Missing,
 }
 
 /// Reads the file at `path`, which may have at most `most` bytes. Returns its folder, its name and its bytes. Other files

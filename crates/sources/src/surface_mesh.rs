@@ -1,4 +1,4 @@
-//! Transforms meshes to world space and repairs them: positions, normals, texture coordinates and front sides.
+//! Transforms meshes to world space and repairs them: positions, normals and front sides.
 
 use glam::{DMat3, DMat4, DVec3, Vec3};
 use mateval_scene::TriangleMesh;
@@ -17,8 +17,6 @@ pub struct Repairs {
     pub degenerate: usize,
     /// Normals that were recomputed because they were zero or not finite.
     pub normals: usize,
-    /// Texture coordinates set to 0 because they were not finite.
-    pub uvs: usize,
 }
 
 impl Repairs {
@@ -37,10 +35,6 @@ impl Repairs {
         if self.normals > 0 {
             let message = format!("{} normals are zero or not finite", self.normals);
             log.note("bad_normals", place, message, "computed them from the adjacent faces");
-        }
-        if self.uvs > 0 {
-            let message = format!("{} texture coordinates are not finite", self.uvs);
-            log.warn("not_finite", place, message, "used (0, 0)");
         }
     }
 }
@@ -72,7 +66,6 @@ pub fn to_world(mut mesh: TriangleMesh, world_from_object: DMat4, flip: bool) ->
     }
     // The other repairs.
     repairs.normals = repair_normals(&mut mesh);
-    repairs.uvs = repair_uvs(&mut mesh);
     repairs.degenerate = (0..mesh.triangles.len()).filter(|&index| is_degenerate(mesh.corners(index))).count();
     (mesh, repairs)
 }
@@ -131,11 +124,6 @@ fn repair_normals(mesh: &mut TriangleMesh) -> usize {
     faulty
 }
 
-fn repair_uvs(mesh: &mut TriangleMesh) -> usize {
-    let faulty = mesh.uvs.iter_mut().flatten().filter(|uv| !uv.is_finite());
-    faulty.map(|uv| *uv = glam::Vec2::ZERO).count()
-}
-
 /// Vertex normals of a smooth surface: the mean of the adjacent faces' normals, weighted by their angles at the vertex
 /// (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", JGT 1998), as Mitsuba computes them for an OBJ
 /// without normals.
@@ -155,8 +143,6 @@ pub fn smooth_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec2;
-
     use super::*;
     use crate::bitterli::primitives::{cube, rectangle};
 
@@ -194,9 +180,8 @@ mod tests {
         mesh.positions[0].x = f32::NAN;
         mesh.positions[5] = mesh.positions[4];
         mesh.normals.as_mut().unwrap()[8] = Vec3::ZERO;
-        mesh.uvs.as_mut().unwrap()[9] = Vec2::new(f32::INFINITY, 0.0);
         let (mesh, repairs) = to_world(mesh, DMat4::IDENTITY, false);
-        assert_eq!(repairs, Repairs { not_finite: 2, degenerate: 1, normals: 1, uvs: 1 });
+        assert_eq!(repairs, Repairs { not_finite: 2, degenerate: 1, normals: 1 });
         assert_eq!((mesh.triangles.len(), mesh.positions.len()), (10, 23));
         assert!(mesh.positions.iter().all(|p| p.is_finite()));
         assert!(mesh.normals.unwrap().iter().all(|n| (n.length() - 1.0).abs() < 1e-5));

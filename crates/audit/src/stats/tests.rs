@@ -21,6 +21,7 @@ fn instance(at: usize, (role, super_category, category, has_atlas): &Thing<'_>) 
         category: category.map(str::to_owned),
         super_category: super_category.map(str::to_owned),
         triangles: 2,
+        unstated: Vec::new(),
         atlas: has_atlas.then_some(atlas),
     }
 }
@@ -34,6 +35,7 @@ fn scene(id: &str, kind: SourceKind, house: &str, things: &[Thing<'_>]) -> Scene
             house: house.to_owned(),
             states_roughness: true,
             states_metallic: true,
+            shift_m: [0.0; 3],
             files: Vec::new(),
         },
         lights: SceneLights::Own,

@@ -1,9 +1,11 @@
 //! A donor: another method's mesh of a scene's surfaces, with the materials that are transferred to the atlases.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_image::Texture;
+use mateval_scene::material::MaterialParameter;
 
 use super::error::{ImportError, Limited};
 use super::limits::MAX_TRIANGLES;
@@ -21,6 +23,40 @@ pub struct Donor {
     pub(super) vertices: usize,
     /// The named groups of triangles.
     pub groups: Vec<DonorGroup>,
+    /// Number of triangles that have textures and no texture coordinates.
+    pub without_uv: usize,
+}
+
+impl DonorMaterial {
+    /// The material with the mean in place of the texture of base colour, and of those of roughness and metallic.
+    fn flattened(&self, [base, numbers]: [bool; 2]) -> Self {
+        let mut flat = self.clone();
+        if base && let (factor, Some(texture)) = &self.base_color {
+            let mean = mean_of(texture);
+            flat.base_color = (std::array::from_fn(|channel| factor[channel] * mean[channel]), None);
+        }
+        for scalar in [&mut flat.roughness, &mut flat.metallic].into_iter().flatten().filter(|_| numbers) {
+            if let Some((texture, channel)) = scalar.texture.take() {
+                scalar.factor *= mean_of(&texture)[channel];
+            }
+        }
+        flat
+    }
+}
+
+/// The shift, for a mesh whose place is nearer to it than to the origin; otherwise the mesh is near the origin, as the
+/// dataset's own files are.
+pub(super) fn shift_near(place: DVec3, shift: DVec3) -> DVec3 {
+    if place.distance(shift) < place.length() { shift } else { DVec3::ZERO }
+}
+
+/// The mean of all texels, summed in f64.
+fn mean_of(texture: &Texture) -> [f32; 3] {
+    let mut sum = [0.0; 3];
+    for (x, y) in (0..texture.height()).flat_map(|y| (0..texture.width()).map(move |x| (x, y))) {
+        sum.iter_mut().zip(texture.texel(x, y)).for_each(|(sum, value)| *sum += f64::from(value));
+    }
+    sum.map(|sum: f64| (sum / (texture.width() * texture.height()) as f64) as f32)
 }
 
 /// A node of a glTF, or a group of an OBJ.
@@ -45,10 +81,16 @@ pub struct DonorTriangle {
     pub material: usize,
 }
 
-/// Constants, multiplied by the textures where there are any. Roughness or metallic is `None` where the file gives
+/// Constants, multiplied by the textures where there are any. Roughness or metallic is `None` where the file states
 /// none.
 #[derive(Clone)]
 pub struct DonorMaterial {
+    /// Its name, for messages.
+    pub name: String,
+    /// Whether the file states the base colour. Otherwise it is the format's default.
+    pub states_base_color: bool,
+    /// Whether the file gives it an emissive texture, where some tools put baked colours.
+    pub glows: bool,
     /// Linear factor and texture.
     pub base_color: ([f32; 3], Option<Texture>),
     /// Perceptual roughness.
@@ -67,6 +109,57 @@ pub struct Scalar {
 }
 
 impl Donor {
+    /// What the materials of its triangles do not state; sorted.
+    pub fn unstated(&self) -> Vec<MaterialParameter> {
+        let any = |lacks: fn(&DonorMaterial) -> bool| self.triangles.iter().any(|t| lacks(&self.materials[t.material]));
+        let all = [
+            (any(|m| !m.states_base_color), MaterialParameter::BaseColor),
+            (any(|m| m.roughness.is_none()), MaterialParameter::Roughness),
+            (any(|m| m.metallic.is_none()), MaterialParameter::Metallic),
+        ];
+        all.into_iter().filter(|(lacks, _)| *lacks).map(|(_, parameter)| parameter).collect()
+    }
+
+    /// Fails where no material of its triangles states a base colour: the whole donor would have the format's default.
+    pub(super) fn check_base_color(&self) -> Result<(), ImportError> {
+        // Black under an emissive texture is how tools write a baked colour that viewers show without light.
+        let is_black = |material: &DonorMaterial| material.base_color.0 == [0.0; 3] && material.glows;
+        let mut used = self.triangles.iter().map(|triangle| &self.materials[triangle.material]);
+        if self.triangles.is_empty() || used.any(|material| material.states_base_color && !is_black(material)) {
+            return Ok(());
+        }
+        let glowing = self.triangles.iter().map(|triangle| &self.materials[triangle.material]).find(|m| m.glows);
+        let material = glowing.unwrap_or(&self.materials[self.triangles[0].material]);
+        Err(ImportError::NoBaseColor { material: material.name.clone(), glows: material.glows })
+    }
+
+    /// Gives the mean of its textures to every triangle without texture coordinates, which are NaN. Returns their number.
+    pub(super) fn use_means(&mut self) -> usize {
+        let (mut flat, mut count) = (BTreeMap::new(), 0);
+        for at in 0..self.triangles.len() {
+            let lacks = |set: usize| self.triangles[at].uvs[set].iter().any(|uv| !uv.is_finite());
+            let lacking = [lacks(0), lacks(1)];
+            let number = self.triangles[at].material;
+            let material = &self.materials[number];
+            let scalars = [&material.roughness, &material.metallic];
+            let has_scalars = scalars.into_iter().flatten().any(|scalar| scalar.texture.is_some());
+            let is_lost = [lacking[0] && material.base_color.1.is_some(), lacking[1] && has_scalars];
+            if is_lost != [false; 2] {
+                count += 1;
+                self.triangles[at].material = *flat.entry((number, is_lost)).or_insert_with(|| {
+                    let material = self.materials[number].flattened(is_lost);
+                    self.materials.push(material);
+                    self.materials.len() - 1
+                });
+            }
+            for uv in self.triangles[at].uvs.iter_mut().flatten().filter(|uv| !uv.is_finite()) {
+                *uv = Vec2::ZERO;
+            }
+        }
+        self.without_uv += count;
+        count
+    }
+
     /// The corners of the triangle with this index, in the mesh's space.
     pub(super) fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].corners.map(|corner| corner.as_dvec3())

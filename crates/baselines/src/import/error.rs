@@ -94,21 +94,34 @@ pub enum ImportError {
     /// A number is infinite or NaN.
     #[error("{0} is not finite")]
     NotFinite(Place),
-    /// Some faces have texture coordinates, others have none.
-    #[error("some faces have texture coordinates and others have none; expected all or none")]
-    MixedUvs,
+    /// No material states a base colour.
+    #[error(
+        "no material states a base colour, such as '{}'{}", shortened(.material), if *.glows {
+            ", which has an emissive texture: baked colours belong into baseColorTexture"
+        } else { ": bake it to a texture, or state baseColorFactor" }
+    )]
+    NoBaseColor {
+        /// A material of the file.
+        material: String,
+        /// Whether it has an emissive texture.
+        glows: bool,
+    },
+    /// A colour that is out of range.
+    #[error("{key} of '{}': expected 0 to 1, found {found:?}{}", shortened(.material), range_hint(.found))]
+    OutOfRange {
+        /// As in `Kd`.
+        key: &'static str,
+        /// The material's name.
+        material: String,
+        /// The values.
+        found: Vec<f32>,
+    },
     /// A group has a material that no MTL file defines.
     #[error("group '{}' has the material '{}', which no mtllib of the file defines", shortened(.group), shortened(.material))]
     UndefinedMaterial {
         /// The group's name.
         group: String,
         /// The material's name; empty where `usemtl` is missing.
-        material: String,
-    },
-    /// A textured material on faces without texture coordinates.
-    #[error("material '{}' has a texture, but the faces have no vt", shortened(.material))]
-    MissingUvs {
-        /// The material's name.
         material: String,
     },
     /// A material without base colour.
@@ -148,9 +161,6 @@ pub enum Unsupported {
     /// Triangle strips and fans.
     #[error("strips and fans are not read; write triangles")]
     StripsAndFans,
-    /// Sparse accessors.
-    #[error("sparse accessors are not supported; write whole buffer views")]
-    SparseAccessor,
     /// A sampler that wraps u and v in different ways.
     #[error("a sampler that wraps u and v in different ways is not read")]
     MixedWrap,
@@ -162,9 +172,6 @@ pub enum Unsupported {
 /// A number of a file that is not finite.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Place {
-    /// A texture coordinate of an OBJ.
-    #[error("a texture coordinate")]
-    TextureCoordinate,
     /// A corner of the OBJ's group of this name.
     #[error("a corner of group '{}'", shortened(.0))]
     GroupCorner(String),
@@ -192,6 +199,15 @@ impl From<FileFault> for ImportError {
 
 fn file_prefix(file: &Option<String>) -> String {
     file.as_ref().map_or_else(String::new, |file| format!("'{}': ", shortened(file)))
+}
+
+/// What the range of a colour may be.
+fn range_hint(found: &[f32]) -> &'static str {
+    if found.iter().any(|v| *v > 1.0) && found.iter().all(|v| (0.0..=255.0).contains(v)) {
+        "; divide by 255"
+    } else {
+        ""
+    }
 }
 
 fn listed(faults: &[MaterialFault]) -> String {

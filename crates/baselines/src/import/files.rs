@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::{InstanceId, SceneId};
@@ -94,10 +95,11 @@ impl ImportFolder {
         self.folder()?.path(name).map_err(|fault| self.refused(name, fault.into()))
     }
 
-    /// Reads a mesh and its textures, and no file outside the folder.
-    pub fn read_mesh(&self, name: &str) -> Result<Donor, BaselineError> {
+    /// Reads a mesh and its textures, and no file outside the folder. `shift` is what the dataset subtracted from the
+    /// source's positions; it is subtracted from meshes in the source's space.
+    pub fn read_mesh(&self, name: &str, shift: DVec3) -> Result<Donor, BaselineError> {
         let read = if name.ends_with(".obj") { obj_donor::read } else { gltf_donor::read };
-        read(&mut self.folder()?, name).map_err(|source| self.refused(name, source))
+        read(&mut self.folder()?, name, shift).map_err(|source| self.refused(name, source))
     }
 
     fn refused(&self, name: &str, source: ImportError) -> BaselineError {

@@ -6,25 +6,27 @@ use std::path::Path;
 
 use glam::{DMat4, DVec3, Mat2, Vec2, Vec3};
 use gltf::Semantic;
+use gltf::material::PbrSpecularGlossiness;
 use gltf::mesh::Mode;
-use mateval_image::texture_io::{Encoding, texture_of_bytes};
+use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
-use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, parse, triangles, view_bytes};
-use mateval_scene::gltf_webp::with_own_pictures;
+use mateval_scene::gltf_accessor::{first_numbers, indices, numbers, triangles, view_bytes};
+use mateval_scene::gltf_file::{GltfFile, parse};
 use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
+use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
 use super::error::{ImportError, Limited, Place, Unsupported};
 use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
 
-/// Reads the file `name` of the folder.
-pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
+/// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
+pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
-    let file = parse(&with_own_pictures(&bytes))?;
+    let file = parse(&bytes)?;
     let beside = name.rsplit_once('/').map_or("", |(beside, _)| beside);
     let mut reader = Reader { folder, beside, buffers: Vec::new(), textures: BTreeMap::new(), texels: 0 };
     let mut bytes = 0;
-    for buffer in file.buffers() {
+    for buffer in file.document.buffers() {
         let read = reader.buffer(&buffer, file.blob.as_deref())?;
         bytes += read.len() as u64;
         if bytes > MAX_FILE_BYTES {
@@ -33,14 +35,21 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError>
         reader.buffers.push(read);
     }
     let mut donor = Donor::default();
-    for material in file.materials() {
-        donor.materials.push(reader.material(&material)?);
+    for material in file.document.materials() {
+        donor.materials.push(reader.material(&material, &file)?);
     }
     // The material that glTF gives to primitives without one.
-    let plain = Scalar { factor: 1.0, texture: None };
-    let default = DonorMaterial { base_color: ([1.0; 3], None), roughness: Some(plain.clone()), metallic: Some(plain) };
-    donor.materials.push(default);
-    reader.walk(&file, &mut donor)?;
+    donor.materials.push(DonorMaterial {
+        name: "default".to_owned(),
+        states_base_color: false,
+        glows: false,
+        base_color: ([1.0; 3], None),
+        roughness: None,
+        metallic: None,
+    });
+    reader.walk(&file.document, shift, &mut donor)?;
+    donor.use_means();
+    donor.check_base_color()?;
     Ok(donor)
 }
 
@@ -74,7 +83,23 @@ impl Reader<'_> {
         Ok(self.folder.read(&relative)?)
     }
 
-    fn material(&mut self, material: &gltf::Material<'_>) -> Result<DonorMaterial, ImportError> {
+    fn material(&mut self, material: &gltf::Material<'_>, file: &GltfFile) -> Result<DonorMaterial, ImportError> {
+        let stated = material.index().and_then(|index| file.stated.get(index)).copied().unwrap_or_default();
+        let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
+        let glows = material.emissive_texture().is_some();
+        if let Some(extension) = material.pbr_specular_glossiness() {
+            let read = self.specular_glossiness(&extension)?;
+            let roughness = read.roughness.filter(|_| stated.roughness);
+            let metallic = read.metallic.filter(|_| stated.metallic);
+            return Ok(DonorMaterial {
+                name,
+                states_base_color: stated.base_color,
+                glows,
+                roughness,
+                metallic,
+                ..read
+            });
+        }
         let pbr = material.pbr_metallic_roughness();
         let base_color =
             pbr.base_color_texture().map(|info| self.texture(&info.texture(), Encoding::Srgb)).transpose()?;
@@ -82,11 +107,69 @@ impl Reader<'_> {
         let both = both.map(|info| self.texture(&info.texture(), Encoding::Linear)).transpose()?;
         let [r, g, b, _] = pbr.base_color_factor();
         let scalar = |factor, channel| Some(Scalar { factor, texture: both.clone().map(|texture| (texture, channel)) });
+        // A metallic of 1 that nobody states is the default of most writers' plain meshes, and no metal.
         Ok(DonorMaterial {
+            name,
+            states_base_color: stated.base_color,
+            glows,
             base_color: ([r, g, b], base_color),
-            roughness: scalar(pbr.roughness_factor(), 1),
-            metallic: scalar(pbr.metallic_factor(), 2),
+            roughness: scalar(pbr.roughness_factor(), 1).filter(|_| stated.roughness),
+            metallic: scalar(pbr.metallic_factor(), 2).filter(|_| stated.metallic),
         })
+    }
+
+    /// A material of `KHR_materials_pbrSpecularGlossiness`. Both textures are looked up where the diffuse one is.
+    fn specular_glossiness(&mut self, material: &PbrSpecularGlossiness<'_>) -> Result<DonorMaterial, ImportError> {
+        let [red, green, blue, _] = material.diffuse_factor();
+        let factors = SpecularGlossiness {
+            diffuse: [red, green, blue],
+            specular: material.specular_factor(),
+            glossiness: material.glossiness_factor(),
+        };
+        let constant = factors.converted();
+        let scalar = |factor, texture| Some(Scalar { factor, texture });
+        let mut donor = DonorMaterial {
+            name: String::new(),
+            states_base_color: true,
+            glows: false,
+            base_color: (constant.base_color, None),
+            roughness: scalar(constant.roughness, None),
+            metallic: scalar(constant.metallic, None),
+        };
+        let (diffuse, specular) = (material.diffuse_texture(), material.specular_glossiness_texture());
+        if diffuse.is_none() && specular.is_none() {
+            return Ok(donor);
+        }
+        let diffuse = diffuse.map(|info| self.texture(&info.texture(), Encoding::Srgb)).transpose()?;
+        let (specular, glossiness) = match specular {
+            Some(info) => {
+                let (name, bytes) = self.picture(&info.texture().source())?;
+                let wrap = wrap(&info.texture().sampler())?;
+                let (specular, glossiness) = texture_and_alpha_of_bytes(Path::new(&name), bytes, Encoding::Srgb, wrap)?;
+                (Some(specular), glossiness)
+            }
+            None => (None, None),
+        };
+        let from = SpecularTextures {
+            diffuse: diffuse.as_ref(),
+            specular: specular.as_ref(),
+            glossiness: glossiness.as_ref(),
+        };
+        let [base, numbers] = textures(factors, from)?;
+        donor.base_color = ([1.0; 3], Some(base));
+        donor.roughness = scalar(1.0, Some((numbers.clone(), 1)));
+        donor.metallic = scalar(1.0, Some((numbers, 2)));
+        Ok(donor)
+    }
+
+    /// The name and the bytes of an image.
+    fn picture(&mut self, image: &gltf::Image<'_>) -> Result<(String, Vec<u8>), ImportError> {
+        match image.source() {
+            gltf::image::Source::Uri { uri, .. } => Ok((uri.to_owned(), self.file(uri)?)),
+            gltf::image::Source::View { view, .. } => {
+                Ok((format!("image {}", image.index()), view_bytes(&view, &self.buffers)?.to_vec()))
+            }
+        }
     }
 
     fn texture(&mut self, texture: &gltf::Texture<'_>, encoding: Encoding) -> Result<Texture, ImportError> {
@@ -96,13 +179,7 @@ impl Reader<'_> {
         if let Some(known) = self.textures.get(&key) {
             return Ok(known.clone());
         }
-        let (name, bytes) = match image.source() {
-            gltf::image::Source::Uri { uri, .. } => (uri.to_owned(), self.file(uri)?),
-            gltf::image::Source::View { view, .. } => {
-                let buffer = &self.buffers[view.buffer().index()];
-                (format!("image {}", image.index()), view_bytes(&view, buffer)?.to_vec())
-            }
-        };
+        let (name, bytes) = self.picture(&image)?;
         let read = texture_of_bytes(Path::new(&name), bytes, encoding, wrap)?;
         self.texels += read.width() * read.height();
         if self.texels > MAX_TEXELS {
@@ -112,7 +189,7 @@ impl Reader<'_> {
         Ok(read)
     }
 
-    fn walk(&self, file: &gltf::Gltf, donor: &mut Donor) -> Result<(), ImportError> {
+    fn walk(&self, file: &gltf::Document, shift: DVec3, donor: &mut Donor) -> Result<(), ImportError> {
         let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or(ImportError::NoScene)?;
         let mut visited = BTreeSet::new();
         let mut open: Vec<(gltf::Node<'_>, DMat4, Vec<String>)> =
@@ -136,7 +213,7 @@ impl Reader<'_> {
                     name: names.first().cloned().unwrap_or_default(),
                     source: Box::new(source),
                 };
-                self.primitive(&primitive, world_from_node, donor).map_err(in_node)?;
+                self.primitive(&primitive, world_from_node, shift, donor).map_err(in_node)?;
             }
             donor.groups.push(DonorGroup { names: names.clone(), triangles: first..donor.triangles.len() });
             open.extend(node.children().map(|child| (child, world_from_node, names.clone())));
@@ -148,6 +225,7 @@ impl Reader<'_> {
         &self,
         primitive: &gltf::Primitive<'_>,
         world_from_node: DMat4,
+        shift: DVec3,
         donor: &mut Donor,
     ) -> Result<(), ImportError> {
         match primitive.mode() {
@@ -157,53 +235,65 @@ impl Reader<'_> {
                 return Err(ImportError::Unsupported(Unsupported::StripsAndFans));
             }
         }
-        let bytes = |accessor: &gltf::Accessor<'_>| {
-            let view = accessor.view().ok_or(ImportError::Unsupported(Unsupported::SparseAccessor))?;
-            Ok::<_, ImportError>(self.buffers[view.buffer().index()].as_slice())
-        };
         let missing = |attribute: String| ImportError::MissingAttribute { attribute };
         let positions = primitive.get(&Semantic::Positions).ok_or_else(|| missing("POSITION".to_owned()))?;
         donor.vertices += positions.count();
         if donor.vertices > MAX_VERTICES {
             return Err(ImportError::TooLarge { what: Limited::Vertices, limit: MAX_VERTICES as u64 });
         }
-        let positions: Vec<Vec3> = floats::<3>(&positions, bytes(&positions)?)?
-            .into_iter()
-            .map(|place| world_from_node.transform_point3(DVec3::from(place.map(f64::from))).as_vec3())
-            .collect();
+        let world = |place: [f32; 3]| world_from_node.transform_point3(DVec3::from(place.map(f64::from)));
+        let positions: Vec<DVec3> = numbers::<3>(&positions, &self.buffers)?.into_iter().map(world).collect();
+        let shift = positions.first().map_or(DVec3::ZERO, |first| shift_near(*first, shift));
+        let positions: Vec<Vec3> = positions.into_iter().map(|place| (place - shift).as_vec3()).collect();
         if !positions.iter().all(|place| place.is_finite()) {
             return Err(ImportError::NotFinite(Place::WorldPosition));
         }
-        let numbers = match primitive.indices() {
+        let corners = match primitive.indices() {
             Some(accessor) if accessor.count() > 3 * MAX_TRIANGLES => {
                 return Err(ImportError::TooLarge { what: Limited::Triangles, limit: MAX_TRIANGLES as u64 });
             }
-            Some(accessor) => indices(&accessor, bytes(&accessor)?)?,
+            Some(accessor) => indices(&accessor, &self.buffers)?,
             None => (0..positions.len() as u32).collect(),
         };
-        let triangles = triangles(numbers, positions.len())?;
+        let triangles = triangles(corners, positions.len())?;
         let same_count = |found: usize, attribute: String| match found == positions.len() {
             true => Ok(()),
             false => Err(ImportError::Count { attribute, found, expected: positions.len() }),
         };
         let colors = match primitive.get(&Semantic::Colors(0)) {
-            Some(accessor) => floats_or_shares::<3>(&accessor, bytes(&accessor)?)?,
+            Some(accessor) if accessor.count() > positions.len() => {
+                return Err(ImportError::Count {
+                    attribute: "COLOR_0".to_owned(),
+                    found: accessor.count(),
+                    expected: positions.len(),
+                });
+            }
+            Some(accessor) => first_numbers::<3>(&accessor, &self.buffers)?,
             None => vec![[1.0; 3]; positions.len()],
         };
         same_count(colors.len(), "COLOR_0".to_owned())?;
-        let pbr = primitive.material().pbr_metallic_roughness();
-        let mut uvs = [vec![Vec2::ZERO; positions.len()], vec![Vec2::ZERO; positions.len()]];
-        for (uvs, info) in uvs.iter_mut().zip([pbr.base_color_texture(), pbr.metallic_roughness_texture()]) {
+        let material = primitive.material();
+        let pbr = material.pbr_metallic_roughness();
+        let infos = match material.pbr_specular_glossiness() {
+            Some(extension) => {
+                let (diffuse, specular) = (extension.diffuse_texture(), extension.specular_glossiness_texture());
+                let first = || diffuse.clone().or_else(|| specular.clone());
+                [first(), first()]
+            }
+            None => [pbr.base_color_texture(), pbr.metallic_roughness_texture()],
+        };
+        // NaN marks what is absent.
+        let mut uvs = [vec![Vec2::NAN; positions.len()], vec![Vec2::NAN; positions.len()]];
+        for (uvs, info) in uvs.iter_mut().zip(infos) {
             let Some(info) = info else { continue };
             let transform = info.texture_transform();
             let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
-            let accessor =
-                primitive.get(&Semantic::TexCoords(set)).ok_or_else(|| missing(format!("TEXCOORD_{set}")))?;
-            let found = floats_or_shares::<2>(&accessor, bytes(&accessor)?)?;
-            same_count(found.len(), format!("TEXCOORD_{set}"))?;
+            let Some(accessor) = primitive.get(&Semantic::TexCoords(set)) else { continue };
+            same_count(accessor.count(), format!("TEXCOORD_{set}"))?;
+            let found = numbers::<2>(&accessor, &self.buffers)?;
             *uvs = found.into_iter().map(|uv| looked_up(Vec2::from(uv), transform.as_ref())).collect();
         }
-        let material = primitive.material().index().unwrap_or(donor.materials.len() - 1);
+        let material = material.index().unwrap_or(donor.materials.len() - 1);
         let mirrored = world_from_node.determinant() < 0.0;
         for mut corners in triangles.into_iter().map(|triangle| triangle.map(|vertex| vertex as usize)) {
             if mirrored {
@@ -252,7 +342,7 @@ mod tests {
     fn read_bytes(bytes: &[u8]) -> Result<Donor, ImportError> {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.glb"), bytes).unwrap();
-        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.glb")
+        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.glb", DVec3::ZERO)
     }
 
     fn sound() -> Vec<u8> {
@@ -269,13 +359,15 @@ mod tests {
     }
 
     #[test]
-    fn a_primitive_without_a_material_has_the_default_of_gltf() {
+    fn a_mesh_whose_materials_state_no_colour_is_refused() {
         let (mut bytes, key) = (sound(), br#","material":0"#);
         let at = bytes.windows(key.len()).position(|window| window == key).unwrap();
         bytes[at..at + key.len()].fill(b' ');
-        let donor = read_bytes(&bytes).unwrap();
+        assert!(matches!(read_bytes(&bytes), Err(ImportError::NoBaseColor { glows: false, .. })));
+        // Twin: our own writer states everything.
+        let donor = read_bytes(&sound()).unwrap();
         assert_eq!((donor.triangles.len(), donor.groups[0].names.as_slice()), (1, &["a".to_owned()][..]));
-        assert_eq!(donor.values(0, DVec3::new(1.0, 0.0, 0.0)), [1.0; 5]);
+        assert_eq!(donor.unstated(), []);
     }
 
     /// Damaged bytes cause no panic.
@@ -300,7 +392,7 @@ mod tests {
         let text = r#"{"asset":{"version":"2.0"},"images":[{"uri":"a"}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":
             {"baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":{"rotation":1.5707963267948966}}}}}]}"#;
         let file = parse(text.as_bytes()).unwrap();
-        let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
+        let info = file.document.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
         let turned = looked_up(Vec2::new(1.0, 0.0), info.texture_transform().as_ref());
         // A step to the right becomes a step up, which is -1 in glTF's v.
         assert!((turned - Vec2::new(0.0, 2.0)).length() < 1e-6, "{turned}");

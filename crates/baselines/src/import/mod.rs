@@ -23,7 +23,9 @@ use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use glam::DVec3;
 use mateval_scene::dataset::SceneFile;
+use mateval_scene::material::MaterialParameter;
 use mateval_scene::open::Dataset;
 use mateval_scene::{InstanceId, PartSetId, Progress, Report};
 
@@ -107,6 +109,9 @@ fn undescribed(instance: &InstanceId) -> ImportedInstance {
         nearest_m: None,
         mean_distance_m: None,
         max_distance_m: None,
+        mean: None,
+        unstated: Vec::new(),
+        faces_without_uv: 0,
     }
 }
 
@@ -167,6 +172,9 @@ struct ImportedAtlas {
     /// Distance of the donor from the nearest texel, in metres; none without a donor.
     nearest_m: Option<f64>,
     given: GivenMaps,
+    /// What the file's materials do not state.
+    unstated: Vec<MaterialParameter>,
+    faces_without_uv: usize,
 }
 
 impl ImportedAtlas {
@@ -184,6 +192,9 @@ impl ImportedAtlas {
             nearest_m: self.nearest_m,
             mean_distance_m: found.then_some(mean_m),
             max_distance_m: found.then_some(self.distances.max),
+            mean: mean_of(texels),
+            unstated: self.unstated,
+            faces_without_uv: self.faces_without_uv,
             ..undescribed(instance)
         };
         if report.has_maps() {
@@ -191,6 +202,18 @@ impl ImportedAtlas {
         }
         Ok(report)
     }
+}
+
+/// The mean of the texels that found a place; none without any.
+fn mean_of(texels: &[Texel]) -> Option<FlatMaterial> {
+    let seen = || texels.iter().filter_map(|texel| if let Texel::Seen(values) = texel { Some(values) } else { None });
+    let count = seen().count();
+    let mean = |at: usize| (seen().map(|values| f64::from(values[at])).sum::<f64>() / count as f64) as f32;
+    (count > 0).then(|| FlatMaterial {
+        base_color: [mean(0), mean(1), mean(2)],
+        roughness: Some(mean(3)),
+        metallic: Some(mean(4)),
+    })
 }
 
 impl<'a> Sources<'a> {
@@ -221,7 +244,7 @@ impl<'a> Sources<'a> {
         let Some(atlas) = &instance.atlas else { return Ok(None) };
         let size = atlas.size as usize;
         if let Some((file, frame)) = self.frames.get(&at) {
-            let mut donor = self.files.read_mesh(file)?;
+            let mut donor = self.files.read_mesh(file, DVec3::from(geometry.scene.source.shift_m))?;
             frame.apply(&mut donor);
             let all = Correspondence::new(&donor, |_| true);
             let place = (file.clone(), frame.clone());
@@ -244,8 +267,17 @@ impl<'a> Sources<'a> {
             let atlas = colors.paint(geometry, at, size);
             let is_described = atlas.texels.pixels().iter().any(|texel| matches!(texel, Texel::Seen(_)));
             let (file, distances) = (file.clone(), Distances::default());
-            let (frame, nearest_m) = (None, None);
-            let atlas = ImportedAtlas { file, own_file: false, frame, atlas, distances, nearest_m, given: *given };
+            let atlas = ImportedAtlas {
+                file,
+                own_file: false,
+                frame: None,
+                atlas,
+                distances,
+                nearest_m: None,
+                given: *given,
+                unstated: Vec::new(),
+                faces_without_uv: 0,
+            };
             is_described.then_some(atlas)
         }))
     }
@@ -262,8 +294,17 @@ impl<'a> Sources<'a> {
     ) -> ImportedAtlas {
         let rebaked = rebake(geometry, at, size, donor, correspondence, self.options.max_distance_m);
         let (atlas, distances, nearest_m) = (rebaked.atlas, rebaked.distances, rebaked.nearest_m);
-        let (own_file, frame, given) = (false, Some(frame), donor.given_maps());
-        ImportedAtlas { file, own_file, frame, atlas, distances, nearest_m, given }
+        ImportedAtlas {
+            file,
+            own_file: false,
+            frame: Some(frame),
+            atlas,
+            distances,
+            nearest_m,
+            given: donor.given_maps(),
+            unstated: donor.unstated(),
+            faces_without_uv: donor.without_uv,
+        }
     }
 }
 
@@ -274,7 +315,7 @@ impl SceneMesh {
         geometry: &SceneGeometry<'_>,
         max_distance_m: f64,
     ) -> Result<Self, BaselineError> {
-        let mut donor = files.read_mesh(&file)?;
+        let mut donor = files.read_mesh(&file, DVec3::from(geometry.scene.source.shift_m))?;
         let owner_of_name = owners(geometry)?;
         let mut owner_of_triangle = vec![None; donor.triangles.len()];
         for group in &donor.groups {
@@ -307,7 +348,7 @@ fn frames(
     let mut located = BTreeMap::new();
     for at in with_atlas(geometry.scene) {
         let Some(file) = files.mesh_of_instance(&geometry.scene.id, &geometry.scene.instances[at].id) else { continue };
-        let donor = files.read_mesh(&file)?;
+        let donor = files.read_mesh(&file, DVec3::from(geometry.scene.source.shift_m))?;
         let triangles = (0..donor.triangles.len()).map(|triangle| donor.corners(triangle));
         let found = Located::new([geometry.mesh(at)].into_iter(), triangles, max_distance_m);
         located.insert(at, (file, found));

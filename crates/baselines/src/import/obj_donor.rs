@@ -1,30 +1,27 @@
 //! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from
-//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`.
+//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`. Groups without a material take the colours of their vertices (sRGB,
+//! as trimesh and MeshLab write them).
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use mateval_image::texture_io::{Encoding, texture_of_bytes};
+use mateval_image::transfer::linear_from_srgb;
 use mateval_image::{Texture, Wrap};
 use mateval_scene::obj::{self, Materials, ObjLimits, ObjMaterial};
 use mateval_scene::source_folder::SourceFolder;
 
-use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar};
+use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shift_near};
 use super::error::{ImportError, Limited, Place, Unsupported};
 use super::limits::{MAX_TEXELS, MAX_TRIANGLES};
 
-/// Reads the file `name` of the folder.
-pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError> {
+/// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
+pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
     let limits = ObjLimits { triangles: MAX_TRIANGLES, corners: 3 * MAX_TRIANGLES };
     let read = obj::read(&bytes, limits, Materials::Split).map_err(|fault| ImportError::Obj { file: None, fault })?;
-    if read.mixed_uvs {
-        return Err(ImportError::MixedUvs);
-    }
-    if read.mesh.uvs.iter().flatten().any(|uv| !uv.is_finite()) {
-        return Err(ImportError::NotFinite(Place::TextureCoordinate));
-    }
+    let offset = read.base - shift_near(read.base, shift);
     let mut reader = Reader { folder, beside: name.rsplit_once('/').map_or("", |(beside, _)| beside), texels: 0 };
     let mut known = BTreeMap::new();
     for file in obj::material_files(&bytes) {
@@ -35,21 +32,18 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError>
     }
     let (mut donor, mut numbers, mut first) = (Donor::default(), BTreeMap::new(), 0);
     for group in &read.groups {
-        let named = group.material.as_ref().and_then(|material| known.get(material));
-        let Some(described) = named else {
-            let (group, material) = (group.name.clone(), group.material.clone().unwrap_or_default());
-            return Err(ImportError::UndefinedMaterial { group, material });
-        };
-        let textured =
-            described.diffuse_map.is_some() || described.roughness_map.is_some() || described.metallic_map.is_some();
-        if textured && read.mesh.uvs.is_none() {
-            return Err(ImportError::MissingUvs { material: described.name.clone() });
-        }
-        let material = match numbers.get(&described.name) {
-            Some(number) => *number,
-            None => {
-                donor.materials.push(reader.material(described)?);
-                numbers.insert(described.name.clone(), donor.materials.len() - 1);
+        let described = group.material.as_ref().and_then(|material| known.get(material));
+        let is_painted = described.is_none() && !read.colors.is_empty();
+        let key = described.map(|described| described.name.clone());
+        let material = match (numbers.get(&key), described) {
+            (Some(number), _) => *number,
+            (None, None) if !is_painted => {
+                let (group, material) = (group.name.clone(), group.material.clone().unwrap_or_default());
+                return Err(ImportError::UndefinedMaterial { group, material });
+            }
+            (None, described) => {
+                donor.materials.push(described.map_or_else(|| Ok(painted()), |described| reader.material(described))?);
+                numbers.insert(key, donor.materials.len() - 1);
                 donor.materials.len() - 1
             }
         };
@@ -58,14 +52,35 @@ pub fn read(folder: &mut SourceFolder, name: &str) -> Result<Donor, ImportError>
             if !corners.iter().all(|corner| corner.is_finite()) {
                 return Err(ImportError::NotFinite(Place::GroupCorner(group.name.clone())));
             }
-            let uv = |vertex: u32| read.mesh.uvs.as_ref().map_or(Vec2::ZERO, |uvs| uvs[vertex as usize]);
+            let corners = corners.map(|corner| (corner.as_dvec3() + offset).as_vec3());
+            let uv = |vertex: u32| read.mesh.uvs.as_ref().map_or(Vec2::NAN, |uvs| uvs[vertex as usize]);
             let uvs = read.mesh.triangles[triangle].map(uv);
-            donor.push(DonorTriangle { corners, uvs: [uvs; 2], colors: [Vec3::ONE; 3], material })?;
+            let color = |vertex: u32| Vec3::from(read.colors[vertex as usize].map(linear_from_srgb));
+            let colors = if is_painted { read.mesh.triangles[triangle].map(color) } else { [Vec3::ONE; 3] };
+            donor.push(DonorTriangle { corners, uvs: [uvs; 2], colors, material })?;
         }
         donor.groups.push(DonorGroup { names: vec![group.name.clone()], triangles: first..first + group.triangles });
         first += group.triangles;
     }
+    if let Some(bad) = read.colors.iter().find(|rgb| !rgb.iter().all(|v| (0.0..=1.0).contains(v))) {
+        let (key, material) = ("a vertex colour", "vertex colours".to_owned());
+        return Err(ImportError::OutOfRange { key, material, found: bad.to_vec() });
+    }
+    donor.use_means();
+    donor.check_base_color()?;
     Ok(donor)
+}
+
+/// The material of groups that have only the colours of their vertices.
+fn painted() -> DonorMaterial {
+    DonorMaterial {
+        name: "vertex colours".to_owned(),
+        states_base_color: true,
+        glows: false,
+        base_color: ([1.0; 3], None),
+        roughness: None,
+        metallic: None,
+    }
 }
 
 struct Reader<'a> {
@@ -115,7 +130,16 @@ impl Reader<'_> {
         };
         let roughness = scalar(material.roughness, &material.roughness_map)?;
         let metallic = scalar(material.metallic, &material.metallic_map)?;
-        Ok(DonorMaterial { base_color, roughness, metallic })
+        let (name, ranges) = (&material.name, [("Kd", material.diffuse), ("Pr", None), ("Pm", None)]);
+        let scalars = [None, material.roughness.map(|v| [v; 3]), material.metallic.map(|v| [v; 3])];
+        for ((key, color), scalar) in ranges.into_iter().zip(scalars) {
+            let found: Vec<f32> = color.map(Vec::from).or(scalar.map(|v| vec![v[0]])).unwrap_or_default();
+            if !found.iter().all(|v| (0.0..=1.0).contains(v)) {
+                return Err(ImportError::OutOfRange { key, material: name.clone(), found });
+            }
+        }
+        let name = name.clone();
+        Ok(DonorMaterial { name, states_base_color: true, glows: false, base_color, roughness, metallic })
     }
 
     fn texture(&mut self, name: &str, encoding: Encoding) -> Result<Texture, ImportError> {

@@ -1,8 +1,11 @@
 //! The report of an import: how much of each instance's surface the files cover.
 
+use mateval_scene::material::MaterialParameter;
 use mateval_scene::{InstanceId, SceneId};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use super::flat_materials::FlatMaterial;
 
 /// The value of `format` for this version of the report.
 pub const IMPORT_FORMAT: &str = "mateval-import/1";
@@ -57,6 +60,15 @@ pub struct ImportedInstance {
     pub mean_distance_m: Option<f64>,
     /// Largest distance of the places that were found, in metres; null without any.
     pub max_distance_m: Option<f64>,
+    /// Mean of the texels that found a place: linear base colour, roughness and metallic; null without any.
+    #[serde(default)]
+    pub mean: Option<FlatMaterial>,
+    /// What materials of the file do not state. Roughness and metallic that no material states are not submitted.
+    #[serde(default)]
+    pub unstated: Vec<MaterialParameter>,
+    /// Faces of the file that have textures and no texture coordinates; they have the mean of the texture.
+    #[serde(default)]
+    pub faces_without_uv: usize,
 }
 
 /// Where a mesh lies.

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::bail;
 use mateval_baselines::adapter::Adapter;
 use mateval_baselines::encoding_fit::{FittedEncoding, LEAST_EXPLAINED, Verdict, best_explained};
-use mateval_baselines::encoding_report::{self, EncodingReport, MapEncoding};
+use mateval_baselines::encoding_report::{self, EncodingReport, MapEncoding, Reading};
 use mateval_scene::json;
 
 use crate::bars::with_progress;
@@ -74,6 +74,9 @@ fn text(report: &EncodingReport) -> String {
 
 /// What the numbers show and what to do.
 fn verdict(map: &MapEncoding) -> String {
+    if let Some(advice) = advice(map.reading) {
+        return format!("the numbers fit far better {advice}");
+    }
     let words = map.fits.iter().map(|fitted| fitted.word()).collect::<Vec<_>>().join(", ");
     match (map.verdict, map.agrees) {
         (Verdict::Fits, true) => format!("the numbers fit {words}, as the adapter states"),
@@ -91,6 +94,24 @@ fn verdict(map: &MapEncoding) -> String {
                 .to_owned()
         }
     }
+}
+
+/// What another reading than the stated one means, and what to do.
+fn advice(reading: Reading) -> Option<&'static str> {
+    Some(match reading {
+        Reading::AsStated => return None,
+        Reading::MinusOneToOne => "as numbers from -1 to 1; write range = [-1.0, 1.0] in the adapter",
+        Reading::To255 => "as numbers from 0 to 255; write range = [0.0, 255.0] in the adapter",
+        Reading::Bgr => "with red and blue swapped (OpenCV's order); swap them in the files",
+        Reading::FlippedRows => "with the rows in reverse order; flip the files upside down",
+        Reading::FlippedColumns => "with the columns in reverse order; mirror the files",
+        Reading::Turned => "turned by 180 degrees; turn the files",
+        Reading::Inverted => "as 1 minus the number, such as a glossiness; invert the files",
+        Reading::Squared => "as the square of the value, such as alpha in place of roughness; store the square root",
+        Reading::Green => "in the green channel; write channel = \"g\" in the adapter",
+        Reading::Blue => "in the blue channel; write channel = \"b\" in the adapter",
+        Reading::CentreCrop => "as a crop of the view's middle; write placement = \"centre_crop\" in the adapter",
+    })
 }
 
 /// The two best encodings with their errors, and what to do.

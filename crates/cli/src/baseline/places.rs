@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
+use mateval_baselines::estimate_source::EstimateSource;
 use mateval_scene::open::Dataset;
 
 use crate::open_dataset::open_dataset;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, print, say};
 
 /// Arguments of every baseline that writes a submission.
 #[derive(clap::Args)]
@@ -36,6 +37,15 @@ impl Places {
     /// Opens the dataset.
     pub fn open(&self) -> anyhow::Result<Dataset> {
         open_dataset(&self.dataset)
+    }
+
+    /// Opens the dataset, and says which of the estimate's files are read for it.
+    pub fn open_for(&self, source: &EstimateSource) -> anyhow::Result<Dataset> {
+        let dataset = self.open()?;
+        if let Some(text) = source.files_read(&dataset) {
+            say(&text);
+        }
+        Ok(dataset)
     }
 
     /// Prints where the submission is and how many instances it covers.

@@ -89,6 +89,7 @@ fn lights_with_screen(role: &Role) -> Vec<NamedLight> {
             house: "house".to_owned(),
             states_roughness: false,
             states_metallic: false,
+            shift_m: [0.0; 3],
             files: Vec::new(),
         },
         lights: SceneLights::Stage,
@@ -113,6 +114,7 @@ fn instance(index: u16, role: &Role) -> Instance {
         category: None,
         super_category: None,
         triangles: 2,
+        unstated: Vec::new(),
         atlas: None,
     }
 }

@@ -39,8 +39,53 @@ pub enum SceneFault {
     #[error("photo: {0}")]
     Photo(PhotoFault),
     /// The input view shows no instance that has an atlas.
-    #[error("the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera")]
-    NothingSeen,
+    #[error(
+        "the camera sees nothing that is scored: no pixel is valid in the input view; choose another camera{}",
+        causes(findings)
+    )]
+    NothingSeen {
+        /// What was found before.
+        findings: Vec<Finding>,
+    },
+    /// Much of the source is missing.
+    #[error(
+        "{message}; at most {:.0} % may be missing, unless the recipe's scene has `allow_missing = true`{}",
+        100.0 * most, causes(findings)
+    )]
+    Missing {
+        /// What is missing.
+        message: String,
+        /// The largest share that may be missing.
+        most: f64,
+        /// What was found before.
+        findings: Vec<Finding>,
+    },
+    /// Base colours are defaults of the format.
+    #[error(
+        "{message}; at most {:.0} % may be unstated. Give the materials a colour or a texture (bake procedural ones), or \
+         write `allow_unstated = true` for the scene in the recipe{}",
+        100.0 * most, causes(findings)
+    )]
+    Unstated {
+        /// What is not stated.
+        message: String,
+        /// The largest share that may be unstated.
+        most: f64,
+        /// What was found before.
+        findings: Vec<Finding>,
+    },
+    /// The picture would be black.
+    #[error(
+        "none of the scene's {lights} lights reaches the input view: its picture would be black; add a light, or state a \
+         photo{}",
+        causes(findings)
+    )]
+    NoLight {
+        /// Groups of lights.
+        lights: usize,
+        /// What was found before.
+        findings: Vec<Finding>,
+    },
     /// The source's picture size is out of range.
     #[error("the source's film is {width}x{height}; state a resolution of {least} to {most} a side in the recipe")]
     FilmSize {
@@ -108,6 +153,15 @@ pub enum PinFault {
         /// The file.
         file: String,
     },
+}
+
+/// What was found before a fault, which may be its cause.
+fn causes(findings: &[Finding]) -> String {
+    if findings.is_empty() {
+        String::new()
+    } else {
+        format!("\nfound before, and perhaps the cause:{}", Finding::list(findings))
+    }
 }
 
 fn joined<T: std::fmt::Display>(faults: &[T]) -> String {

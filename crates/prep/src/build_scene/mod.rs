@@ -5,6 +5,7 @@ mod geometry;
 mod materials;
 mod photo;
 mod plan;
+mod plausible;
 mod scene_file;
 mod source;
 mod turned_views;
@@ -49,20 +50,29 @@ pub fn build(
     progress(Report::step("read the source", 0, 1));
     let read = source::read(recipe, entry, source)?;
     let licence = read.licence.clone();
+    let missing = plausible::missing(entry, &read.missing, &entry.root(source), &read.file, &read.findings);
+    let missing = missing.map_err(PrepError::scene(&entry.id))?;
     let (mut plan, absent) = plan::plan(recipe, entry, source, read)?;
+    plan.findings.extend(missing);
     check_inputs(entry, &plan.files)?;
     make_folders(folder, &plan)?;
 
     // Views and atlases. Only instances with an appearance can have an atlas.
     let has_appearance = |surface: &Surface| plan.scene.materials[surface.material.0].has_appearance();
     let expected: Vec<bool> = plan.scene.surfaces.iter().map(has_appearance).collect();
-    let mut seen = view_pictures::write(&plan, folder, &expected, progress)?.or_refuse(&entry.id)?;
+    let mut seen = view_pictures::write(&plan, folder, &expected, progress)?.or_refuse(&entry.id, &plan)?;
+    let unstated = plausible::unstated(entry, &plan, &seen).map_err(PrepError::scene(&entry.id))?;
+    plan.findings.extend(unstated);
+    if !plausible::is_lit(&plan)? {
+        let findings = plausible::above_notes(&plan.findings);
+        return Err(PrepError::scene(&entry.id)(SceneFault::NoLight { lights: plan.scene.lights.len(), findings }));
+    }
     let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };
     let atlases = materials::write(&mut plan, folder, &sizes, cache, progress)?;
     let scored: Vec<bool> = atlases.iter().map(|atlas| atlas.unwrapped.is_some()).collect();
     if scored != expected {
         // An instance without an atlas cannot be scored, so its pixels must not be valid.
-        seen = view_pictures::write(&plan, folder, &scored, progress)?.or_refuse(&entry.id)?;
+        seen = view_pictures::write(&plan, folder, &scored, progress)?.or_refuse(&entry.id, &plan)?;
     }
     plan.findings.extend(seen.findings);
     if let Some(photo) = &plan.photo {

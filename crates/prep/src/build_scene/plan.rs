@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use glam::DVec3;
 use mateval_scene::dataset::{TrueMaterials, View};
+use mateval_scene::material::StatedParameters;
 use mateval_scene::material_class::{ClassifiedPart, MaterialClass};
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::source_folder::SourceFolder;
@@ -30,6 +32,10 @@ pub(super) struct Plan {
     /// The house that it belongs to.
     pub(super) house: String,
     pub(super) lights: SceneLights,
+    /// What was subtracted from the source's positions, in metres.
+    pub(super) shift_m: DVec3,
+    /// Which parameters of each instance's material the source states.
+    pub(super) stated: Vec<StatedParameters>,
     /// Whether the source states roughness and metallic.
     pub(super) states_roughness: bool,
     pub(super) states_metallic: bool,
@@ -104,6 +110,8 @@ pub(super) fn plan(
         kind,
         house: entry.house.clone().unwrap_or(read.house),
         lights,
+        shift_m: read.shift_m,
+        stated: read.origins.iter().map(|origin| origin.stated).collect(),
         states_roughness,
         states_metallic,
         scene,

@@ -17,9 +17,9 @@ pub(super) fn write(
     atlases: &[InstanceAtlas],
     folder: &SceneFolder,
 ) -> Result<(), PrepError> {
-    let instances = plan.instances.iter().zip(&plan.scene.surfaces).zip(atlases);
+    let instances = plan.instances.iter().zip(&plan.scene.surfaces).zip(atlases).zip(&plan.stated);
     let instances = instances
-        .map(|((instance, surface), atlas)| Instance {
+        .map(|(((instance, surface), atlas), stated)| Instance {
             id: instance.id.clone(),
             index: instance.index,
             name: surface.name.clone(),
@@ -27,6 +27,7 @@ pub(super) fn write(
             category: instance.category.clone(),
             super_category: instance.super_category.clone(),
             triangles: surface.mesh.triangles.len(),
+            unstated: stated.unstated(),
             atlas: atlas.unwrapped.as_ref().map(|unwrapped| Atlas {
                 size: unwrapped.size,
                 charts: unwrapped.charts,
@@ -55,6 +56,7 @@ pub(super) fn write(
             house: plan.house,
             states_roughness: plan.states_roughness,
             states_metallic: plan.states_metallic,
+            shift_m: plan.shift_m.to_array(),
             files,
         },
         lights: plan.lights,

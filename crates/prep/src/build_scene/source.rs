@@ -4,9 +4,12 @@ use std::path::Path;
 
 use glam::DVec3;
 use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::material::StatedParameters;
+use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{SceneLights, SourceKind};
 
 use super::fault::SceneFault;
+use super::plausible::MOST_UNSTATED;
 use super::turned_views::views_of;
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
@@ -15,7 +18,7 @@ use mateval_sources::bitterli;
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
 use mateval_sources::gltf;
-use mateval_sources::source_scene::{InstanceOrigin, SourceScene};
+use mateval_sources::source_scene::{InstanceOrigin, Missing, SourceScene};
 use mateval_tracer::World;
 
 /// Width and height in pixels where neither the recipe nor a glTF with a camera states them.
@@ -30,20 +33,43 @@ pub(super) fn read(recipe: &Recipe, entry: &RecipeScene, root: &Path) -> Result<
     }
 }
 
+/// The place of the recipe's own camera, if it states one.
+fn given_place(entry: &RecipeScene) -> Option<DVec3> {
+    match &entry.camera {
+        Some(RecipeCamera::Given(given)) => Some(DVec3::from_array(given.position)),
+        _ => None,
+    }
+}
+
+/// Whether a parameter is stated for all but a small share of the surfaces' area.
+fn states(scene: &ReferenceScene, origins: &[InstanceOrigin], stated: fn(&StatedParameters) -> bool) -> bool {
+    let (mut all, mut unstated) = (0.0, 0.0);
+    for (surface, origin) in scene.surfaces.iter().zip(origins) {
+        if scene.materials[surface.material.0].has_appearance() {
+            let area = surface.mesh.area();
+            all += area;
+            unstated += if stated(&origin.stated) { 0.0 } else { area };
+        }
+    }
+    unstated <= MOST_UNSTATED * all
+}
+
 fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path) -> Result<SourceScene, PrepError> {
-    let read = bitterli::read(&root.join(xml), &bitterli::Limits::default())?;
+    let read = bitterli::read(&root.join(xml), given_place(entry), &bitterli::Limits::default())?;
     let folder = xml.parent().and_then(Path::file_name);
     Ok(SourceScene {
         kind: SourceKind::Bitterli,
         lights: SceneLights::Own,
-        states_roughness: true,
-        states_metallic: true,
+        states_roughness: states(&read.scene, &read.origins, |stated| stated.roughness),
+        states_metallic: states(&read.scene, &read.origins, |stated| stated.metallic),
+        origins: read.origins,
         house: folder.map_or_else(|| entry.id.to_string(), |name| name.to_string_lossy().into_owned()),
         file: xml.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        origins: vec![InstanceOrigin::default(); read.scene.surfaces.len()],
-        camera: bitterli_camera(recipe, entry, &read.camera).map_err(PrepError::scene(&entry.id))?,
+        shift_m: read.shift_m,
+        camera: bitterli_camera(recipe, entry, &read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?,
         scene: read.scene,
         findings: read.findings,
+        missing: Missing::files(&read.source_files, &read.absent_files),
         licence: read.licence,
         files: read.source_files,
         absent: read.absent_files,
@@ -51,11 +77,16 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
 }
 
 /// The source's or the recipe's camera at the recipe's resolution. The source's horizontal field of view is kept.
-fn bitterli_camera(recipe: &Recipe, entry: &RecipeScene, source: &Camera) -> Result<Camera, SceneFault> {
+fn bitterli_camera(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    source: &Camera,
+    shift_m: DVec3,
+) -> Result<Camera, SceneFault> {
     let old = source.intrinsics;
     let [width, height] = picture_size(recipe, entry, [old.width, old.height])?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
-        return given_camera(given, [width, height]);
+        return given_camera(given, [width, height], shift_m);
     }
     let scale = f64::from(width) / f64::from(old.width);
     let intrinsics = Intrinsics {
@@ -80,18 +111,20 @@ fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[
 }
 
 fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, file: &Path) -> Result<SourceScene, PrepError> {
-    let read = gltf::read(&root.join(file), &gltf::Limits::default())?;
+    let read = gltf::read(&root.join(file), given_place(entry), &gltf::Limits::default())?;
     Ok(SourceScene {
         kind: SourceKind::Gltf,
         lights: read.lights,
-        states_roughness: true,
-        states_metallic: true,
+        states_roughness: states(&read.scene, &read.origins, |stated| stated.roughness),
+        states_metallic: states(&read.scene, &read.origins, |stated| stated.metallic),
+        shift_m: read.shift_m,
         house: file.file_stem().map_or_else(|| entry.id.to_string(), |stem| stem.to_string_lossy().into_owned()),
         file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         origins: read.origins,
-        camera: gltf_camera(recipe, entry, read.camera).map_err(PrepError::scene(&entry.id))?,
+        camera: gltf_camera(recipe, entry, read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?,
         scene: read.scene,
         findings: read.findings,
+        missing: Missing::files(&read.source_files, &read.absent_files),
         licence: read.licence,
         files: read.source_files,
         absent: read.absent_files,
@@ -99,11 +132,16 @@ fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, file: &Path) ->
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.
-fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, own: Option<Camera>) -> Result<Camera, SceneFault> {
+fn gltf_camera(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    own: Option<Camera>,
+    shift_m: DVec3,
+) -> Result<Camera, SceneFault> {
     let own_size = own.map_or(DEFAULT_SIZE, |camera| [camera.intrinsics.width, camera.intrinsics.height]);
     let [width, height] = picture_size(recipe, entry, own_size)?;
     if let Some(RecipeCamera::Given(given)) = &entry.camera {
-        return given_camera(given, [width, height]);
+        return given_camera(given, [width, height], shift_m);
     }
     let camera = own.ok_or(SceneFault::NoCameraInFile)?;
     let focal = camera.intrinsics.fy * f64::from(height) / f64::from(camera.intrinsics.height);
@@ -111,10 +149,12 @@ fn gltf_camera(recipe: &Recipe, entry: &RecipeScene, own: Option<Camera>) -> Res
     Ok(Camera { intrinsics: Intrinsics { width, height, fx: focal, fy: focal, cx, cy }, ..camera })
 }
 
-fn given_camera(given: &GivenCamera, [width, height]: [u32; 2]) -> Result<Camera, SceneFault> {
+/// A camera of the recipe, whose places are those of the source, in a scene from which `shift_m` was subtracted.
+fn given_camera(given: &GivenCamera, [width, height]: [u32; 2], shift_m: DVec3) -> Result<Camera, SceneFault> {
     let GivenCamera { position, target, fov_y_deg } = *given;
     let intrinsics = Intrinsics::from_fov_y(width, height, fov_y_deg.to_radians());
-    let camera = Camera::look_at(DVec3::from_array(position), DVec3::from_array(target), DVec3::Y, intrinsics);
+    let [position, target] = [position, target].map(|place| DVec3::from_array(place) - shift_m);
+    let camera = Camera::look_at(position, target, DVec3::Y, intrinsics);
     camera.ok_or(SceneFault::CameraDirection)
 }
 
@@ -159,14 +199,14 @@ fn room_camera(
     let resolution = entry.resolution.or(recipe.resolution).unwrap_or(recipe.camera_rules.resolution());
     match &entry.camera {
         None => Err(RecipeSceneFault::NoCamera.into()),
-        Some(RecipeCamera::Given(given)) => given_camera(given, resolution),
+        Some(RecipeCamera::Given(given)) => given_camera(given, resolution, house.shift_m),
         Some(RecipeCamera::Designer(number)) => {
             let Some(camera) = house.cameras.iter().find(|camera| camera.number == *number) else {
                 let known = house.cameras.iter().map(|camera| camera.number).collect();
                 return Err(SceneFault::NoDesignersCamera { number: *number, known });
             };
             let (position, target) = (camera.position.to_array(), camera.target.to_array());
-            given_camera(&GivenCamera { position, target, fov_y_deg: camera.fov_y_deg }, resolution)
+            given_camera(&GivenCamera { position, target, fov_y_deg: camera.fov_y_deg }, resolution, DVec3::ZERO)
         }
         Some(RecipeCamera::Seed { seed, fov_y_deg }) => {
             let [width, height] = resolution;

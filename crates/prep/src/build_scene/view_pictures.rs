@@ -10,6 +10,7 @@ use mateval_tracer::World;
 
 use super::fault::SceneFault;
 use super::plan::Plan;
+use super::plausible::above_notes;
 use crate::error::PrepError;
 use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
 
@@ -20,16 +21,19 @@ pub(super) struct Seen {
     pub(super) nearest: Vec<Option<f64>>,
     /// The share of the valid pixels of each view that the input view does not show.
     pub(super) unseen_shares: Vec<f64>,
-    /// Whether the input view shows something that is scored.
-    input_shows_something: bool,
+    /// For each instance, how many valid pixels of the input view show it.
+    pub(super) input_pixels: Vec<usize>,
     /// Findings about views that are of little use.
     pub(super) findings: Vec<Finding>,
 }
 
 impl Seen {
     /// Fails if the input view shows nothing that is scored.
-    pub(super) fn or_refuse(self, scene: &SceneId) -> Result<Self, PrepError> {
-        if self.input_shows_something { Ok(self) } else { Err(PrepError::scene(scene)(SceneFault::NothingSeen)) }
+    pub(super) fn or_refuse(self, scene: &SceneId, plan: &Plan) -> Result<Self, PrepError> {
+        if self.input_pixels.iter().any(|count| *count > 0) {
+            return Ok(self);
+        }
+        Err(PrepError::scene(scene)(SceneFault::NothingSeen { findings: above_notes(&plan.findings) }))
     }
 }
 
@@ -57,6 +61,9 @@ pub(super) fn write(
         let (geometry, truth) = scene.pictures(&view.camera, &plan.views[0].camera);
         note_nearest(&geometry, if at == 0 { &mut in_input } else { &mut elsewhere });
         check_use(plan, &view.id, &geometry, &mut seen);
+        if at == 0 {
+            seen.input_pixels = valid_pixels(&geometry, plan.instances.len());
+        }
         seen.unseen_shares.push(unseen_share(&geometry));
         write_geometry(folder, &view.id, &geometry)?;
         write_truth(folder, &view.id, &truth)?;
@@ -84,13 +91,21 @@ fn check_use(plan: &Plan, view: &ViewId, geometry: &GeometryPictures, seen: &mut
         let message = format!("a surface is {nearest:.1e} m in front of the camera, expected {TOO_NEAR_M} m or more");
         warn("camera_too_near", message, "kept the view; choose another camera, since so near a surface may be noise");
     }
-    let shows_something = geometry.valid.pixels().contains(&true);
-    if view.as_str() == INPUT {
-        seen.input_shows_something = shows_something;
-    } else if !shows_something {
+    if view.as_str() != INPUT && !geometry.valid.pixels().contains(&true) {
         let message = "the camera sees nothing that is scored: no pixel is valid".to_owned();
         warn("nothing_seen", message, "kept the view; it adds nothing to any score");
     }
+}
+
+/// For each instance, how many valid pixels show it.
+fn valid_pixels(geometry: &GeometryPictures, instances: usize) -> Vec<usize> {
+    let mut count = vec![0; instances];
+    for (instance, _) in geometry.instance.pixels().iter().zip(geometry.valid.pixels()).filter(|(_, valid)| **valid) {
+        if let Some(place) = usize::from(*instance).checked_sub(1) {
+            count[place] += 1;
+        }
+    }
+    count
 }
 
 /// Lowers the nearest depth of every instance that the view shows.

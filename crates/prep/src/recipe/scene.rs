@@ -41,6 +41,12 @@ pub struct RecipeScene {
     /// byte is read, the scene is refused. Not checked if empty.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
+    /// Accept a scene of which more than a fifth of the models, meshes or textures is missing.
+    #[serde(default)]
+    pub allow_missing: bool,
+    /// Accept a scene of which more than 5 % of the scored pixels have a base colour that the source does not state.
+    #[serde(default)]
+    pub allow_unstated: bool,
     /// Overrides the recipe's.
     pub resolution: Option<[u32; 2]>,
     /// Overrides the recipe's.

@@ -212,7 +212,7 @@ impl RoomSearch<'_> {
             position: position.to_array(),
             target: (position + forward).to_array(),
             fov_y_deg,
-            score: score(self.house, &surfaces, self.options.camera_rules.sampler_rules().architecture_weight),
+            score: score(self.house, &surfaces, &self.options.camera_rules.sampler_rules()),
             nearest_m: nearest(&seen),
             outside,
             seen_objects: pieces.len(),

@@ -1,6 +1,6 @@
 //! BSDFs. Any nesting of wrappers (`twosided`, `mask`, `bumpmap`) around one model becomes one material.
 
-use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput};
+use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput, StatedParameters};
 use mateval_scene::reference::MaterialIndex;
 
 use super::document::Element;
@@ -10,6 +10,16 @@ use mateval_scene::findings::shortened;
 
 /// The deepest nesting of wrappers. A deeper one is taken for a cycle of references.
 const MOST_WRAPPERS: usize = 16;
+
+/// Nothing but the emission, which belongs to the shape.
+const UNSTATED: StatedParameters =
+    StatedParameters { base_color: false, roughness: false, metallic: false, emission: true };
+
+/// A material and which of its parameters the scene states.
+struct ReadMaterial {
+    material: Material,
+    stated: StatedParameters,
+}
 
 impl<'a> Reader<'a> {
     /// The material of the BSDF `element`, which is made at its first use. Without an id it is named after `owner`, the
@@ -27,43 +37,49 @@ impl<'a> Reader<'a> {
     /// The material of a shape without a BSDF. As in Mitsuba, it is diffuse grey, or black where the shape emits.
     pub(super) fn default_material(&mut self, owner: &str, emits: bool) -> MaterialIndex {
         let reflectance = if emits { 0.0 } else { 0.5 };
-        self.add_material(Material {
+        let material = Material {
             name: owner.to_owned(),
             model: diffuse(reflectance),
             two_sided: false,
             opacity: None,
             bump: None,
-        })
+        };
+        // A lamp without a BSDF reflects nothing.
+        let stated = if emits { StatedParameters::default() } else { UNSTATED };
+        self.add_material(ReadMaterial { material, stated })
     }
 
-    fn add_material(&mut self, material: Material) -> MaterialIndex {
-        self.scene.materials.push(material);
+    fn add_material(&mut self, read: ReadMaterial) -> MaterialIndex {
+        self.scene.materials.push(read.material);
+        self.stated.push(read.stated);
         MaterialIndex(self.scene.materials.len() - 1)
     }
 
-    fn flat_material(&mut self, outer: &'a Element, owner: &str) -> Material {
-        let mut material =
+    fn flat_material(&mut self, outer: &'a Element, owner: &str) -> ReadMaterial {
+        let material =
             Material { name: owner.to_owned(), model: diffuse(0.5), two_sided: false, opacity: None, bump: None };
+        let mut read = ReadMaterial { material, stated: UNSTATED };
         let mut named = false;
         let mut element = outer;
         for _ in 0..MOST_WRAPPERS {
             // The outermost id names the material.
             if let (Some(id), false) = (element.attribute("id"), named) {
-                (material.name, named) = (id.to_owned(), true);
+                (read.material.name, named) = (id.to_owned(), true);
             }
             // One layer is read, then the BSDF within it.
-            let place = if named { format!("bsdf '{}'", shortened(&material.name)) } else { place_of(element, owner) };
+            let place =
+                if named { format!("bsdf '{}'", shortened(&read.material.name)) } else { place_of(element, owner) };
             let mut from = self.parameters(element, place);
-            let inner = self.unwrap_layer(element, &mut from, &mut material);
+            let inner = self.unwrap_layer(element, &mut from, &mut read);
             from.finish(&mut self.log);
             match inner {
                 Some(inner) => element = inner,
-                None => return material,
+                None => return read,
             }
         }
         let message = format!("more than {MOST_WRAPPERS} nested BSDFs");
         self.log.warn("nested_too_deep", &place_of(outer, owner), message, "used diffuse grey 0.5");
-        material
+        read
     }
 
     /// Reads one layer into `material`. Returns the BSDF within it, or none for the innermost.
@@ -71,8 +87,9 @@ impl<'a> Reader<'a> {
         &mut self,
         element: &'a Element,
         from: &mut Parameters<'a>,
-        material: &mut Material,
+        read: &mut ReadMaterial,
     ) -> Option<&'a Element> {
+        let material = &mut read.material;
         match element.kind() {
             "twosided" => material.two_sided = true,
             "mask" => {
@@ -82,13 +99,19 @@ impl<'a> Reader<'a> {
             "bumpmap" | "bump" => self.bump(from, material),
             "null" => {
                 self.set_opacity(material, Some(ScalarInput::Constant(0.0)), &from.place);
+                read.stated = StatedParameters::default();
                 return None;
             }
             "normalmap" | "blendbsdf" | "mixturebsdf" | "coating" | "roughcoating" => {
                 self.report_unsupported_wrapper(element, from);
             }
-            _ => {
+            kind => {
+                read.stated = stated(kind);
+                // A texture that could not be read states nothing.
+                let is_texture =
+                    base_color_of(kind).and_then(|name| from.find(name)).is_some_and(|e| e.tag == "texture");
                 material.model = self.model(element, from);
+                read.stated.base_color &= !is_texture || !material.lookups().is_empty();
                 return None;
             }
         }
@@ -150,6 +173,26 @@ impl<'a> Reader<'a> {
         self.log.warn("unknown_plugin", &from.place, message, "used diffuse grey 0.5");
         from.take_all();
         diffuse(0.5)
+    }
+}
+
+/// The parameter of a model that is its base colour; none of metals and glass.
+fn base_color_of(kind: &str) -> Option<&'static str> {
+    match kind {
+        "diffuse" | "roughdiffuse" => Some("reflectance"),
+        "plastic" | "roughplastic" => Some("diffuse_reflectance"),
+        "principled" => Some("base_color"),
+        _ => None,
+    }
+}
+
+/// Which parameters a model states. Mitsuba documents a default for every parameter of a kind, so that naming the kind
+/// states them; a kind that is not known states nothing.
+fn stated(kind: &str) -> StatedParameters {
+    match kind {
+        "diffuse" | "roughdiffuse" | "plastic" | "roughplastic" | "conductor" | "roughconductor" | "dielectric"
+        | "roughdielectric" | "thindielectric" | "principled" => StatedParameters::default(),
+        _ => UNSTATED,
     }
 }
 

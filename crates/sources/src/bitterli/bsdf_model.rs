@@ -2,10 +2,10 @@
 
 use mateval_scene::material::{ConductorIor, Distribution, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput};
 
+use super::color::ColorUse;
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::texture::Bounds;
 use super::{ior, value};
 use mateval_scene::findings::shortened;
 
@@ -64,7 +64,7 @@ impl<'a> Reader<'a> {
         let outside = self.index(from, "ext_eta").unwrap_or(1.0) as f32;
         let mut constant = |name: &str| {
             let element = from.take(&[name])?;
-            self.constant(element, &from.place, Bounds::NotNegative)
+            self.constant(element, &from.place, ColorUse::Index)
         };
         let (eta, k) = (constant("eta"), constant("k"));
         let material = from.string("material");

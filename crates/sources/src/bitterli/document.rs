@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use super::error::BitterliError;
 use super::limits::Limits;
 use crate::log::Log;
+use mateval_image::file_kind::{hint, without_mark};
 use mateval_scene::findings::shortened;
+use mateval_scene::source_folder::SourceFolder;
 
 /// One XML element.
 #[derive(Debug)]
@@ -15,6 +17,8 @@ pub(super) struct Element {
     pub(super) tag: String,
     /// The line, from 1.
     pub(super) line: usize,
+    /// The included file that holds the element; none for the scene's own.
+    file: Option<String>,
     /// A number that identifies the element in the document.
     pub(super) serial: usize,
     attributes: Vec<(String, String)>,
@@ -42,7 +46,10 @@ impl Element {
     pub(super) fn place(&self) -> String {
         match self.attribute("id") {
             Some(id) => format!("{} '{}'", self.tag, shortened(id)),
-            None => format!("line {}", self.line),
+            None => match &self.file {
+                Some(file) => format!("'{}' line {}", shortened(file), self.line),
+                None => format!("line {}", self.line),
+            },
         }
     }
 }
@@ -56,21 +63,37 @@ pub(super) struct Document {
     pub(super) major_version: u32,
 }
 
+/// The deepest nesting of included files.
+const MOST_INCLUDES: usize = 8;
+
 /// Elements by id and alias.
 pub(super) type Ids<'a> = BTreeMap<&'a str, &'a Element>;
 
 impl Document {
-    /// Parses XML. Fails where it is not well-formed, is not a `<scene>`, or exceeds a limit.
-    pub(super) fn parse(text: &str, limits: &Limits, log: &mut Log) -> Result<Self, BitterliError> {
+    /// Parses XML, with the files that it includes from `folder`. Fails where it is not well-formed, is not a `<scene>`, or
+    /// exceeds a limit.
+    pub(super) fn parse(
+        text: &str,
+        limits: &Limits,
+        folder: &mut SourceFolder,
+        log: &mut Log,
+    ) -> Result<Self, BitterliError> {
         check_depth(text, limits.xml_depth)?;
         let xml = roxmltree::Document::parse(text).map_err(|reason| BitterliError::NotXml { reason })?;
-        let mut builder = Builder::new(text, limits, log);
+        let mut builder = Builder::new(text, limits, folder, log);
         let root = builder.element(xml.root_element(), 0)?;
         if root.tag != "scene" {
             return Err(BitterliError::NotAScene { found: shortened(&root.tag) });
         }
         let major_version = major_version(&root, log);
         Ok(Self { root, major_version })
+    }
+
+    /// Parses XML that includes no files.
+    #[cfg(test)]
+    pub(super) fn parse_text(text: &str, log: &mut Log) -> Result<Self, BitterliError> {
+        let folder = tempfile::tempdir().unwrap();
+        Self::parse(text, &Limits::default(), &mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), log)
     }
 
     /// Every element that has an id. Of several with the same id, the first counts.
@@ -183,18 +206,28 @@ struct Builder<'l> {
     budget: u64,
     depth_limit: usize,
     serial: usize,
+    /// The included file that is being read, and its includers; empty in the scene's own.
+    files: Vec<String>,
+    folder: &'l mut SourceFolder,
     log: &'l mut Log,
 }
 
+/// The offsets of the beginnings of lines.
+fn line_starts(text: &str) -> Vec<usize> {
+    let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+    std::iter::once(0).chain(ends).collect()
+}
+
 impl<'l> Builder<'l> {
-    fn new(text: &str, limits: &Limits, log: &'l mut Log) -> Self {
-        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+    fn new(text: &str, limits: &Limits, folder: &'l mut SourceFolder, log: &'l mut Log) -> Self {
         Self {
-            line_starts: std::iter::once(0).chain(ends).collect(),
+            line_starts: line_starts(text),
             variables: BTreeMap::new(),
             budget: limits.xml_bytes,
             depth_limit: limits.xml_depth,
             serial: 0,
+            files: Vec::new(),
+            folder,
             log,
         }
     }
@@ -211,12 +244,44 @@ impl<'l> Builder<'l> {
             "lookAt" | "look_at" => "lookat",
             other => other,
         };
-        let mut element = Element { tag: tag.to_owned(), line, serial, attributes, children: Vec::new() };
+        let file = self.files.last().cloned();
+        let mut element = Element { tag: tag.to_owned(), line, file, serial, attributes, children: Vec::new() };
         for child in node.children().filter(roxmltree::Node::is_element) {
             let child = self.element(child, depth + 1)?;
-            if child.tag == "default" { self.define(&child) } else { element.children.push(child) }
+            match child.tag.as_str() {
+                "default" => self.define(&child),
+                "include" => element.children.extend(self.included(&child, depth + 1)?),
+                _ => element.children.push(child),
+            }
         }
         Ok(element)
+    }
+
+    /// The elements of the file that an `<include>` names. As in Mitsuba, they stand in its place, and variables are shared.
+    fn included(&mut self, include: &Element, depth: usize) -> Result<Vec<Element>, BitterliError> {
+        let line = include.line;
+        let refused = |reason| BitterliError::Include { line, reason };
+        let name = include.attribute("filename").unwrap_or("");
+        let file = SourceFolder::relative(name).map_err(|fault| refused(fault.message))?;
+        if self.files.contains(&file) || self.files.len() >= MOST_INCLUDES {
+            return Err(refused(format!("'{}' includes itself, or is included too deeply", shortened(&file))));
+        }
+        let bytes = self.folder.read(&file).map_err(|fault| refused(fault.message))?;
+        self.spend(bytes.len(), line)?;
+        let not_text = |_| refused(format!("'{}' is not UTF-8{}", shortened(&file), hint(&bytes)));
+        let text = std::str::from_utf8(without_mark(&bytes)).map_err(not_text)?;
+        check_depth(text, self.depth_limit)?;
+        let xml = roxmltree::Document::parse(text)
+            .map_err(|reason| refused(format!("'{}': expected well-formed XML: {reason}", shortened(&file))))?;
+        // Its own lines, until it ends.
+        let outer = std::mem::replace(&mut self.line_starts, line_starts(text));
+        self.files.push(file);
+        let root = self.element(xml.root_element(), depth);
+        self.files.pop();
+        self.line_starts = outer;
+        let root = root?;
+        // A file that holds one object includes that object.
+        Ok(if root.tag == "scene" { root.children } else { vec![root] })
     }
 
     fn attribute(&mut self, attribute: &roxmltree::Attribute, line: usize) -> Result<(String, String), BitterliError> {
@@ -297,7 +362,7 @@ mod tests {
 
     fn parse(text: &str) -> (Result<Document, BitterliError>, Vec<mateval_scene::Finding>) {
         let mut log = Log::new("scene.xml".into(), 100);
-        let document = Document::parse(text, &Limits::default(), &mut log);
+        let document = Document::parse_text(text, &mut log);
         (document, log.into_findings())
     }
 

@@ -5,13 +5,13 @@ use mateval_image::Wrap;
 use mateval_scene::material::{ColorInput, TextureIndex};
 use mateval_scene::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
 
+use super::color::ColorUse;
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
-use super::texture::{Bounds, all_texels};
+use super::texture::all_texels;
 use crate::mean_color::mean_color;
 use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::SourceFolder;
 
 impl<'a> Reader<'a> {
     /// Adds the emitter of a shape, which emits on its front side.
@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
     fn area_radiance(&mut self, from: &mut Parameters<'a>) -> ([f32; 3], Option<EmissionMap>) {
         let Some(element) = from.take(&["radiance"]) else { return ([1.0; 3], None) };
         if element.tag != "texture" {
-            return (self.constant(element, &from.place, Bounds::NotNegative).unwrap_or([1.0; 3]), None);
+            return (self.constant(element, &from.place, ColorUse::Emission).unwrap_or([1.0; 3]), None);
         }
         match self.color_bitmap(element, &from.place) {
             ColorInput::Constant(rgb) => (rgb, None),
@@ -92,7 +92,7 @@ impl<'a> Reader<'a> {
     fn radiance(&mut self, from: &mut Parameters<'a>, name: &str, default: [f32; 3]) -> [f32; 3] {
         let Some(element) = from.take(&[name]) else { return default };
         if element.tag != "texture" {
-            return self.constant(element, &from.place, Bounds::NotNegative).unwrap_or(default);
+            return self.constant(element, &from.place, ColorUse::Emission).unwrap_or(default);
         }
         let message = format!("line {}: a texture as radiance", element.line);
         self.log.warn("unsupported", &from.place, message, "used its mean colour");
@@ -108,8 +108,8 @@ impl<'a> Reader<'a> {
         let to_world = from.transform("to_world", &mut self.log);
         let world_from_environment = self.rotation(to_world, &from.place);
         from.ignore(&["cache", "gamma", "mis_compensation"]);
-        let picture = SourceFolder::relative(name)
-            .and_then(|file| Ok((self.read_picture(&file, false, Wrap::Repeat, false)?, file)));
+        let picture =
+            self.file(name).and_then(|file| Ok((self.read_picture(&file, false, Wrap::Repeat, false)?, file)));
         match picture {
             Ok((texture, file)) => {
                 let texture = self.add_texture(file, texture);

@@ -32,11 +32,21 @@ pub enum BitterliError {
     /// The scene has no sensor.
     #[error("expected a <sensor>, found none")]
     NoSensor,
-    /// The sensor has no field of view.
-    #[error("line {line}: expected fov or focal_length of the sensor, found neither")]
-    NoFieldOfView {
+    /// The sensor is not a perspective camera.
+    #[error("line {line}: the sensor '{kind}' is not supported; expected 'perspective' (a pinhole camera)")]
+    OtherSensor {
         /// The sensor's line.
         line: usize,
+        /// Its type.
+        kind: String,
+    },
+    /// An included file cannot be read.
+    #[error("line {line}: <include>: {reason}")]
+    Include {
+        /// The element's line.
+        line: usize,
+        /// Why not.
+        reason: String,
     },
     /// The sensor's focal length is not a positive number of millimetres.
     #[error("line {line}: focal_length of the sensor: {reason}")]
@@ -98,6 +108,33 @@ pub enum ValueError {
     NotABoolean {
         /// The beginning of the text.
         found: String,
+    },
+    /// It is not a hexadecimal colour.
+    #[error("expected # and six hexadecimal digits, found '{found}'")]
+    NotHex {
+        /// The beginning of the text.
+        found: String,
+    },
+    /// It is not a pair of a wavelength and a value.
+    #[error("expected wavelength:value, found '{found}'")]
+    NotAPair {
+        /// The beginning of the text.
+        found: String,
+    },
+    /// Its pairs are not those of a spectrum.
+    #[error("expected two or more wavelengths, each above the one before")]
+    NotASpectrum,
+    /// A parameter of the spectrum is missing.
+    #[error("expected '{name}', found none")]
+    Missing {
+        /// The parameter.
+        name: &'static str,
+    },
+    /// The file of the spectrum cannot be read.
+    #[error("{reason}")]
+    File {
+        /// Why not.
+        reason: String,
     },
     /// The element does not describe a colour.
     #[error("expected a colour, found <{found}>")]

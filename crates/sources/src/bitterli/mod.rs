@@ -12,6 +12,7 @@
 
 mod bsdf;
 mod bsdf_model;
+mod color;
 mod document;
 mod emitter;
 mod error;
@@ -36,17 +37,21 @@ mod value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use glam::DVec3;
 use mateval_scene::reference::ReferenceScene;
 use mateval_scene::{Camera, Finding};
 
+use crate::coincident;
 use crate::error::{InvalidSource, SourceError};
 use crate::licence::read_licence;
 use crate::log::Log;
-use crate::source_scene::LicenceText;
+use crate::shift::{self, shift_of};
+use crate::source_scene::{InstanceOrigin, LicenceText};
 use crate::unique_names::UniqueNames;
 use document::Document;
 pub use error::{BitterliError, ValueError};
 pub use limits::Limits;
+use mateval_image::file_kind::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 use reader::{Reader, Totals};
@@ -58,6 +63,10 @@ pub struct BitterliScene {
     pub title: String,
     /// Surfaces, materials, textures and lights, in world space.
     pub scene: ReferenceScene,
+    /// Facts about each surface, in the order of `scene.surfaces`.
+    pub origins: Vec<InstanceOrigin>,
+    /// What was subtracted from the scene's positions, in metres.
+    pub shift_m: DVec3,
     /// The first sensor. The picture's size is that of the film's crop window.
     pub camera: Camera,
     /// Everything that was left out, replaced or approximated; sorted.
@@ -70,15 +79,16 @@ pub struct BitterliScene {
     pub absent_files: Vec<String>,
 }
 
-/// Reads the scene whose XML is at `xml_path`.
+/// Reads the scene whose XML is at `xml_path`. `camera` is the place of the camera that will be used instead of the scene's
+/// own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file cannot be read, is not a Mitsuba scene, breaks `limits`, or has no usable camera.
-pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceError> {
+pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<BitterliScene, SourceError> {
     // The XML as a tree.
     let invalid = |error| SourceError::invalid(xml_path, InvalidSource::Bitterli(error));
     let (mut source, name, text) = read_xml_file(xml_path, limits)?;
     let mut log = Log::new(name, limits.findings);
-    let document = Document::parse(&text, limits, &mut log).map_err(invalid)?;
+    let document = Document::parse(&text, limits, &mut source, &mut log).map_err(invalid)?;
     let ids = document.ids(&mut log);
     let licence = read_licence(&mut source, &mut log);
     // The scene.
@@ -88,25 +98,35 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
         limits: *limits,
         log,
         source,
+        search: Vec::new(),
+        shift_m: DVec3::ZERO,
         scene: ReferenceScene::default(),
         textures: BTreeMap::new(),
         texels: 0,
         alphas: BTreeMap::new(),
+        stated: Vec::new(),
         materials: BTreeMap::new(),
         totals: Totals::default(),
         has_environment: false,
         light_names: UniqueNames::default(),
     };
-    let camera = read_elements(&mut reader, &document).map_err(invalid)?;
+    let camera = read_elements(&mut reader, &document, camera).map_err(invalid)?;
     report_unused(&mut reader, &document);
+    let mut origins = vec![InstanceOrigin::default(); reader.scene.surfaces.len()];
+    for (origin, surface) in origins.iter_mut().zip(&reader.scene.surfaces) {
+        origin.stated = reader.stated[surface.material.0];
+    }
+    coincident::separate(&mut reader.scene.surfaces, &origins, &mut reader.log);
     // Its title, findings and files.
     let title = title(licence.as_ref(), xml_path);
-    let Reader { scene, log, source, .. } = reader;
+    let Reader { scene, log, source, shift_m, .. } = reader;
     let files = source.into_files();
     Ok(BitterliScene {
         title,
         scene,
+        origins,
         camera,
+        shift_m,
         findings: log.into_findings(),
         licence,
         source_files: files.hashes,
@@ -116,8 +136,9 @@ pub fn read(xml_path: &Path, limits: &Limits) -> Result<BitterliScene, SourceErr
 
 fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {
     let (source, name, bytes) = crate::source_scene::open(xml_path, limits.xml_bytes, limits.file_bytes)?;
-    let text = String::from_utf8(bytes).map_err(|_| SourceError::invalid(xml_path, InvalidSource::NotUtf8))?;
-    Ok((source, name, text))
+    let not_utf8 = |_| InvalidSource::NotUtf8 { hint: hint(&bytes).into_owned() };
+    let text = std::str::from_utf8(without_mark(&bytes)).map_err(|e| SourceError::invalid(xml_path, not_utf8(e)))?;
+    Ok((source, name, text.to_owned()))
 }
 
 fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
@@ -130,9 +151,21 @@ fn title(licence: Option<&LicenceText>, xml_path: &Path) -> String {
     folder.map_or_else(|| "scene".to_owned(), |name| shortened(&name.to_string_lossy()))
 }
 
-/// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor.
-fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<Camera, BitterliError> {
-    let mut camera = None;
+/// Reads all elements directly below `<scene>`. Fails where none of them is a usable sensor. `place` is that of the camera
+/// that will be used instead.
+fn read_elements<'a>(
+    reader: &mut Reader<'a>,
+    document: &'a Document,
+    place: Option<DVec3>,
+) -> Result<Camera, BitterliError> {
+    // What concerns all others: the folders of files, and the camera, which decides whether the scene is moved.
+    let elements = || document.root.children.iter();
+    reader.search =
+        elements().filter(|e| e.tag == "path").filter_map(|e| e.attribute("value")).map(str::to_owned).collect();
+    let sensor = elements().find(|element| element.tag == "sensor").ok_or(BitterliError::NoSensor)?;
+    let camera = reader.sensor(sensor)?;
+    reader.shift_m = shift_of(place.unwrap_or(camera.position()));
+    shift::report(reader.shift_m, &mut reader.log);
     let mut shapes = 0;
     for element in &document.root.children {
         match element.tag.as_str() {
@@ -144,22 +177,18 @@ fn read_elements<'a>(reader: &mut Reader<'a>, document: &'a Document) -> Result<
                 let message = format!("the scene has more than {} shapes", reader.limits.shapes);
                 reader.log.warn("limit", "", message, "left the rest out");
             }
-            "sensor" if camera.is_none() => camera = Some(reader.sensor(element)?),
+            "sensor" if element.serial == sensor.serial => {}
             "sensor" => reader.log.warn("unsupported", &element.place(), "a second sensor", "used the first one"),
             "emitter" => reader.scene_emitter(element),
             "medium" => reader.log.warn("unsupported", &element.place(), "a medium", "ignored it"),
-            "bsdf" | "texture" | "integrator" | "sampler" | "film" | "alias" => {}
-            "include" => {
-                let message = format!("line {}: <include> is not supported", element.line);
-                reader.log.warn("unsupported", &element.place(), message, "left the included file out");
-            }
+            "bsdf" | "texture" | "integrator" | "sampler" | "film" | "alias" | "path" => {}
             other => {
                 let message = format!("line {}: <{}> is not known", element.line, shortened(other));
                 reader.log.warn("unknown_element", &element.place(), message, "ignored");
             }
         }
     }
-    camera.ok_or(BitterliError::NoSensor)
+    Ok(if reader.shift_m == DVec3::ZERO { camera } else { camera.moved(-reader.shift_m) })
 }
 
 /// Reports BSDFs that no shape uses. One of them can be a `bumpmap` around the BSDF that has the id: references resolve to

@@ -44,6 +44,11 @@ impl<'a> Parameters<'a> {
         Some(child.element)
     }
 
+    /// The first child with this name, which is not taken.
+    pub(super) fn find(&self, name: &str) -> Option<&'a Element> {
+        self.children.iter().find(|child| child.name == name).map(|child| child.element)
+    }
+
     /// Takes every object with this tag, in order.
     pub(super) fn objects(&mut self, tag: &str) -> Vec<&'a Element> {
         let found = self.children.iter_mut().filter(|c| !c.taken && c.element.tag == tag);

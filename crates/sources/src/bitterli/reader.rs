@@ -2,8 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use mateval_scene::Severity;
-use mateval_scene::material::TextureIndex;
+use mateval_scene::material::{StatedParameters, TextureIndex};
 use mateval_scene::reference::{LightGroup, MaterialIndex, ReferenceScene};
 
 use super::document::{Element, Ids};
@@ -22,6 +23,10 @@ pub(super) struct Reader<'a> {
     pub(super) limits: Limits,
     pub(super) log: Log,
     pub(super) source: SourceFolder,
+    /// Folders in which files are looked for besides the scene's own, from `<path>`.
+    pub(super) search: Vec<String>,
+    /// What is subtracted from all positions.
+    pub(super) shift_m: DVec3,
     pub(super) scene: ReferenceScene,
     /// Every texture looked up so far. None stands for a file that could not be used, which has been reported.
     pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
@@ -29,6 +34,8 @@ pub(super) struct Reader<'a> {
     pub(super) texels: usize,
     /// By file: whether it has an alpha channel that is not 1 everywhere.
     pub(super) alphas: BTreeMap<String, bool>,
+    /// For each material of the scene, which of its parameters are stated.
+    pub(super) stated: Vec<StatedParameters>,
     /// By the serial number of the BSDF's element.
     pub(super) materials: BTreeMap<usize, MaterialIndex>,
     pub(super) totals: Totals,
@@ -48,6 +55,14 @@ impl<'a> Reader<'a> {
     /// The parameters of `element`; their findings are reported at `place`.
     pub(super) fn parameters(&mut self, element: &'a Element, place: String) -> Parameters<'a> {
         Parameters::new(element, place, &self.ids, &mut self.log)
+    }
+
+    /// The file `name` relative to the scene's folder: there, or else in the first folder of `<path>` that has it.
+    pub(super) fn file(&self, name: &str) -> Result<String, FileFault> {
+        let own = SourceFolder::relative(name)?;
+        let folders = self.search.iter().filter(|_| !self.source.contains(&own));
+        let mut found = folders.filter_map(|folder| SourceFolder::relative(&format!("{folder}/{own}")).ok());
+        Ok(found.find(|file| self.source.contains(file)).unwrap_or(own))
     }
 
     /// Reports that the file `name` could not be used. The finding names that file where the name is valid, else the XML.

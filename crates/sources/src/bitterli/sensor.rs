@@ -14,6 +14,9 @@ use mateval_scene::findings::shortened;
 /// The largest deviation of a matrix from a rotation that is not reported. Bitterli's scenes are written with six digits.
 const SKEW_WITHOUT_FINDING: f64 = 1e-4;
 
+/// Mitsuba's focal length of a sensor that states none.
+const DEFAULT_FOCAL_LENGTH: &str = "50mm";
+
 /// The film's size and crop window in pixels.
 struct Film {
     size: [f64; 2],
@@ -22,12 +25,21 @@ struct Film {
 }
 
 impl<'a> Reader<'a> {
-    /// The camera of the sensor `element`. Fails where it has no field of view or its `to_world` is singular.
+    /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is singular.
     pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, BitterliError> {
         let mut from = self.parameters(element, element.place());
-        if element.kind() != "perspective" {
-            let message = format!("line {}: the sensor '{}'", element.line, shortened(element.kind()));
-            self.log.warn("unsupported", &from.place, message, "used a pinhole camera");
+        match element.kind() {
+            "perspective" => {}
+            "thinlens" => {
+                let message = format!("line {}: the sensor 'thinlens'", element.line);
+                self.log.warn(
+                    "unsupported",
+                    &from.place,
+                    message,
+                    "used a pinhole camera, which sees everything sharp",
+                );
+            }
+            other => return Err(BitterliError::OtherSensor { line: element.line, kind: shortened(other) }),
         }
         let world_from_sensor = from.transform("to_world", &mut self.log);
         let films = from.objects("film");
@@ -75,14 +87,19 @@ impl<'a> Reader<'a> {
         let axis = from.string("fov_axis").unwrap_or("x");
         let focal_length = from.string("focal_length");
         let fov = from.number_within("fov", 1e-3, 179.9, &mut self.log);
-        let (half_tangent, axis) = match (fov, focal_length) {
-            (Some(degrees), _) => (libm::tan(degrees.to_radians() / 2.0), axis),
-            (None, Some(text)) => {
+        let (half_tangent, axis) = match fov {
+            Some(degrees) => (libm::tan(degrees.to_radians() / 2.0), axis),
+            None => {
+                let text = focal_length.unwrap_or_else(|| {
+                    let message = format!("line {line}: the sensor states neither fov nor focal_length");
+                    let action = format!("used {DEFAULT_FOCAL_LENGTH}, as Mitsuba does");
+                    self.log.warn("no_field_of_view", &from.place, message, action);
+                    DEFAULT_FOCAL_LENGTH
+                });
                 // Mitsuba's convention: a film of 36 mm by 24 mm, measured along its diagonal.
                 let millimetres = millimetres(text).map_err(|reason| BitterliError::FocalLength { line, reason })?;
                 ((36.0_f64 * 36.0 + 24.0 * 24.0).sqrt() / 2.0 / millimetres, "diagonal")
             }
-            (None, None) => return Err(BitterliError::NoFieldOfView { line }),
         };
         // The same along x.
         let aspect = width / height;
@@ -212,11 +229,26 @@ mod tests {
         assert!(findings.is_empty());
     }
 
+    /// Mitsuba 3.9.1 has an x_fov of 38.18 degrees for a film of 4:3.
+    #[test]
+    fn a_sensor_without_fov_has_50_mm() {
+        let (camera, findings) = sensor_camera("", "");
+        assert!((fov_x_degrees(&camera) - 42.311714).abs() < 1e-4);
+        assert_eq!(findings, ["no_field_of_view"]);
+        let four_to_three = "<scene version='3.0.0'><sensor type='perspective'/></scene>";
+        assert!((fov_x_degrees(&read_xml(four_to_three).unwrap().camera) - 38.18).abs() < 5e-3);
+    }
+
+    #[test]
+    fn other_sensors_are_named() {
+        let error = read_xml("<scene version='3.0.0'><sensor type='orthographic'/></scene>").unwrap_err();
+        assert!(error.to_string().contains("'orthographic' is not supported"), "{error}");
+    }
+
     #[test]
     fn without_a_usable_camera_there_is_no_scene() {
         for sensor in [
             "",
-            "<sensor type='perspective'/>",
             "<sensor type='perspective'><float name='fov' value='50'/>\
              <transform name='toWorld'><scale value='0'/></transform></sensor>",
         ] {

@@ -1,17 +1,19 @@
 //! Shapes. Each becomes one surface in world space, and one light if it emits.
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, Vec2};
 use mateval_scene::TriangleMesh;
-use mateval_scene::reference::{MaterialIndex, Surface, SurfaceIndex};
+use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
 
 use super::document::Element;
 use super::parameters::Parameters;
 use super::primitives;
 use super::reader::Reader;
+use crate::missing_uv::barycentric;
+use crate::shift::{self, shift_of};
 use crate::surface_mesh::{smooth_normals, to_world};
 use mateval_scene::findings::shortened;
 use mateval_scene::obj::{self, Materials, ObjFault, ObjLimits};
-use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_scene::source_folder::FileFault;
 
 const LEFT_OUT: &str = "left the shape out";
 
@@ -22,7 +24,7 @@ impl<'a> Reader<'a> {
         let place = format!("shape '{}'", shortened(&name));
         let mut from = self.parameters(element, place);
         self.report_medium(element, &mut from);
-        let world_from_object = from.transform("to_world", &mut self.log);
+        let world_from_object = shift::transform(self.shift_m) * from.transform("to_world", &mut self.log);
         let flip = from.boolean("flip_normals", false, &mut self.log);
         let (bsdfs, emitters) = (from.objects("bsdf"), from.objects("emitter"));
         // The material of a shape that is left out is read too, so that its faults are reported.
@@ -34,13 +36,30 @@ impl<'a> Reader<'a> {
         from.finish(&mut self.log);
     }
 
-    fn add_surface(&mut self, name: String, mesh: TriangleMesh, material: MaterialIndex, emitters: &[&'a Element]) {
-        self.totals.triangles += mesh.triangles.len();
-        self.totals.vertices += mesh.positions.len();
+    fn add_surface(&mut self, name: String, mut mesh: TriangleMesh, material: MaterialIndex, emitters: &[&'a Element]) {
         let surface = SurfaceIndex(self.scene.surfaces.len());
         for emitter in emitters {
             self.area_light(emitter, surface, &name);
         }
+        // Texture coordinates matter where there is a texture.
+        let has_map = |light: &LightGroup| match &light.emission {
+            Emission::Area { surfaces, map: Some(_), .. } => surfaces.contains(&surface),
+            _ => false,
+        };
+        if !self.scene.materials[material.0].lookups().is_empty() || self.scene.lights.iter().any(has_map) {
+            let all = mesh.triangles.len();
+            let count = barycentric(&mut mesh);
+            if count > 0 {
+                let message = format!("{count} of {all} faces have no texture coordinates");
+                let place = format!("shape '{}'", shortened(&name));
+                self.log.warn("no_uv", &place, message, "used barycentric coordinates, as Mitsuba does");
+            }
+        }
+        for uv in mesh.uvs.iter_mut().flatten().filter(|uv| !uv.is_finite()) {
+            *uv = Vec2::ZERO;
+        }
+        self.totals.triangles += mesh.triangles.len();
+        self.totals.vertices += mesh.positions.len();
         self.scene.surfaces.push(Surface { name, mesh, material });
     }
 
@@ -69,7 +88,9 @@ impl<'a> Reader<'a> {
         flip: bool,
     ) -> Option<TriangleMesh> {
         // Normals of the file are dropped where flat ones are wanted.
-        let object = self.object_mesh(element, from)?;
+        let (object, base) = self.object_mesh(element, from)?;
+        let world_from_object =
+            if base == DVec3::ZERO { world_from_object } else { world_from_object * DMat4::from_translation(base) };
         let smooth = from.boolean("face_normals", false, &mut self.log);
         let mirrored = DMat3::from_mat4(world_from_object).determinant() < 0.0;
         let (object, smooth) = (TriangleMesh { normals: object.normals.filter(|_| !smooth), ..object }, !smooth);
@@ -95,27 +116,32 @@ impl<'a> Reader<'a> {
         (!over).then_some(mesh)
     }
 
-    fn object_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<TriangleMesh> {
+    /// The shape's triangles in its own space, and what has been subtracted from their positions far from the origin.
+    fn object_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<(TriangleMesh, DVec3)> {
         match element.kind() {
             "obj" => self.obj_mesh(element, from),
-            "rectangle" => Some(primitives::rectangle()),
-            "cube" => Some(primitives::cube()),
+            "rectangle" => Some((primitives::rectangle(), DVec3::ZERO)),
+            "cube" => Some((primitives::cube(), DVec3::ZERO)),
             "disk" => {
                 self.tessellated(from);
-                Some(primitives::disk())
+                Some((primitives::disk(), DVec3::ZERO))
             }
             "sphere" => {
                 self.tessellated(from);
                 let center = from.vector("center", &mut self.log).unwrap_or([0.0; 3]);
                 let radius = self.radius(from);
-                Some(primitives::sphere(DVec3::from_array(center), radius))
+                let center = DVec3::from_array(center);
+                let base = shift_of(center);
+                Some((primitives::sphere(center - base, radius), base))
             }
             "cylinder" => {
                 self.tessellated(from);
                 let start = from.vector("p0", &mut self.log).unwrap_or([0.0; 3]);
                 let end = from.vector("p1", &mut self.log).unwrap_or([0.0, 0.0, 1.0]);
                 let radius = self.radius(from);
-                Some(primitives::cylinder(DVec3::from_array(start), DVec3::from_array(end), radius))
+                let (start, end) = (DVec3::from_array(start), DVec3::from_array(end));
+                let base = shift_of(start);
+                Some((primitives::cylinder(start - base, end - base, radius), base))
             }
             other => {
                 let message = format!("line {}: the shape '{}' is not known", element.line, shortened(other));
@@ -136,22 +162,21 @@ impl<'a> Reader<'a> {
         self.log.note("tessellated", &from.place, message, action);
     }
 
-    fn obj_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<TriangleMesh> {
+    fn obj_mesh(&mut self, element: &'a Element, from: &mut Parameters<'a>) -> Option<(TriangleMesh, DVec3)> {
         let name = from.string("filename").unwrap_or("");
         let flip_v = !from.boolean("flip_tex_coords", true, &mut self.log);
         from.ignore(&["collapse", "max_smooth_angle"]);
         match self.read_obj(name) {
             Ok(obj) => {
                 let mut mesh = obj.mesh;
-                let mixed = [(obj.mixed_uvs, "texture coordinates"), (obj.mixed_normals, "normals")];
-                for (_, what) in mixed.iter().filter(|(is_mixed, _)| *is_mixed) {
-                    let message = format!("only some faces of '{}' have {what}", shortened(name));
-                    self.log.warn("mixed_faces", &from.place, message, format!("left all {what} out"));
+                if obj.corners_without_normal > 0 {
+                    let message = format!("only some faces of '{}' have normals", shortened(name));
+                    self.log.warn("mixed_faces", &from.place, message, "computed the others from the adjacent faces");
                 }
                 if flip_v {
                     mesh.uvs.iter_mut().flatten().for_each(|uv| uv.y = 1.0 - uv.y);
                 }
-                Some(mesh)
+                Some((mesh, obj.base))
             }
             Err(fault) => {
                 self.report_file(name, &from.place, element.line, &fault, LEFT_OUT);
@@ -163,7 +188,7 @@ impl<'a> Reader<'a> {
     }
 
     fn read_obj(&mut self, name: &str) -> Result<obj::ObjMesh, FileFault> {
-        let relative = SourceFolder::relative(name)?;
+        let relative = self.file(name)?;
         if self.totals.mesh_bytes > self.limits.mesh_bytes {
             let message = format!("the OBJ files read so far have more than {} bytes", self.limits.mesh_bytes);
             return Err(FileFault { code: "limit", message });

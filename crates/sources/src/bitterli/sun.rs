@@ -25,18 +25,18 @@ pub(super) fn radiance(elevation: f64, turbidity: f64) -> [f64; 3] {
     let mut xyz = [0.0; 3];
     for step in 0..=40 {
         let nanometres = 380.0 + 10.0 * f64::from(step);
-        let value = black_body(nanometres) * transmittance(nanometres, mass, turbidity);
+        let value = black_body(nanometres, SUN_KELVIN) * transmittance(nanometres, mass, turbidity);
         xyz.iter_mut().zip(cie_1931(nanometres)).for_each(|(sum, weight)| *sum += value * weight * 10.0);
     }
     rec709_from_xyz(xyz.map(|v| v / CIE_Y_INTEGRAL)).map(|v| v.max(0.0))
 }
 
-/// Planck's law: W/(m^2 sr nm).
-fn black_body(nanometres: f64) -> f64 {
+/// Planck's law at a temperature in kelvin: W/(m^2 sr nm).
+pub(super) fn black_body(nanometres: f64, kelvin: f64) -> f64 {
     const TWO_H_C2: f64 = 1.191_042_97e-16;
     const H_C_OVER_K: f64 = 0.014_387_769;
     let metres = nanometres * 1e-9;
-    TWO_H_C2 / (libm::pow(metres, 5.0) * (libm::exp(H_C_OVER_K / (metres * SUN_KELVIN)) - 1.0)) * 1e-9
+    TWO_H_C2 / (libm::pow(metres, 5.0) * (libm::exp(H_C_OVER_K / (metres * kelvin)) - 1.0)) * 1e-9
 }
 
 fn transmittance(nanometres: f64, mass: f64, turbidity: f64) -> f64 {
@@ -71,7 +71,7 @@ fn cie_1931(nanometres: f64) -> [f64; 3] {
 }
 
 /// The matrix of IEC 61966-2-1.
-fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
+pub(super) fn rec709_from_xyz([x, y, z]: [f64; 3]) -> [f64; 3] {
     [
         3.240_479 * x - 1.537_150 * y - 0.498_535 * z,
         -0.969_256 * x + 1.875_991 * y + 0.041_556 * z,

@@ -71,7 +71,7 @@ impl<'a> Reader<'a> {
     fn ground_albedo(&mut self, from: &mut Parameters<'a>) -> [f64; 3] {
         let default = if self.major_version == 0 { 0.15 } else { 0.3 };
         let Some(element) = from.take(&["albedo"]) else { return [default; 3] };
-        let constant = self.constant(element, &from.place, super::texture::Bounds::Fraction);
+        let constant = self.constant(element, &from.place, super::color::ColorUse::Reflectance);
         constant.map_or([default; 3], |rgb| rgb.map(f64::from))
     }
 

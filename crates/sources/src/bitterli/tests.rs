@@ -32,7 +32,7 @@ fn folder_with(xml: &str) -> tempfile::TempDir {
 
 /// Reads a scene from a folder with `models/a b.obj` and `a b.png`.
 pub(super) fn read_xml(xml: &str) -> Result<BitterliScene, SourceError> {
-    read(&folder_with(xml).path().join("scene.xml"), &Limits::default())
+    read(&folder_with(xml).path().join("scene.xml"), None, &Limits::default())
 }
 
 /// A scene of version 0.6 with a sensor and `inner`.
@@ -66,10 +66,61 @@ const SCENE: &str = r#"<?xml version="1.0" encoding="utf-8"?><scene version="0.6
  <rgb name="specularReflectance" value="0.5"/></bsdf></bsdf>
 <shape type="obj" id="Table"><string name="filename" value="models/a b.obj"/><boolean name="faceNormals" value="true"/>
  <transform name="toWorld"><scale value="2"/><translate x="1"/></transform><ref id="Wood"/></shape>
-<shape type="rectangle"><ref id="Metal"/><emitter type="area"><spectrum name="radiance" value="16.032"/></emitter></shape>
+<shape type="rectangle"><ref id="Metal"/><emitter type="area"><rgb name="radiance" value="16.032"/></emitter></shape>
 <emitter type="envmap"><string name="filename" value="a b.png"/><float name="scale" value="3"/>
  <transform name="toWorld"><rotate y="1" angle="90"/></transform></emitter>
 </scene>"#;
+
+#[test]
+fn included_files_stand_in_their_place_and_paths_are_searched() {
+    let folder = folder_with(&format!(
+        "<scene version='3.0.0'><path value='parts'/><default name='n' value='2'/><include filename='parts/more.xml'/>{SENSOR}</scene>"
+    ));
+    let parts = folder.path().join("parts");
+    std::fs::create_dir(&parts).unwrap();
+    std::fs::write(parts.join("t.obj"), TRIANGLE).unwrap();
+    let read_with = |text: &str| {
+        std::fs::write(parts.join("more.xml"), text).unwrap();
+        read(&folder.path().join("scene.xml"), None, &Limits::default())
+    };
+    let shape = "<shape type='obj'><string name='filename' value='t.obj'/><transform name='to_world'><scale value='$n'/></transform></shape>";
+    let scene = read_with(&format!("<scene version='3.0.0'>{shape}</scene>")).unwrap();
+    assert_eq!((codes(&scene), scene.scene.surfaces[0].mesh.positions[1].x), (vec![], 2.0));
+    assert!(scene.source_files.iter().any(|(file, _)| file == "parts/t.obj"));
+    for (text, word) in [
+        ("<scene version='3.0.0'><include filename='parts/more.xml'/></scene>", "includes itself"),
+        ("<scene version='3.0.0'><include filename='../more.xml'/></scene>", "leads out"),
+        ("<scene version='3.0.0'><include filename='none.xml'/></scene>", "does not exist"),
+        ("<scene", "well-formed"),
+    ] {
+        let error = read_with(text).unwrap_err().to_string();
+        assert!(error.contains("<include>") && error.contains(word), "{error}");
+    }
+}
+
+/// The same room at the origin and 571 km from it.
+#[test]
+fn far_scenes_are_moved_by_whole_metres() {
+    let at = |x: f64, y: f64, z: f64| {
+        let camera = format!("<lookat origin='{},{},{}' target='{x},{y},{z}' up='0,1,0'/>", x + 0.25, y + 1.5, z + 3.0);
+        let place = format!("<translate x='{}' y='{y}' z='{z}'/>", x + 0.123);
+        let sphere = format!("<point name='center' x='{x}' y='{y}' z='{}'/>", z + 0.5);
+        read_xml(&format!(
+            "<scene version='3.0.0'><sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'>{camera}</transform></sensor>
+            <shape type='rectangle'><transform name='to_world'>{place}</transform></shape><shape type='sphere'>{sphere}</shape></scene>"
+        ))
+        .unwrap()
+    };
+    let (near, far) = (at(0.0, 0.0, 0.0), at(448_231.0, 120.0, -354_123.0));
+    assert_eq!((near.shift_m, far.shift_m), (DVec3::ZERO, DVec3::new(448_231.0, 122.0, -354_120.0)));
+    let moved = near.camera.position() - far.camera.position();
+    assert!((moved - DVec3::new(0.0, 2.0, 3.0)).length() < 1e-9, "{moved}");
+    for (near, far) in near.scene.surfaces.iter().zip(&far.scene.surfaces) {
+        let miss = |(a, b): (&glam::Vec3, &glam::Vec3)| (a.as_dvec3() - b.as_dvec3() - moved).length();
+        assert!(near.mesh.positions.iter().zip(&far.mesh.positions).map(miss).fold(0.0, f64::max) < 1e-6);
+    }
+    assert_eq!(far.findings.iter().filter(|finding| finding.code == "far_from_origin").count(), 1);
+}
 
 #[test]
 fn the_three_versions_spell_one_scene() {
@@ -194,7 +245,7 @@ fn each_fault_is_a_finding_and_the_rest_is_read() {
         ("<shape type='obj'><string name='filename' value='../a.obj'/></shape>", "path_escapes"),
         ("<shape type='obj'><string name='filename' value='/etc/passwd'/></shape>", "path_escapes"),
         ("<shape type='obj'/>", "bad_value"),
-        ("<shape type='obj'><string name='filename' value='a b.png'/></shape>", "empty_mesh"),
+        ("<shape type='obj'><string name='filename' value='a b.png'/></shape>", "bad_mesh"),
         ("<shape type='rectangle'><float name='wings' value='2'/></shape>", "unknown_parameter"),
         ("<shape type='rectangle'><ref id='nothing'/></shape>", "unknown_id"),
         ("<shape type='rectangle'><bsdf type='velvet'/></shape>", "unknown_plugin"),
@@ -220,7 +271,6 @@ fn each_fault_is_a_finding_and_the_rest_is_read() {
         ("<emitter type='point'/>", "unknown_plugin"),
         ("<emitter type='constant'/><emitter type='constant'/>", "unsupported"),
         ("<emitter type='envmap'><string name='filename' value='none.exr'/></emitter>", "missing_file"),
-        ("<include filename='more.xml'/>", "unsupported"),
         ("<medium type='homogeneous'/>", "unsupported"),
         ("<teapot/>", "unknown_element"),
     ] {
@@ -326,7 +376,7 @@ fn opacity_is_luminance_unless_alpha_varies() {
     );
     std::fs::write(folder.path().join("scene.xml"), xml).unwrap();
     let opacity = || {
-        let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+        let scene = read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap();
         let texture = scene.scene.textures[0].texture.clone();
         ([texture.texel(0, 0)[0], texture.texel(1, 0)[0]], scene.findings)
     };
@@ -344,7 +394,7 @@ fn the_licence_is_kept_and_names_the_scene() {
     let folder = folder_with(&format!("<scene version='0.6.0'>{SENSOR}</scene>"));
     let text = "This is the Mitsuba version of 'A Room' by Somebody, downloaded from there\nCC0\n";
     std::fs::write(folder.path().join("LICENSE.txt"), text).unwrap();
-    let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+    let scene = read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap();
     assert_eq!(scene.title, "'A Room' by Somebody");
     assert_eq!(scene.licence.map(|licence| licence.text).as_deref(), Some(text));
 }
@@ -353,14 +403,14 @@ fn the_licence_is_kept_and_names_the_scene() {
 fn limits_hold() {
     let folder = folder_with(&format!("<scene version='0.6.0'>{SENSOR}{}</scene>", "<shape type='cube'/>".repeat(5)));
     let path = folder.path().join("scene.xml");
-    let read_with = |limits: Limits| read(&path, &limits);
+    let read_with = |limits: Limits| read(&path, None, &limits);
     let shapes = read_with(Limits { shapes: 2, ..Limits::default() }).unwrap();
     assert_eq!((shapes.scene.surfaces.len(), codes(&shapes)), (2, vec!["limit"]));
     let triangles = read_with(Limits { triangles: 36, ..Limits::default() }).unwrap();
     assert_eq!(triangles.scene.surfaces.len(), 3);
     assert!(read_with(Limits { xml_bytes: 10, ..Limits::default() }).is_err());
-    assert!(read(Path::new("no-such-folder/scene.xml"), &Limits::default()).is_err());
-    assert!(read(folder.path(), &Limits::default()).is_err());
+    assert!(read(Path::new("no-such-folder/scene.xml"), None, &Limits::default()).is_err());
+    assert!(read(folder.path(), None, &Limits::default()).is_err());
 }
 
 #[test]
@@ -392,7 +442,7 @@ proptest! {
         let folder = folder_with("");
         let path = folder.path().join("scene.xml");
         std::fs::write(&path, mutated(SCENE.as_bytes(), &changes, cut)).unwrap();
-        let _ = read(&path, &Limits { triangles: 10_000, ..Limits::default() });
+        let _ = read(&path, None, &Limits { triangles: 10_000, ..Limits::default() });
     }
 
     /// Words of the format in any order, which a change of single bytes would rarely produce.
@@ -412,7 +462,7 @@ proptest! {
         );
         let folder = folder_with(&xml);
         std::fs::write(folder.path().join("models/a b.obj"), mutated(TRIANGLE.as_bytes(), &changes, cut)).unwrap();
-        let scene = read(&folder.path().join("scene.xml"), &Limits::default()).unwrap();
+        let scene = read(&folder.path().join("scene.xml"), None, &Limits::default()).unwrap();
         for surface in &scene.scene.surfaces {
             let count = surface.mesh.positions.len();
             prop_assert!(surface.mesh.triangles.iter().flatten().all(|&v| (v as usize) < count));

@@ -8,7 +8,7 @@ use super::*;
 /// The scene; none where the shared data are missing.
 fn real(file: &str) -> Option<BitterliScene> {
     let path = shared_data(&format!("bitterli/{file}"))?;
-    Some(read(&path, &Limits::default()).unwrap())
+    Some(read(&path, None, &Limits::default()).unwrap())
 }
 
 /// The triangles of the OBJ files. Rectangles and disks come in addition.

@@ -5,26 +5,16 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
 
+use super::color::{ColorUse, constant_color};
 use super::document::Element;
-use super::error::ValueError;
 use super::parameters::Parameters;
 use super::reader::Reader;
 use super::texture_key::{Aspect, TextureKey};
-use super::value;
 use mateval_scene::findings::shortened;
-use mateval_scene::source_folder::{FileFault, SourceFolder};
+use mateval_scene::source_folder::FileFault;
 
 /// Linear mid-grey, which replaces a texture that cannot be read. (Mitsuba refuses such a scene.)
 const MISSING: [f32; 3] = [0.5; 3];
-
-/// The range of a constant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Bounds {
-    /// A fraction of light: 0 to 1.
-    Fraction,
-    /// Radiance or an index of refraction: 0 or more.
-    NotNegative,
-}
 
 /// A `<texture type="bitmap">` whose file has not been read.
 struct Bitmap {
@@ -42,7 +32,7 @@ impl<'a> Reader<'a> {
     pub(super) fn color(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ColorInput {
         let Some(element) = from.take(&[name]) else { return ColorInput::Constant([default; 3]) };
         if element.tag != "texture" {
-            let constant = self.constant(element, &from.place, Bounds::Fraction);
+            let constant = self.constant(element, &from.place, ColorUse::Reflectance);
             return ColorInput::Constant(constant.unwrap_or([default; 3]));
         }
         self.color_bitmap(element, &from.place)
@@ -65,7 +55,7 @@ impl<'a> Reader<'a> {
     pub(super) fn scalar(&mut self, from: &mut Parameters<'a>, name: &str, default: f32) -> ScalarInput {
         let Some(element) = from.take(&[name]) else { return ScalarInput::Constant(default) };
         if element.tag != "texture" {
-            let constant = self.constant(element, &from.place, Bounds::Fraction);
+            let constant = self.constant(element, &from.place, ColorUse::Reflectance);
             return ScalarInput::Constant(constant.map_or(default, luminance));
         }
         self.scalar_texture(element, &from.place, false).unwrap_or(ScalarInput::Constant(default))
@@ -79,7 +69,7 @@ impl<'a> Reader<'a> {
         let Some(element) = from.take(&[name]) else { return Some(ScalarInput::Constant(0.5)) };
         if element.tag != "texture" {
             return self
-                .constant(element, &from.place, Bounds::Fraction)
+                .constant(element, &from.place, ColorUse::Reflectance)
                 .map(|rgb| ScalarInput::Constant(luminance(rgb)));
         }
         self.scalar_texture(element, &from.place, true)
@@ -106,18 +96,10 @@ impl<'a> Reader<'a> {
         Some(ScalarInput::Texture { texture, channel, uv: bitmap.uv })
     }
 
-    /// The constant colour of `<rgb>`, `<srgb>`, `<spectrum>`, `<float>` or `<integer>`. Anything else is reported and gives
-    /// none.
-    pub(super) fn constant(&mut self, element: &Element, place: &str, bounds: Bounds) -> Option<[f32; 3]> {
-        match constant_color(element) {
-            Ok((rgb, wavelengths)) => {
-                if let Some(count) = wavelengths {
-                    let message =
-                        format!("line {}: '{}': a spectrum of {count} wavelengths", element.line, element.name());
-                    self.log.warn("spectrum_approximated", place, message, "used the mean of its values");
-                }
-                Some(self.bounded(rgb, element, place, bounds))
-            }
+    /// The constant colour of an element ([`constant_color`]). Anything else is reported and gives none.
+    pub(super) fn constant(&mut self, element: &Element, place: &str, usage: ColorUse) -> Option<[f32; 3]> {
+        match constant_color(element, usage, self.major_version, &mut self.source) {
+            Ok(rgb) => Some(self.bounded(rgb, element, place, usage)),
             Err(error) => {
                 let message = format!("line {}: '{}': {error}", element.line, shortened(element.name()));
                 self.log.warn("bad_value", place, message, "used the default");
@@ -126,8 +108,8 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, bounds: Bounds) -> [f32; 3] {
-        let most = if bounds == Bounds::Fraction { 1.0 } else { 1e9 };
+    fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, usage: ColorUse) -> [f32; 3] {
+        let most = if usage == ColorUse::Reflectance { 1.0 } else { 1e9 };
         if rgb.iter().any(|v| *v < 0.0 || *v > most) {
             let message = format!("line {}: '{}': expected 0 to {most}, found {rgb:?}", element.line, element.name());
             self.log.warn("out_of_range", place, message, "clamped");
@@ -143,7 +125,7 @@ impl<'a> Reader<'a> {
         }
         let mut from = self.parameters(element, place.to_owned());
         let name = from.string("filename").unwrap_or("");
-        let file = match SourceFolder::relative(name) {
+        let file = match self.file(name) {
             Ok(file) => file,
             Err(fault) => {
                 self.report_file(name, place, element.line, &fault, TEXTURE_LEFT_OUT);
@@ -314,25 +296,4 @@ fn luminance_texture(texture: &Texture) -> Result<Texture, FileFault> {
     let values = (0..texture.height()).flat_map(row).collect();
     Texture::new(texture.width(), texture.height(), Texels::Grey(values), texture.wrap())
         .map_err(|error| FileFault { code: "unreadable_texture", message: error.to_string() })
-}
-
-/// A linear colour, and the number of wavelengths that it approximates, if it is a spectrum.
-fn constant_color(element: &Element) -> Result<([f64; 3], Option<usize>), ValueError> {
-    let text = element.attribute("value").unwrap_or("");
-    match element.tag.as_str() {
-        "float" | "integer" => Ok(([value::number(text)?; 3], None)),
-        "rgb" => Ok((value::triple(text)?, None)),
-        "srgb" => {
-            let linear = |v: f64| f64::from(mateval_image::transfer::linear_from_srgb(v as f32));
-            Ok((value::triple(text)?.map(linear), None))
-        }
-        "spectrum" if text.contains(':') => {
-            let values = text.split(',').map(|pair| value::number(pair.rsplit(':').next().unwrap_or("")));
-            let values = values.take(4096).collect::<Result<Vec<_>, _>>()?;
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            Ok(([mean; 3], Some(values.len())))
-        }
-        "spectrum" => Ok((value::triple(text)?, None)),
-        other => Err(ValueError::NotAColor { found: shortened(other) }),
-    }
 }

@@ -7,6 +7,11 @@ use super::error::ValueError;
 use super::value::{number, numbers, vector};
 use crate::log::Log;
 
+/// The last row of a matrix that is no projection.
+const AFFINE: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
+/// The largest deviation from [`AFFINE`] that counts as noise.
+const AFFINE_TOLERANCE: f64 = 1e-6;
+
 /// Why a step of a transform is not a matrix.
 #[derive(Debug, thiserror::Error)]
 enum StepError {
@@ -69,9 +74,13 @@ fn step(element: &Element) -> Result<DMat4, StepError> {
 fn matrix(text: &str) -> Result<DMat4, StepError> {
     let list = numbers(text)?;
     if let Ok(rows) = <[f64; 16]>::try_from(list.as_slice()) {
-        if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
+        // A matrix that was inverted elsewhere has noise in its last row.
+        let miss = rows[12..].iter().zip(AFFINE).map(|(found, expected)| (found - expected).abs());
+        if miss.fold(0.0, f64::max) > AFFINE_TOLERANCE {
             return Err(StepError::Projection);
         }
+        let mut rows = rows;
+        rows[12..].copy_from_slice(&AFFINE);
         return Ok(DMat4::from_cols_array(&rows).transpose());
     }
     match <[f64; 9]>::try_from(list.as_slice()) {
@@ -112,13 +121,12 @@ fn look_at(element: &Element) -> Result<DMat4, StepError> {
 #[cfg(test)]
 mod tests {
     use super::super::document::Document;
-    use super::super::limits::Limits;
     use super::*;
 
     fn read_text(steps: &str) -> (DMat4, usize) {
         let mut log = Log::new("scene.xml".into(), 100);
         let text = format!("<scene version='3.0.0'><transform>{steps}</transform></scene>");
-        let document = Document::parse(&text, &Limits::default(), &mut log).unwrap();
+        let document = Document::parse_text(&text, &mut log).unwrap();
         let matrix = read(&document.root.children[0], "shape", &mut log);
         (matrix, log.into_findings().len())
     }
@@ -146,10 +154,18 @@ mod tests {
     }
 
     #[test]
+    fn noise_in_the_last_row_is_dropped() {
+        let noisy = read_text("<matrix value='2 0 0 1 0 2 0 2 0 0 2 3 0 -1e-9 5.9e-08 0.9999999'/>");
+        assert_eq!(noisy, read_text("<matrix value='2 0 0 1 0 2 0 2 0 0 2 3 0 0 0 1'/>"));
+        assert_eq!(noisy.1, 0);
+    }
+
+    #[test]
     fn faulty_steps_are_findings() {
         for bad in [
             "<matrix value='1 2 3'/>",
             "<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1'/>",
+            "<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 2e-6 1'/>",
             "<rotate angle='3'/>",
             "<rotate x='1' angle='nan'/>",
             "<skew/>",

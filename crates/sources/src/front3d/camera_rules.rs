@@ -9,8 +9,8 @@ pub enum CameraRules {
     /// furniture, often no camera keeps them.
     #[default]
     BlenderProc,
-    /// Those of the fork of BlenderProc that the paper's lab (3dlg-hcvc) published: no distances, a lower score that
-    /// ignores the architecture, and the best of three times as many cameras.
+    /// Those of the fork of BlenderProc that the paper's lab (3dlg-hcvc) published: no distances, a score of its
+    /// own that ignores the architecture, and the best of three times as many cameras.
     ThreeDlg,
 }
 
@@ -48,6 +48,7 @@ impl CameraRules {
                 mean_distance_m: [0.0, f64::INFINITY],
                 no_background: false,
                 architecture_weight: 0,
+                coverage: Coverage::EntropyOfInstances,
                 min_score: 0.5,
                 ..SamplerRules::default()
             },
@@ -112,6 +113,15 @@ impl FromStr for CameraRules {
     }
 }
 
+/// How the variety of what a camera sees enters its score.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coverage {
+    /// By the number of kinds and their shares.
+    Kinds,
+    /// By the entropy of the hits by instance.
+    EntropyOfInstances,
+}
+
 /// The rules for a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SamplerRules {
@@ -130,6 +140,8 @@ pub struct SamplerRules {
     pub no_background: bool,
     /// The weight of walls, floors and the like in the score; other things weigh 1 or 10.
     pub architecture_weight: u32,
+    /// How the variety of what is seen enters the score.
+    pub coverage: Coverage,
     /// The least score of the input view.
     pub min_score: f64,
     /// The largest number of draws.
@@ -148,6 +160,7 @@ impl Default for SamplerRules {
             mean_distance_m: [2.5, 3.5],
             no_background: true,
             architecture_weight: 1,
+            coverage: Coverage::Kinds,
             min_score: 0.8,
             tries: 10_000,
         }

@@ -11,7 +11,7 @@ use mateval_scene::camera::{Camera, Intrinsics};
 use mateval_tracer::aov::{PixelHit, hit_through};
 use mateval_tracer::{Hit, Ray, Sampler, World};
 
-use super::camera_rules::SamplerRules;
+use super::camera_rules::{Coverage, SamplerRules};
 use super::furnished_house::FurnishedHouse;
 use crate::clearance::distance_to_anything;
 
@@ -201,7 +201,7 @@ impl<'a> RoomSampler<'a> {
         let mean_m = distances().sum::<f64>() / distances().count() as f64;
         holds((rules.mean_distance_m[0]..=rules.mean_distance_m[1]).contains(&mean_m), Refusal::MeanDistance)?;
         let surfaces: Vec<Option<usize>> = seen.iter().map(|hit| Some((*hit)?.0)).collect();
-        let score = score(self.house, &surfaces, rules.architecture_weight);
+        let score = score(self.house, &surfaces, rules);
         holds(score >= rules.min_score, Refusal::LowScore)?;
         // All views, with few rays and then with many.
         let turned: Vec<Camera> = turns.iter().map(|turn| camera.turned(turn[0], turn[1])).collect();
@@ -295,22 +295,46 @@ fn grid(intrinsics: &Intrinsics, side: usize) -> impl Iterator<Item = DVec2> + u
 /// a ray that meets nothing, `architecture_weight` for walls and the like, and 1 otherwise; a third of the number of
 /// different kinds, where walls and floors are kinds too; and the product over all kinds of one minus the kind's fraction
 /// of the rays.
-pub fn score(house: &FurnishedHouse, seen: &[Option<usize>], architecture_weight: u32) -> f64 {
+///
+/// The fork 3dlg-hcvc/BlenderProc-3DFront multiplies the mean weight by the entropy, in bits, of the hits by instance,
+/// without those of weight 0.
+pub fn score(house: &FurnishedHouse, seen: &[Option<usize>], rules: &SamplerRules) -> f64 {
     const SPECIAL: [&str; 4] = ["chair", "sofa", "table", "bed"];
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
+    let mut instances: BTreeMap<usize, usize> = BTreeMap::new();
     let mut weighted = 0;
     for surface in seen.iter().flatten() {
         let placed = &house.placed[*surface];
         let kind = || placed.origin.role.architecture_kind().unwrap_or_default().to_lowercase();
         let name = placed.model.as_ref().map_or_else(kind, |model| model.name.clone());
-        weighted += match SPECIAL.iter().any(|special| name.contains(special)) {
+        let weight = match SPECIAL.iter().any(|special| name.contains(special)) {
             true => 10,
-            false if placed.model.is_none() => architecture_weight,
+            false if placed.model.is_none() => rules.architecture_weight,
             false => 1,
         };
+        weighted += weight;
         *kinds.entry(name).or_insert(0) += 1;
+        if weight > 0 {
+            *instances.entry(*surface).or_insert(0) += 1;
+        }
     }
     let all = seen.len().max(1) as f64;
-    let spread: f64 = kinds.values().map(|count| 1.0 - *count as f64 / all).product();
-    f64::from(weighted) / all * (kinds.len() as f64 / 3.0) * spread
+    let mean_weight = f64::from(weighted) / all;
+    match rules.coverage {
+        Coverage::Kinds => {
+            let spread: f64 = kinds.values().map(|count| 1.0 - *count as f64 / all).product();
+            mean_weight * (kinds.len() as f64 / 3.0) * spread
+        }
+        Coverage::EntropyOfInstances => mean_weight * entropy_bits(instances.values().copied()),
+    }
+}
+
+/// Shannon's entropy in bits of a distribution that counts state.
+fn entropy_bits(counts: impl Iterator<Item = usize> + Clone) -> f64 {
+    let all: usize = counts.clone().sum();
+    let bits = |count: usize| {
+        let share = count as f64 / all as f64;
+        -share * libm::log2(share)
+    };
+    counts.filter(|count| *count > 0).map(bits).sum()
 }

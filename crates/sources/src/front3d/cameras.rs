@@ -27,6 +27,7 @@ pub(super) fn all(house: &House, files: &HouseFiles, limits: &Limits, log: &mut 
     let invalid = |error| SourceError::invalid(&path, InvalidSource::House(error));
     let tree = document::parse(&bytes, limits).map_err(invalid)?;
     let all = of_house(&tree, &house.uid);
+    let all: Vec<DesignerCamera> = all.into_iter().map(|camera| camera.shifted(house.shift_m)).collect();
     if all.is_empty() {
         let message = format!("expected cameras of the house '{}', found none", house.uid);
         let action = "used the cameras in the house's JSON";

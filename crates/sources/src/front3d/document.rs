@@ -1,6 +1,7 @@
 //! Parses JSON within limits on memory, and looks up values in it. Lookups treat a value of the wrong type as missing,
 //! since the data has both.
 
+use mateval_image::file_kind::{hint, without_mark};
 use serde_json::Value;
 
 use super::error::HouseError;
@@ -15,8 +16,9 @@ pub(super) fn parse(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
 
 /// Parses any JSON. Fails where the text is not JSON or exceeds `limits`.
 pub(super) fn parse_any(text: &[u8], limits: &Limits) -> Result<Value, HouseError> {
+    let text = without_mark(text);
     check_size(text, limits)?;
-    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason })
+    serde_json::from_slice(text).map_err(|reason| HouseError::NotJson { reason, hint: hint(text).into_owned() })
 }
 
 /// Counts the values in the text before it is parsed.
@@ -54,11 +56,17 @@ pub(super) fn list<'a>(from: &'a Value, key: &str) -> &'a [Value] {
     from.get(key).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
+/// The number that a value holds: a number, or a text of one, as two of twelve houses of a later release have.
+pub(super) fn number(value: &Value) -> Option<f64> {
+    let found = value.as_f64().or_else(|| value.as_str()?.trim().parse().ok());
+    found.filter(|number| number.is_finite())
+}
+
 /// Exactly `N` finite numbers at `key`.
 pub(super) fn numbers<const N: usize>(from: &Value, key: &str) -> Option<[f64; N]> {
     let all = from.get(key)?.as_array()?;
     let all: [&Value; N] = all.iter().collect::<Vec<_>>().try_into().ok()?;
-    let values = all.map(|value| value.as_f64().unwrap_or(f64::NAN));
+    let values = all.map(|value| number(value).unwrap_or(f64::NAN));
     values.iter().all(|value| value.is_finite()).then_some(values)
 }
 
@@ -96,6 +104,9 @@ mod tests {
         let long = serde_json::json!({"t": "x".repeat(LONGEST_TEXT), "u": "x".repeat(LONGEST_TEXT + 1)});
         assert_eq!((text(&long, "t").map(str::len), text(&long, "u")), (Some(LONGEST_TEXT), None));
         assert_eq!(numbers::<2>(&value, "n"), Some([1.0, 2.5]));
+        let texts = serde_json::json!({"n": ["1", " -2.5e0 "], "bad": ["1", "one"], "nan": ["1", "nan"]});
+        assert_eq!(numbers::<2>(&texts, "n"), Some([1.0, -2.5]));
+        assert_eq!((numbers::<2>(&texts, "bad"), numbers::<2>(&texts, "nan")), (None, None));
         assert_eq!((numbers::<3>(&value, "n"), numbers::<2>(&value, "bad")), (None, None));
         assert!(list(&value, "none").is_empty());
     }

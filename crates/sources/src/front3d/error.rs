@@ -4,10 +4,12 @@
 #[derive(Debug, thiserror::Error)]
 pub enum HouseError {
     /// The text is not JSON.
-    #[error("expected JSON: {reason}")]
+    #[error("expected JSON: {reason}{hint}")]
     NotJson {
         /// The parser's reason.
         reason: serde_json::Error,
+        /// What the file is instead, and what to do; empty where that is not known.
+        hint: String,
     },
     /// The JSON is not an object.
     #[error("expected an object, found {found}")]

@@ -41,6 +41,7 @@ pub fn furnish(files: &HouseFiles, limits: &Limits) -> Result<FurnishedHouse, So
     looked_for.extend(LookedFor { hashes: cameras.hash.into_iter().collect(), absent: Vec::new() });
     Ok(FurnishedHouse {
         cameras: cameras.all.into_iter().map(|camera| mirrored(camera, files.blenderproc_compat)).collect(),
+        shift_m: world_from_house(files.blenderproc_compat).transform_vector3(house.shift_m),
         house,
         file,
         scene: Arc::new(scene),

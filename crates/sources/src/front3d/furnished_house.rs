@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use mateval_scene::Finding;
 use mateval_scene::reference::ReferenceScene;
 
@@ -46,6 +47,8 @@ pub struct FurnishedHouse {
     pub appearance: AppearanceRule,
     /// Facts about each surface, in the order of `scene.surfaces`.
     pub placed: Vec<PlacedSurface>,
+    /// What has been subtracted from all positions in world space, in metres.
+    pub shift_m: DVec3,
     /// Designers' cameras by number, from the file beside the house or else from the JSON.
     pub cameras: Vec<DesignerCamera>,
     /// For each room the number of valid pieces that its children refer to, whether they could be placed or not.

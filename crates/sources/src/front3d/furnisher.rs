@@ -5,11 +5,13 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::{DMat3, DMat4, DVec3};
+use mateval_scene::material::StatedParameters;
 use mateval_scene::reference::{ReferenceScene, Surface};
 use mateval_scene::{Role, Severity, TriangleMesh};
 
 use super::appearance::{Appearances, MISSING};
 use super::appearance_rule::AppearanceRule;
+use super::classify;
 use super::finish::Finish;
 use super::furnished_house::{PlacedModel, PlacedSurface};
 use super::house::{Child, ChildKind, House, world_from_house};
@@ -17,11 +19,11 @@ use super::house_files::HouseFiles;
 use super::limits::Limits;
 use super::model::{self, Library, Model, is_folder_name};
 use super::model_info::{Kind, ModelInfo};
-use super::{classify, coincident};
 use crate::log::Log;
 use crate::parts::parts_of_labels;
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::{Repairs, to_world};
+use crate::{coincident, missing_uv};
 use mateval_scene::findings::shortened;
 
 /// A piece with a smaller scale is left out. (ATISS drops rooms with such pieces.)
@@ -87,9 +89,14 @@ impl<'a> Furnisher<'a> {
     pub(super) fn finish(mut self) -> Furnished {
         self.report_private_pieces();
         self.appearances.report_untextured(&mut self.log);
-        coincident::separate(&mut self.surfaces, &self.placed, &mut self.log);
         let Appearances { materials, textures, .. } = self.appearances;
-        let scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
+        let mut scene = ReferenceScene { surfaces: self.surfaces, materials, textures, lights: Vec::new() };
+        let mut origins: Vec<InstanceOrigin> = self.placed.iter().map(|placed| placed.origin.clone()).collect();
+        for split in missing_uv::resolve(&mut scene, &mut origins, &mut self.log) {
+            self.placed.push(self.placed[split].clone());
+        }
+        self.placed.iter_mut().zip(&origins).for_each(|(placed, origin)| placed.origin.clone_from(origin));
+        coincident::separate(&mut scene.surfaces, &origins, &mut self.log);
         let libraries = [Some(self.models), self.textures].into_iter().flatten().collect();
         Furnished { scene, placed: self.placed, log: self.log, libraries }
     }
@@ -120,7 +127,8 @@ impl<'a> Furnisher<'a> {
             if !self.fits_limit(&source.mesh, &source.place) {
                 continue;
             }
-            let matrix = world_from_house(self.compat) * house.rooms[room].house_from_room * child.placement.matrix();
+            let own = child.placement.matrix() * DMat4::from_translation(source.base);
+            let matrix = world_from_house(self.compat) * house.rooms[room].house_from_room * own;
             let (mesh, repairs) = to_world(source.mesh.clone(), matrix, false);
             if self.is_too_far(&repairs, &child.place) {
                 continue;
@@ -143,6 +151,7 @@ impl<'a> Furnisher<'a> {
                 role: Role::Architecture { kind: kind.to_owned() },
                 part_of_triangle: Some(parts),
                 class_of_part: finish.map(|finish| finish.of_parts),
+                stated: self.stated(material.is_some()),
                 ..InstanceOrigin::default()
             };
             self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });
@@ -158,6 +167,13 @@ impl<'a> Furnisher<'a> {
         let content = material.and_then(|material| self.house.materials[material].content.as_deref());
         let class = classify::of_architecture(content, kind, &self.house.rooms[room].kind);
         Some(Finish::uniform(class, 1 + parts.iter().max().copied().unwrap_or(0)))
+    }
+
+    /// What the data states of a surface. It has no roughness and metallic; those of a rule are stated by the recipe. Only
+    /// lights emit.
+    fn stated(&self, base_color: bool) -> StatedParameters {
+        let by_rule = self.appearances.rule != AppearanceRule::Constant;
+        StatedParameters { base_color, roughness: by_rule, metallic: by_rule, emission: true }
     }
 
     /// Counts the mesh's triangles and reports whether they are within the limit on triangles.
@@ -215,9 +231,11 @@ impl<'a> Furnisher<'a> {
             self.log.note("unlisted_model", &record.place, message, action);
         }
         let name = kind.category.clone().unwrap_or_else(|| kind.super_category.clone());
+        // model_info.json first: in later releases one of four pieces has neither category nor title.
         let title = || record.title.as_deref().and_then(|title| title.split('/').next()).map(str::to_owned);
-        let blenderproc_name = record.category.clone().or_else(title).unwrap_or_else(|| "others".to_owned());
-        let blenderproc_name = blenderproc_name.to_lowercase();
+        let listed = if kind.known { kind.category.clone() } else { None };
+        let named = listed.or_else(|| record.category.clone()).or_else(title);
+        let blenderproc_name = named.unwrap_or_else(|| "others".to_owned()).to_lowercase();
         let gives_light = kind.super_category == LIGHTING || blenderproc_name.contains("lamp");
         self.surfaces.push(Surface { name, mesh, material });
         self.placed.push(PlacedSurface {
@@ -229,6 +247,7 @@ impl<'a> Furnisher<'a> {
                 super_category: Some(kind.super_category),
                 part_of_triangle: Some(model.part_of_triangle.clone()),
                 class_of_part: finish.map(|finish| finish.of_parts.clone()),
+                stated: self.stated(complete),
                 shape: is_rigid(matrix, child.placement.scale).then(|| scaled(&model.mesh, child.placement.scale)),
             },
             color: MISSING,

@@ -32,6 +32,8 @@ pub struct House {
     pub rooms: Vec<Room>,
     /// The designers' cameras in the file.
     pub cameras: Vec<DesignerCamera>,
+    /// What has been subtracted from the places of rooms and cameras: whole metres far from the origin, else nothing.
+    pub shift_m: DVec3,
     /// Number of V-Ray lights. They are not used, since their units are V-Ray's own.
     pub lights: usize,
 }
@@ -60,8 +62,10 @@ pub struct HouseMesh {
     pub uid: String,
     /// Its type, as in `WallInner`; `Other` where the file gives none.
     pub kind: String,
-    /// The triangles, without the file's normals, which are often wrong.
+    /// The triangles relative to `base`, without the file's normals, which are often wrong.
     pub mesh: TriangleMesh,
+    /// What has been subtracted from the file's positions: whole metres far from the origin, else nothing.
+    pub base: DVec3,
     /// Index in [`House::materials`]; none where the file names no known material.
     pub material: Option<usize>,
     /// JSON pointer to the record.
@@ -92,7 +96,7 @@ pub struct Room {
     pub id: String,
     /// Its type, as in `LivingDiningRoom`.
     pub kind: String,
-    /// The product of the scene's and the room's transforms; the identity in every known file.
+    /// The product of the scene's and the room's transforms, less the house's shift; the identity in every known file.
     pub house_from_room: DMat4,
     /// Its meshes and pieces of furniture.
     pub children: Vec<Child>,
@@ -167,6 +171,13 @@ pub struct DesignerCamera {
     pub target: DVec3,
     /// Vertical field of view in degrees.
     pub fov_y_deg: f64,
+}
+
+impl DesignerCamera {
+    /// The camera in a house from whose places `shift_m` is subtracted.
+    pub(super) fn shifted(self, shift_m: DVec3) -> Self {
+        Self { position: self.position - shift_m, target: self.target - shift_m, ..self }
+    }
 }
 
 impl House {

@@ -1,24 +1,27 @@
 //! Meshes of the architecture: turns flat lists of numbers into triangles and reports what had to be repaired.
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
 use serde_json::Value;
 
-use super::document::{kind, list};
+use super::document::{kind, list, number};
 use crate::log::Log;
+use crate::shift::shift_of;
 use crate::surface_mesh::has_area;
 
 /// Coordinates beyond this many metres are faults.
-const FARTHEST: f64 = 1e5;
+const FARTHEST: f64 = 1e9;
 /// The largest deviation of a normal's length from 1 that is not reported.
 const UNIT_TOLERANCE: f64 = 0.01;
 
-/// Reads `xyz`, `uv` and `faces` of the mesh at `place`. None, with a finding, where no triangle is usable.
-pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleMesh> {
+/// Reads `xyz`, `uv` and `faces` of the mesh at `place`, and what has been subtracted from its positions. None, with a
+/// finding, where no triangle is usable.
+pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(TriangleMesh, DVec3)> {
     // Anything that is not a number is read as NaN and then handled with the numbers that are not finite.
-    let floats = |key: &str| list(from, key).iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect::<Vec<f64>>();
+    let floats = |key: &str| list(from, key).iter().map(|v| number(v).unwrap_or(f64::NAN)).collect::<Vec<f64>>();
     let (xyz, uv) = (floats("xyz"), floats("uv"));
-    let positions = positions(&xyz);
+    let base = base(&xyz);
+    let positions = positions(&xyz, base);
     let mut mesh = TriangleMesh { positions, normals: None, uvs: None, triangles: faces(from, place, log) };
     drop_impossible(&mut mesh, place, log);
     drop_without_area(&mut mesh, place, log);
@@ -29,13 +32,21 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<TriangleM
         return None;
     }
     // Unused vertices may have positions that are not finite, so they are dropped.
-    Some(mesh.picked(|_| true))
+    Some((mesh.picked(|_| true), base))
 }
 
-/// One position for every three numbers. A coordinate beyond [`FARTHEST`] becomes NaN.
-fn positions(xyz: &[f64]) -> Vec<Vec3> {
-    let sound = |v: f64| if v.abs() <= FARTHEST { v as f32 } else { f32::NAN };
-    xyz.as_chunks::<3>().0.iter().map(|p| Vec3::from_array(p.map(sound))).collect()
+/// The first sound position in whole metres, where it lies far from the origin, else zero.
+fn base(xyz: &[f64]) -> DVec3 {
+    let is_sound = |p: &&[f64; 3]| p.iter().all(|v| v.abs() <= FARTHEST);
+    let first = xyz.as_chunks::<3>().0.iter().find(is_sound);
+    first.map_or(DVec3::ZERO, |first| shift_of(DVec3::from_array(*first)))
+}
+
+/// One position for every three numbers, relative to `base`. A coordinate beyond [`FARTHEST`] becomes NaN.
+fn positions(xyz: &[f64], base: DVec3) -> Vec<Vec3> {
+    let is_sound = |p: &[f64; 3]| p.iter().all(|v| v.abs() <= FARTHEST);
+    let position = |p: &[f64; 3]| if is_sound(p) { (DVec3::from_array(*p) - base).as_vec3() } else { Vec3::NAN };
+    xyz.as_chunks::<3>().0.iter().map(position).collect()
 }
 
 fn faces(from: &Value, place: &str, log: &mut Log) -> Vec<[u32; 3]> {
@@ -45,7 +56,9 @@ fn faces(from: &Value, place: &str, log: &mut Log) -> Vec<[u32; 3]> {
         log.warn("bad_faces", &format!("{place}/faces"), message, "left the last ones out");
     }
     // Anything that is not an index becomes an index that no mesh has.
-    let index = |value: &Value| value.as_u64().and_then(|v| u32::try_from(v).ok()).unwrap_or(u32::MAX);
+    let whole =
+        |value: f64| (value >= 0.0 && value.fract() == 0.0 && value < f64::from(u32::MAX)).then_some(value as u32);
+    let index = |value: &Value| number(value).and_then(whole).unwrap_or(u32::MAX);
     all.as_chunks::<3>().0.iter().map(|face| [0, 1, 2].map(|corner| index(&face[corner]))).collect()
 }
 
@@ -73,22 +86,22 @@ fn drop_without_area(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     }
 }
 
-/// One pair of numbers for each vertex, or none where the list is empty. Missing and impossible numbers become 0.
+/// One pair of numbers for each vertex, or none where the list is empty. Missing and impossible pairs become NaN.
 fn uvs(uv: &[f64], mesh: &TriangleMesh, place: &str, log: &mut Log) -> Option<Vec<Vec2>> {
     let (pairs, count) = (uv.as_chunks::<2>().0, mesh.positions.len());
     let place = format!("{place}/uv");
     if pairs.len() < count {
         let message = format!("expected {count} texture coordinates, one for each vertex, found {}", pairs.len());
-        log.warn("bad_uv", &place, message, "used (0, 0) for the others");
+        log.warn("bad_uv", &place, message, "treated the others as missing");
     }
-    let bad = pairs.iter().flatten().filter(|v| v.is_nan() || v.abs() > FARTHEST).count();
+    let is_sound = |pair: &[f64; 2]| pair.iter().all(|v| v.abs() <= FARTHEST);
+    let bad = pairs.iter().filter(|pair| !is_sound(pair)).count();
     if bad > 0 {
-        let message = format!("{bad} of {} values are not finite numbers", uv.len());
-        log.warn("bad_uv", &place, message, "used 0 for them");
+        let message = format!("{bad} of {} texture coordinates are not finite numbers", pairs.len());
+        log.warn("bad_uv", &place, message, "treated them as missing");
     }
-    let sound = |v: f64| if v.abs() <= FARTHEST { v as f32 } else { 0.0 };
-    let pair = |at: usize| pairs.get(at).map_or(Vec2::ZERO, |pair| Vec2::from_array(pair.map(sound)));
-    (!pairs.is_empty()).then(|| (0..count).map(pair).collect())
+    let sound = |pair: &[f64; 2]| if is_sound(pair) { Vec2::from_array(pair.map(|v| v as f32)) } else { Vec2::NAN };
+    (!pairs.is_empty()).then(|| (0..count).map(|at| pairs.get(at).map_or(Vec2::NAN, sound)).collect())
 }
 
 fn note_bad_normals(from: &Value, vertices: usize, place: &str, log: &mut Log) {
@@ -98,7 +111,7 @@ fn note_bad_normals(from: &Value, vertices: usize, place: &str, log: &mut Log) {
         let message = format!("expected a list of numbers, found {}", kind(normals));
         return log.note("bad_normals", &place, message, "used the triangles' geometric normals");
     };
-    let floats: Vec<f64> = all.iter().map(|v| v.as_f64().unwrap_or(f64::NAN)).collect();
+    let floats: Vec<f64> = all.iter().map(|v| number(v).unwrap_or(f64::NAN)).collect();
     let is_unit = |n: &[f64; 3]| (n.iter().map(|v| v * v).sum::<f64>().sqrt() - 1.0).abs() <= UNIT_TOLERANCE;
     let bad = floats.as_chunks::<3>().0.iter().filter(|normal| !is_unit(normal)).count();
     if bad > 0 || floats.len() != 3 * vertices {
@@ -117,7 +130,7 @@ mod tests {
 
     fn read_one(mesh: Value) -> (Option<TriangleMesh>, Vec<String>) {
         let mut log = Log::new("house.json".into(), 100);
-        let mesh = read(&mesh, "/mesh/0", &mut log);
+        let mesh = read(&mesh, "/mesh/0", &mut log).map(|(mesh, _)| mesh);
         (mesh, log.into_findings().into_iter().map(|f| format!("{} {}", f.code, f.place)).collect())
     }
 
@@ -140,6 +153,20 @@ mod tests {
         let mesh = mesh.unwrap();
         assert_eq!((mesh.triangles.len(), mesh.area(), findings.len()), (2, 1.0, 0));
         assert_eq!(mesh.uvs.unwrap()[2], Vec2::ONE);
+    }
+
+    #[test]
+    fn numbers_may_be_texts_and_far_meshes_keep_their_shape() {
+        let texts = |key: &str| square()[key].as_array().unwrap().iter().map(Value::to_string).collect::<Vec<_>>();
+        let as_texts =
+            json!({ "xyz": texts("xyz"), "uv": texts("uv"), "normal": texts("normal"), "faces": texts("faces") });
+        let (mesh, findings) = read_one(as_texts);
+        assert_eq!((mesh, findings.len()), (read_one(square()).0, 0));
+        let far =
+            square()["xyz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() + 448_231.25).collect::<Vec<_>>();
+        let mut log = Log::new("house.json".into(), 100);
+        let (mesh, base) = read(&with("xyz", json!(far)), "/mesh/0", &mut log).unwrap();
+        assert_eq!((base, mesh.positions[2]), (DVec3::splat(448_231.0), Vec3::new(1.25, 1.25, 0.25)));
     }
 
     #[test]

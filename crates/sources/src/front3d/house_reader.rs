@@ -6,7 +6,7 @@ use glam::{DMat4, DQuat, DVec3};
 use mateval_scene::material::UvTransform;
 use serde_json::Value;
 
-use super::document::{kind, list, numbers, text};
+use super::document::{kind, list, number, numbers, text};
 use super::error::HouseError;
 use super::house::{
     Child, ChildKind, DesignerCamera, FurnitureRecord, House, HouseMaterial, HouseMesh, Placement, Release, Room,
@@ -14,6 +14,7 @@ use super::house::{
 use super::house_mesh;
 use super::limits::Limits;
 use crate::log::Log;
+use crate::shift::{self, shift_of};
 use mateval_scene::findings::shortened;
 
 /// Reads the whole tree; `stem` is that of the file's name. Fails where it has no scene or exceeds `limits`.
@@ -23,18 +24,33 @@ pub(super) fn read(tree: &Value, stem: &str, limits: &Limits, log: &mut Log) -> 
     let material_of: BTreeMap<&str, usize> = materials.iter().enumerate().map(|(k, m)| (m.uid.as_str(), k)).collect();
     let meshes = meshes(tree, &material_of, limits, log)?;
     let furniture = furniture(tree, log);
-    let rooms = rooms(tree, &furniture, &meshes, limits, log)?;
+    let mut rooms = rooms(tree, &furniture, &meshes, limits, log)?;
     report_unused(&rooms, &meshes, log);
+    let shift_m = shift_of(place_of(&rooms, &meshes));
+    shift::report(shift_m, log);
+    rooms.iter_mut().for_each(|room| room.house_from_room = shift::transform(shift_m) * room.house_from_room);
     Ok(House {
         uid: text(tree, "uid").unwrap_or(stem).to_owned(),
         release,
-        cameras: snapshots(tree, log),
+        cameras: snapshots(tree, log).into_iter().map(|camera| camera.shifted(shift_m)).collect(),
+        shift_m,
         lights: list(tree, "lights").len(),
         furniture,
         meshes,
         materials,
         rooms,
     })
+}
+
+/// A corner of the first mesh that a room shows; the origin where there is none.
+fn place_of(rooms: &[Room], meshes: &[HouseMesh]) -> DVec3 {
+    let shown = rooms.iter().flat_map(|room| room.children.iter().map(move |child| (room, child)));
+    let mut corners = shown.filter_map(|(room, child)| {
+        let ChildKind::Mesh(mesh) = child.what else { return None };
+        let corner = meshes[mesh].base + meshes[mesh].mesh.positions.first()?.as_dvec3();
+        Some((room.house_from_room * child.placement.matrix()).transform_point3(corner))
+    });
+    corners.next().unwrap_or(DVec3::ZERO)
 }
 
 fn release(tree: &Value) -> Release {
@@ -116,7 +132,7 @@ fn content(record: &Value) -> Option<String> {
 
 fn color(record: &Value, place: &str, log: &mut Log) -> [f64; 3] {
     let Some(found) = record.get("color") else { return [255.0; 3] };
-    let all: Vec<f64> = found.as_array().into_iter().flatten().map_while(Value::as_f64).collect();
+    let all: Vec<f64> = found.as_array().into_iter().flatten().map_while(number).collect();
     match all.first_chunk::<3>() {
         Some(rgb) if rgb.iter().all(|v| (0.0..=255.0).contains(v)) => *rgb,
         _ => {
@@ -149,7 +165,7 @@ fn meshes(
     let mut triangles = 0;
     for (at, uid, record) in first_of_each_uid(tree, "mesh", log) {
         let place = format!("/mesh/{at}");
-        let Some(mesh) = house_mesh::read(record, &place, log) else { continue };
+        let Some((mesh, base)) = house_mesh::read(record, &place, log) else { continue };
         triangles += mesh.triangles.len();
         if triangles > limits.triangles {
             return Err(HouseError::TooManyTriangles { place, most: limits.triangles });
@@ -161,7 +177,7 @@ fn meshes(
             log.warn("no_material", &format!("{place}/material"), message, "used mid-grey");
         }
         let kind = text(record, "type").unwrap_or("Other").to_owned();
-        meshes.push(HouseMesh { uid, kind, mesh, material, place });
+        meshes.push(HouseMesh { uid, kind, mesh, base, material, place });
     }
     Ok(meshes)
 }
@@ -267,7 +283,7 @@ fn child_kind(child: &Value, place: &str, records: &Records<'_>, log: &mut Log) 
 fn placement(record: &Value, place: &str, log: &mut Log) -> Placement {
     let mut vector = |key: &str, default: DVec3| {
         let Some(found) = record.get(key).filter(|found| !found.is_null()) else { return default };
-        match numbers::<3>(record, key).filter(|v| v.iter().all(|v| v.abs() < 1e5)) {
+        match numbers::<3>(record, key).filter(|v| v.iter().all(|v| v.abs() < 1e9)) {
             Some(values) => DVec3::from_array(values),
             None => {
                 let message = format!("expected 3 finite numbers, found {}", kind(found));
@@ -329,7 +345,7 @@ fn snapshots(tree: &Value, log: &mut Log) -> Vec<DesignerCamera> {
 /// A designer's camera with `pos`, `target` and a vertical `fov` in degrees; none where one of them is missing or faulty.
 pub(super) fn designer_camera(record: &Value, number: usize) -> Option<DesignerCamera> {
     let (position, target) = (numbers::<3>(record, "pos")?, numbers::<3>(record, "target")?);
-    let fov_y_deg = record.get("fov")?.as_f64().filter(|fov| (1.0..179.0).contains(fov))?;
+    let fov_y_deg = record.get("fov").and_then(super::document::number).filter(|fov| (1.0..179.0).contains(fov))?;
     let (position, target) = (DVec3::from_array(position), DVec3::from_array(target));
     (position.distance(target) > 1e-6).then_some(DesignerCamera { number, position, target, fov_y_deg })
 }

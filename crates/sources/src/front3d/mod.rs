@@ -21,7 +21,6 @@ pub mod camera_sampler;
 mod cameras;
 mod class_table;
 mod classify;
-mod coincident;
 mod document;
 mod drop_shadow;
 mod error;
@@ -38,7 +37,6 @@ mod limits;
 mod model;
 mod model_info;
 pub mod room_scene;
-mod sheets;
 
 pub use appearance_rule::AppearanceRule;
 pub use error::HouseError;

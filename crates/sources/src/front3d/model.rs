@@ -103,14 +103,15 @@ pub(super) fn read(jid: &str, library: &mut Library, limits: &Limits, log: &mut 
             return None;
         }
     };
-    if read.mixed_uvs || read.mixed_normals {
-        let message = "only some faces have texture coordinates or normals".to_owned();
-        warn("mixed_faces", "", message, "dropped them for all faces");
+    if read.corners_without_normal > 0 {
+        let message = format!("{} corners have no normals", read.corners_without_normal);
+        warn("mixed_faces", "", message, "computed them from the adjacent faces");
     }
     let names: Vec<String> = read.groups.iter().map(|group| group.name.clone()).collect();
     // What is kept of it, in metres.
+    let base = read.base;
     let (mesh, group_of_triangle) = without_shadows(read, &file, log);
-    let Some((mesh, groups)) = in_metres(mesh, group_of_triangle, &file, log) else {
+    let Some((mesh, groups)) = in_metres(mesh, base, group_of_triangle, &file, log) else {
         let message = "expected a triangle with an area, found none";
         log.push(Severity::Warning, "bad_model", &file, "", message, "left its pieces out");
         return None;
@@ -174,8 +175,14 @@ fn without_painted_shadow(
 }
 
 /// Drops triangles that are not finite or have no area, and scales a model in centimetres. Returns the group of each
-/// remaining triangle too.
-fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) -> Option<(TriangleMesh, Vec<usize>)> {
+/// remaining triangle too. The positions are relative to `base`.
+fn in_metres(
+    mesh: TriangleMesh,
+    base: DVec3,
+    groups: Vec<usize>,
+    file: &str,
+    log: &mut Log,
+) -> Option<(TriangleMesh, Vec<usize>)> {
     // Triangles without area go first, and their group numbers with them.
     let sound: Vec<bool> = (0..mesh.triangles.len()).map(|t| has_area(mesh.corners(t))).collect();
     let dropped = sound.iter().filter(|sound| !**sound).count();
@@ -194,10 +201,12 @@ fn in_metres(mesh: TriangleMesh, groups: Vec<usize>, file: &str, log: &mut Log) 
         log.push(Severity::Note, "centimetres", file, "", message, "read its numbers as centimetres");
     }
     let scale = if centimetres { 0.01 } else { 1.0 };
-    let (mesh, repairs) = to_world(mesh, DMat4::from_scale(DVec3::splat(scale)), false);
-    if repairs.normals > 0 || repairs.uvs > 0 {
-        let message = format!("{} normals are zero or not finite, {} uvs are not finite", repairs.normals, repairs.uvs);
-        log.push(Severity::Note, "bad_normals", file, "", message, "computed new normals, used uv 0");
+    let metres_from_file = DMat4::from_scale(DVec3::splat(scale));
+    let matrix = if base == DVec3::ZERO { metres_from_file } else { metres_from_file * DMat4::from_translation(base) };
+    let (mesh, repairs) = to_world(mesh, matrix, false);
+    if repairs.normals > 0 {
+        let message = format!("{} normals are zero or not finite", repairs.normals);
+        log.push(Severity::Note, "bad_normals", file, "", message, "computed new normals");
     }
     if mesh.triangles.is_empty() || mesh.triangles.len() != groups.len() {
         return None;

@@ -12,8 +12,9 @@ use rayon::prelude::*;
 
 use super::appearance_rule::AppearanceRule;
 use super::furnished_house::FurnishedHouse;
+use super::house::ChildKind;
 use super::lights;
-use crate::source_scene::SourceScene;
+use crate::source_scene::{Missing, SourceScene};
 
 /// The most characters of a name before an appended number.
 const LONGEST_NAME: usize = 40;
@@ -41,11 +42,35 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
         scene,
         origins: kept.iter().map(|&surface| house.placed[surface].origin.clone()).collect(),
         camera: views[0],
+        shift_m: house.shift_m,
         findings: house.findings.clone(),
         licence: None,
         files: house.files.clone(),
         absent: house.absent.clone(),
+        missing: missing(house, room),
     }
+}
+
+/// The models and textures of the room's pieces that do not exist. Those that exist and cannot be read are findings.
+fn missing(house: &FurnishedHouse, room: usize) -> Missing {
+    let records = house.house.rooms[room].children.iter().filter_map(|child| match child.what {
+        ChildKind::Furniture(record) => Some(&house.house.furniture[record]).filter(|record| record.valid),
+        ChildKind::Mesh(_) => None,
+    });
+    let mut missing = Missing { what: "models and textures of the room's furniture", ..Missing::default() };
+    for record in records {
+        for file in ["raw_model.obj", "texture.png"] {
+            let end = format!("{}/{file}", record.jid);
+            let absent = house.absent.iter().find(|path| path.ends_with(&end));
+            missing.wanted += 1;
+            missing.files.extend(absent.cloned());
+            // A texture is looked for once the model has been read.
+            if absent.is_some() {
+                break;
+            }
+        }
+    }
+    missing
 }
 
 /// The surfaces that any coarse sub-pixel of any view shows.

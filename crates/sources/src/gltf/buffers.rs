@@ -1,6 +1,6 @@
 //! The buffers of a glTF, read as a whole.
 
-use gltf::Gltf;
+use mateval_scene::gltf_file::GltfFile;
 use mateval_scene::source_folder::SourceFolder;
 
 use super::error::GltfSceneError;
@@ -9,14 +9,14 @@ use super::uri;
 
 /// Reads all buffers. The binary part of a .glb is moved out of `file`.
 pub(super) fn read(
-    file: &mut Gltf,
+    file: &mut GltfFile,
     folder: &mut SourceFolder,
     limits: &Limits,
 ) -> Result<Vec<Vec<u8>>, GltfSceneError> {
     let mut blob = file.blob.take();
     let mut buffers = Vec::new();
     let mut total = 0_u64;
-    for buffer in file.buffers() {
+    for buffer in file.document.buffers() {
         let number = buffer.index();
         let bytes = match buffer.source() {
             gltf::buffer::Source::Bin => blob.take().ok_or(GltfSceneError::BufferWithoutData { buffer: number })?,

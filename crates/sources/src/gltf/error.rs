@@ -28,10 +28,12 @@ pub enum GltfSceneError {
         most_containers: usize,
     },
     /// The file cannot be read without an extension that is not supported, such as a compression of meshes.
-    #[error("/extensionsRequired: '{name}' is not supported; export the file without it")]
+    #[error("/extensionsRequired: '{name}' is not supported; {way_out}")]
     RequiredExtension {
         /// The extension's name, shortened.
         name: String,
+        /// What to do.
+        way_out: &'static str,
     },
     /// The file breaks the rules of glTF.
     #[error("{pointer}: {reason}{}", and_more(*others))]

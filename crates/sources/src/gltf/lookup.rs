@@ -61,7 +61,7 @@ mod tests {
             r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"a"}}],"textures":[{{"source":0}}],"materials":[
             {{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0,"extensions":{{"KHR_texture_transform":{transform}}}}}}}}}]}}"#
         );
-        let file = mateval_scene::gltf_accessor::parse(text.as_bytes()).unwrap();
+        let file = mateval_scene::gltf_file::parse(text.as_bytes()).unwrap().document;
         let info = file.materials().next().unwrap().pbr_metallic_roughness().base_color_texture().unwrap();
         Lookup::new(&info).uv
     }

@@ -4,7 +4,7 @@ use gltf::material::AlphaMode;
 use mateval_image::texture_io::Encoding;
 use mateval_scene::findings::shortened;
 use mateval_scene::material::{
-    ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput,
+    ColorInput, Distribution, Material, MaterialModel, Microfacets, PrincipledFlavour, ScalarInput, StatedParameters,
 };
 use mateval_scene::reference::{EmissionMap, MaterialIndex};
 
@@ -23,18 +23,28 @@ const GLASS: f32 = 0.5;
 /// The lookups of a material's textures. All are looked up at the uv set of the first; the mean stands for a texture at
 /// another set, since a mesh has one uv.
 struct Lookups<'a> {
+    /// Of the base colour, or the diffuse colour.
     base_color: Option<Lookup<'a>>,
+    /// Of metallic and roughness, or specular colour and glossiness.
     metallic_roughness: Option<Lookup<'a>>,
     emissive: Option<Lookup<'a>>,
 }
 
 impl<'a> Lookups<'a> {
     fn new(material: &gltf::Material<'a>) -> Self {
+        let emissive = material.emissive_texture().map(|info| Lookup::new(&info));
+        if let Some(specular) = material.pbr_specular_glossiness() {
+            return Self {
+                base_color: specular.diffuse_texture().map(|info| Lookup::new(&info)),
+                metallic_roughness: specular.specular_glossiness_texture().map(|info| Lookup::new(&info)),
+                emissive,
+            };
+        }
         let pbr = material.pbr_metallic_roughness();
         Self {
             base_color: pbr.base_color_texture().map(|info| Lookup::new(&info)),
             metallic_roughness: pbr.metallic_roughness_texture().map(|info| Lookup::new(&info)),
-            emissive: material.emissive_texture().map(|info| Lookup::new(&info)),
+            emissive,
         }
     }
 
@@ -61,12 +71,36 @@ impl Reader<'_> {
         let name = material.name().map(shortened).unwrap_or_else(own_name);
         self.scene.materials.push(Material { name, model, two_sided: true, opacity, bump: None });
         let index = MaterialIndex(self.scene.materials.len() - 1);
-        let read = ReadMaterial { index, uv_set: lookups.set(), glow };
+        // A primitive without a material has the format's default, which states nothing.
+        let nothing = StatedParameters { base_color: false, roughness: false, metallic: false, emission: false };
+        let stated = material.index().and_then(|index| self.file.stated.get(index)).copied().unwrap_or(nothing);
+        let read = ReadMaterial { index, uv_set: lookups.set(), stated, glow };
         self.materials.insert(material.index(), read);
         read
     }
 
     fn model(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> MaterialModel {
+        let (base_color, [roughness, metallic]) = match material.pbr_specular_glossiness() {
+            Some(extension) => {
+                let (diffuse, specular) = (lookups.base_color.as_ref(), lookups.metallic_roughness.as_ref());
+                self.specular_glossiness(&extension, diffuse, specular, pointer)
+            }
+            None => self.metallic_roughness(material, lookups, pointer),
+        };
+        if let Some(glass) = self.glass(material, base_color, roughness, pointer) {
+            return glass;
+        }
+        let specular = self.specular(material, pointer);
+        MaterialModel::Principled { base_color, roughness, metallic, specular, flavour: PrincipledFlavour::Blender }
+    }
+
+    /// Base colour, roughness and metallic by the core of glTF.
+    fn metallic_roughness(
+        &mut self,
+        material: &gltf::Material<'_>,
+        lookups: &Lookups<'_>,
+        pointer: &str,
+    ) -> (ColorInput, [ScalarInput; 2]) {
         let pbr = material.pbr_metallic_roughness();
         let [red, green, blue, _] = pbr.base_color_factor();
         let base_color = match &lookups.base_color {
@@ -74,7 +108,7 @@ impl Reader<'_> {
             None => ColorInput::Constant([red, green, blue]),
         };
         let factors = [pbr.roughness_factor(), pbr.metallic_factor()];
-        let [roughness, metallic] = match &lookups.metallic_roughness {
+        let numbers = match &lookups.metallic_roughness {
             Some(lookup) if Some(lookup.set) == lookups.set() => {
                 [self.scalar(lookup, 1, factors[0]), self.scalar(lookup, 2, factors[1])]
             }
@@ -85,11 +119,7 @@ impl Reader<'_> {
             }
             None => factors.map(ScalarInput::Constant),
         };
-        if let Some(glass) = self.glass(material, base_color, roughness, pointer) {
-            return glass;
-        }
-        let specular = self.specular(material, pointer);
-        MaterialModel::Principled { base_color, roughness, metallic, specular, flavour: PrincipledFlavour::Blender }
+        (base_color, numbers)
     }
 
     /// Disney's `specular` of the index of refraction; 0.5 where that is not representable.
@@ -157,7 +187,10 @@ impl Reader<'_> {
 
     /// The opacity of the alpha mode; none where everything is opaque.
     fn opacity(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> Option<ScalarInput> {
-        let factor = material.pbr_metallic_roughness().base_color_factor()[3];
+        let factor = match material.pbr_specular_glossiness() {
+            Some(specular) => specular.diffuse_factor()[3],
+            None => material.pbr_metallic_roughness().base_color_factor()[3],
+        };
         let cutoff = match material.alpha_mode() {
             AlphaMode::Opaque => return None,
             AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),

@@ -4,7 +4,7 @@ use glam::{Vec2, Vec3};
 use gltf::Semantic;
 use gltf::mesh::Mode;
 use mateval_scene::TriangleMesh;
-use mateval_scene::gltf_accessor::{floats, floats_or_shares, indices, triangles};
+use mateval_scene::gltf_accessor::{indices, numbers};
 use mateval_scene::gltf_error::GltfError;
 
 use super::error::PrimitiveFault;
@@ -23,31 +23,48 @@ impl Reader<'_> {
             return Err(PrimitiveFault::NotASurface);
         }
         let positions = primitive.get(&Semantic::Positions).ok_or(GltfError::Missing { attribute: "POSITION" })?;
-        let numbers = primitive.indices();
-        let corners = numbers.as_ref().map_or(positions.count(), gltf::Accessor::count);
+        let corner_numbers = primitive.indices();
+        let corners = corner_numbers.as_ref().map_or(positions.count(), gltf::Accessor::count);
         self.count(positions.count(), corners, primitive.mode())?;
         self.report_omitted_attributes(primitive, pointer);
-        let normals = primitive.get(&Semantic::Normals);
-        let uvs = self.uv_accessor(primitive, uv_set, pointer);
         // Counts are compared before anything is read, so that what is read is bounded by what was counted.
-        let same = |other: &Option<gltf::Accessor<'_>>| {
-            other.as_ref().is_none_or(|accessor| accessor.count() == positions.count())
+        let mut same = |semantic: Semantic, what: &str| {
+            let accessor = primitive.get(&semantic)?;
+            let (expected, found) = (positions.count(), accessor.count());
+            if expected == found {
+                return Some(accessor);
+            }
+            let message = format!("{what} has {found} entries, POSITION {expected}");
+            self.log.warn("bad_attribute", pointer, message, "treated it as absent");
+            None
         };
-        if !same(&normals) || !same(&uvs) {
-            return Err(GltfError::CountsDiffer.into());
-        }
+        let normals = same(Semantic::Normals, "NORMAL");
+        let uvs = same(Semantic::TexCoords(uv_set.unwrap_or(0)), "TEXCOORD");
+        let positions = numbers::<3>(&positions, self.buffers)?.into_iter().map(Vec3::from_array).collect();
+        let normals = normals.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
+        let uvs = uvs.map(|accessor| numbers::<2>(&accessor, self.buffers)).transpose()?;
         let mesh = TriangleMesh {
-            positions: self.vectors::<3, _>(&positions, Vec3::from_array)?,
-            normals: normals.map(|accessor| self.vectors::<3, _>(&accessor, Vec3::from_array)).transpose()?,
-            uvs: uvs.map(|accessor| self.uvs(&accessor)).transpose()?,
+            positions,
+            normals: normals.map(|all| all.into_iter().map(Vec3::from_array).collect()),
+            // v upwards.
+            uvs: uvs.map(|all| all.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()),
             triangles: Vec::new(),
         };
         let vertices = mesh.positions.len();
-        let numbers = match numbers {
-            Some(accessor) => indices(&accessor, self.buffer(&accessor)?)?,
+        let numbers = match corner_numbers {
+            Some(accessor) => indices(&accessor, self.buffers)?,
             None => (0..vertices as u32).collect(),
         };
-        Ok(TriangleMesh { triangles: triangles(listed(numbers, primitive.mode()), vertices)?, ..mesh })
+        let listed = listed(numbers, primitive.mode());
+        let (all, rest) = listed.as_chunks::<3>();
+        let sound = |triangle: &&[u32; 3]| triangle.iter().all(|vertex| (*vertex as usize) < vertices);
+        let triangles: Vec<[u32; 3]> = all.iter().filter(sound).copied().collect();
+        let bad = all.len() - triangles.len() + usize::from(!rest.is_empty());
+        if bad > 0 {
+            let message = format!("{bad} of {} triangles name vertices that do not exist, or too few", all.len());
+            self.log.warn("bad_indices", pointer, message, "left them out");
+        }
+        Ok(TriangleMesh { triangles, ..mesh })
     }
 
     /// Adds to the counts of vertices and triangles. Fails, without adding, where they would exceed the limits.
@@ -60,40 +77,6 @@ impl Reader<'_> {
         }
         (self.vertices, self.triangles) = (all_vertices, all_triangles);
         Ok(())
-    }
-
-    fn buffer(&self, accessor: &gltf::Accessor<'_>) -> Result<&[u8], GltfError> {
-        let view = accessor.view().ok_or(GltfError::Sparse)?;
-        Ok(&self.buffers[view.buffer().index()])
-    }
-
-    fn vectors<const N: usize, V>(
-        &self,
-        accessor: &gltf::Accessor<'_>,
-        from: impl Fn([f32; N]) -> V,
-    ) -> Result<Vec<V>, GltfError> {
-        Ok(floats::<N>(accessor, self.buffer(accessor)?)?.into_iter().map(from).collect())
-    }
-
-    /// The texture coordinates of a set. A material with textures on a primitive without them is reported.
-    fn uv_accessor<'p>(
-        &mut self,
-        primitive: &gltf::Primitive<'p>,
-        set: Option<u32>,
-        pointer: &str,
-    ) -> Option<gltf::Accessor<'p>> {
-        let accessor = primitive.get(&Semantic::TexCoords(set.unwrap_or(0)));
-        if accessor.is_none() && set.is_some() {
-            let feature = "textures of a primitive without their texture coordinates";
-            self.omit(Omission::Visible, feature, "looked them up at one point", pointer);
-        }
-        accessor
-    }
-
-    /// Texture coordinates with v upwards.
-    fn uvs(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<Vec2>, GltfError> {
-        let uvs = floats_or_shares::<2>(accessor, self.buffer(accessor)?)?;
-        Ok(uvs.into_iter().map(|[u, v]| Vec2::new(u, 1.0 - v)).collect())
     }
 
     fn report_omitted_attributes(&mut self, primitive: &gltf::Primitive<'_>, pointer: &str) {

@@ -23,6 +23,7 @@ mod omitted;
 mod punctual;
 mod read_material;
 mod reader;
+mod specular_glossiness;
 #[cfg(test)]
 mod tests;
 mod texture_key;
@@ -31,13 +32,16 @@ mod uri;
 
 use std::path::Path;
 
+use glam::DVec3;
 use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
 use mateval_scene::{Camera, Finding, SceneLights};
 
 use crate::error::{InvalidSource, SourceError};
 use crate::licence::read_licence;
 use crate::log::Log;
+use crate::shift::{self, shift_of};
 use crate::source_scene::{InstanceOrigin, LicenceText};
+use crate::{coincident, missing_uv};
 pub use error::GltfSceneError;
 pub use limits::Limits;
 use omitted::{LEFT_OUT, Omission};
@@ -57,6 +61,8 @@ pub struct GltfScene {
     pub lights: SceneLights,
     /// The first perspective camera of the scene. glTF states no picture size; it has 480 columns.
     pub camera: Option<Camera>,
+    /// What was subtracted from the file's positions, in metres.
+    pub shift_m: DVec3,
     /// Everything that was left out, replaced or approximated; sorted.
     pub findings: Vec<Finding>,
     /// The licence file beside the glTF, if any.
@@ -67,11 +73,12 @@ pub struct GltfScene {
     pub absent_files: Vec<String>,
 }
 
-/// Reads the default scene, or else the first scene, of the glTF at `path`.
+/// Reads the default scene, or else the first scene, of the glTF at `path`. `camera` is the place of the camera that will
+/// be used instead of the file's own; it decides with that whether the scene is moved nearer to the origin.
 ///
 /// Fails where the file or one of its buffers cannot be read, the JSON is not valid glTF, breaks `limits` or requires
 /// an unknown extension, or the file has no scene.
-pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
+pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfScene, SourceError> {
     // The file and its buffers.
     let invalid = |error| SourceError::invalid(path, InvalidSource::Gltf(error));
     let (mut source, name, bytes) = crate::source_scene::open(path, limits.file_bytes, limits.file_bytes)?;
@@ -81,14 +88,19 @@ pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
     let mut log = Log::new(name, limits.findings);
     let licence = read_licence(&mut source, &mut log);
     // The scene.
-    let scene = file.default_scene().or_else(|| file.scenes().next());
+    let document = &file.document;
+    let scene = document.default_scene().or_else(|| document.scenes().next());
     let scene = scene.ok_or_else(|| invalid(GltfSceneError::NoScene))?;
-    let mut reader = Reader::new(&buffers, limits, log, source);
-    report_unused(&mut reader, &file);
-    let camera = reader.nodes(&scene);
+    let shift_m = shift_of(camera.or_else(|| nodes::place_of_camera(&scene)).unwrap_or(DVec3::ZERO));
+    shift::report(shift_m, &mut log);
+    let mut reader = Reader::new(&file, &buffers, limits, log, source);
+    reader.report_unused();
+    let camera = reader.nodes(&scene, shift_m);
     let lights = default_light(&mut reader);
-    // Its findings and files.
-    let Reader { scene, origins, mut log, omitted, source, .. } = reader;
+    // Repairs that concern all of it.
+    let Reader { mut scene, mut origins, mut log, omitted, source, .. } = reader;
+    missing_uv::resolve(&mut scene, &mut origins, &mut log);
+    coincident::separate(&mut scene.surfaces, &origins, &mut log);
     omitted.report(&mut log);
     let files = source.into_files();
     Ok(GltfScene {
@@ -96,6 +108,7 @@ pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
         origins,
         lights,
         camera,
+        shift_m,
         findings: log.into_findings(),
         licence,
         source_files: files.hashes,
@@ -103,14 +116,20 @@ pub fn read(path: &Path, limits: &Limits) -> Result<GltfScene, SourceError> {
     })
 }
 
-/// Reports the parts of a file that no node shows.
-fn report_unused(reader: &mut Reader<'_>, file: &gltf::Document) {
-    if file.animations().next().is_some() {
-        reader.omit(Omission::Slight, "animations", "showed the scene at rest", "/animations");
-    }
-    for scene in file.scenes().skip(1) {
-        let pointer = format!("/scenes/{}", scene.index());
-        reader.omit(Omission::Slight, "further scenes", LEFT_OUT, &pointer);
+impl Reader<'_> {
+    /// Reports the parts of a file that no node shows, and the textures that it only names.
+    fn report_unused(&mut self) {
+        let file = self.file;
+        if file.document.animations().next().is_some() {
+            self.omit(Omission::Slight, "animations", "showed the scene at rest", "/animations");
+        }
+        for scene in file.document.scenes().skip(1) {
+            let pointer = format!("/scenes/{}", scene.index());
+            self.omit(Omission::Slight, "further scenes", LEFT_OUT, &pointer);
+        }
+        for pointer in &file.without_picture {
+            self.omit(Omission::Visible, "textures that name no picture", "treated them as absent", pointer);
+        }
     }
 }
 

@@ -8,7 +8,10 @@ use gltf::scene::Transform;
 use mateval_scene::TriangleMesh;
 use mateval_scene::camera::Camera;
 use mateval_scene::findings::shortened;
+use mateval_scene::gltf_accessor::numbers;
+use mateval_scene::gltf_error::GltfError;
 use mateval_scene::reference::{Emission, Surface, SurfaceIndex};
+use serde_json::Value;
 
 use super::camera::perspective;
 use super::error::PrimitiveFault;
@@ -17,9 +20,11 @@ use super::omitted::{LEFT_OUT, Omission};
 use super::read_material::ReadMaterial;
 use super::reader::Reader;
 use crate::parts::parts_of_labels;
+use crate::shift;
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::to_world;
 
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// Longer names are shortened, since a name may be copied to many instances.
 const LONGEST_NAME: usize = 1024;
 
@@ -35,11 +40,12 @@ struct Group {
 }
 
 impl Reader<'_> {
-    /// Adds all nodes of a scene. Returns its first perspective camera, in the order of the tree.
-    pub(super) fn nodes(&mut self, scene: &gltf::Scene<'_>) -> Option<Camera> {
+    /// Adds all nodes of a scene, moved by `-shift`. Returns its first perspective camera, in the order of the tree.
+    pub(super) fn nodes(&mut self, scene: &gltf::Scene<'_>, shift: DVec3) -> Option<Camera> {
         let mut camera = None;
         let mut visited = BTreeSet::new();
-        let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
+        let root = shift::transform(shift);
+        let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, root)).collect();
         open.reverse();
         while let Some((node, world_from_parent)) = open.pop() {
             let pointer = format!("/nodes/{}", node.index());
@@ -49,7 +55,11 @@ impl Reader<'_> {
                 self.log.warn("not_a_tree", &pointer, message, "kept its first place");
                 continue;
             }
-            let world_from_node = world_from_parent * self.parent_from_node(&node, &pointer);
+            let (parent_from_node, is_sound) = parent_from_node(&node);
+            if !is_sound {
+                self.log.warn("bad_value", &pointer, "expected a rotation of length 1", "used no rotation");
+            }
+            let world_from_node = world_from_parent * parent_from_node;
             self.node(&node, world_from_node, &pointer);
             camera = camera.or_else(|| self.camera(&node, world_from_node, &pointer));
             let first = open.len();
@@ -57,25 +67,6 @@ impl Reader<'_> {
             open[first..].reverse();
         }
         camera
-    }
-
-    /// The node's own transform. A rotation that cannot be normalised is reported and left out.
-    fn parent_from_node(&mut self, node: &gltf::Node<'_>, pointer: &str) -> DMat4 {
-        let (translation, rotation, scale) = match node.transform() {
-            Transform::Matrix { matrix } => {
-                return DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from)));
-            }
-            Transform::Decomposed { translation, rotation, scale } => (translation, rotation, scale),
-        };
-        let rotation = DQuat::from_array(rotation.map(f64::from));
-        let (length, vector) = (rotation.length(), |values: [f32; 3]| DVec3::from_array(values.map(f64::from)));
-        let rotation = if length > 1e-9 && length.is_finite() {
-            rotation / length
-        } else {
-            self.log.warn("bad_value", pointer, "expected a rotation of length 1", "used no rotation");
-            DQuat::IDENTITY
-        };
-        DMat4::from_scale_rotation_translation(vector(scale), rotation, vector(translation))
     }
 
     fn camera(&mut self, node: &gltf::Node<'_>, world_from_node: DMat4, pointer: &str) -> Option<Camera> {
@@ -89,7 +80,8 @@ impl Reader<'_> {
     }
 
     fn node(&mut self, node: &gltf::Node<'_>, world_from_node: DMat4, pointer: &str) {
-        self.omit_extensions(node.extensions().into_iter().flat_map(|map| map.keys()), pointer);
+        let others = node.extensions().into_iter().flat_map(|map| map.keys());
+        self.omit_extensions(others.filter(|name| *name != INSTANCING), pointer);
         if node.skin().is_some() {
             self.omit(Omission::Visible, "skins", "showed the mesh without its bones", pointer);
         }
@@ -98,14 +90,61 @@ impl Reader<'_> {
             self.punctual(&light, world_from_node, &name, pointer);
         }
         let Some(mesh) = node.mesh() else { return };
-        let groups = self.groups(&mesh);
+        match node.extension_value(INSTANCING) {
+            None => self.mesh(&mesh, &name, world_from_node, pointer),
+            Some(extension) => {
+                let copies = match self.instances(extension) {
+                    Ok(copies) => copies,
+                    Err(fault) => {
+                        let message = format!("{INSTANCING}: {fault}");
+                        return self.log.warn("bad_instances", pointer, message, "left all instances out");
+                    }
+                };
+                for (number, node_from_copy) in copies.into_iter().enumerate() {
+                    let name = format!("{name} {}", number + 1);
+                    self.mesh(&mesh, &name, world_from_node * node_from_copy, pointer);
+                }
+            }
+        }
+    }
+
+    /// The transforms of `EXT_mesh_gpu_instancing`. Absent attributes have the format's defaults: no motion.
+    fn instances(&self, extension: &Value) -> Result<Vec<DMat4>, GltfError> {
+        let attribute = |key: &str| {
+            let index = extension.pointer(&format!("/attributes/{key}")).and_then(Value::as_u64);
+            index.and_then(|index| self.file.document.accessors().nth(index as usize))
+        };
+        let all = ["TRANSLATION", "ROTATION", "SCALE"].map(attribute);
+        let count = all.iter().flatten().map(gltf::Accessor::count).max().unwrap_or(0);
+        if all.iter().flatten().any(|accessor| accessor.count() != count) {
+            return Err(GltfError::CountsDiffer);
+        }
+        if count > self.limits.primitives {
+            let accessor = all.iter().flatten().map(gltf::Accessor::index).next().unwrap_or(0);
+            return Err(GltfError::AccessorTooLarge { accessor, most: self.limits.primitives });
+        }
+        let [translation, rotation, scale] = all;
+        let translation = translation.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
+        let rotation = rotation.map(|accessor| numbers::<4>(&accessor, self.buffers)).transpose()?;
+        let scale = scale.map(|accessor| numbers::<3>(&accessor, self.buffers)).transpose()?;
+        let copy = |at: usize| {
+            let translation = translation.as_ref().map_or([0.0; 3], |all| all[at]);
+            let rotation = rotation.as_ref().map_or([0.0, 0.0, 0.0, 1.0], |all| all[at]);
+            placed(translation, rotation, scale.as_ref().map_or([1.0; 3], |all| all[at])).0
+        };
+        Ok((0..count).map(copy).collect())
+    }
+
+    /// Adds the instances of a mesh at one place.
+    fn mesh(&mut self, mesh: &gltf::Mesh<'_>, name: &str, world_from_node: DMat4, pointer: &str) {
+        let groups = self.groups(mesh);
         if groups.len() > 1 {
             let action = "made one instance for each of its materials";
             self.omit(Omission::Slight, "nodes of several materials as one instance", action, pointer);
         }
         let is_only = groups.len() == 1;
         for group in groups {
-            let name = if is_only { name.clone() } else { format!("{name} {}", group.name) };
+            let name = if is_only { name.to_owned() } else { format!("{name} {}", group.name) };
             self.instance(name, group, world_from_node, pointer);
         }
     }
@@ -167,7 +206,7 @@ impl Reader<'_> {
             self.add_light(&name, emission, true, pointer);
         }
         self.scene.surfaces.push(Surface { name, mesh, material: group.read.index });
-        self.origins.push(InstanceOrigin { part_of_triangle, ..InstanceOrigin::default() });
+        self.origins.push(InstanceOrigin { part_of_triangle, stated: group.read.stated, ..InstanceOrigin::default() });
     }
 }
 
@@ -185,6 +224,46 @@ impl Group {
             _ => self.mesh.append(mesh),
         }
     }
+}
+
+/// The node's own transform, and whether its rotation could be normalised; without, it has none.
+fn parent_from_node(node: &gltf::Node<'_>) -> (DMat4, bool) {
+    let (translation, rotation, scale) = match node.transform() {
+        Transform::Matrix { matrix } => {
+            return (DMat4::from_cols_array_2d(&matrix.map(|column| column.map(f64::from))), true);
+        }
+        Transform::Decomposed { translation, rotation, scale } => (translation, rotation, scale),
+    };
+    placed(translation, rotation, scale)
+}
+
+/// The transform of a translation, a quaternion and a scale, and whether the quaternion could be normalised.
+fn placed(translation: [f32; 3], rotation: [f32; 4], scale: [f32; 3]) -> (DMat4, bool) {
+    let rotation = DQuat::from_array(rotation.map(f64::from));
+    let (length, vector) = (rotation.length(), |values: [f32; 3]| DVec3::from_array(values.map(f64::from)));
+    let is_sound = length > 1e-9 && length.is_finite();
+    let rotation = if is_sound { rotation / length } else { DQuat::IDENTITY };
+    (DMat4::from_scale_rotation_translation(vector(scale), rotation, vector(translation)), is_sound)
+}
+
+/// The place of the scene's first camera that can be used, as [`Reader::nodes`] finds it.
+pub(super) fn place_of_camera(scene: &gltf::Scene<'_>) -> Option<DVec3> {
+    let mut visited = BTreeSet::new();
+    let mut open: Vec<(gltf::Node<'_>, DMat4)> = scene.nodes().map(|node| (node, DMat4::IDENTITY)).collect();
+    open.reverse();
+    while let Some((node, world_from_parent)) = open.pop() {
+        if !visited.insert(node.index()) {
+            continue;
+        }
+        let world_from_node = world_from_parent * parent_from_node(&node).0;
+        if let Some(camera) = node.camera().and_then(|camera| perspective(&camera, world_from_node)) {
+            return Some(camera.position());
+        }
+        let first = open.len();
+        open.extend(node.children().map(|child| (child, world_from_node)));
+        open[first..].reverse();
+    }
+    None
 }
 
 /// The node's name, else its mesh's, else its number.

@@ -1,5 +1,6 @@
 //! A material as it was read: what the surfaces of a primitive need to know of it.
 
+use mateval_scene::material::StatedParameters;
 use mateval_scene::reference::{EmissionMap, MaterialIndex};
 
 /// A material that was read.
@@ -9,6 +10,8 @@ pub(super) struct ReadMaterial {
     pub(super) index: MaterialIndex,
     /// The set of texture coordinates that its textures are looked up at; none where it has no texture.
     pub(super) uv_set: Option<u32>,
+    /// What the file states of it.
+    pub(super) stated: StatedParameters,
     /// Its emission, if it emits.
     pub(super) glow: Option<Glow>,
 }

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::findings::shortened;
+use mateval_scene::gltf_file::GltfFile;
 use mateval_scene::material::TextureIndex;
 use mateval_scene::reference::{Emission, LightGroup, ReferenceScene};
 use mateval_scene::source_folder::SourceFolder;
@@ -17,6 +18,7 @@ use crate::unique_names::UniqueNames;
 
 /// A scene under construction.
 pub(super) struct Reader<'a> {
+    pub(super) file: &'a GltfFile,
     pub(super) buffers: &'a [Vec<u8>],
     pub(super) limits: Limits,
     pub(super) log: Log,
@@ -44,8 +46,15 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// A reader of a file with these buffers.
-    pub(super) fn new(buffers: &'a [Vec<u8>], limits: &Limits, log: Log, source: SourceFolder) -> Self {
+    pub(super) fn new(
+        file: &'a GltfFile,
+        buffers: &'a [Vec<u8>],
+        limits: &Limits,
+        log: Log,
+        source: SourceFolder,
+    ) -> Self {
         Self {
+            file,
             buffers,
             limits: *limits,
             log,

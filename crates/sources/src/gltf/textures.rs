@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mateval_image::file_kind::hint;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes};
 use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::Severity;
@@ -26,11 +27,11 @@ const MISSING: f32 = 0.5;
 const SIGNATURES: [&[u8]; 3] = [b"\x89PNG", b"\xff\xd8\xff", b"RIFF"];
 
 /// A decoded image.
-struct Decoded {
+pub(super) struct Decoded {
     name: String,
     sha256: String,
-    color: Texture,
-    alpha: Option<Texture>,
+    pub(super) color: Texture,
+    pub(super) alpha: Option<Texture>,
 }
 
 impl Reader<'_> {
@@ -137,14 +138,26 @@ impl Reader<'_> {
                 Some(TextureIndex(self.scene.textures.len() - 1))
             }
             Err(fault) => {
-                self.faulty_images.insert(image.index());
-                let file = self.log.file().to_owned();
-                let pointer = format!("/images/{}", image.index());
-                let action = "used linear mid-grey as colour, the factor as number, and no opacity";
-                self.log.push(Severity::Warning, fault.code, &file, &pointer, fault.message, action);
+                self.report_image(image, fault);
                 None
             }
         }
+    }
+
+    /// The decoded image; none, which is reported once, where it cannot be read.
+    pub(super) fn decoded(&mut self, image: &gltf::Image<'_>, encoding: Encoding, wrap: Wrap) -> Option<Decoded> {
+        if self.faulty_images.contains(&image.index()) {
+            return None;
+        }
+        self.decode(image, encoding, wrap).map_err(|fault| self.report_image(image, fault)).ok()
+    }
+
+    fn report_image(&mut self, image: &gltf::Image<'_>, fault: FileFault) {
+        self.faulty_images.insert(image.index());
+        let file = self.log.file().to_owned();
+        let pointer = format!("/images/{}", image.index());
+        let action = "used linear mid-grey as colour, the factor as number, and no opacity";
+        self.log.push(Severity::Warning, fault.code, &file, &pointer, fault.message, action);
     }
 
     fn decode(&mut self, image: &gltf::Image<'_>, encoding: Encoding, wrap: Wrap) -> Result<Decoded, FileFault> {
@@ -158,14 +171,13 @@ impl Reader<'_> {
         let (bytes, file) = match image.source() {
             gltf::image::Source::Uri { uri, .. } => uri::read(uri, &mut self.source)?,
             gltf::image::Source::View { view, .. } => {
-                let buffer = &self.buffers[view.buffer().index()];
-                let bytes = view_bytes(&view, buffer);
+                let bytes = view_bytes(&view, self.buffers);
                 let fault = |error| FileFault { code: "bad_image", message: format!("{error}") };
                 (bytes.map_err(fault)?.to_vec(), None)
             }
         };
         if !SIGNATURES.iter().any(|signature| bytes.starts_with(signature)) {
-            let message = "expected PNG, JPEG or WebP, found other bytes".to_owned();
+            let message = format!("expected PNG, JPEG or WebP, found other bytes{}", hint(&bytes));
             return Err(FileFault { code: "bad_image", message });
         }
         let sha256 = sha256_of_bytes(&bytes);

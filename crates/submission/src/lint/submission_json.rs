@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mateval_image::file_kind::{hint, without_mark};
 use mateval_scene::findings::shortened;
 use mateval_scene::submission::{MAX_SUBMISSION_BYTES, SUBMISSION, SUBMISSION_FORMAT, SubmissionFile};
 use mateval_scene::{Finding, Severity};
@@ -42,8 +43,16 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
     let path = submission.join(SUBMISSION);
     let fault = |code: &str, message: String, action: &str| Box::new(error(code, SUBMISSION, message, action));
     if !exists(&path) {
-        let action = "write it beside scenes/; FORMAT.md, section 11, lists its keys";
-        return Err(fault("no_submission_file", "the file is missing".to_owned(), action));
+        return Err(match elsewhere(submission) {
+            Some(place) => {
+                let message = format!("the file is missing here; '{place}' holds it");
+                fault("no_submission_file", message, "hand in that, without the folders or the archive around it")
+            }
+            None => {
+                let action = "write it beside scenes/; FORMAT.md, section 11, lists its keys";
+                fault("no_submission_file", "the file is missing".to_owned(), action)
+            }
+        });
     }
     let source = SubmittedFile::read(submission, &path, MAX_SUBMISSION_BYTES).map_err(|found| match found {
         FileFault { code: "file_too_large", message, .. } => {
@@ -51,10 +60,10 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
         }
         FileFault { code, message, action, .. } => fault(code, message, action),
     })?;
-    let bytes = source.bytes();
+    let bytes = without_mark(source.bytes());
     let bad = |found: serde_json::Error| {
         let place = format!("line {} column {}", found.line(), found.column());
-        Box::new(Finding { place, ..*fault("bad_json", found.to_string(), "write it as JSON") })
+        Box::new(Finding { place, ..*fault("bad_json", format!("{found}{}", hint(bytes)), "write it as JSON") })
     };
     match serde_json::from_slice(bytes).map_err(bad)? {
         // Parsing the type finds what the parsed object no longer shows, such as a key that occurs twice.
@@ -64,6 +73,40 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
         },
         other => Err(fault("wrong_type", format!("expected an object, found {}", kind(&other)), "write { ... }")),
     }
+}
+
+/// The folder below a submission that holds its `submission.json`, or an archive that may; none where neither exists. The
+/// first in the order of names, at most four folders down.
+fn elsewhere(submission: &Path) -> Option<String> {
+    const MOST: usize = 1000;
+    let mut folders = vec![(submission.to_owned(), String::new())];
+    let (mut at, mut archive) = (0, None);
+    while at < folders.len() && folders.len() < MOST {
+        let (folder, name) = folders[at].clone();
+        let mut names: Vec<String> = std::fs::read_dir(&folder)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .filter_map(|entry| entry.file_name().into_string().ok())
+            .take(MOST)
+            .collect();
+        names.sort();
+        for entry in names {
+            let (path, shown) =
+                (folder.join(&entry), if name.is_empty() { entry.clone() } else { format!("{name}/{entry}") });
+            let is_archive = [".zip", ".tar.gz", ".tgz"].iter().any(|ending| entry.to_lowercase().ends_with(ending));
+            if path.is_dir() && !path.is_symlink() && shown.matches('/').count() < 4 {
+                if path.join(SUBMISSION).is_file() {
+                    return Some(shown);
+                }
+                folders.push((path, shown));
+            } else if is_archive && archive.is_none() {
+                archive = Some(shown);
+            }
+        }
+        at += 1;
+    }
+    archive
 }
 
 fn is_sound(object: &Map<String, Value>) -> bool {
@@ -155,6 +198,18 @@ mod tests {
         std::fs::write(folder.path().join(SUBMISSION), file.to_string()).unwrap();
         let (_, findings) = check(folder.path(), &"0".repeat(64));
         findings.into_iter().map(|finding| finding.code).collect()
+    }
+
+    #[test]
+    fn a_submission_that_lies_deeper_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let message = || check(folder.path(), &"0".repeat(64)).1[0].message.clone();
+        assert_eq!(message(), "the file is missing");
+        std::fs::write(folder.path().join("sub.zip"), "").unwrap();
+        assert!(message().contains("'sub.zip' holds it"));
+        std::fs::create_dir_all(folder.path().join("home/me/sub")).unwrap();
+        std::fs::write(folder.path().join("home/me/sub").join(SUBMISSION), "{}").unwrap();
+        assert!(message().contains("'home/me/sub' holds it"));
     }
 
     #[test]

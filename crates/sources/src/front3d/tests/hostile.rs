@@ -115,7 +115,6 @@ fn assert_house_is_sound(json: &Value) {
         assert!(!mesh.mesh.triangles.is_empty());
         assert!(mesh.mesh.positions.iter().all(|p| p.is_finite()));
         assert!(mesh.mesh.triangles.iter().flatten().all(|v| (*v as usize) < mesh.mesh.positions.len()));
-        assert!(mesh.mesh.uvs.iter().flatten().all(|uv| uv.is_finite()));
         assert!(mesh.material.is_none_or(|at| at < house.materials.len()));
     }
     for child in house.rooms.iter().flat_map(|room| &room.children) {

@@ -1,4 +1,5 @@
-//! Separates sheets that coincide: of architecture, and of furniture that lies in architecture.
+//! Separates sheets that coincide: in houses those of architecture, and of furniture that lies in architecture; in other
+//! scenes, which do not say what is architecture, all sheets that lie in each other.
 //!
 //! Houses place a feature wall, a door's pocket or a second ceiling exactly in the plane of the wall or ceiling behind it,
 //! and mats, lamps and feet in that of the floor. A ray meets either of two such sheets, and each shadows the other. The
@@ -11,9 +12,9 @@ use glam::DVec3;
 use mateval_scene::TriangleMesh;
 use mateval_scene::reference::Surface;
 
-use super::furnished_house::PlacedSurface;
-use super::sheets::{Face, MOST_PAIRS, Sheets, faces, for_each_near};
 use crate::log::Log;
+use crate::sheets::{Face, MOST_PAIRS, Sheets, faces, for_each_near};
+use crate::source_scene::InstanceOrigin;
 
 /// Sheets of architecture no further apart coincide: a few steps of a 32-bit coordinate at 20 m.
 const COINCIDENT_M: f64 = 1e-5;
@@ -35,20 +36,23 @@ type Shifts = BTreeMap<usize, BTreeMap<usize, DVec3>>;
 /// furniture that touches architecture slightly in front of it.
 ///
 /// Of two sheets of architecture, the smaller is moved, since a decoration is smaller than its wall; of two of equal area,
-/// the later.
-pub(super) fn separate(surfaces: &mut [Surface], placed: &[PlacedSurface], log: &mut Log) {
-    let architecture = faces(surfaces, placed, |placed| placed.origin.role.is_architecture());
+/// the later. Without architecture, all sheets are compared in this way.
+pub(crate) fn separate(surfaces: &mut [Surface], origins: &[InstanceOrigin], log: &mut Log) {
+    let has_architecture = origins.iter().any(|origin| origin.role.is_architecture());
+    let is_fixed = |origin: &InstanceOrigin| !has_architecture || origin.role.is_architecture();
+    let fixed = faces(surfaces, origins, is_fixed);
     let mut shifts = Shifts::new();
-    let all_compared = match layered(&architecture, log, &mut shifts) {
+    let place = if has_architecture { "/mesh" } else { "" };
+    let all_compared = match layered(&fixed, place, log, &mut shifts) {
         None => false,
         Some(layer_of_face) => {
-            let furniture = faces(surfaces, placed, |placed| !placed.origin.role.is_architecture());
-            raise(surfaces, &architecture, &layer_of_face, furniture, log, &mut shifts)
+            let furniture = faces(surfaces, origins, |origin| !is_fixed(origin));
+            raise(surfaces, &fixed, &layer_of_face, furniture, log, &mut shifts)
         }
     };
     if !all_compared {
         let message = format!("more than {MOST_PAIRS} pairs of triangles are near each other");
-        log.warn("coincident_sheets", "/mesh", message, "did not move all sheets that coincide with others");
+        log.warn("coincident_sheets", place, message, "did not move all sheets that coincide with others");
     }
     for (surface, shift_of) in shifts {
         shift(&mut surfaces[surface].mesh, &shift_of);
@@ -56,7 +60,7 @@ pub(super) fn separate(surfaces: &mut [Surface], placed: &[PlacedSurface], log: 
 }
 
 /// Moves the sheets of architecture. Returns the layer of each face; none where there are too many pairs.
-fn layered(faces: &[Face], log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usize>> {
+fn layered(faces: &[Face], place: &str, log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usize>> {
     let mut pairs = Vec::new();
     let is_whole = for_each_near(faces, faces, COINCIDENT_M, |one, other| {
         if one < other {
@@ -79,7 +83,7 @@ fn layered(faces: &[Face], log: &mut Log, shifts: &mut Shifts) -> Option<Vec<usi
         let area: f64 = moved().map(|sheet| sheets.all[sheet].area).sum();
         let message = format!("{} sheets with a total area of {area:.2} m2 coincide with larger ones", moved().count());
         let action = "moved each by 0.1 mm, or more in a stack, to the side it faces";
-        log.note("coincident_sheets", "/mesh", message, action);
+        log.note("coincident_sheets", place, message, action);
     }
     Some(sheets.of_face.iter().map(|&sheet| layers[sheet]).collect())
 }
@@ -222,19 +226,18 @@ mod tests {
 
     fn separated_in_roles(meshes: Vec<(TriangleMesh, Role)>) -> (Vec<TriangleMesh>, Vec<String>) {
         let (meshes, roles): (Vec<TriangleMesh>, Vec<Role>) = meshes.into_iter().unzip();
-        let placed: Vec<PlacedSurface> = meshes
+        let origins: Vec<InstanceOrigin> = meshes
             .iter()
             .zip(roles)
             .map(|(mesh, role)| {
                 let part_of_triangle = Some(vec![0; mesh.triangles.len()]);
-                let origin = InstanceOrigin { role, part_of_triangle, ..InstanceOrigin::default() };
-                PlacedSurface { room: 0, origin, model: None, color: [1.0; 3] }
+                InstanceOrigin { role, part_of_triangle, ..InstanceOrigin::default() }
             })
             .collect();
         let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
         let mut surfaces: Vec<Surface> = meshes.into_iter().map(surface).collect();
         let mut log = Log::new("house.json".to_owned(), 10);
-        separate(&mut surfaces, &placed, &mut log);
+        separate(&mut surfaces, &origins, &mut log);
         let codes = log.into_findings().into_iter().map(|finding| finding.code).collect();
         (surfaces.into_iter().map(|surface| surface.mesh).collect(), codes)
     }
@@ -277,8 +280,14 @@ mod tests {
         across.positions.iter_mut().for_each(|p| *p = Vec3::new(p.x, 0.5, p.y));
         let touching = vec![square(0.0, 1.0, true), square(1.0, 1.0, true), near, across];
         assert_eq!(separated(touching.clone(), &architecture()), (touching, vec![]));
-        let inside = vec![square(0.0, 3.0, true), square(1.0, 1.0, true)];
-        assert_eq!(separated(inside.clone(), &Role::Furniture {}), (inside, vec![]));
+        // Furniture in furniture stays in a house; a scene without architecture separates all sheets.
+        let inside = [square(0.0, 3.0, true), square(1.0, 1.0, true)];
+        let far = (square(9.0, 3.0, true), architecture());
+        let furniture = inside.clone().map(|mesh| (mesh, Role::Furniture {}));
+        let (meshes, codes) = separated_in_roles([vec![far], furniture.into()].concat());
+        assert_eq!((&meshes[1..], codes), (&inside[..], vec![]));
+        let (meshes, codes) = separated(inside.into(), &Role::Furniture {});
+        assert_eq!((heights(&meshes[1]), codes), ((1e-4, 1e-4), vec!["coincident_sheets".to_owned()]));
     }
 
     /// Only the faces in the other sheet's plane are moved; the mesh's other faces and vertices stay.

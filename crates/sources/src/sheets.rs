@@ -7,30 +7,30 @@ use mateval_scene::reference::Surface;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-use super::furnished_house::PlacedSurface;
+use crate::source_scene::InstanceOrigin;
 
 /// Triangles that overlap by no more than this, in metres, only touch.
 const TOUCHING_M: f64 = 1e-4;
 /// Triangles with a smaller area, in m^2, are ignored.
 const SMALLEST_AREA: f64 = 1e-8;
 /// The most pairs of triangles that are compared. A real house has less than a hundredth as many.
-pub(super) const MOST_PAIRS: usize = 50_000_000;
+pub(crate) const MOST_PAIRS: usize = 50_000_000;
 
 /// A triangle in world space.
-pub(super) struct Face {
+pub(crate) struct Face {
     /// Index of its surface.
-    pub(super) surface: usize,
+    pub(crate) surface: usize,
     /// Index in the surface's mesh.
-    pub(super) triangle: usize,
+    pub(crate) triangle: usize,
     part: usize,
-    pub(super) corners: [DVec3; 3],
-    pub(super) normal: DVec3,
-    pub(super) area: f64,
+    pub(crate) corners: [DVec3; 3],
+    pub(crate) normal: DVec3,
+    pub(crate) area: f64,
 }
 
 impl Face {
     /// The distance of a point from the face's plane; positive on the side that it faces.
-    pub(super) fn height(&self, point: DVec3) -> f64 {
+    pub(crate) fn height(&self, point: DVec3) -> f64 {
         self.normal.dot(point - self.corners[0])
     }
 
@@ -41,24 +41,24 @@ impl Face {
     }
 
     /// Whether the smaller of two triangles lies within `distance` of the plane of the larger and overlaps it.
-    pub(super) fn lies_in(&self, other: &Self, distance: f64) -> bool {
+    pub(crate) fn lies_in(&self, other: &Self, distance: f64) -> bool {
         let (large, small) = if self.area >= other.area { (self, other) } else { (other, self) };
         small.corners.iter().all(|&corner| large.height(corner).abs() <= distance) && overlap(large, small)
     }
 }
 
 /// The faces of all surfaces that `chosen` accepts.
-pub(super) fn faces(
+pub(crate) fn faces(
     surfaces: &[Surface],
-    placed: &[PlacedSurface],
-    chosen: impl Fn(&PlacedSurface) -> bool,
+    origins: &[InstanceOrigin],
+    chosen: impl Fn(&InstanceOrigin) -> bool,
 ) -> Vec<Face> {
-    let chosen = surfaces.iter().zip(placed).enumerate().filter(|(_, (_, placed))| chosen(placed));
-    let faces = chosen.flat_map(|(number, (surface, placed))| {
+    let chosen = surfaces.iter().zip(origins).enumerate().filter(|(_, (_, origin))| chosen(origin));
+    let faces = chosen.flat_map(|(number, (surface, origin))| {
         (0..surface.mesh.triangles.len()).map(move |triangle| {
             let corners = surface.mesh.corners(triangle).map(|corner| corner.as_dvec3());
             let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-            let part = placed.origin.part_of_triangle.as_ref().map_or(0, |parts| parts[triangle]);
+            let part = origin.part_of_triangle.as_ref().map_or(0, |parts| parts[triangle]);
             let (normal, area) = (across.normalize_or_zero(), across.length() / 2.0);
             Face { surface: number, triangle, part, corners, normal, area }
         })
@@ -68,7 +68,7 @@ pub(super) fn faces(
 
 /// For each face of `all` and each face of `among` that lies within `distance` of it, calls `found` with both indices.
 /// Returns false where there are more than [`MOST_PAIRS`] to compare.
-pub(super) fn for_each_near(all: &[Face], among: &[Face], distance: f64, mut found: impl FnMut(usize, usize)) -> bool {
+pub(crate) fn for_each_near(all: &[Face], among: &[Face], distance: f64, mut found: impl FnMut(usize, usize)) -> bool {
     let boxed = |(number, face): (usize, &Face)| {
         let bounds = face.bounds(0.0);
         GeomWithData::new(Rectangle::from_corners(bounds.lower(), bounds.upper()), number)
@@ -108,16 +108,16 @@ fn overlap(one: &Face, other: &Face) -> bool {
 type Split = fn(&[Face], &[usize]) -> Vec<usize>;
 
 /// The triangles of one part of a mesh that lie in one plane and face one way, without overlaps.
-pub(super) struct Sheet {
-    pub(super) normal: DVec3,
-    pub(super) area: f64,
+pub(crate) struct Sheet {
+    pub(crate) normal: DVec3,
+    pub(crate) area: f64,
     overlaps: Vec<usize>,
 }
 
 /// All sheets, and the sheet of each face.
-pub(super) struct Sheets {
-    pub(super) all: Vec<Sheet>,
-    pub(super) of_face: Vec<usize>,
+pub(crate) struct Sheets {
+    pub(crate) all: Vec<Sheet>,
+    pub(crate) of_face: Vec<usize>,
 }
 
 impl Sheets {
@@ -125,7 +125,7 @@ impl Sheets {
     ///
     /// The segments of a moulding may overlap each other, and small meshes share a part. Where faces of one sheet overlap, each
     /// of its connected pieces is a sheet, and where that is not enough, each of the piece's triangles.
-    pub(super) fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
+    pub(crate) fn new(faces: &[Face], pairs: &[[usize; 2]]) -> Self {
         let mut of_face = numbered(faces.iter().map(plane_key));
         for finer in [connected_pieces as Split, triangles_apart] {
             let folded: BTreeSet<usize> =
@@ -157,7 +157,7 @@ impl Sheets {
 
     /// A layer for each sheet, at most `most`. From the largest sheet to the smallest, each takes the lowest layer that no
     /// sheet it overlaps has taken.
-    pub(super) fn layers(&self, most: usize) -> Vec<usize> {
+    pub(crate) fn layers(&self, most: usize) -> Vec<usize> {
         let mut by_area: Vec<usize> =
             (0..self.all.len()).filter(|&sheet| !self.all[sheet].overlaps.is_empty()).collect();
         by_area.sort_by(|&a, &b| self.all[b].area.total_cmp(&self.all[a].area).then(a.cmp(&b)));

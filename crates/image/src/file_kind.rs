@@ -1,0 +1,90 @@
+//! What a file is by its first bytes, for messages about files that are not what their name or place promises.
+
+use std::borrow::Cow;
+
+/// The byte order mark that some editors put before UTF-8.
+const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Kinds of files that are found in place of others, by their first bytes. The first that matches counts.
+const KINDS: [(&[u8], &str); 27] = [
+    (b"version https://git-lfs.", "a Git LFS pointer in place of the file; run `git lfs pull` where it was cloned"),
+    (b"\xff\xfe\0\0", "UTF-32 text; save it as UTF-8"),
+    (b"\0\0\xfe\xff", "UTF-32 text; save it as UTF-8"),
+    (b"\xff\xfe", "UTF-16 text; save it as UTF-8"),
+    (b"\xfe\xff", "UTF-16 text; save it as UTF-8"),
+    (b"PK\x03\x04", "a ZIP archive; unpack it"),
+    (b"\x1f\x8b", "gzip data; unpack it"),
+    (b"BZh", "bzip2 data; unpack it"),
+    (b"\xfd7zXZ\0", "XZ data; unpack it"),
+    (b"(\xb5/\xfd", "Zstandard data; unpack it (a .blend is compressed in this way too)"),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive; unpack it"),
+    (b"Rar!", "a RAR archive; unpack it"),
+    (b"BLENDER", "a Blender file"),
+    (b"Kaydara FBX Binary", "an FBX file"),
+    (b"PXR-USDC", "a USD file, which MatEval does not read"),
+    (b"#usda", "a USD file, which MatEval does not read"),
+    (b"glTF", "a binary glTF"),
+    (b"ply", "a PLY file"),
+    (b"\x89PNG", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"\x76\x2f\x31\x01", "an OpenEXR picture"),
+    (b"\xabKTX 20\xbb", "a KTX2 texture; convert it with `gltf-transform ktxdecompress`"),
+    (b"DDS ", "a DDS texture; convert it to PNG"),
+    (b"\x93NUMPY", "a NumPy array"),
+    (b"%PDF", "a PDF"),
+    (b"<!DOCTYPE html", "a web page; a download probably asked to sign in"),
+    (b"<html", "a web page; a download probably asked to sign in"),
+];
+
+/// The kind of a file that cannot be read as what was expected, and what to do; `None` where its first bytes are those
+/// of no kind that is often mistaken for another.
+pub fn mistaken_for(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.is_empty() {
+        return Some("an empty file");
+    }
+    let known = KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind);
+    // ASCII characters as UTF-16 without a mark: every second byte is 0.
+    let is_utf16 = || bytes.len() >= 4 && (bytes[..2].contains(&0) && bytes[2..4].contains(&0) && bytes[..4] != [0; 4]);
+    known.or_else(|| is_utf16().then_some("UTF-16 text; save it as UTF-8"))
+}
+
+/// Whether the file is a Git LFS pointer, which no format of ours begins like.
+pub fn is_lfs_pointer(bytes: &[u8]) -> bool {
+    bytes.starts_with(KINDS[0].0)
+}
+
+/// The bytes without a UTF-8 byte order mark.
+pub fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes)
+}
+
+/// A sentence's end that names the kind: `; it is a ZIP archive; unpack it`, or nothing.
+pub fn hint(bytes: &[u8]) -> Cow<'static, str> {
+    mistaken_for(bytes).map_or(Cow::Borrowed(""), |kind| Cow::Owned(format!("; it is {kind}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mistaken_files_are_named() {
+        let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n";
+        assert!(is_lfs_pointer(pointer) && hint(pointer).contains("git lfs pull"));
+        for (bytes, word) in [
+            (b"\xff\xfe{\0}\0".as_slice(), "UTF-16"),
+            (b"{\0\"\0", "UTF-16"),
+            (b"\0{\0\"", "UTF-16"),
+            (b"PK\x03\x04...", "ZIP"),
+            (b"#usda 1.0", "USD"),
+            (b"", "empty"),
+        ] {
+            assert!(mistaken_for(bytes).is_some_and(|kind| kind.contains(word)), "{word}");
+        }
+        // Twins: what the readers expect.
+        for bytes in [b"{}".as_slice(), b"<scene version='3'/>", b"v 0 0 0\n", b"\xef\xbb\xbf{}", b"{", b"\0\0\0\0"] {
+            assert_eq!(mistaken_for(bytes), None);
+        }
+        assert_eq!((without_mark(b"\xef\xbb\xbf{}"), without_mark(b"{}")), (b"{}".as_slice(), b"{}".as_slice()));
+    }
+}

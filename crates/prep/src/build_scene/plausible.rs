@@ -1,0 +1,172 @@
+//! Refuses scenes that would be built into a wrong truth: much of the source is missing, base colours are not stated, or no
+//! light reaches the picture. The recipe may allow the first two.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mateval_scene::camera::{Camera, Intrinsics};
+use mateval_scene::{Finding, Severity};
+use mateval_sources::source_scene::Missing;
+use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
+
+use super::fault::SceneFault;
+use super::plan::Plan;
+use super::view_pictures::Seen;
+use crate::error::PrepError;
+use crate::recipe::RecipeScene;
+
+/// A larger share of the valid pixels of the input view without a stated base colour refuses the scene.
+pub(super) const MOST_UNSTATED: f64 = 0.05;
+/// A larger share of missing files or pieces is a warning.
+const FEW_MISSING: f64 = 0.05;
+/// A larger share of missing files or pieces refuses the scene.
+const MOST_MISSING: f64 = 0.2;
+/// Most names in a message.
+const MOST_NAMES: usize = 5;
+/// Largest number of pixels of a side of the picture in which light is looked for.
+const LIGHT_PIXELS: f64 = 48.0;
+/// Samples a pixel in which light is looked for: first few, then many.
+const LIGHT_SAMPLES: [u32; 2] = [4, 128];
+/// Most folders that are searched for a missing file.
+const MOST_FOLDERS: usize = 2000;
+
+/// The finding about missing files, if any are missing. Fails where too many are.
+pub(super) fn missing(
+    entry: &RecipeScene,
+    missing: &Missing,
+    root: &Path,
+    file: &str,
+    findings: &[Finding],
+) -> Result<Option<Finding>, SceneFault> {
+    let Some(example) = missing.files.first() else { return Ok(None) };
+    let (count, wanted) = (missing.files.len(), missing.wanted.max(1));
+    let share = count as f64 / wanted as f64;
+    let elsewhere = folder_of(root, example)
+        .map_or(String::new(), |folder| format!("; '{}' holds such files: name that folder", folder.display()));
+    let message = format!("{count} of {wanted} {} are missing, such as '{example}'{elsewhere}", missing.what);
+    if share > MOST_MISSING && !entry.allow_missing {
+        return Err(SceneFault::Missing { message, most: MOST_MISSING, findings: above_notes(findings) });
+    }
+    Ok(Some(Finding {
+        severity: if share > FEW_MISSING { Severity::Warning } else { Severity::Note },
+        code: "missing_share".to_owned(),
+        file: file.to_owned(),
+        place: String::new(),
+        message,
+        action: "made the scene without them".to_owned(),
+    }))
+}
+
+/// A folder below `root`, or beside it, in which the end of a path exists: the piece's own folder and file, or else the file.
+fn folder_of(root: &Path, missing: &str) -> Option<PathBuf> {
+    let parts: Vec<&str> = missing.split('/').collect();
+    // Three levels down from the folder of the scene, in a fixed order.
+    let mut folders = vec![root.to_owned()];
+    let mut at = 0;
+    while at < folders.len() && folders.len() < MOST_FOLDERS {
+        let depth = folders[at].strip_prefix(root).map_or(0, |below| below.components().count());
+        if depth < 3 {
+            let entries = std::fs::read_dir(&folders[at]).into_iter().flatten().flatten();
+            let below = entries.filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir()));
+            let mut below: Vec<PathBuf> = below.map(|entry| entry.path()).take(MOST_FOLDERS).collect();
+            below.sort();
+            folders.append(&mut below);
+        }
+        at += 1;
+    }
+    let ends =
+        [2, 1].into_iter().filter(|count| *count < parts.len()).map(|count| parts[parts.len() - count..].join("/"));
+    ends.into_iter().find_map(|end| folders.iter().find(|folder| folder.join(&end).is_file()).cloned())
+}
+
+/// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
+pub(super) fn unstated(entry: &RecipeScene, plan: &Plan, seen: &Seen) -> Result<Option<Finding>, SceneFault> {
+    let all: usize = seen.input_pixels.iter().sum();
+    let is_unstated = |at: &usize| !plan.stated[*at].base_color && seen.input_pixels[*at] > 0;
+    let mut unstated: Vec<usize> = (0..plan.instances.len()).filter(is_unstated).collect();
+    if unstated.is_empty() {
+        return Ok(None);
+    }
+    unstated.sort_by_key(|at| std::cmp::Reverse(seen.input_pixels[*at]));
+    let share = |count: usize| count as f64 / all.max(1) as f64;
+    let names = unstated.iter().take(MOST_NAMES).map(|at| {
+        let name = &plan.scene.materials[plan.scene.surfaces[*at].material.0].name;
+        format!("'{}' ({:.1} %, material '{name}')", plan.instances[*at].id, 100.0 * share(seen.input_pixels[*at]))
+    });
+    let total = share(unstated.iter().map(|at| seen.input_pixels[*at]).sum());
+    let message = format!(
+        "{} instances state no base colour and cover {:.1} % of the scored pixels: {}",
+        unstated.len(),
+        100.0 * total,
+        names.collect::<Vec<_>>().join(", ")
+    );
+    if total > MOST_UNSTATED && !entry.allow_unstated {
+        return Err(SceneFault::Unstated { message, most: MOST_UNSTATED, findings: above_notes(&plan.findings) });
+    }
+    Ok(Some(Finding {
+        severity: Severity::Warning,
+        code: "unstated_base_color".to_owned(),
+        file: plan.file.clone(),
+        place: String::new(),
+        message,
+        action: "used the default of the format as their truth".to_owned(),
+    }))
+}
+
+/// Whether any light reaches the input view. A photo from elsewhere has its own light.
+pub(super) fn is_lit(plan: &Plan) -> Result<bool, PrepError> {
+    if plan.photo.is_some() {
+        return Ok(true);
+    }
+    let world = World::new(Arc::clone(&plan.scene))?;
+    let groups = LightGroups::apart(world.emitters().groups());
+    let camera = coarse(&plan.views[0].camera);
+    for samples in LIGHT_SAMPLES {
+        let settings = RenderSettings { samples, ..RenderSettings::default() };
+        let render = render_views(&world, &[camera], &groups, &settings, &[0], &|_, _| {})?;
+        let sums = render.views[0].halves.iter().map(|half| half.basis.sum());
+        if sums.flat_map(|sum| sum.pixels().to_vec()).any(|pixel| pixel.0.iter().any(|value| *value > 0.0)) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The camera with a small picture.
+fn coarse(camera: &Camera) -> Camera {
+    let k = camera.intrinsics;
+    let scale = (LIGHT_PIXELS / f64::from(k.width.max(k.height))).min(1.0);
+    let side = |pixels: u32| ((f64::from(pixels) * scale).round() as u32).max(1);
+    let intrinsics = Intrinsics {
+        width: side(k.width),
+        height: side(k.height),
+        fx: k.fx * scale,
+        fy: k.fy * scale,
+        cx: k.cx * scale,
+        cy: k.cy * scale,
+    };
+    Camera { intrinsics, ..*camera }
+}
+
+/// The findings that may be the cause of a fault.
+pub(super) fn above_notes(findings: &[Finding]) -> Vec<Finding> {
+    let mut causes: Vec<Finding> = findings.iter().filter(|found| found.severity != Severity::Note).cloned().collect();
+    causes.sort();
+    causes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_that_holds_a_missing_file_is_found() {
+        let root = tempfile::tempdir().unwrap();
+        let models = root.path().join("models/3D-FUTURE-model/chair-a");
+        std::fs::create_dir_all(&models).unwrap();
+        std::fs::write(models.join("raw_model.obj"), "").unwrap();
+        let found = folder_of(root.path(), "models/chair-a/raw_model.obj");
+        assert_eq!(found, Some(root.path().join("models/3D-FUTURE-model")));
+        assert_eq!(folder_of(root.path(), "models/chair-a/texture.png"), None);
+    }
+}

@@ -1,0 +1,243 @@
+//! Faces without texture coordinates: absent, or NaN at one of their corners.
+//!
+//! A texture has no place for such a face. Mitsuba uses barycentric coordinates ([`barycentric`]); for all other sources
+//! the mean of the texture stands for it ([`resolve`]), so that no face takes the colour of an arbitrary texel.
+
+use std::collections::BTreeMap;
+
+use glam::Vec2;
+use mateval_image::{Texels, Texture};
+use mateval_scene::TriangleMesh;
+use mateval_scene::findings::shortened;
+use mateval_scene::material::TextureIndex;
+use mateval_scene::reference::{
+    Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, Surface, SurfaceIndex,
+};
+
+use crate::log::Log;
+use crate::mean_color::mean_color;
+use crate::source_scene::InstanceOrigin;
+
+/// The triangles that have no texture coordinates.
+fn triangles_without(mesh: &TriangleMesh) -> Vec<bool> {
+    let Some(uvs) = &mesh.uvs else { return vec![true; mesh.triangles.len()] };
+    mesh.triangles.iter().map(|triangle| triangle.iter().any(|vertex| !uvs[*vertex as usize].is_finite())).collect()
+}
+
+/// The mesh with barycentric texture coordinates on faces without any, as Mitsuba 3.9.1 looks them up: (0, 0), (1, 0) and
+/// (0, 1) at the corners, with v downwards. Returns the number of those faces.
+pub(crate) fn barycentric(mesh: &mut TriangleMesh) -> usize {
+    let without = triangles_without(mesh);
+    let count = without.iter().filter(|is_without| **is_without).count();
+    if count == 0 {
+        return 0;
+    }
+    let mut uvs = mesh.uvs.take().unwrap_or_else(|| vec![Vec2::NAN; mesh.positions.len()]);
+    for (triangle, _) in mesh.triangles.iter_mut().zip(without).filter(|(_, is_without)| *is_without) {
+        // Each face needs corners of its own.
+        for (vertex, uv) in triangle.iter_mut().zip([Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::ZERO]) {
+            let old = *vertex as usize;
+            *vertex = mesh.positions.len() as u32;
+            mesh.positions.push(mesh.positions[old]);
+            if let Some(normals) = &mut mesh.normals {
+                normals.push(normals[old]);
+            }
+            uvs.push(uv);
+        }
+    }
+    mesh.uvs = Some(uvs);
+    // The old corners of these faces may be used no more.
+    *mesh = mesh.picked(|_| true);
+    count
+}
+
+/// Gives the mean of its textures to every face that has textures and no texture coordinates. Where only some faces of a
+/// surface have none, they become a surface of their own at the end of the list; the indices of the surfaces that were
+/// split are returned in their order. Afterwards all texture coordinates are finite.
+pub(crate) fn resolve(scene: &mut ReferenceScene, origins: &mut Vec<InstanceOrigin>, log: &mut Log) -> Vec<usize> {
+    let (mut means, mut split) = (Means::default(), Vec::new());
+    for at in 0..scene.surfaces.len() {
+        let surface = &scene.surfaces[at];
+        let is_textured = !scene.materials[surface.material.0].lookups().is_empty() || emission_of(scene, at).is_some();
+        let without = if is_textured { triangles_without(&surface.mesh) } else { Vec::new() };
+        let count = without.iter().filter(|is_without| **is_without).count();
+        if count > 0 {
+            let name = shortened(&surface.name);
+            let message = format!("{count} of {} faces of '{name}' have no texture coordinates", without.len());
+            log.warn("no_uv", "", message, "used the mean of the texture for them");
+            if count == without.len() {
+                means.flatten(scene, at);
+            } else {
+                means.split(scene, origins, at, &without);
+                split.push(at);
+            }
+        }
+        for uv in scene.surfaces[at].mesh.uvs.iter_mut().flatten().filter(|uv| !uv.is_finite()) {
+            *uv = Vec2::ZERO;
+        }
+    }
+    split
+}
+
+/// The light group of a surface that emits by a texture.
+fn emission_of(scene: &ReferenceScene, at: usize) -> Option<usize> {
+    scene.lights.iter().position(|light| match &light.emission {
+        Emission::Area { surfaces, map: Some(_), .. } => surfaces.contains(&SurfaceIndex(at)),
+        _ => false,
+    })
+}
+
+/// Materials and textures whose texels were replaced by their mean, by the originals.
+#[derive(Default)]
+struct Means {
+    materials: BTreeMap<MaterialIndex, MaterialIndex>,
+    textures: BTreeMap<TextureIndex, TextureIndex>,
+}
+
+impl Means {
+    fn texture(&mut self, scene: &mut ReferenceScene, index: TextureIndex) -> TextureIndex {
+        *self.textures.entry(index).or_insert_with(|| {
+            let SourceTexture { name, texture, .. } = &scene.textures[index.0];
+            let mean = mean_color(texture).map(|value| value as f32);
+            let texels = match texture.texels() {
+                Texels::Grey(_) => Texels::Grey(vec![mean[0]]),
+                _ => Texels::Linear(vec![mean]),
+            };
+            // One texel of a sound texture is sound.
+            let texture = Texture::new(1, 1, texels, texture.wrap()).unwrap_or_else(|_| texture.clone());
+            scene.textures.push(SourceTexture { name: format!("{name} (mean)"), sha256: None, texture });
+            TextureIndex(scene.textures.len() - 1)
+        })
+    }
+
+    fn material(&mut self, scene: &mut ReferenceScene, index: MaterialIndex) -> MaterialIndex {
+        if let Some(known) = self.materials.get(&index) {
+            return *known;
+        }
+        let mut material = scene.materials[index.0].clone();
+        // A plain height has no bumps.
+        material.bump = None;
+        for texture in material.texture_indices_mut() {
+            *texture = self.texture(scene, *texture);
+        }
+        scene.materials.push(material);
+        let flat = MaterialIndex(scene.materials.len() - 1);
+        self.materials.insert(index, flat);
+        flat
+    }
+
+    /// Makes a whole surface plain.
+    fn flatten(&mut self, scene: &mut ReferenceScene, at: usize) {
+        scene.surfaces[at].material = self.material(scene, scene.surfaces[at].material);
+        scene.surfaces[at].mesh.uvs = None;
+        if let Some(light) = emission_of(scene, at)
+            && let Emission::Area { radiance, map, .. } = &mut scene.lights[light].emission
+            && let Some(lost) = map.take()
+        {
+            let mean = mean_color(&scene.textures[lost.texture.0].texture);
+            *radiance = std::array::from_fn(|channel| radiance[channel] * mean[channel] as f32);
+        }
+    }
+
+    /// Splits the faces `without` texture coordinates off as a plain surface.
+    fn split(&mut self, scene: &mut ReferenceScene, origins: &mut Vec<InstanceOrigin>, at: usize, without: &[bool]) {
+        let Surface { name, mesh, material } = scene.surfaces[at].clone();
+        let new = SurfaceIndex(scene.surfaces.len());
+        let name = format!("{name} without uv");
+        scene.surfaces.push(Surface { name: name.clone(), mesh: mesh.picked(|triangle| without[triangle]), material });
+        scene.surfaces[at].mesh = mesh.picked(|triangle| !without[triangle]);
+        // Their parts. A copy of a model is no longer a copy.
+        let picked = |parts: &Option<Vec<usize>>, wanted: bool| {
+            let parts = parts.as_ref()?;
+            Some(parts.iter().zip(without).filter(|(_, is)| **is == wanted).map(|(part, _)| *part).collect())
+        };
+        let old = origins[at].clone();
+        let origin = |wanted| InstanceOrigin {
+            part_of_triangle: picked(&old.part_of_triangle, wanted),
+            shape: None,
+            ..old.clone()
+        };
+        origins[at] = origin(false);
+        origins.push(origin(true));
+        // Its light.
+        if let Some(light) = emission_of(scene, at) {
+            let LightGroup { emission, camera_visible, .. } = scene.lights[light].clone();
+            if let Emission::Area { radiance, map, two_sided, .. } = emission {
+                let emission = Emission::Area { surfaces: vec![new], radiance, map, two_sided };
+                scene.lights.push(LightGroup { name, emission, camera_visible });
+            }
+        }
+        self.flatten(scene, new.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mateval_image::Wrap;
+    use mateval_scene::material::{ColorInput, Material, MaterialModel, UvTransform};
+
+    use super::*;
+    use crate::bitterli::primitives::rectangle;
+
+    /// A square of two triangles under a texture of two texels, 0 and 1.
+    fn scene(uvs: Option<Vec<Vec2>>) -> (ReferenceScene, Vec<InstanceOrigin>) {
+        let texture = Texture::new(2, 1, Texels::Linear(vec![[0.0; 3], [1.0; 3]]), Wrap::Repeat).unwrap();
+        let reflectance = ColorInput::Texture { texture: TextureIndex(0), uv: UvTransform::default() };
+        let model = MaterialModel::Diffuse { reflectance, alpha: None };
+        let scene = ReferenceScene {
+            surfaces: vec![Surface {
+                name: "square".to_owned(),
+                mesh: TriangleMesh { uvs, ..rectangle() },
+                material: MaterialIndex(0),
+            }],
+            materials: vec![Material { name: "m".to_owned(), model, two_sided: true, opacity: None, bump: None }],
+            textures: vec![SourceTexture { name: "t".to_owned(), sha256: None, texture }],
+            ..ReferenceScene::default()
+        };
+        (scene, vec![InstanceOrigin::default()])
+    }
+
+    fn resolved(uvs: Option<Vec<Vec2>>) -> (ReferenceScene, usize) {
+        let (mut scene, mut origins) = scene(uvs);
+        let mut log = Log::new("a".to_owned(), 10);
+        let split = resolve(&mut scene, &mut origins, &mut log);
+        assert_eq!(split.len() + 1, scene.surfaces.len());
+        assert_eq!(origins.len(), scene.surfaces.len());
+        assert!(scene.surfaces.iter().flat_map(|s| s.mesh.uvs.iter().flatten()).all(|uv| uv.is_finite()));
+        (scene, log.into_findings().len())
+    }
+
+    fn color(scene: &ReferenceScene, surface: usize) -> [f32; 3] {
+        let material = &scene.materials[scene.surfaces[surface].material.0];
+        material.appearance(&scene.texture_list(), Vec2::new(0.75, 0.5)).unwrap().base_color
+    }
+
+    #[test]
+    fn the_mean_stands_for_what_has_no_place() {
+        let (whole, findings) = resolved(None);
+        assert_eq!((whole.surfaces.len(), color(&whole, 0), findings), (1, [0.5; 3], 1));
+        let mut uvs = rectangle().uvs.unwrap();
+        // A corner of the second triangle alone.
+        let only_second = rectangle().triangles[1].iter().copied().find(|v| !rectangle().triangles[0].contains(v));
+        uvs[only_second.unwrap() as usize] = Vec2::NAN;
+        let (split, findings) = resolved(Some(uvs));
+        assert_eq!((split.surfaces.len(), findings), (2, 1));
+        assert_eq!((color(&split, 0), color(&split, 1)), ([1.0; 3], [0.5; 3]));
+        assert_eq!(split.surfaces.iter().map(|s| s.mesh.triangles.len()).collect::<Vec<_>>(), [1, 1]);
+        // Twin.
+        let (sound, findings) = resolved(rectangle().uvs);
+        assert_eq!((sound.surfaces.len(), color(&sound, 0), findings), (1, [1.0; 3], 0));
+    }
+
+    /// Mitsuba 3.9.1 on an OBJ of one triangle without vt.
+    #[test]
+    fn barycentric_coordinates_as_mitsuba() {
+        let mut mesh = TriangleMesh { uvs: None, ..rectangle() };
+        assert_eq!(barycentric(&mut mesh), 2);
+        assert_eq!((mesh.positions.len(), mesh.uvs.as_ref().map(Vec::len)), (6, Some(6)));
+        let [a, b, c] = mesh.triangles[1].map(|vertex| mesh.uvs.as_ref().unwrap()[vertex as usize]);
+        assert_eq!([a, b, c], [Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::ZERO]);
+        let mut sound = rectangle();
+        assert_eq!((barycentric(&mut sound), sound), (0, rectangle()));
+    }
+}
