@@ -97,7 +97,9 @@ def carry_out(*, job: Job, work: Path, result: Job, findings: Findings) -> None:
     try:
         found = evaluate(scene=source, findings=findings, **limits)
     except TooMuchError as error:
-        findings.fault(code="too_much", place=source.name, message=str(error), action="simplify it, or raise the limits")
+        findings.fault(
+            code="too_much", place=source.name, message=str(error), action="simplify it, or raise the limits"
+        )
         return
     scene = bpy.data.scenes.new("mateval")
     bench = make_bench(job=job, source=source, is_osl=is_osl)

@@ -69,7 +69,9 @@ class Glb:
         found = self.json["accessors"][accessor]
         kind = {5126: np.float32, 5125: np.uint32, 5123: np.uint16, 5121: np.uint8}[found["componentType"]]
         width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[found["type"]]
-        return np.frombuffer(self.view(index=found["bufferView"]), dtype=kind)[: found["count"] * width].reshape(-1, width)
+        return np.frombuffer(self.view(index=found["bufferView"]), dtype=kind)[: found["count"] * width].reshape(
+            -1, width
+        )
 
     def node(self, *, name: str) -> dict:
         """A node by its name."""
@@ -146,7 +148,8 @@ class Bake(unittest.TestCase):
         (self.root / "job.json").write_text(json.dumps({**job, **LIMITS, **changes}))
         command = [sys.executable, str(SCRIPTS / "bake_blend.py"), str(self.root / "job.json")]
         if before:
-            code = f"import sys, runpy; sys.argv = sys.argv[1:]; {before}; runpy.run_path(sys.argv[0], run_name='__main__')"
+            run = "runpy.run_path(sys.argv[0], run_name='__main__')"
+            code = f"import sys, runpy; sys.argv = sys.argv[1:]; {before}; {run}"
             command = [sys.executable, "-c", code, *command[1:]]
         ran = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
         result = json.loads((out / "result.json").read_text())
@@ -184,7 +187,9 @@ class Bake(unittest.TestCase):
         """Coordinates of the surface."""
         return tree.nodes.new("ShaderNodeTexCoord").outputs[kind]
 
-    def checks(self, *, tree: bpy.types.NodeTree, scale: float, colors: tuple, kind: str = "Object") -> bpy.types.NodeSocket:
+    def checks(
+        self, *, tree: bpy.types.NodeTree, scale: float, colors: tuple, kind: str = "Object"
+    ) -> bpy.types.NodeSocket:
         """A checker of two colours."""
         node = tree.nodes.new("ShaderNodeTexChecker")
         node.inputs["Scale"].default_value = scale
@@ -301,7 +306,9 @@ class Shaders(Bake):
         for name in ("First", "Second"):
             outer.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketShader")
         outer.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
-        entry, end, mix = (outer.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "ShaderNodeMixShader"))
+        entry, end, mix = (
+            outer.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "ShaderNodeMixShader")
+        )
         mix.inputs[0].default_value = 0.25
         outer.links.new(entry.outputs["First"], mix.inputs[1])
         outer.links.new(entry.outputs["Second"], mix.inputs[2])
@@ -327,7 +334,10 @@ class Shaders(Bake):
     def test_a_mixture_of_diffuse_and_glossy(self) -> None:
         made, tree, _ = self.material(name="mixed")
         diffuse, glossy = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeBsdfAnisotropic")
-        diffuse.inputs["Color"].default_value, glossy.inputs["Color"].default_value = (0.2, 0.4, 0.6, 1), (0.9, 0.8, 0.7, 1)
+        diffuse.inputs["Color"].default_value, glossy.inputs["Color"].default_value = (
+            (0.2, 0.4, 0.6, 1),
+            (0.9, 0.8, 0.7, 1),
+        )
         glossy.inputs["Roughness"].default_value = 0.2
         mix = tree.nodes.new("ShaderNodeMixShader")
         gradient = tree.nodes.new("ShaderNodeTexGradient")
@@ -381,6 +391,26 @@ class Shaders(Bake):
             self.assertEqual(extensions["KHR_materials_transmission"]["transmissionFactor"], 1)
             self.assertAlmostEqual(extensions["KHR_materials_ior"]["ior"], 1.33, places=5)
             self.assertEqual("KHR_materials_volume" in extensions, is_solid)
+
+    def test_glass_that_lets_shadow_rays_through_is_glass(self) -> None:
+        """What only shadow rays see is left out: baking sees what the camera does."""
+        made, tree, _ = self.material(name="window")
+        glass, clear, mix = (
+            tree.nodes.new(f"ShaderNode{kind}") for kind in ("BsdfGlass", "BsdfTransparent", "MixShader")
+        )
+        glass.inputs["Roughness"].default_value = 0.0
+        tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Shadow Ray"], mix.inputs[0])
+        tree.links.new(glass.outputs[0], mix.inputs[1])
+        tree.links.new(clear.outputs[0], mix.inputs[2])
+        tree.links.new(mix.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+        self.plane(material=made)
+        result = self.bake()
+        self.assertEqual(self.codes(result), {"camera", "view_dependent"})
+        found = self.glb().material(name="plane")
+        self.assertEqual(found["extensions"]["KHR_materials_transmission"]["transmissionFactor"], 1)
+        self.assertEqual(
+            (found.get("alphaMode", "OPAQUE"), found["pbrMetallicRoughness"]["roughnessFactor"]), ("OPAQUE", 0)
+        )
 
     def test_an_unknown_shader_leaves_the_base_color_open(self) -> None:
         made, tree, _ = self.material(name="toon")
@@ -470,7 +500,9 @@ class Shaders(Bake):
         self.plane(material=made)
         result = self.bake()
         self.assertEqual(result["files"], ["rough.png", "wood.png"])
-        self.assertEqual([result["materials"][0][key] for key in ("base_color", "roughness", "uv")], ["picture", "picture", "UVMap"])
+        self.assertEqual(
+            [result["materials"][0][key] for key in ("base_color", "roughness", "uv")], ["picture", "picture", "UVMap"]
+        )
         pbr = self.glb().material(name="plane")["pbrMetallicRoughness"]
         color = self.glb().picture(info=pbr["baseColorTexture"])
         np.testing.assert_allclose(color[..., :3], stored["wood"][::-1, :, :3], atol=1e-6)
@@ -527,7 +559,11 @@ class Scenes(Bake):
         peak = found.get("extensions", {}).get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1.0)
         texels = self.glb().picture(info=found["emissiveTexture"])[..., :3]
         factor = np.array(found["emissiveFactor"]) * peak
-        self.close(texels.reshape(-1, 3), srgb_bytes(linear=expected[..., :3] / factor).reshape(-1, 3), tolerance=2.01 * ONE_BYTE)
+        self.close(
+            texels.reshape(-1, 3),
+            srgb_bytes(linear=expected[..., :3] / factor).reshape(-1, 3),
+            tolerance=2.01 * ONE_BYTE,
+        )
 
     def test_random_numbers_are_those_of_blender(self) -> None:
         """Every object has its own; two instances of a mesh are baked apart."""
@@ -596,7 +632,9 @@ class Scenes(Bake):
         self.plane(material=made, name="wall", location=(1, 0, 1), rotation=(0, -math.pi / 2, 0))
         self.bake(samples=16)
         found = self.glb().texels(name="plane", info=self.glb().material(name="plane")["emissiveTexture"])
-        near, far = (found.values[mask, 0].mean() for mask in (found.positions[:, 0] > 0.9, found.positions[:, 0] < -0.9))
+        near, far = (
+            found.values[mask, 0].mean() for mask in (found.positions[:, 0] > 0.9, found.positions[:, 0] < -0.9)
+        )
         self.assertLess(near + 0.1, far)
 
     def test_a_scene_is_read_as_it_is_rendered(self) -> None:
@@ -619,7 +657,9 @@ class Scenes(Bake):
         self.bake()
         names = {node["name"] for node in self.glb().json["nodes"]}
         self.assertEqual(names, {"cube", "sheared", "Text", "Mball", "SurfSphere"})
-        self.assertEqual(self.glb().json["accessors"][self.glb().primitives(name="cube")[0]["indices"]]["count"], 3 * 36)
+        self.assertEqual(
+            self.glb().json["accessors"][self.glb().primitives(name="cube")[0]["indices"]]["count"], 3 * 36
+        )
         positions = self.glb().numbers(accessor=self.glb().primitives(name="sheared")[0]["attributes"]["POSITION"])
         self.assertNotIn("scale", self.glb().node(name="sheared"))
         for low, high, axis, sign in ((0, 0, 0, 1), (2, 2, 1, -1), (1, 1, 2, 1)):
@@ -742,7 +782,9 @@ class Untrusted(Bake):
         unused.filepath, unused.use_fake_user = "/nowhere/unused.png", True
         result = self.bake(is_good=False)
         found = {(fault["code"], Path(fault["place"]).name) for fault in result["faults"]}
-        self.assertEqual(found, {("file_outside", "outside.png"), ("file_outside", "link.png"), ("file_missing", "missing.png")})
+        self.assertEqual(
+            found, {("file_outside", "outside.png"), ("file_outside", "link.png"), ("file_missing", "missing.png")}
+        )
 
     def test_a_linked_library_outside_is_refused_and_one_inside_is_read(self) -> None:
         made, _, _ = self.material(name="grey")

@@ -57,7 +57,9 @@ def set_up(*, scene: bpy.types.Scene, job: Job, source: bpy.types.Scene, is_osl:
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0.0
 
 
-def bake_body(*, body: Body, bench: bpy.types.Scene, surroundings: bpy.types.Scene, findings: Findings) -> list[Result | None]:
+def bake_body(
+    *, body: Body, bench: bpy.types.Scene, surroundings: bpy.types.Scene, findings: Findings
+) -> list[Result | None]:
     """Bakes every slot of a body that needs it; the others get none."""
     slots = [slot if slot.is_baked else None for slot in body.slots]
     results: list[Result | None] = [{} if slot else None for slot in slots]
@@ -90,8 +92,10 @@ def varies(*, look: Look, channels: tuple[tuple[str, Numbers], ...]) -> bool:
     return any(isinstance(getattr(look.channels, name), Linked) for name, _ in channels)
 
 
-def bake_pass(*, body: Body, scene: bpy.types.Scene, uv: str, name: str, looks: dict[int, Look]) -> dict[int, np.ndarray]:
-    """Bakes one pass of the given slots. Returns texels of shape (edge, edge, 4), whose alpha is 0 where no surface is."""
+def bake_pass(
+    *, body: Body, scene: bpy.types.Scene, uv: str, name: str, looks: dict[int, Look]
+) -> dict[int, np.ndarray]:
+    """Bakes one pass of the given slots. Returns texels of shape (edge, edge, 4), with alpha 0 where no surface is."""
     images: dict[int, bpy.types.Image] = {}
     idle, nothing = idle_material()
     for index, slot in enumerate(body.slots):
@@ -218,6 +222,4 @@ def constants_of(*, channels: Channels) -> Result:
 
 def edges_of(*, slots: list[Slot]) -> list[int]:
     """Returns the edge of each texture that will be baked, one per pass."""
-    return [
-        slot.edge for slot in slots for channels in PASSES.values() if varies(look=slot.look, channels=channels)
-    ]
+    return [slot.edge for slot in slots for channels in PASSES.values() if varies(look=slot.look, channels=channels)]

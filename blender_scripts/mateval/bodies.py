@@ -27,7 +27,13 @@ SURROUNDED = {"ShaderNodeAmbientOcclusion"}
 PER_PLACE = {"Position", "Normal", "True Normal", "Tangent", "Incoming"}
 """Outputs of the Geometry node in world space."""
 
-UNCONNECTED = {"ShaderNodeTexImage", "ShaderNodeTexCoord", "ShaderNodeTexIES", "ShaderNodeTexSky", "ShaderNodeTexWhiteNoise"}
+UNCONNECTED = {
+    "ShaderNodeTexImage",
+    "ShaderNodeTexCoord",
+    "ShaderNodeTexIES",
+    "ShaderNodeTexSky",
+    "ShaderNodeTexWhiteNoise",
+}
 """Texture nodes that do not use generated coordinates where nothing is linked to them."""
 
 
@@ -211,7 +217,11 @@ def is_sheared(*, matrix: Matrix) -> bool:
     """Returns whether a matrix is more than a place, a rotation and a scale, which is all that a node of glTF has."""
     rebuilt = Matrix.LocRotScale(*matrix.decompose())
     size = max(abs(value) for row in matrix.to_3x3() for value in row)
-    return any(abs(a - b) > 1e-5 * size for p, q in zip(matrix, rebuilt, strict=True) for a, b in zip(p[:3], q[:3], strict=True))
+    return any(
+        abs(a - b) > 1e-5 * size
+        for p, q in zip(matrix, rebuilt, strict=True)
+        for a, b in zip(p[:3], q[:3], strict=True)
+    )
 
 
 def apply_shear(*, body: Body) -> None:

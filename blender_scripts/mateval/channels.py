@@ -70,9 +70,16 @@ OMITTED = {
 """Inputs of Principled that the result has no place for, and the words for what they add."""
 
 VIEWED = {
-    "ShaderNodeFresnel", "ShaderNodeLayerWeight", "ShaderNodeLightPath", "ShaderNodeCameraData",
-}  # fmt: skip
-"""Nodes whose value depends on who looks. Baking looks along the normal."""
+    "ShaderNodeFresnel": {"Fac"},
+    "ShaderNodeLayerWeight": {"Fresnel", "Facing"},
+    "ShaderNodeCameraData": {"View Vector", "View Z Depth", "View Distance"},
+    "ShaderNodeNewGeometry": {"Backfacing", "Incoming"},
+    "ShaderNodeLightPath": None,
+}
+"""Outputs that depend on who looks; none stands for all of a node. Baking looks along the normal, as a camera."""
+
+SEEN = {"Is Camera Ray": 1.0, "Ray Length": 1.0}
+"""Outputs of Light Path that are not 0 where Cycles bakes."""
 
 
 class MaterialGraph:
@@ -96,13 +103,17 @@ class MaterialGraph:
     def surface(self) -> Channels:
         """Returns the channels of the surface, as values of the outermost tree."""
         if self.output is None or self._source(socket=self.output.inputs["Surface"]) is None:
-            self._note(code="no_surface", message="no shader is linked to the surface", action="left its base colour open")
+            self._note(
+                code="no_surface", message="no shader is linked to the surface", action="left its base colour open"
+            )
             return Channels(is_unstated=True)
         if self.output.inputs["Displacement"].is_linked:
             self._note(code="displacement", message="displacement", action="left it out")
         for node in self.nodes():
-            if node.bl_idname in VIEWED and any(output.is_linked for output in node.outputs):
-                action = "used its value for a view along the normal"
+            linked = {output.name for output in node.outputs if output.is_linked}
+            viewed = VIEWED.get(node.bl_idname, set())
+            if linked if viewed is None else linked & viewed:
+                action = "used its value for a camera that looks along the normal"
                 self._note(code="view_dependent", node=node, message="depends on the view", action=action)
         return self._of_shader(socket=self.output.inputs["Surface"])
 
@@ -322,6 +333,8 @@ def by_identifier(*, sockets: bpy.types.bpy_prop_collection, identifier: str) ->
 
 def constant_of(*, origin: Socket, as_color: bool) -> Numbers | None:
     """Returns a value that is the same everywhere; none for one that nodes compute."""
+    if origin.is_output and origin.node.bl_idname == "ShaderNodeLightPath":
+        return (SEEN.get(origin.name, 0.0),) * (3 if as_color else 1)
     if origin.is_output and origin.node.bl_idname not in ("ShaderNodeRGB", "ShaderNodeValue"):
         return None
     found = getattr(origin, "default_value", None)

@@ -134,13 +134,12 @@ class Collector:
         if not instance.show_self:
             return
         if thing.type == "LIGHT":
-            return self.found.lights.append(placed(thing=thing, matrix=instance.matrix_world))
-        if thing.type == "MESH":
-            return self._take_mesh(instance=instance)
-        if thing.type not in IGNORED | SURFACES:
+            self.found.lights.append(placed(thing=thing, matrix=instance.matrix_world))
+        elif thing.type == "MESH":
+            self._take_mesh(instance=instance)
+        elif thing.type not in IGNORED | SURFACES:
             message = f"an object of the type {thing.type.lower()}"
             self._findings.note(code="object_type", place=thing.name, message=message, action="left it out")
-        return None
 
     def _take_mesh(self, *, instance: bpy.types.DepsgraphObjectInstance) -> None:
         thing = instance.object
@@ -149,11 +148,15 @@ class Collector:
         for trait in ("is_holdout", "is_shadow_catcher"):
             if getattr(thing, trait):
                 message = f"an object with {trait}"
-                self._findings.note(code="visibility", place=thing.name, message=message, action="showed it as any other")
+                self._findings.note(
+                    code="visibility", place=thing.name, message=message, action="showed it as any other"
+                )
         shape = self._shape(thing=thing)
         self._triangles -= len(shape.mesh.loop_triangles)
         if len(self.found.instances) >= self._instances or self._triangles < 0:
-            raise TooMuchError(f"the scene has more instances or triangles than allowed; '{thing.name}' is the first left")
+            raise TooMuchError(
+                f"the scene has more instances or triangles than allowed; '{thing.name}' is the first left"
+            )
         number = instance.random_id
         self.found.instances.append(
             Instance(

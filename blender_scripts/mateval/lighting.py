@@ -23,14 +23,14 @@ def add_light(*, light: Placed, scene: bpy.types.Scene, findings: Findings) -> N
     if max(color) <= 0.0:
         return
     if source.type == "AREA":
-        return add_area(light=light, power=color, scene=scene, findings=findings)
+        add_area(light=light, power=color, scene=scene, findings=findings)
+        return
     made = bpy.data.lights.new(source.name, source.type)
     made.energy = max(color)
     made.color = tuple(channel / made.energy for channel in color)
     if source.type == "SPOT":
         made.spot_size, made.spot_blend = source.spot_size, source.spot_blend
     add(name=light.name, data=made, matrix=light.world_from_object, scene=scene)
-    return None
 
 
 def color_of(*, light: Placed, findings: Findings) -> tuple[float, ...]:

@@ -14,6 +14,12 @@ UV_LAYER = "mateval"
 ANGLE_LIMIT = 1.15192
 """Blender's default in radians for Smart UV Project, 66 degrees."""
 
+USUAL_SHARE = 0.5
+"""Share of the square that charts cover, before it is known."""
+
+MOST_GAP = 1.0 / 32.0
+"""Widest gap between charts, so that those of small textures have an area."""
+
 
 def plan_uvs(*, body: Body, bench: bpy.types.Scene, job: Job, findings: Findings) -> None:
     """Chooses the uv of each slot that is baked, and the edge of its texture."""
@@ -41,7 +47,9 @@ def plan_uvs(*, body: Body, bench: bpy.types.Scene, job: Job, findings: Findings
         name = layer.name
         for index, slot in open_slots:
             slot.uv = name
-            if not unwrap(body=body, bench=bench, slot=index, name=name, edge=job["most_texels"], areas=areas):
+            area = float(areas[triangles_of(mesh=mesh, slot=index)].sum())
+            gap = 2 * MARGIN / texture_edge(job=job, area=area, covered=USUAL_SHARE)
+            if not unwrap(body=body, bench=bench, slot=index, name=name, gap=min(gap, MOST_GAP), areas=areas):
                 message, action = "faces that overlap when they are unwrapped", "baked them over each other"
                 findings.note(code="uv_overlap", place=body.objects[0].name, message=message, action=action)
     for index, slot in chosen:
@@ -50,16 +58,15 @@ def plan_uvs(*, body: Body, bench: bpy.types.Scene, job: Job, findings: Findings
         slot.edge = texture_edge(job=job, area=float(areas[own].sum()), covered=share)
 
 
-def unwrap(*, body: Body, bench: bpy.types.Scene, slot: int, name: str, edge: int, areas: np.ndarray) -> bool:
+def unwrap(*, body: Body, bench: bpy.types.Scene, slot: int, name: str, gap: float, areas: np.ndarray) -> bool:
     """Unwraps the faces of a slot to the whole square: by Smart UV Project, or each face apart where that overlaps.
 
-    Returns whether the result can hold a texture.
+    `gap` is that between charts, as a share of the square. Returns whether the result can hold a texture.
     """
     mesh, thing = body.mesh, body.objects[0]
     indices = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("material_index", indices)
     mesh.uv_layers.active = mesh.uv_layers[name]
-    gap = 2 * MARGIN / min(edge, 1024)
 
     # Operators leave hidden faces as they are.
     for hidden in [each for each in mesh.attributes if each.name.startswith(".hide_")]:

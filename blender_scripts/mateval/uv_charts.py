@@ -25,7 +25,7 @@ def twice_areas(*, uvs: np.ndarray) -> np.ndarray:
 
 
 def covered_share(*, uvs: np.ndarray) -> float:
-    """Returns the summed area of the triangles, which is the share of the square that they cover unless they overlap."""
+    """Returns the summed area of the triangles: the share of the square that they cover, unless they overlap."""
     return float(np.abs(twice_areas(uvs=uvs)).sum() / 2.0)
 
 
