@@ -55,6 +55,7 @@ def carry_out_or_record(*, path: Path) -> int:
         "blender": bpy.app.version_string,
         "glb": None,
         "world": None,
+        "lamps": [],
         "materials": [],
         "files": [],
         "findings": [],
@@ -116,8 +117,8 @@ def carry_out(*, job: Job, work: Path, result: Job, findings: Findings) -> None:
         results = bake_body(body=body, bench=bench, surroundings=scene, findings=findings)
         apply_shear(body=body)
         writer.assign(body=body, results=results)
-    for light in found.lights:
-        add_light(light=light, scene=scene, findings=findings)
+    lamps = [add_light(light=light, scene=scene, findings=findings) for light in found.lights]
+    result["lamps"] = [lamp for lamp in lamps if lamp is not None]
     report("world")
     result["world"] = read_world(source=source, bench=bench, job=job, findings=findings)
     report("export")

@@ -176,7 +176,8 @@ class MaterialGraph:
         """The channels of the shader that is linked to an input, as values of the input's tree."""
         out = self._source(socket=socket)
         if out is None:
-            return Channels()
+            # Cycles shows no shader as black.
+            return Channels(base_color=BLACK, alpha=ONE)
         node = out.node
         key = (node.id_data.name if node.id_data.name in self._owners else "", node.name, out.identifier)
         if key not in self._known:

@@ -145,9 +145,10 @@ class Collector:
         thing = instance.object
         if len(thing.data.polygons) == 0:
             return
-        for trait in ("is_holdout", "is_shadow_catcher"):
-            if getattr(thing, trait):
-                message = f"an object with {trait}"
+        hidden = (thing.is_holdout, thing.is_shadow_catcher, not thing.visible_camera)
+        for words, is_so in zip(("a holdout", "a shadow catcher", "hidden from the camera"), hidden, strict=True):
+            if is_so:
+                message = f"an object that is {words}"
                 self._findings.note(
                     code="visibility", place=thing.name, message=message, action="showed it as any other"
                 )

@@ -16,21 +16,25 @@ CORNERS = 32
 IDENTITY = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
-def add_light(*, light: Placed, scene: bpy.types.Scene, findings: Findings) -> None:
-    """Adds a lamp: an area lamp as a surface that emits, any other as one of KHR_lights_punctual."""
+def add_light(*, light: Placed, scene: bpy.types.Scene, findings: Findings) -> dict | None:
+    """Adds a lamp: an area lamp as a surface that emits, any other as one of KHR_lights_punctual.
+
+    Returns the node of a surface, which in Blender casts no shadow and is seen by the camera only if it is `visible`.
+    """
     source = light.original.data
     color = color_of(light=light, findings=findings)
     if max(color) <= 0.0:
-        return
+        return None
     if source.type == "AREA":
-        add_area(light=light, power=color, scene=scene, findings=findings)
-        return
+        made = add_area(light=light, power=color, scene=scene, findings=findings)
+        return made and {"node": made.name, "visible": light.original.visible_camera}
     made = bpy.data.lights.new(source.name, source.type)
     made.energy = max(color)
     made.color = tuple(channel / made.energy for channel in color)
     if source.type == "SPOT":
         made.spot_size, made.spot_blend = source.spot_size, source.spot_blend
     add(name=light.name, data=made, matrix=light.world_from_object, scene=scene)
+    return None
 
 
 def color_of(*, light: Placed, findings: Findings) -> tuple[float, ...]:
@@ -63,8 +67,10 @@ def emission_of(*, tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     return None if any(node.inputs[name].is_linked for name in ("Color", "Strength")) else node
 
 
-def add_area(*, light: Placed, power: tuple[float, ...], scene: bpy.types.Scene, findings: Findings) -> None:
-    """Adds an area lamp as a polygon that emits towards its -Z.
+def add_area(
+    *, light: Placed, power: tuple[float, ...], scene: bpy.types.Scene, findings: Findings
+) -> bpy.types.Object | None:
+    """Adds an area lamp as a polygon that emits towards its -Z; none for one without an area.
 
     A lamp of power P and area A in the world has the radiance P / (pi A) (Cycles 4.5, `scene/light.cpp`).
     """
@@ -79,13 +85,13 @@ def add_area(*, light: Placed, power: tuple[float, ...], scene: bpy.types.Scene,
     scale = [column.length for column in light.world_from_object.to_3x3().col]
     area = polygon_area(outline=outline) * scale[0] * scale[1]
     if area <= 0.0:
-        return
+        return None
     mesh = bpy.data.meshes.new(source.name)
     # Clockwise seen from +Z, so that the front faces -Z.
     mesh.from_pydata([(x, y, 0.0) for x, y in reversed(outline)], [], [range(len(outline))])
     radiance = tuple(channel / (math.pi * area) for channel in power)
     mesh.materials.append(emitting(name=f"light {light.name}", radiance=radiance))
-    add(name=light.name, data=mesh, matrix=light.world_from_object, scene=scene)
+    return add(name=light.name, data=mesh, matrix=light.world_from_object, scene=scene)
 
 
 def outline_of(*, width: float, height: float, is_round: bool) -> list[tuple[float, float]]:
