@@ -93,6 +93,38 @@ class ClosedForms(Bake):
         sure = np.abs(gap - 0.02) > 1e-4
         self.close(data.values[sure, 1], np.where(gap[sure] < 0.02, 0.75, 0.25), tolerance=ONE_BYTE)
 
+    def test_generated_coordinates_stay_when_a_mesh_is_deformed(self) -> None:
+        """By a shape key and a modifier; the undeformed neighbour has its own."""
+        made, tree, shader = self.material(name="generated")
+        split = tree.nodes.new("ShaderNodeSeparateXYZ")
+        tree.links.new(self.coordinates(tree=tree, kind="Generated"), split.inputs[0])
+        tree.links.new(split.outputs["X"], shader.inputs["Roughness"])
+        gradient = tree.nodes.new("ShaderNodeTexGradient")
+        tree.links.new(gradient.outputs["Fac"], shader.inputs["Metallic"])
+        for name, is_deformed in (("bent", True), ("flat", False)):
+            bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8, size=2.0)
+            grid = bpy.context.object
+            grid.name = name
+            grid.data.materials.append(made)
+            if is_deformed:
+                grid.shape_key_add(name="Basis")
+                key = grid.shape_key_add(name="moved")
+                key.value = 1.0
+                for point in key.data:
+                    point.co.x += 0.3 * (1.0 - point.co.x**2)
+                cast = grid.modifiers.new("cast", "CAST")
+                cast.factor = 0.5
+        self.assertNotIn("generated_coordinates", self.codes(self.bake()))
+        for name in ("bent", "flat"):
+            info = self.glb().material(name=name)["pbrMetallicRoughness"]["metallicRoughnessTexture"]
+            data = self.glb().picture(info=info)
+            u = np.tile((np.arange(64) + 0.5) / 64, (64, 1))
+            self.close(data[..., 1].ravel(), u.ravel(), tolerance=ONE_BYTE)
+            self.close(data[..., 2].ravel(), u.ravel(), tolerance=ONE_BYTE)
+        bent = self.glb().numbers(accessor=self.glb().primitives(name="bent")[0]["attributes"]["POSITION"])
+        flat = self.glb().numbers(accessor=self.glb().primitives(name="flat")[0]["attributes"]["POSITION"])
+        self.assertGreater(np.abs(bent - flat).max(), 0.2)
+
 
 class Shaders(Bake):
     """Shaders as channels."""

@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 from mateval.baking_job import Findings
 from mateval.channels import Channels, Linked, MaterialGraph
-from mateval.evaluated import Evaluated, Instance, Shape
+from mateval.evaluated import Evaluated, Instance, Shape, positions_of
 from mateval.pictures import Kept, kept_pictures
 
 PER_INSTANCE = {
@@ -35,6 +35,10 @@ UNCONNECTED = {
     "ShaderNodeTexWhiteNoise",
 }
 """Texture nodes that do not use generated coordinates where nothing is linked to them."""
+
+
+GENERATED = "mateval_generated"
+"""The attribute that holds generated coordinates."""
 
 
 @dataclass
@@ -70,6 +74,29 @@ def replaced_random(*, node: bpy.types.Node) -> bpy.types.Node:
     for link in list(node.outputs["Random"].links):
         tree.links.new(made.outputs[0], link.to_socket)
     return made
+
+
+def use_attribute(*, graph: MaterialGraph) -> None:
+    """Makes a material take generated coordinates from an attribute of the mesh."""
+    for node in graph.nodes():
+        if not is_generated(node=node):
+            continue
+        source = node.id_data.nodes.new("ShaderNodeAttribute")
+        source.attribute_name = GENERATED
+        is_coordinates = node.bl_idname == "ShaderNodeTexCoord"
+        links = list(node.outputs["Generated"].links) if is_coordinates else []
+        for socket in [link.to_socket for link in links] if is_coordinates else [node.inputs["Vector"]]:
+            node.id_data.links.new(source.outputs["Vector"], socket)
+
+
+def write_attribute(*, mesh: bpy.types.Mesh, rest: np.ndarray | None) -> None:
+    """Stores generated coordinates: undeformed places in the texture space (Cycles, `blender/mesh.cpp`)."""
+    if GENERATED in mesh.attributes:
+        return
+    location, size = np.array(mesh.texspace_location), np.array(mesh.texspace_size)
+    positions = positions_of(mesh=mesh) if rest is None else rest
+    attribute = mesh.attributes.new(GENERATED, "FLOAT_VECTOR", "POINT")
+    attribute.data.foreach_set("vector", ((positions - location) / (2.0 * size) + 0.5).astype(np.float32).ravel())
 
 
 @dataclass
@@ -142,12 +169,17 @@ def is_generated(*, node: bpy.types.Node) -> bool:
 def make_bodies(*, found: Evaluated, scene: bpy.types.Scene, findings: Findings) -> list[Body]:
     """Puts all instances into the scene, and returns their bodies."""
     looks: dict[str, Look] = {}
+    # Cycles takes generated coordinates from the mesh that it is given, which is already deformed.
+    is_stored = any(instance.shape.rest is not None for instance in found.instances)
     bodies: dict[tuple, Body] = {}
     for number, instance in enumerate(found.instances):
         shape = instance.shape
         for material in shape.materials:
             if material is not None and material.name_full not in looks:
-                looks[material.name_full] = read_look(material=material, findings=findings)
+                look = read_look(material=material, findings=findings)
+                looks[material.name_full] = look
+                if is_stored and look.is_generated:
+                    use_attribute(graph=look.graph)
         used = [looks[material.name_full] if material is not None else None for material in shape.materials]
         is_own = is_sheared(matrix=instance.world_from_object) or any(
             look is not None and look.is_per_instance and look.varies for look in used
@@ -155,7 +187,10 @@ def make_bodies(*, found: Evaluated, scene: bpy.types.Scene, findings: Findings)
         key = (id(shape), number if is_own else None)
         if key not in bodies:
             bodies[key] = new_body(shape=shape, looks=used, random=instance.random, is_copied=is_own)
-            report_generated(instance=instance, looks=used, findings=findings)
+            if any(look is not None and look.varies and look.is_generated for look in used):
+                report_generated(instance=instance, findings=findings)
+                if is_stored:
+                    write_attribute(mesh=bodies[key].mesh, rest=shape.rest)
         bodies[key].objects.append(place(instance=instance, mesh=bodies[key].mesh, scene=scene))
     return list(bodies.values())
 
@@ -236,9 +271,9 @@ def apply_shear(*, body: Body) -> None:
         thing.matrix_parent_inverse.identity()
 
 
-def report_generated(*, instance: Instance, looks: list[Look | None], findings: Findings) -> None:
+def report_generated(*, instance: Instance, findings: Findings) -> None:
     """Reports textures that follow a deformed shape, where Blender would use the shape before."""
-    if instance.shape.is_deformed and any(look is not None and look.varies and look.is_generated for look in looks):
+    if instance.shape.is_deformed and instance.shape.rest is None:
         findings.note(
             code="generated_coordinates",
             place=instance.name,

@@ -7,6 +7,7 @@ visibility are those of the render and not those of the viewport.
 from dataclasses import dataclass, field
 
 import bpy
+import numpy as np
 from mathutils import Matrix, Vector
 
 from mateval.baking_job import Findings, random_of_id, random_of_name
@@ -31,6 +32,8 @@ class Shape:
     mesh: bpy.types.Mesh
     materials: tuple[bpy.types.Material | None, ...]
     is_deformed: bool
+    rest: np.ndarray | None = None
+    """Positions of the vertices before the deformation, shape (n, 3), where they are known."""
 
 
 @dataclass
@@ -82,14 +85,29 @@ class Reading(bpy.types.RenderEngine):
 def evaluate(*, scene: bpy.types.Scene, most_instances: int, most_triangles: int, findings: Findings) -> Evaluated:
     """Returns what the active view layer of the scene would render."""
     collector = Collector(most_instances=most_instances, most_triangles=most_triangles, findings=findings)
+    has_camera = scene.camera is not None
+    if not has_camera:
+        # Blender renders nothing without a camera, not even by an engine of our own.
+        scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    run_engine(scene=scene, collector=collector)
+    found = collector.found
+    if any(instance.shape.is_deformed for instance in found.instances):
+        switch_off_deformation()
+        rest = RestCollector()
+        run_engine(scene=scene, collector=rest)
+        rest.give(instances=found.instances)
+    if not has_camera:
+        found.camera = None
+        bpy.data.objects.remove(scene.camera)
+    return found
+
+
+def run_engine(*, scene: bpy.types.Scene, collector: "Collector | RestCollector") -> None:
+    """Lets a collector take the dependency graph of a render."""
     shown = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
     for layer in scene.view_layers:
         layer.use = layer == shown
     engine, render = scene.render.engine, scene.render
-    # Blender renders nothing without a camera, not even by this engine.
-    has_camera = scene.camera is not None
-    if not has_camera:
-        scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     Reading.take = collector.take
     bpy.utils.register_class(Reading)
     try:
@@ -102,10 +120,17 @@ def evaluate(*, scene: bpy.types.Scene, most_instances: int, most_triangles: int
     # Blender prints an exception in an engine and continues.
     if collector.error is not None:
         raise collector.error
-    if not has_camera:
-        collector.found.camera = None
-        bpy.data.objects.remove(scene.camera)
-    return collector.found
+
+
+def switch_off_deformation() -> None:
+    """Makes meshes evaluate to what they are before modifiers and shape keys move their vertices."""
+    for thing in bpy.data.objects:
+        for modifier in thing.modifiers:
+            if modifier.type in DEFORMING:
+                modifier.show_render = False
+    for key in bpy.data.shape_keys:
+        for block in key.key_blocks:
+            block.mute = True
 
 
 class Collector:
@@ -183,6 +208,37 @@ class Collector:
             mesh.calc_loop_triangles()
             self._shapes[key] = Shape(mesh=mesh, materials=materials, is_deformed=is_deformed(thing=thing.original))
         return self._shapes[key]
+
+
+class RestCollector:
+    """Reads the vertices of the same instances once more, without deformation."""
+
+    def __init__(self) -> None:
+        self.error: Exception | None = RuntimeError("Blender did not evaluate the scene again")
+        self._meshes: list[tuple[str, np.ndarray]] = []
+
+    def take(self, *, depsgraph: bpy.types.Depsgraph) -> None:
+        """Reads every mesh, in the order of `Collector`."""
+        for instance in depsgraph.object_instances:
+            thing = instance.object
+            if instance.show_self and thing.type == "MESH" and len(thing.data.polygons) > 0:
+                self._meshes.append((thing.name, positions_of(mesh=thing.data)))
+        self.error = None
+
+    def give(self, *, instances: list[Instance]) -> None:
+        """Gives deformed shapes the vertices, unless the deformation also changes what there is to see."""
+        if [name for name, _ in self._meshes] != [instance.name for instance in instances]:
+            return
+        for (_, positions), instance in zip(self._meshes, instances, strict=True):
+            if instance.shape.is_deformed and len(positions) == len(instance.shape.mesh.vertices):
+                instance.shape.rest = positions
+
+
+def positions_of(*, mesh: bpy.types.Mesh) -> np.ndarray:
+    """Returns the vertices of a mesh, shape (n, 3)."""
+    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", positions)
+    return positions.reshape(-1, 3)
 
 
 def placed(*, thing: bpy.types.Object, matrix: Matrix) -> Placed:
