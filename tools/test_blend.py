@@ -99,6 +99,7 @@ class ClosedForms(Bake):
         split = tree.nodes.new("ShaderNodeSeparateXYZ")
         tree.links.new(self.coordinates(tree=tree, kind="Generated"), split.inputs[0])
         tree.links.new(split.outputs["X"], shader.inputs["Roughness"])
+        tree.links.new(self.coordinates(tree=tree, kind="Generated"), shader.inputs["Base Color"])
         gradient = tree.nodes.new("ShaderNodeTexGradient")
         tree.links.new(gradient.outputs["Fac"], shader.inputs["Metallic"])
         for name, is_deformed in (("bent", True), ("flat", False)):
@@ -116,11 +117,13 @@ class ClosedForms(Bake):
                 cast.factor = 0.5
         self.assertNotIn("generated_coordinates", self.codes(self.bake()))
         for name in ("bent", "flat"):
-            info = self.glb().material(name=name)["pbrMetallicRoughness"]["metallicRoughnessTexture"]
-            data = self.glb().picture(info=info)
+            pbr = self.glb().material(name=name)["pbrMetallicRoughness"]
+            data = self.glb().picture(info=pbr["metallicRoughnessTexture"])
+            color = self.glb().picture(info=pbr["baseColorTexture"])
             u = np.tile((np.arange(64) + 0.5) / 64, (64, 1))
             self.close(data[..., 1].ravel(), u.ravel(), tolerance=ONE_BYTE)
             self.close(data[..., 2].ravel(), u.ravel(), tolerance=ONE_BYTE)
+            self.close(color[..., 0].ravel(), srgb_bytes(linear=u).ravel(), tolerance=1.01 * ONE_BYTE)
         bent = self.glb().numbers(accessor=self.glb().primitives(name="bent")[0]["attributes"]["POSITION"])
         flat = self.glb().numbers(accessor=self.glb().primitives(name="flat")[0]["attributes"]["POSITION"])
         self.assertGreater(np.abs(bent - flat).max(), 0.2)

@@ -201,7 +201,7 @@ def constant_or_baked(*, values: np.ndarray, covered: np.ndarray) -> Numbers | B
     """Returns the mean where the covered texels are alike, else all texels."""
     inside = values[covered]
     if len(inside) and np.ptp(inside, axis=0).max() <= UNIFORM:
-        return tuple(float(value) for value in inside.mean(axis=0, dtype=np.float64))
+        return tuple(np.atleast_1d(inside.mean(axis=0, dtype=np.float64)).tolist())
     return Baked(texels=values)
 
 

@@ -28,14 +28,9 @@ PER_PLACE = {"Position", "Normal", "True Normal", "Tangent", "Incoming"}
 """Outputs of the Geometry node in world space."""
 
 UNCONNECTED = {
-    "ShaderNodeTexImage",
-    "ShaderNodeTexCoord",
-    "ShaderNodeTexIES",
-    "ShaderNodeTexSky",
-    "ShaderNodeTexWhiteNoise",
-}
+    "ShaderNodeTexCoord", "ShaderNodeTexIES", "ShaderNodeTexImage", "ShaderNodeTexSky", "ShaderNodeTexWhiteNoise",
+}  # fmt: skip
 """Texture nodes that do not use generated coordinates where nothing is linked to them."""
-
 
 GENERATED = "mateval_generated"
 """The attribute that holds generated coordinates."""
@@ -52,6 +47,8 @@ class Look:
     is_per_instance: bool = False
     is_surrounded: bool = False
     is_generated: bool = False
+    randoms: tuple[bpy.types.Node, ...] = ()
+    """The nodes that stand for `Random` of Object Info nodes."""
 
     @property
     def varies(self) -> bool:
@@ -60,33 +57,31 @@ class Look:
 
     def set_random(self, *, value: float) -> None:
         """Sets `Random` of the Object Info nodes, which Cycles would make of the name that the object has now."""
-        for node in self.graph.nodes():
-            if node.bl_idname == "ShaderNodeObjectInfo":
-                target = node.id_data.nodes.get(f"random of {node.name}") or replaced_random(node=node)
-                target.outputs[0].default_value = value
+        for node in self.randoms:
+            node.inputs[0].default_value = value
 
 
 def replaced_random(*, node: bpy.types.Node) -> bpy.types.Node:
-    """Puts a constant in place of an Object Info node's `Random`, and returns it."""
+    """Puts a sum in place of an Object Info node's `Random`, and returns it. A Value would be read as a constant."""
     tree = node.id_data
-    made = tree.nodes.new("ShaderNodeValue")
-    made.name = f"random of {node.name}"
+    made = tree.nodes.new("ShaderNodeMath")
+    made.operation, made.inputs[1].default_value = "ADD", 0.0
     for link in list(node.outputs["Random"].links):
         tree.links.new(made.outputs[0], link.to_socket)
     return made
 
 
-def use_attribute(*, graph: MaterialGraph) -> None:
-    """Makes a material take generated coordinates from an attribute of the mesh."""
-    for node in graph.nodes():
-        if not is_generated(node=node):
-            continue
-        source = node.id_data.nodes.new("ShaderNodeAttribute")
-        source.attribute_name = GENERATED
-        is_coordinates = node.bl_idname == "ShaderNodeTexCoord"
-        links = list(node.outputs["Generated"].links) if is_coordinates else []
-        for socket in [link.to_socket for link in links] if is_coordinates else [node.inputs["Vector"]]:
-            node.id_data.links.new(source.outputs["Vector"], socket)
+def use_attribute(*, node: bpy.types.Node) -> None:
+    """Makes a node give or use the attribute in place of generated coordinates."""
+    tree = node.id_data
+    source = tree.nodes.new("ShaderNodeAttribute")
+    source.attribute_name = GENERATED
+    if node.bl_idname == "ShaderNodeTexCoord":
+        targets = [link.to_socket for link in node.outputs["Generated"].links]
+    else:
+        targets = [node.inputs["Vector"]]
+    for target in targets:
+        tree.links.new(source.outputs["Vector"], target)
 
 
 def write_attribute(*, mesh: bpy.types.Mesh, rest: np.ndarray | None) -> None:
@@ -125,8 +120,8 @@ class Body:
     objects: list[bpy.types.Object] = field(default_factory=list)
 
 
-def read_look(*, material: bpy.types.Material, findings: Findings) -> Look:
-    """Reads a material."""
+def read_look(*, material: bpy.types.Material, is_stored: bool, findings: Findings) -> Look:
+    """Reads a material. `is_stored` states whether meshes have generated coordinates as an attribute."""
     if not material.use_nodes or material.node_tree is None:
         color, numbers = tuple(material.diffuse_color)[:3], ((material.roughness,), (material.metallic,))
         channels = Channels(base_color=color, roughness=numbers[0], metallic=numbers[1])
@@ -134,11 +129,17 @@ def read_look(*, material: bpy.types.Material, findings: Findings) -> Look:
     graph = MaterialGraph(material=material, findings=findings)
     nodes = graph.nodes()
     kinds = {node.bl_idname for node in nodes}
+    generated = [node for node in nodes if is_generated(node=node)]
+    # Before the channels are read, which name the sockets of nodes.
+    randoms = tuple(replaced_random(node=node) for node in nodes if node.bl_idname == "ShaderNodeObjectInfo")
+    for node in generated if is_stored else ():
+        use_attribute(node=node)
     return Look(
         name=material.name,
         is_per_instance=bool(kinds & PER_INSTANCE) or any(is_per_place(node=node) for node in nodes),
         is_surrounded=bool(kinds & SURROUNDED),
-        is_generated=any(is_generated(node=node) for node in nodes),
+        is_generated=bool(generated),
+        randoms=randoms,
         channels=graph.surface(),
         graph=graph,
     )
@@ -176,10 +177,7 @@ def make_bodies(*, found: Evaluated, scene: bpy.types.Scene, findings: Findings)
         shape = instance.shape
         for material in shape.materials:
             if material is not None and material.name_full not in looks:
-                look = read_look(material=material, findings=findings)
-                looks[material.name_full] = look
-                if is_stored and look.is_generated:
-                    use_attribute(graph=look.graph)
+                looks[material.name_full] = read_look(material=material, is_stored=is_stored, findings=findings)
         used = [looks[material.name_full] if material is not None else None for material in shape.materials]
         is_own = is_sheared(matrix=instance.world_from_object) or any(
             look is not None and look.is_per_instance and look.varies for look in used
