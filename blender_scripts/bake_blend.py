@@ -28,7 +28,7 @@ from mateval.gltf import MaterialWriter, export  # noqa: E402
 from mateval.job import write_result  # noqa: E402
 from mateval.lighting import add_camera, add_light, read_world  # noqa: E402
 from mateval.osl import prepare_scripts  # noqa: E402
-from mateval.unwrap import plan_uvs, slots_of  # noqa: E402
+from mateval.unwrap import drop_missing_uv, plan_uvs, slots_of  # noqa: E402
 
 VERSION = (4, 5)
 """The version of Blender whose nodes are known."""
@@ -115,6 +115,7 @@ def carry_out(*, job: Job, work: Path, result: Job, findings: Findings) -> None:
         if any(slot.is_baked for slot in body.slots):
             report(f"bake {number + 1} of {len(bodies)}: {body.objects[0].name}")
         results = bake_body(body=body, bench=bench, surroundings=scene, findings=findings)
+        drop_missing_uv(body=body)
         apply_shear(body=body)
         writer.assign(body=body, results=results)
     lamps = [add_light(light=light, scene=scene, findings=findings) for light in found.lights]

@@ -62,6 +62,30 @@ class ClosedForms(Bake):
         expected = srgb_bytes(linear=first * colors[0] + (1.0 - first) * colors[1])
         self.close(color.values[inside, :3], expected, tolerance=ONE_BYTE)
 
+    def test_a_spiral_is_unwrapped_face_by_face(self) -> None:
+        """Seen from above its turns overlap, and they are one chart. It has no uv, which its picture's place shows."""
+        made, tree, shader = self.material(name="spiral")
+        split = tree.nodes.new("ShaderNodeSeparateXYZ")
+        tree.links.new(self.coordinates(tree=tree), split.inputs[0])
+        tree.links.new(split.outputs["Z"], shader.inputs["Roughness"])
+        tree.links.new(self.coordinates(tree=tree, kind="UV"), shader.inputs["Emission Color"])
+        shader.inputs["Emission Strength"].default_value = 1.0
+        angles = np.linspace(0.0, 6.0 * math.pi, 97)
+        rings = [(r * math.cos(a), r * math.sin(a), a / (6.0 * math.pi)) for a in angles for r in (0.5, 1.0)]
+        faces = [(2 * k, 2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(96)]
+        mesh = bpy.data.meshes.new("spiral")
+        mesh.from_pydata(rings, [], faces)
+        mesh.materials.append(made)
+        self.scene.collection.objects.link(bpy.data.objects.new("spiral", mesh))
+        result = self.bake(texels=256)
+        self.assertEqual((result["materials"][0]["uv"], self.codes(result)), ("mateval", {"camera"}))
+        found = self.glb().material(name="spiral")
+        self.assertNotIn("emissiveTexture", found)
+        self.assertEqual(found.get("emissiveFactor", [0, 0, 0]), [0, 0, 0])
+        self.assertNotIn("TEXCOORD_1", self.glb().primitives(name="spiral")[0]["attributes"])
+        data = self.glb().texels(name="spiral", info=found["pbrMetallicRoughness"]["metallicRoughnessTexture"])
+        self.close(data.values[:, 1], data.positions[:, 2], tolerance=1.01 * ONE_BYTE)
+
     def test_bands_and_bricks(self) -> None:
         made, tree, shader = self.material(name="bands")
         wave = tree.nodes.new("ShaderNodeTexWave")
@@ -351,6 +375,31 @@ class Shaders(Bake):
         data = self.glb().picture(info=pbr["metallicRoughnessTexture"])
         gray = stored["rough"][::-1, :, :3] @ [0.2126, 0.7152, 0.0722]
         self.assertLessEqual(np.abs(data[..., 1] - gray).max(), 0.51 * ONE_BYTE)
+
+    def test_a_picture_with_holes_is_kept_only_with_its_opacity(self) -> None:
+        stored = np.ones((8, 8, 4), dtype=np.float32)
+        stored[:4, :, 3] = 0.0
+        image = bpy.data.images.new("holes", 8, 8, alpha=True)
+        image.pixels.foreach_set(stored.ravel())
+        image.filepath_raw, image.file_format = str(self.folder / "holes.png"), "PNG"
+        image.save()
+        for name in ("whole", "open"):
+            made, tree, shader = self.material(name=name)
+            node = tree.nodes.new("ShaderNodeTexImage")
+            node.image = bpy.data.images.load(str(self.folder / "holes.png"), check_existing=True)
+            node.interpolation = "Closest"
+            tree.links.new(node.outputs["Color"], shader.inputs["Base Color"])
+            if name == "open":
+                tree.links.new(node.outputs["Alpha"], shader.inputs["Alpha"])
+            self.plane(material=made, name=name)
+        result = self.bake()
+        kinds = {entry["source"]: entry["base_color"] for entry in result["materials"]}
+        self.assertEqual(kinds, {"whole": "baked", "open": "picture"})
+        for name, rgb in (("whole", 0.0), ("open", 1.0)):
+            found = self.glb().material(name=name)
+            self.assertEqual(found.get("alphaMode", "OPAQUE"), "OPAQUE" if name == "whole" else "BLEND")
+            lower = self.glb().picture(info=found["pbrMetallicRoughness"]["baseColorTexture"])[-1, 0]
+            self.assertEqual((lower[0], lower[3]), (rgb, 1.0 - rgb))
 
 
 class Charts(unittest.TestCase):

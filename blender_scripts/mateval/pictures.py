@@ -63,7 +63,16 @@ def kept_pictures(*, graph: MaterialGraph, channels: Channels, mesh: bpy.types.M
     # glTF holds the opacity in the picture of the base colour.
     if alpha is not None and (color is None or color.image != alpha.image or alpha.channel != CHANNEL["Alpha"]):
         return None
+    if alpha is None and any(is_see_through(image=picture.image) for picture in pictures.values()):
+        return None
     return Kept(pictures=pictures, lookup=places.pop())
+
+
+def is_see_through(*, image: bpy.types.Image) -> bool:
+    """Returns whether an image has transparent texels, which Cycles shows black where nothing uses its opacity."""
+    if image.channels < 4 or image.alpha_mode not in ("STRAIGHT", "PREMUL"):
+        return False
+    return bool(texels_of(image=image, size=image.size)[..., 3].min() < 1.0)
 
 
 def picture_of(*, graph: MaterialGraph, value: Value, mesh: bpy.types.Mesh, is_color: bool) -> Picture | None:

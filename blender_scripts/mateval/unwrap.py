@@ -7,9 +7,11 @@ import numpy as np
 
 from mateval.baking_job import MARGIN, Findings, Job, texture_edge
 from mateval.bodies import Body, Slot, world_from_object
+from mateval.evaluated import positions_of
 from mateval.uv_charts import covered_share, holds_texture
 
-UV_LAYER = "mateval"
+UV_LAYER, NO_UV = "mateval", "mateval none"
+"""Names of the uv that is made, and of one that stands for a missing uv, which materials see as 0."""
 
 ANGLE_LIMIT = 1.15192
 """Blender's default in radians for Smart UV Project, 66 degrees."""
@@ -27,13 +29,15 @@ def plan_uvs(*, body: Body, bench: bpy.types.Scene, job: Job, findings: Findings
     if not chosen:
         return
     mesh = body.mesh
+    if len(mesh.uv_layers) == 0:
+        mesh.uv_layers.new(name=NO_UV, do_init=False)
     mesh.calc_loop_triangles()
     areas = world_areas(body=body)
-    active = next((layer for layer in mesh.uv_layers if layer.active_render), None)
+    active = next(layer for layer in mesh.uv_layers if layer.active_render)
     open_slots = []
     for index, slot in chosen:
         own = triangles_of(mesh=mesh, slot=index)
-        if active is not None and holds_texture(uvs=uvs_of(mesh=mesh, layer=active.name)[own], areas=areas[own]):
+        if holds_texture(uvs=uvs_of(mesh=mesh, layer=active.name)[own], areas=areas[own]):
             slot.uv = active.name
         else:
             open_slots.append((index, slot))
@@ -56,6 +60,13 @@ def plan_uvs(*, body: Body, bench: bpy.types.Scene, job: Job, findings: Findings
         own = triangles_of(mesh=mesh, slot=index)
         share = covered_share(uvs=uvs_of(mesh=mesh, layer=slot.uv)[own])
         slot.edge = texture_edge(job=job, area=float(areas[own].sum()), covered=share)
+
+
+def drop_missing_uv(*, body: Body) -> None:
+    """Removes what stood for a missing uv while the body was baked."""
+    layer = body.mesh.uv_layers.get(NO_UV)
+    if layer is not None:
+        body.mesh.uv_layers.remove(layer)
 
 
 def unwrap(*, body: Body, bench: bpy.types.Scene, slot: int, name: str, gap: float, areas: np.ndarray) -> bool:
@@ -131,11 +142,9 @@ def world_areas(*, body: Body) -> np.ndarray:
     mesh = body.mesh
     matrices = [world_from_object(thing=thing) for thing in body.objects]
     matrix = max(matrices, key=lambda each: abs(each.determinant()))
-    positions = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.vertices.foreach_get("co", positions)
     corners = np.empty(len(mesh.loop_triangles) * 3, dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
-    places = positions.reshape(-1, 3).astype(np.float64) @ np.array(matrix.to_3x3()).T
+    places = positions_of(mesh=mesh).astype(np.float64) @ np.array(matrix.to_3x3()).T
     triangles = places[corners].reshape(-1, 3, 3)
     sides = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return np.linalg.norm(sides, axis=1) / 2.0
