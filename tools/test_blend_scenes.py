@@ -204,8 +204,9 @@ class Scenes(Bake):
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         self.scene.collection.objects.link(camera)
         self.scene.camera = camera
+        self.scene.unit_settings.scale_length = 0.01
         result = self.bake()
-        self.assertEqual(self.codes(result), set())
+        self.assertEqual(self.codes(result), {"unit"})
         lights = self.glb().json["extensions"]["KHR_lights_punctual"]["lights"]
         found = {light["type"]: light["intensity"] for light in lights}
         expected = {"point": 683 * 80 / (4 * math.pi), "directional": 6.0 * 683, "spot": 683 * 160 / (4 * math.pi)}

@@ -28,12 +28,25 @@ def open_scene(*, job: Job, findings: Findings) -> tuple[bpy.types.Scene, list[s
             action="ran none; a value that a Python expression drives is the one that was saved, or 0",
         )
     scene = bpy.context.scene
+    report_settings(scene=scene, findings=findings)
     drop_unused(scene=scene)
     check_libraries(findings=findings)
     files = external_files(folder=Path(job["folder"]), findings=findings)
     if not findings.faults:
         check_images(findings=findings)
     return scene, files
+
+
+def report_settings(*, scene: bpy.types.Scene, findings: Findings) -> None:
+    """Reports settings of the scene that change its size or its materials."""
+    scale = scene.unit_settings.scale_length
+    if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6:
+        message, action = f"a unit of {scale:.6g} m", "took a unit as 1 m, as Blender's glTF exporter does"
+        findings.note(code="unit", place="scene", message=message, action=action)
+    for layer in scene.view_layers:
+        if layer.use and layer.material_override is not None:
+            message, action = "one material overrides all others", "used each object's own"
+            findings.note(code="material_override", place=layer.name, message=message, action=action)
 
 
 def drop_unused(*, scene: bpy.types.Scene) -> None:
