@@ -10,7 +10,16 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from mateval.camera import lens  # noqa: E402 (the folder above must come first)
+from mateval.baking_job import (  # noqa: E402 (the folder above must come first)
+    Findings,
+    halvings,
+    place_of,
+    random_of_id,
+    random_of_name,
+    texture_edge,
+)
+from mateval.baking_job import read_job as read_baking_job  # noqa: E402
+from mateval.camera import lens  # noqa: E402
 from mateval.environment import blender_from_world  # noqa: E402
 from mateval.job import JobError, light_of_world, lights_of_surfaces, read_job, read_numbers, write_result  # noqa: E402
 from mateval.metal import EDGE_COSINE, edge_tint, reflectance  # noqa: E402
@@ -72,6 +81,60 @@ class JobFiles(unittest.TestCase):
         self.assertIsNone(light_of_world(job={"lights": [area(surfaces=[1])]}))
         with self.assertRaises(JobError):
             light_of_world(job={"lights": [outside, outside]})
+
+
+class Baking(unittest.TestCase):
+    """Jobs that bake a scene."""
+
+    def test_a_job_is_checked_key_by_key(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            path = Path(name) / "job.json"
+            (Path(name) / "room.blend").touch()
+            sizes = ("texels", "most_texels", "samples", "world_rows", "most_instances", "most_triangles")
+            job = {"format": "mateval-bake/1", "blend": f"{name}/room.blend", "folder": name, "out": f"{name}/out"}
+            job |= dict.fromkeys((*sizes, "threads", "most_baked_texels"), 64) | {"texel_m": None}
+            path.write_text(json.dumps(job))
+            self.assertEqual(read_baking_job(path=path), job)
+            wrong = {"format": "mateval-bake/2", "blend": f"{name}/no.blend", "folder": f"{name}/no", "texels": 0}
+            for key, value in {**wrong, "texel_m": -1.0, "samples": True, "threads": "1"}.items():
+                path.write_text(json.dumps({**job, key: value}))
+                with self.assertRaises(JobError, msg=key):
+                    read_baking_job(path=path)
+
+    def test_textures_grow_with_the_surface(self) -> None:
+        job = {"texels": 512, "texel_m": 0.01, "most_texels": 1024}
+        for area, covered, edge in ((1.0, 1.0, 128), (1.64, 1.0, 256), (1.0, 0.25, 256), (1e-6, 1.0, 16), (1e6, 1.0, 1024)):
+            self.assertEqual(texture_edge(job=job, area=area, covered=covered), edge)
+        # 1.28 m at 0.01 m are exactly 128 texels.
+        self.assertEqual(texture_edge(job=job, area=1.28 * 1.28, covered=1.0), 128)
+        self.assertEqual(texture_edge(job={**job, "texel_m": None}, area=1.0, covered=1.0), 512)
+
+    def test_edges_are_halved_until_they_fit(self) -> None:
+        self.assertEqual(halvings(edges=[128, 128], most=2 * 128 * 128), 0)
+        self.assertEqual(halvings(edges=[128, 128], most=2 * 128 * 128 - 1), 1)
+        self.assertEqual(halvings(edges=[1024], most=0), 6)
+
+    def test_random_numbers_are_those_of_cycles(self) -> None:
+        """Baked from Object Info in Blender 4.5.15."""
+        for name, expected in (("first", 0.6102996), ("a", 0.5055515), ("zweites Ding ä", 0.4175181)):
+            self.assertAlmostEqual(random_of_name(name=name), expected, places=6)
+        self.assertEqual((random_of_id(number=-1), random_of_id(number=0)), (1.0, 0.0))
+
+    def test_links_lead_out_of_a_folder(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            inside = Path(name) / "scene"
+            (inside / "maps").mkdir(parents=True)
+            (inside / "link").symlink_to(Path(name))
+            self.assertEqual(place_of(path=inside / "maps/../maps/wood.png", folder=inside), "maps/wood.png")
+            for outside in (inside / "../wood.png", inside / "link/wood.png", Path(f"{inside}2/wood.png")):
+                self.assertIsNone(place_of(path=outside, folder=inside))
+
+    def test_findings_are_kept_once_and_sorted(self) -> None:
+        findings = Findings()
+        for place in ("b", "a", "b"):
+            findings.note(code="omitted", place=place, message="coat", action="left it out")
+        self.assertEqual([note["place"] for note in findings.notes], ["a", "b"])
+        self.assertEqual(findings.faults, [])
 
 
 class Lenses(unittest.TestCase):
