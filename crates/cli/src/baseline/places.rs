@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use mateval_scene::open::Dataset;
 
 use crate::open_dataset::open_dataset;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 
 /// Arguments of every baseline that writes a submission.
 #[derive(clap::Args)]
@@ -40,7 +40,7 @@ impl Places {
 
     /// Prints where the submission is and how many instances it covers.
     pub fn done(&self, instances: usize) -> anyhow::Result<Outcome> {
-        print(&format!("{}: {instances} instances\n", self.out.display()))?;
+        print(&format!("{}: {}\n", self.out.display(), counted(instances, "instance")))?;
         Ok(Outcome::Good)
     }
 }

@@ -10,7 +10,7 @@ use mateval_scene::SceneId;
 use super::blender::BlenderArgs;
 use crate::bars::with_progress;
 use crate::fetch::check_blender;
-use crate::outcome::{Outcome, print, say};
+use crate::outcome::{Outcome, counted, print, say};
 
 /// Arguments of `prep render`.
 #[derive(clap::Args)]
@@ -65,10 +65,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
     for failure in &report.failures {
         say(&failure.to_string());
     }
-    print(&format!("{}: {} views rendered, {} kept\n", args.dataset.display(), report.rendered, report.kept))?;
+    let rendered = counted(report.rendered, "view");
+    print(&format!("{}: {rendered} rendered, {} kept\n", args.dataset.display(), report.kept))?;
     super::finish::say_if_apart(&args.scenes, &args.dataset);
     if !report.failures.is_empty() {
-        bail!("{} scenes could not be rendered; all others were rendered", report.failures.len());
+        bail!("{} could not be rendered; all others were rendered", counted(report.failures.len(), "scene"));
     }
     Ok(Outcome::Good)
 }
