@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use mateval_audit::mitsuba_export::{ExportOptions, export_view};
 use mateval_scene::{SceneId, Severity, ViewId};
 
+use super::render::samples_parser;
 use crate::outcome::{Outcome, counted, print, say};
 
 /// Arguments of `prep mitsuba`.
@@ -23,7 +24,7 @@ pub struct MitsubaArgs {
     #[arg(long)]
     out: PathBuf,
     /// Samples per pixel [default: the recipe's].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// Replace a folder that already exists.
     #[arg(long)]
