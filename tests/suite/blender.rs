@@ -139,12 +139,12 @@ fn a_killed_blender_is_a_finding_and_the_next_run_resumes() {
         python.display()
     );
     let failed = run(&mut by_blender(copy.path(), &stand_in(tools.path(), &body), &[]));
-    assert!(failed.stdout.contains("1 views rendered, 0 kept"), "{}", failed.stdout);
+    assert!(failed.stdout.contains("1 view rendered, 0 kept"), "{}", failed.stdout);
     fails(failed, &["exit status: 137", "Killed"]);
     assert!(renders(copy.path()).join("input/render.json").is_file());
     assert!(!renders(copy.path()).join("left/render.json").exists());
     let whole = run(&mut by_blender(copy.path(), &python, &[])).ends_with(0);
-    assert!(whole.stdout.contains("1 views rendered, 1 kept"), "{}", whole.stdout);
+    assert!(whole.stdout.contains("1 view rendered, 1 kept"), "{}", whole.stdout);
     run(&mut verify(copy.path())).ends_with(0);
 }
 
@@ -165,7 +165,7 @@ fn a_hanging_growing_or_crashing_blender_is_ended_and_reported() {
         "exec python3 -c 'import time; x = bytearray(3 << 29); x[::4096] = b\"1\" * len(x[::4096]); time.sleep(600)'";
     fails(try_body(swell, &["--memory-limit", "1"]), &["more than 1024 MiB"]);
     fails(try_body("echo no graphics >&2; exit 11", &[]), &["exit status: 11", "no graphics"]);
-    fails(try_body("exit 0", &[]), &["the process ended with exit status: 0"]);
+    fails(try_body("exit 0", &[]), &["the process ended with exit status: 0", "(the log is empty)"]);
     fails(try_body("echo '{\"format\": 3}' > \"$JOB/result.json\"; sleep 1", &[]), &["result.json"]);
     assert!(manifest(copy.path()) == before, "a failed render changed the dataset");
     assert_eq!(files_below(&renders(copy.path())), [""; 0].map(PathBuf::from));
@@ -182,14 +182,14 @@ fn attempts_are_counted_and_other_scenes_are_rendered() {
     let real = format!("exec '{}' -I -B \"$JOB/scripts/render.py\" \"$JOB/job.json\"", python.display());
     let body = format!("case \"$JOB\" in */one) exit 3;; esac\n{real}");
     let failed = run(by_blender(&dataset, &stand_in(folder.path(), &body), &[]).args(["--jobs", "2"]));
-    fails(failed, &["'scenes/one'", "1 scenes could not be rendered"]).says("attempt 1 failed");
+    fails(failed, &["'scenes/one'", "1 scene could not be rendered"]).says("attempt 1 failed");
     assert!(dataset.join("scenes/two/ground_truth/renders/blender/input/render.json").is_file());
     // The first attempt fails, the second does not.
     let body = format!("[ -f '{0}/tried' ] || {{ touch '{0}/tried'; exit 3; }}\n{real}", folder.path().display());
     let mut command = render(&dataset, 2);
     command.args(["--renderer", "blender", "--attempts", "2", "--blender"]).arg(stand_in(folder.path(), &body));
     let whole = run(&mut command).ends_with(0).says("scene 'one': attempt 1 failed");
-    assert!(whole.stdout.contains("1 views rendered, 1 kept"), "{}", whole.stdout);
+    assert!(whole.stdout.contains("1 view rendered, 1 kept"), "{}", whole.stdout);
 }
 
 /// A texture that is missing or no picture, and files that cannot be written.

@@ -129,7 +129,7 @@ fn a_room_is_lit_anew() {
     let photo = exr_io::read_linear(&DATASET.join("scenes/room/views/input/rgb.exr")).unwrap();
     let brightness = |name: &str, words: &[&str]| {
         let out = folder.path().join(name);
-        relight(&PICTURES, &out, words).ends_with(0).prints("1 scenes");
+        relight(&PICTURES, &out, words).ends_with(0).prints("1 scene;");
         mean_of_valid(&exr_io::read_linear(&out.join("room/relit.exr")).unwrap()) / mean_of_valid(&photo)
     };
     let fitted = brightness("fitted", &[]);

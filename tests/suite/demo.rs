@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use super::command::{mateval, run};
+use super::resume::kill_when;
 
 fn demo(out: &Path) -> Command {
     let mut command = mateval();
@@ -11,10 +12,17 @@ fn demo(out: &Path) -> Command {
     command
 }
 
+/// Whether a picture of an input view has been begun.
+fn is_rendering(out: &Path) -> bool {
+    let scenes = std::fs::read_dir(out.join("dataset/scenes")).into_iter().flatten().flatten();
+    scenes.map(|scene| scene.path()).any(|scene| scene.join("ground_truth/renders/builtin/input/rgb_a.exr").is_file())
+}
+
 #[test]
 fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("demo");
+    let out = folder.path().join("my demo");
+    kill_when(&mut demo(&out), || is_rendering(&out));
     let first = run(&mut demo(&out)).ends_with(0);
     let steps = first.stderr.lines().filter(|line| line.contains("/6 ")).count();
     assert_eq!(steps, 6, "{}", first.stderr);
@@ -34,20 +42,37 @@ fn it_says_what_it_made_resumes_and_refuses_other_folders() {
     assert_eq!(second.stdout, first.stdout);
     assert_eq!(std::fs::read(&result).unwrap(), whole);
 
-    // The three commands that it ends with.
-    let whole = first.stdout.replace(" \\\n", " ");
-    let commands: Vec<&str> = whole.lines().filter(|line| line.starts_with("  mateval ")).collect();
-    assert_eq!(commands.len(), 3, "{}", first.stdout);
-    for line in commands {
-        run(mateval().args(line.split_whitespace().skip(1))).ends_with(0);
-    }
+    // The three commands that it ends with, pasted into a shell.
+    let (_, commands) = first.stdout.split_once("on a board:\n\n").unwrap();
+    assert_eq!(commands.lines().filter(|line| line.starts_with("  mateval ")).count(), 3, "{commands}");
+    let program = mateval().get_program().to_owned();
+    let mut shell = Command::new("sh");
+    shell.args(["-euc", &format!("mateval() {{ \"$0\" \"$@\"; }}\n{commands}")]).arg(program);
+    run(&mut shell).ends_with(0);
 
     run(mateval().args(["demo", "--renderer", "builtin", "--samples", "2", "--out"]).arg(&out))
         .ends_with(2)
         .says("holds a demo that was run with other options");
+    std::fs::write(out.join("demo.json"), "{").unwrap();
+    run(&mut demo(&out)).ends_with(2).says("does not hold a demo").says("demo.json");
     let other = folder.path().join("other");
     std::fs::create_dir(&other).unwrap();
     std::fs::write(other.join("thesis.tex"), "").unwrap();
     run(demo(&other).arg("--force")).ends_with(2).says("does not hold a demo");
     assert!(other.join("thesis.tex").exists());
+}
+
+/// Without such a choice, a demo falls back to the built-in renderer.
+#[test]
+fn a_blender_that_is_named_must_be_usable() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, absent) = (folder.path().join("demo"), folder.path().join("no/blender"));
+    let mut by_option = mateval();
+    by_option.args(["demo", "--out"]).arg(&out).arg("--blender").arg(&absent);
+    let mut by_variable = mateval();
+    by_variable.args(["demo", "--out"]).arg(&out).env("MATEVAL_BLENDER", &absent);
+    for (command, origin) in [(&mut by_option, "--blender"), (&mut by_variable, "MATEVAL_BLENDER")] {
+        run(command).ends_with(2).says(&format!("error: {origin} is '{}', which does not exist", absent.display()));
+    }
+    assert!(!out.exists());
 }

@@ -20,7 +20,11 @@ fn without_a_network_it_says_what_to_do() {
     let mut command = mateval();
     command.args(["fetch", "lpips"]).env("MATEVAL_CACHE", empty.path());
     command.env("PIP_INDEX_URL", "http://127.0.0.1:9/").env("PIP_RETRIES", "0").env_remove("PIP_EXTRA_INDEX_URL");
-    let failed = run(&mut command).ends_with(2).says("pip could not fetch").says("--lpips-archive");
+    let failed = run(&mut command)
+        .ends_with(2)
+        .says("pip could not fetch")
+        .says("is the network reachable?")
+        .says("--lpips-archive");
     assert_eq!(failed.stdout, "");
     assert_eq!(std::fs::read_dir(empty.path()).unwrap().count(), 0);
 }

@@ -70,6 +70,20 @@ fn unknown_arguments() {
     check(&["prep", "render", "d", "--scene", "../up"], 2, "", error);
 }
 
+/// Memory and time grow with the samples, so a typing error must not ask for a thousand million.
+#[test]
+fn samples_have_a_bound() {
+    for words in [&["demo"][..], &["prep", "render", "d"], &["prep", "compare", "d"]] {
+        for samples in ["0", "65537"] {
+            let error = format!(
+                "error: invalid value '{samples}' for '--samples <SAMPLES>': {samples} is not in 1..=65536\n\n\
+                 For more information, try '--help'.\n"
+            );
+            check(&[words, &["--samples", samples]].concat(), 2, "", &error);
+        }
+    }
+}
+
 #[test]
 fn missing_arguments() {
     let error = "error: the following required arguments were not provided:\n  --dataset <DATASET>\n  --out <OUT>\n  \

@@ -390,7 +390,7 @@ fn partfield_meshes_are_exported_and_its_labels_become_a_second_set_of_parts() {
         command.args(["baseline", "partfield-import", "--parts", "5", "--dataset"]).arg(&dataset).arg(&clusters);
         run(command.arg("--out").arg(out))
     };
-    assert!(import(&labels).ends_with(0).stdout.contains("labels of 1 instances"));
+    assert!(import(&labels).ends_with(0).stdout.contains("labels of 1 instance\n"));
     let recipe = folder.path().join("recipe.toml");
     let text = std::fs::read_to_string(&recipe).unwrap() + "part_labels = { partfield = \"labels/room\" }\n";
     std::fs::write(&recipe, text).unwrap();

@@ -51,6 +51,17 @@ fn the_verdict_is_one_line_and_the_exit_code() {
                     'scenes/room/sofa/base_color.png')\n";
     assert!(bad.stdout.starts_with(expected), "{}", bad.stdout);
     assert!(bad.stdout.contains("\nnot good: 4 errors, "), "{}", bad.stdout);
+    let instances = std::fs::read_dir(&room).unwrap().flatten().map(|entry| entry.path());
+    for instance in instances {
+        for map in ["roughness.png", "metallic.png"] {
+            std::fs::remove_file(instance.join(map)).unwrap();
+        }
+    }
+    let bare = lint(&submission, &[]).ends_with(1);
+    for (map, value) in [("roughness", "0.5"), ("metallic", "0")] {
+        let line = bare.stdout.lines().find(|line| line.starts_with(&format!("note [default_{map}] "))).unwrap();
+        assert!(line.contains(&format!("{map} is missing, which the format allows; scored as {value} (")), "{line}");
+    }
     let none = lint(&folder.path().join("none"), &[]).ends_with(2);
     assert!(none.stdout.is_empty() && none.error().contains("none'"), "{}", none.stderr);
     std::fs::write(folder.path().join("a.rar"), "Rar!").unwrap();

@@ -101,7 +101,7 @@ fn the_report_states_what_the_release_is() {
     let outs = ["first", "second"].map(|name| folder.path().join(name));
     for out in &outs {
         let words = [("--verdicts", verdicts.as_path()), ("--date", Path::new("2026-11-24"))];
-        report(dataset(), out, words).ends_with(0).prints("1 scenes, sound; renderers agree on 1 of 1 compared scenes");
+        report(dataset(), out, words).ends_with(0).prints("1 scene, sound; renderers agree on 1 of 1 compared scenes");
         check_pictures(out);
     }
     // The same inputs give the same bytes.
@@ -146,7 +146,7 @@ fn a_faulty_release_fails_and_says_where() {
     let (copy, folder) = (copied_dataset(), tempfile::tempdir().unwrap());
     std::fs::write(copy.path().join("scenes/room/ground_truth/lights.json"), "{}").unwrap();
     let out = folder.path().join("faulty");
-    report(copy.path(), &out, []).ends_with(1).prints("1 scenes, NOT sound; no scene compared");
+    report(copy.path(), &out, []).ends_with(1).prints("1 scene, NOT sound; no scene compared");
     let html = page(&out).replace("&#x2f;", "/");
     assert!(html.contains("What fails") && html.contains("[changed_file] &#x27;scenes/room/ground_truth/lights.json"));
     // A verdict that does not agree.

@@ -6,13 +6,14 @@ use std::process::{Child, Command, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use super::command::{build, render, run, verify};
+use super::command::{build, mateval, render, run, verify};
 use super::sample::{SMALL, copied_dataset, dataset, manifest, recipe_text, write_source};
-use mateval_testkit::kept_folder::kept_folder;
+use mateval_testkit::kept_folder::{copy_folder, kept_folder};
 
-/// A source whose recipe has two scenes, and the manifest of its whole dataset.
+/// A source whose recipe has two scenes, its whole dataset, and that one's manifest.
 struct Whole {
     recipe: PathBuf,
+    dataset: PathBuf,
     manifest: String,
 }
 
@@ -21,16 +22,17 @@ static WHOLE: LazyLock<Whole> = LazyLock::new(|| {
     let recipe = write_source(&folder.join("source"), SMALL, &["first", "second"]);
     let dataset = folder.join("dataset");
     run(&mut build(&recipe, &dataset)).ends_with(0);
-    Whole { recipe, manifest: manifest(&dataset) }
+    let manifest = manifest(&dataset);
+    Whole { recipe, dataset, manifest }
 });
 
 /// Starts the command and kills it (SIGKILL) once `is_time` returns true. Panics if it ends by itself.
-fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
+pub fn kill_when(command: &mut Command, is_time: impl Fn() -> bool) {
     let mut child: Child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let start = Instant::now();
     while !is_time() {
         assert!(child.try_wait().unwrap().is_none(), "it ended before it could be killed");
-        assert!(start.elapsed() < Duration::from_secs(120), "the time to kill it never came");
+        assert!(start.elapsed() < Duration::from_secs(300), "the time to kill it never came");
         std::thread::sleep(Duration::from_micros(200));
     }
     child.kill().unwrap();
@@ -148,4 +150,23 @@ fn a_killed_render_resumes() {
     let kept: usize = again.stdout.split(", ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((1..5).contains(&kept), "{}", again.stdout);
     assert!(manifest(copy.path()) == manifest(dataset()));
+}
+
+/// The build is resumed over what a killed render left, as `mateval demo` does it. `prep finish` refuses that.
+#[test]
+fn a_build_resumes_after_a_killed_render() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, out] = ["whole", "cut_off"].map(|name| folder.path().join(name));
+    [&whole, &out].into_iter().for_each(|copy| copy_folder(&WHOLE.dataset, copy));
+    run(&mut render(&whole, 1)).ends_with(0);
+    let renders = out.join("scenes/first/ground_truth/renders/builtin");
+    kill_when(&mut render(&out, 1), || renders.join("up_left/rgb_a.exr").is_file());
+    run(mateval().args(["prep", "finish"]).arg(&out)).ends_with(2).says("unlisted_file");
+    run(&mut build(&WHOLE.recipe, &out)).ends_with(0).says("scene 'first' was already made");
+    run(&mut render(&out, 1)).ends_with(0);
+    assert!(manifest(&out) == manifest(&whole));
+
+    // Only pictures of a scene that was being rendered: anything else is still a fault.
+    std::fs::write(renders.join("up_left/notes.txt"), "by hand").unwrap();
+    run(&mut build(&WHOLE.recipe, &out)).ends_with(2).says("unlisted_file");
 }

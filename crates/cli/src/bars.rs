@@ -45,25 +45,32 @@ struct Measure {
     since: Instant,
 }
 
-/// Fewest measured pieces that allow an estimate of the remaining time, since single pieces differ.
+/// Fewest measured pieces, and the shortest time, that allow an estimate of the remaining time: single pieces differ.
 const LEAST_MEASURED: usize = 10;
+const LEAST_TIME: Duration = Duration::from_secs(10);
+/// Columns of the text before the bar.
+const LABEL: usize = 40;
 
 impl Measure {
-    /// `, 20 seconds left`, or an empty text while too few pieces were measured.
+    /// `, 20s left`, or an empty text while too little was measured or where less than a second is left.
     fn time_left(&self, done: usize, total: usize, now: Instant) -> String {
-        let measured = done.saturating_sub(self.before);
-        if measured < LEAST_MEASURED {
+        let (measured, time) = (done.saturating_sub(self.before), now - self.since);
+        if measured < LEAST_MEASURED || time < LEAST_TIME {
             return String::new();
         }
-        let seconds = (now - self.since).as_secs_f64() / measured as f64 * total.saturating_sub(done) as f64;
-        format!(", {:#} left", HumanDuration(Duration::from_secs_f64(seconds)))
+        let seconds = time.as_secs_f64() / measured as f64 * total.saturating_sub(done) as f64;
+        match seconds < 1.0 {
+            true => String::new(),
+            false => format!(", {:#} left", HumanDuration(Duration::from_secs_f64(seconds))),
+        }
     }
 }
 
 impl Bars {
     fn new() -> Self {
         let bar = if std::io::stderr().is_terminal() { ProgressBar::new(1) } else { ProgressBar::hidden() };
-        if let Ok(style) = ProgressStyle::with_template("{elapsed_precise} {msg:32!} {wide_bar} {pos}/{len}{prefix}") {
+        let template = format!("{{elapsed_precise}} {{msg:{LABEL}!}} {{wide_bar}} {{pos}}/{{len}}{{prefix}}");
+        if let Ok(style) = ProgressStyle::with_template(&template) {
             bar.set_style(style);
         }
         let state = State { parts: 1, part: String::new(), measure: None, printed: Instant::now() };
@@ -82,9 +89,10 @@ impl Bars {
             }
             Report::Step { name, done, total } => (name, done, total),
         };
-        self.bar.set_message(name.to_owned());
+        let is_step_of_a_part = matches!(report, Report::Step { .. }) && state.parts > 1;
+        self.bar.set_message(label(name, is_step_of_a_part.then_some([done, total])));
         // With several parts the bar counts these: a step of one part says nothing about the time of the others.
-        if matches!(report, Report::Part { .. }) || state.parts == 1 {
+        if !is_step_of_a_part {
             self.bar.set_length(total as u64);
             self.bar.set_position(done as u64);
             let step = matches!(report, Report::Step { .. }).then(|| name.to_owned());
@@ -103,6 +111,16 @@ impl Bars {
     }
 }
 
+/// The text before the bar. Where the bar counts parts, a step's own count follows its name, which is cut to make room.
+fn label(name: &str, count: Option<[usize; 2]>) -> String {
+    let count = count.map_or_else(String::new, |[done, total]| format!(" {done}/{total}"));
+    let room = LABEL.saturating_sub(count.len());
+    match name.chars().count() <= room {
+        true => format!("{name}{count}"),
+        false => format!("{}…{count}", name.chars().take(room.saturating_sub(1)).collect::<String>()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,6 +132,18 @@ mod tests {
         let after = |seconds| since + Duration::from_secs(seconds);
         assert_eq!(measure.time_left(109, 200, after(9)), "", "pieces of an earlier run took no time of this one");
         assert_eq!(measure.time_left(110, 200, after(20)), ", 3m left");
-        assert_eq!(measure.time_left(200, 200, after(200)), ", 0s left");
+        assert_eq!(measure.time_left(190, 200, after(9)), "", "too early");
+        assert_eq!(measure.time_left(199, 200, after(199)), ", 2s left");
+        assert_eq!(measure.time_left(199, 200, after(60)), "", "never 0s left");
+        assert_eq!(measure.time_left(200, 200, after(200)), "");
+    }
+
+    #[test]
+    fn a_label_keeps_the_count_and_cuts_the_name() {
+        assert_eq!(label("hashes", None), "hashes");
+        assert_eq!(label("scene room: relit", Some([3, 12])), "scene room: relit 3/12");
+        let long = label("scene sample-living-4: companions of true light", Some([100, 900]));
+        assert_eq!(long, "scene sample-living-4: companio… 100/900");
+        assert_eq!(long.chars().count(), LABEL);
     }
 }

@@ -26,14 +26,14 @@ use mateval_prep::render::{RenderOptions, Renderer, RendererKind, render};
 use mateval_report::leaderboard::results_folder::ResultsFolder;
 use mateval_report::leaderboard::{self, LeaderboardPlan, Submissions, entries};
 use mateval_report::strips::Shown;
-use mateval_report::tables::{Grouping, TableFormat, headline, tables};
+use mateval_report::tables::{Grouping, TableFormat, headline, tables, wrapped};
 use mateval_scene::open::Dataset;
 use mateval_scene::{Finding, Severity, json, work_folder};
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, error_text, print, say};
+use crate::outcome::{Outcome, counted, error_text, print, say};
 use crate::prep::blender::BlenderArgs;
-use crate::prep::render::{checked_renderer, renderer_parser};
+use crate::prep::render::{checked_renderer, renderer_parser, samples_parser};
 use crate::tool::TOOL;
 use crate::weights;
 
@@ -79,7 +79,7 @@ pub struct Args {
     #[arg(long, default_value = "mateval-demo")]
     out: PathBuf,
     /// Samples per pixel of each half of a rendered picture [default: 24; with --full 64].
-    #[arg(long)]
+    #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// The renderer [default: blender, or builtin where Blender is not installed].
     #[arg(long, value_parser = renderer_parser())]
@@ -97,6 +97,8 @@ pub struct Args {
     force: bool,
 }
 
+/// Steps from the sample to the leaderboard.
+const STEPS: u8 = 6;
 /// Samples per pixel of the leaderboard's lit pictures: two for their two halves at least, and few at most, since noise is
 /// filtered for display.
 const SHOWN_SAMPLES: std::ops::RangeInclusive<u32> = 2..=16;
@@ -105,7 +107,7 @@ const SMALL: [u32; 2] = [160, 120];
 const LARGE: [u32; 2] = [320, 240];
 
 /// The options on which the content of a demo's folder depends.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Options {
     tool: String,
     renderer: RendererKind,
@@ -158,7 +160,8 @@ impl Places {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let places = Places::of(&args.out);
     let lpips = weights::load(Net::Alex);
-    let (kind, renderer) = choose_renderer(args, &places)?;
+    let earlier = earlier_options(&places)?;
+    let (kind, renderer) = choose_renderer(args, earlier.as_ref())?;
     let options = Options {
         tool: TOOL.to_owned(),
         renderer: kind,
@@ -167,7 +170,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         baselines: args.baselines(),
         lpips: matches!(lpips, LpipsWeights::Loaded(_)),
     };
-    begin(&places, &options, args.force)?;
+    begin(&places, earlier.as_ref(), &options, args.force)?;
     json::write(&places.options, &options).context("cannot begin the demo")?;
 
     step(1, "sample", || {
@@ -195,14 +198,31 @@ impl Args {
     }
 }
 
+/// The options of an earlier demo in the folder. Fails where the folder holds anything else.
+fn earlier_options(places: &Places) -> anyhow::Result<Option<Options>> {
+    let is_empty = |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    if !places.out.exists() || is_empty(&places.out) {
+        return Ok(None);
+    }
+    match json::read(&places.options) {
+        Ok(options) => Ok(Some(options)),
+        Err(reason) => bail!(
+            "'{}' exists and does not hold a demo of this version ({reason}); choose another --out",
+            places.out.display()
+        ),
+    }
+}
+
 /// The named renderer, else that of an earlier demo in this folder, else Blender if it can be used, else the built-in one.
-fn choose_renderer(args: &Args, places: &Places) -> anyhow::Result<(RendererKind, Renderer)> {
-    let earlier = || json::read::<Options>(&places.options).ok().filter(|_| !args.force);
-    if let Some(kind) = args.renderer.or_else(|| earlier().map(|options| options.renderer)) {
+/// A Blender that the user names must be usable.
+fn choose_renderer(args: &Args, earlier: Option<&Options>) -> anyhow::Result<(RendererKind, Renderer)> {
+    let earlier = earlier.filter(|_| !args.force);
+    if let Some(kind) = args.renderer.or_else(|| earlier.map(|options| options.renderer)) {
         return Ok((kind, checked_renderer(kind, &args.blender)?));
     }
     match checked_renderer(RendererKind::Blender, &args.blender) {
         Ok(renderer) => Ok((RendererKind::Blender, renderer)),
+        Err(reason) if args.blender.is_given() => Err(reason),
         Err(reason) => {
             say(&format!(
                 "{}\nThe demo uses the built-in renderer instead; scores of light are then other numbers.\n",
@@ -213,22 +233,20 @@ fn choose_renderer(args: &Args, places: &Places) -> anyhow::Result<(RendererKind
     }
 }
 
-/// Checks that the folder is new or holds a demo of these options; with `force`, removes an earlier demo.
-fn begin(places: &Places, options: &Options, force: bool) -> anyhow::Result<()> {
+/// Makes the folder, or checks that it holds a demo of these options; with `force`, removes an earlier demo. What depends
+/// on the weights of LPIPS is removed where they were missing and are found now.
+fn begin(places: &Places, earlier: Option<&Options>, options: &Options, force: bool) -> anyhow::Result<()> {
     let out = places.out.display();
-    let is_empty = |folder: &Path| std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-    if !places.out.exists() || is_empty(&places.out) {
+    let Some(earlier) = earlier else {
         return std::fs::create_dir_all(&places.out).with_context(|| format!("cannot create '{out}'"));
-    }
-    let Ok(earlier) = json::read::<Options>(&places.options) else {
-        bail!("'{out}' exists and does not hold a demo of this version; choose another --out");
     };
+    let Places { source, dataset, submissions, delit, results, scores, leaderboard, .. } = places;
+    let remove = |folders: &[&PathBuf]| folders.iter().try_for_each(|folder| work_folder::remove(folder));
     if force {
-        let Places { source, dataset, submissions, delit, results, scores, leaderboard, .. } = places;
-        for folder in [source, dataset, submissions, delit, results, scores, leaderboard] {
-            work_folder::remove(folder)?;
-        }
-    } else if earlier != *options {
+        remove(&[source, dataset, submissions, delit, results, scores, leaderboard])?;
+    } else if options.lpips && *earlier == (Options { lpips: false, ..options.clone() }) {
+        remove(&[results, scores, leaderboard])?;
+    } else if earlier != options {
         bail!(
             "'{out}' holds a demo that was run with other options or another version ({}); run it again with those, add \
              --force to replace it, or choose another --out",
@@ -257,7 +275,7 @@ impl Options {
 fn step(number: u8, name: &str, work: impl FnOnce() -> anyhow::Result<String>) -> anyhow::Result<()> {
     let start = Instant::now();
     let made = work()?;
-    say(&format!("{number}/6 {name:<12} {made:<52} {:>6.1} s", start.elapsed().as_secs_f64()));
+    say(&format!("{number}/{STEPS} {name:<12} {made:<52} {:>6.1} s", start.elapsed().as_secs_f64()));
     Ok(())
 }
 
@@ -284,7 +302,8 @@ fn build_dataset(places: &Places) -> anyhow::Result<String> {
     let dataset = Dataset::open(&places.dataset).context("cannot open the dataset")?;
     let instances: usize = dataset.scenes.iter().map(|scene| scene.instances.len()).sum();
     let views: usize = dataset.scenes.iter().map(|scene| scene.views.len()).sum();
-    Ok(format!("{} scenes, {instances} objects, {views} views", dataset.scenes.len()))
+    let scenes = counted(dataset.scenes.len(), "scene");
+    Ok(format!("{scenes}, {}, {}", counted(instances, "object"), counted(views, "view")))
 }
 
 fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> anyhow::Result<String> {
@@ -294,11 +313,13 @@ fn render_dataset(places: &Places, options: &Options, renderer: Renderer) -> any
     report.remarks.iter().for_each(|line| say(line));
     if !report.failures.is_empty() {
         report.failures.iter().for_each(|failure| say(&failure.to_string()));
-        bail!("{} scenes could not be rendered; run the demo again to try these again", report.failures.len());
+        let failed = counted(report.failures.len(), "scene");
+        bail!("{failed} could not be rendered; run the demo again to go on from here");
     }
     let (by, samples) = (options.renderer.name(), options.samples);
     let kept = if report.kept > 0 { format!(", {} kept", report.kept) } else { String::new() };
-    Ok(format!("{} pictures by {by}{kept}, 2 x {samples} samples", report.rendered))
+    let rendered = counted(report.rendered, "picture");
+    Ok(format!("{rendered} by {by}{kept}, 2 x {}", counted(samples as usize, "sample")))
 }
 
 /// Makes the submissions that do not exist yet. They appear whole or not at all.
@@ -334,7 +355,7 @@ fn make_submissions(places: &Places, options: &Options, dataset: &Dataset) -> an
         };
     }
     let names: Vec<&str> = options.baselines.iter().map(|baseline| baseline.name()).collect();
-    Ok(format!("{} submissions: {}", names.len(), names.join(", ")))
+    Ok(format!("{}: {}", counted(names.len(), "submission"), names.join(", ")))
 }
 
 /// Scores the submissions that have no result yet.
@@ -370,7 +391,7 @@ fn score_submissions(
         }
         work_folder::remove(&places.scores)?;
     }
-    Ok(format!("{} results", options.baselines.len()))
+    Ok(counted(options.baselines.len(), "result"))
 }
 
 /// The baselines that are ranked, and the result of the truth as their ceiling, if it is not the only baseline.
@@ -402,7 +423,8 @@ fn write_leaderboard(places: &Places, options: &Options, dataset: &Dataset) -> a
     };
     with_progress(|progress| leaderboard::write(&plan, &places.leaderboard, true, progress))
         .context("cannot write the leaderboard")?;
-    Ok(format!("{} methods, pictures of {} scenes", ranked.len(), dataset.scenes.len()))
+    let scenes = counted(dataset.scenes.len(), "scene");
+    Ok(format!("{}, pictures of {scenes}", counted(ranked.len(), "method")))
 }
 
 /// Prints the table, the address of the leaderboard and the next commands.
@@ -417,7 +439,7 @@ fn close(places: &Places, options: &Options, dataset: &Dataset, full: bool) -> a
         false => headline(&results, ceiling.as_ref(), PROTOCOL, format)?,
     };
     let page = std::path::absolute(places.leaderboard.join("index.html"))?;
-    print(&format!("\n{shown}\nThe leaderboard, with pictures: file://{}\n", page.display()))?;
+    print(&format!("\n{shown}\nThe leaderboard, with pictures:\n  {}\n", address(&page)))?;
     if full {
         let rooms = dataset.file.scenes.iter().map(|id| dataset.folder(id).path().join("views").display().to_string());
         print(&format!("The rooms' pictures: {}\n", rooms.collect::<Vec<_>>().join(", ")))?;
@@ -435,28 +457,34 @@ fn next_commands(places: &Places, options: &Options) -> String {
         places.out.join("board"),
     ]
     .map(|path| quoted(&path));
+    let [dataset, submission, result, board] = [&dataset, &submission, &result, &board].map(String::as_str);
     let others: Vec<String> = ranked.iter().map(|baseline| quoted(&places.result(*baseline))).collect();
-    let ceiling = ceiling.map_or_else(String::new, |ceiling| format!(" --ceiling {}", quoted(&ceiling)));
+    let ceiling = ceiling.map(|ceiling| quoted(&ceiling));
+    let mut rank = vec!["mateval", "eval", "leaderboard"];
+    rank.extend(others.iter().map(String::as_str));
+    rank.push(result);
+    rank.extend(ceiling.iter().flat_map(|ceiling| ["--ceiling", ceiling]));
+    rank.extend(["--out", board]);
     let commands = [
-        format!("mateval baseline median --dataset {dataset} --out {submission}"),
-        format!("mateval eval score {submission} --dataset {dataset} --out {result}"),
-        format!("mateval eval leaderboard {} {result}{ceiling} --out {board}", others.join(" ")),
+        vec!["mateval", "baseline", "median", "--dataset", dataset, "--out", submission],
+        vec!["mateval", "eval", "score", submission, "--dataset", dataset, "--out", result],
+        rank,
     ];
-    let shown: String = commands.iter().map(|command| continued(command)).collect();
+    let shown: String = commands.map(continued).concat();
     format!("\nNext, score one more method and put it on a board:\n\n{shown}")
 }
 
-/// A command, indented, over as many lines of a terminal of 80 columns as it needs.
-fn continued(command: &str) -> String {
-    let (mut text, mut line) = (String::new(), " ".to_owned());
-    for word in command.split(' ') {
-        if line.chars().count() + word.chars().count() > 76 {
-            text.push_str(&format!("{line} \\\n"));
-            line = "     ".to_owned();
-        }
-        line.push_str(&format!(" {word}"));
-    }
-    format!("{text}{line}\n")
+/// The words of a command, indented, over as many lines of a terminal of 80 columns as they need.
+fn continued(words: Vec<&str>) -> String {
+    // The end of a line is a blank and a backslash.
+    wrapped(words, "  ", "      ", 78).join(" \\\n") + "\n"
+}
+
+/// The address of a file for a browser. Terminals end an address at a blank.
+fn address(path: &Path) -> String {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"/._-~+".contains(&byte);
+    let shown = |byte: &u8| if is_plain(*byte) { char::from(*byte).to_string() } else { format!("%{byte:02X}") };
+    format!("file://{}", path.as_os_str().as_encoded_bytes().iter().map(shown).collect::<String>())
 }
 
 /// A path as a word of a shell.
@@ -466,5 +494,39 @@ fn quoted(path: &Path) -> String {
     match text.chars().all(is_plain) && !text.starts_with('-') {
         true => text,
         false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Results of a demo whose only change is that the weights were fetched are made again, and the rest is kept.
+    #[test]
+    fn weights_that_were_fetched_meanwhile_are_used() {
+        let folder = tempfile::tempdir().unwrap();
+        let places = Places::of(folder.path());
+        let options = |lpips, samples| Options {
+            tool: TOOL.to_owned(),
+            renderer: RendererKind::Builtin,
+            samples,
+            resolution: SMALL,
+            baselines: vec![DemoBaseline::Grey],
+            lpips,
+        };
+        for place in [&places.dataset, &places.submissions, &places.results, &places.leaderboard] {
+            std::fs::create_dir(place).unwrap();
+        }
+        begin(&places, Some(&options(false, 1)), &options(true, 2), false).unwrap_err();
+        begin(&places, Some(&options(true, 1)), &options(false, 1), false).unwrap_err();
+        assert!(places.results.exists(), "a refusal removed something");
+        begin(&places, Some(&options(false, 1)), &options(true, 1), false).unwrap();
+        assert!(!places.results.exists() && !places.leaderboard.exists());
+        assert!(places.dataset.exists() && places.submissions.exists());
+    }
+
+    #[test]
+    fn addresses_hold_no_blank() {
+        assert_eq!(address(Path::new("/my demo/ü.html")), "file:///my%20demo/%C3%BC.html");
     }
 }

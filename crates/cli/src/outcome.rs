@@ -3,6 +3,8 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
+use console::Term;
+use mateval_report::tables::wrapped;
 use mateval_scene::{Finding, Severity};
 
 /// How a command that did its work ended.
@@ -42,18 +44,50 @@ pub fn error_text(error: &anyhow::Error) -> String {
     })
 }
 
-/// Prints a line about the work to stderr.
+/// Prints a line about the work to stderr, wrapped between words where that is a terminal.
 pub fn say(text: &str) {
+    let text = match Term::stderr().size_checked() {
+        Some((_, columns)) => fitted(text, usize::from(columns)),
+        None => text.to_owned(),
+    };
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Prints warnings and errors to stderr, each after `title`; notes are only counted.
-pub fn say_findings(title: &str, findings: &[Finding]) {
+/// The text with each line wrapped that is wider than the terminal.
+fn fitted(text: &str, columns: usize) -> String {
+    let lines: Vec<String> = text.split('\n').flat_map(|line| wrapped(line.split(' '), "", "  ", columns)).collect();
+    lines.join("\n")
+}
+
+/// A count with its noun: `1 scene`, `2 scenes`.
+pub fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Prints warnings and errors to stderr, each after `title`; notes are only counted, and can be read in `file`.
+pub fn say_findings(title: &str, findings: &[Finding], file: &str) {
     let notes = findings.iter().filter(|finding| finding.severity == Severity::Note).count();
     for finding in findings.iter().filter(|finding| finding.severity != Severity::Note) {
         say(&format!("{title}: {finding}"));
     }
     if notes > 0 {
-        say(&format!("{title}: {notes} more notes"));
+        say(&format!("{title}: {}, in {file}", counted(notes, "note")));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_that_fit_are_left_alone_and_others_wrapped() {
+        let text = "1/6  sample      2 s\nerror: 'a b' does not exist";
+        assert_eq!(fitted(text, 80), text);
+        assert_eq!(fitted(text, 20), "1/6  sample      2 s\nerror: 'a b' does\n  not exist");
+    }
+
+    #[test]
+    fn one_takes_the_singular() {
+        assert_eq!([0, 1, 2].map(|count| counted(count, "note")), ["0 notes", "1 note", "2 notes"]);
     }
 }

@@ -65,10 +65,7 @@ pub enum MetricError {
     },
 
     /// The weights file does not exist or cannot be read.
-    #[error(
-        "cannot read the LPIPS weights '{}': {source}; run: mateval fetch lpips",
-        path.display()
-    )]
+    #[error("cannot read the LPIPS weights '{}': {source}", path.display())]
     WeightsIo {
         /// The file.
         path: PathBuf,
@@ -77,10 +74,7 @@ pub enum MetricError {
     },
 
     /// The weights file has another hash than the published one.
-    #[error(
-        "'{}' has SHA-256 {found}; expected {expected}; write it again: mateval fetch lpips",
-        path.display()
-    )]
+    #[error("the LPIPS weights '{}' have SHA-256 {found}; expected {expected}", path.display())]
     WeightsHash {
         /// The file.
         path: PathBuf,
@@ -91,7 +85,7 @@ pub enum MetricError {
     },
 
     /// The weights do not fit the network.
-    #[error("the LPIPS weights are malformed: {reason}; write them again: mateval fetch lpips")]
+    #[error("the LPIPS weights are malformed: {reason}")]
     WeightsMalformed {
         /// What was expected and what was found.
         reason: String,

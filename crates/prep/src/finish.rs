@@ -1,7 +1,7 @@
 //! Writes the files that describe a whole dataset, once its scenes are made: `dataset.json`, `targets.json`, the recipe and
 //! the manifest. Files of scenes are not read again where their hashes are known.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use mateval_scene::build_folder::BuildFolder;
@@ -20,11 +20,35 @@ use crate::recipe::{self, RECIPE, Recipe};
 use crate::render::kind::RendererKind;
 use crate::render::store::{can_show_input, show_input};
 
+/// Pictures that a killed render wrote and that no list names yet.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CutOffRenders {
+    /// A fault: who finishes a dataset wants it whole.
+    Refused,
+    /// Listed as they are: the build can be resumed, and then the render.
+    Listed,
+}
+
 /// Finishes the dataset that `prep build` makes in `root`, without the scenes `without`, which are put aside in `.build`
 /// until a later call wants them. Fails where another process works on the dataset, where a scene is not made, where one
 /// was changed by anything but `prep`, or where a folder is none of the recipe's scenes; everything of one kind is named
 /// at once. Of a dataset that was not built here, the list of scenes stays as it is.
 pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
+    finish_with(root, without, CutOffRenders::Refused, tool, progress)
+}
+
+/// Like [`finish`] for all scenes, at the end of a build, also where a render of its scenes was killed.
+pub(crate) fn finish_build(root: &Path, tool: &str, progress: Progress<'_>) -> Result<DatasetFile, PrepError> {
+    finish_with(root, &[], CutOffRenders::Listed, tool, progress)
+}
+
+fn finish_with(
+    root: &Path,
+    without: &[SceneId],
+    cut_off: CutOffRenders,
+    tool: &str,
+    progress: Progress<'_>,
+) -> Result<DatasetFile, PrepError> {
     if !is_build(root) {
         return match without.is_empty() {
             true => finish_again(root, progress),
@@ -64,7 +88,7 @@ pub fn finish(root: &Path, without: &[SceneId], tool: &str, progress: Progress<'
     for id in &dataset.scenes {
         dataset.licences.extend(json::read::<SceneMark>(&build.mark(id))?.licence);
     }
-    let known = scene_hashes(root, &mut dataset, progress)?;
+    let known = scene_hashes(root, &mut dataset, cut_off, progress)?;
     json::write(&root.join(TARGETS), &targets(root, &dataset)?)?;
     mateval_image::store::write_whole(&root.join(RECIPE), text.as_bytes())?;
     write(root, dataset, &known)
@@ -77,7 +101,7 @@ pub fn finish_again(root: &Path, progress: Progress<'_>) -> Result<DatasetFile, 
     let _lease = BuildFolder::of(root).lease_of_whole(&dataset.scenes)?;
     manifest::remove_unfinished(&root.join("scenes"))?;
     check_strays(root, &dataset.scenes)?;
-    let known = scene_hashes(root, &mut dataset, progress)?;
+    let known = scene_hashes(root, &mut dataset, CutOffRenders::Refused, progress)?;
     write(root, dataset, &known)
 }
 
@@ -143,10 +167,12 @@ pub(crate) fn check_strays(root: &Path, scenes: &[SceneId]) -> Result<(), PrepEr
 fn scene_hashes(
     root: &Path,
     dataset: &mut DatasetFile,
+    cut_off: CutOffRenders,
     progress: Progress<'_>,
 ) -> Result<BTreeMap<String, String>, PrepError> {
     dataset.scored_renderer = scored_renderer(root, dataset);
     let shown = dataset.scored_renderer.clone().or_else(|| any_renderer(root, &dataset.scenes));
+    let changed = BuildFolder::of(root).changed();
     let (mut findings, mut lists) = (Vec::new(), Vec::new());
     for (at, id) in dataset.scenes.iter().enumerate() {
         progress(Report::step("hashes", at, dataset.scenes.len()));
@@ -156,7 +182,10 @@ fn scene_hashes(
         let shown = shown.as_ref().filter(can_show);
         // The input picture is a copy of that renderer's and is made again.
         let is_remade = |path: &str| shown.is_some() && is_input_picture(path);
-        findings.extend(list.check(|path| !is_remade(path))?);
+        let listed: BTreeSet<String> = list.entries().map(|(file, _)| file.to_owned()).collect();
+        let may_be_cut_off = cut_off == CutOffRenders::Listed && changed.contains(id);
+        let is_cut_off = |path: &str| may_be_cut_off && is_rendered(path) && !listed.contains(path);
+        findings.extend(list.check(|path| !is_remade(path) && !is_cut_off(path))?);
         lists.push((id, shown, list));
     }
     if !findings.is_empty() {
@@ -176,6 +205,11 @@ fn scene_hashes(
 /// Whether a path in the dataset is that of an input picture.
 fn is_input_picture(path: &str) -> bool {
     path.ends_with("/views/input/rgb.exr") || path.ends_with("/views/input/rgb.png")
+}
+
+/// Whether a path in the dataset is that of a file that `prep render` or `prep companions` writes.
+fn is_rendered(path: &str) -> bool {
+    path.contains("/ground_truth/renders/") || path.contains("/ground_truth/companions/")
 }
 
 /// The first renderer in the order of [`RendererKind::ALL`] that has rendered every view of the scenes that have no

@@ -5,7 +5,7 @@ use mateval_baselines::delight::{self, CandidateLights, DelightOptions};
 
 use super::places::ExportPlaces;
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 
 /// Arguments of `delight`.
 #[derive(clap::Args)]
@@ -43,8 +43,9 @@ pub fn run(args: &DelightArgs) -> anyhow::Result<Outcome> {
     let out = &args.places.out;
     let count = with_progress(|progress| delight::write(&dataset, out, &options, progress))?;
     let shown = out.display();
+    let scenes = counted(count, "scene");
     print(&format!(
-        "'{shown}': {count} scenes; open '{shown}/index.html'; use them with --estimate '{shown}' --adapter delight\n"
+        "'{shown}': {scenes}; open '{shown}/index.html'; use them with --estimate '{shown}' --adapter delight\n"
     ))?;
     Ok(Outcome::Good)
 }

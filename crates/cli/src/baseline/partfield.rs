@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use mateval_baselines::partfield;
 
 use super::places::ExportPlaces;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 
 /// Arguments of `partfield-import`.
 #[derive(clap::Args)]
@@ -22,13 +22,13 @@ pub struct PartfieldImportArgs {
 /// Writes the meshes.
 pub fn export(places: &ExportPlaces) -> anyhow::Result<Outcome> {
     let count = partfield::export(&places.open()?, &places.out)?;
-    print(&format!("{}: {count} meshes\n", places.out.display()))?;
+    print(&format!("{}: {count} mesh{}\n", places.out.display(), if count == 1 { "" } else { "es" }))?;
     Ok(Outcome::Good)
 }
 
 /// Copies the labels to where a recipe expects them.
 pub fn import(args: &PartfieldImportArgs) -> anyhow::Result<Outcome> {
     let count = partfield::import(&args.places.open()?, &args.clusters, args.parts, &args.places.out)?;
-    print(&format!("{}: labels of {count} instances\n", args.places.out.display()))?;
+    print(&format!("{}: labels of {}\n", args.places.out.display(), counted(count, "instance")))?;
     Ok(Outcome::Good)
 }

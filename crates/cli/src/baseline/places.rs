@@ -6,7 +6,7 @@ use mateval_baselines::estimate_source::EstimateSource;
 use mateval_scene::open::Dataset;
 
 use crate::open_dataset::open_dataset;
-use crate::outcome::{Outcome, print, say};
+use crate::outcome::{Outcome, counted, print, say};
 
 /// Arguments of every baseline that writes a submission.
 #[derive(clap::Args)]
@@ -50,7 +50,7 @@ impl Places {
 
     /// Prints where the submission is and how many instances it covers.
     pub fn done(&self, instances: usize) -> anyhow::Result<Outcome> {
-        print(&format!("{}: {instances} instances\n", self.out.display()))?;
+        print(&format!("{}: {}\n", self.out.display(), counted(instances, "instance")))?;
         Ok(Outcome::Good)
     }
 }

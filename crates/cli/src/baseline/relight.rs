@@ -8,7 +8,7 @@ use mateval_baselines::delight::relight::{self, Dimmed, RelightOptions};
 
 use super::places::ExportPlaces;
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 
 /// Arguments of `relight`.
 #[derive(clap::Args)]
@@ -50,6 +50,7 @@ pub fn run(args: &RelightArgs) -> anyhow::Result<Outcome> {
     let options = RelightOptions { dimmed, samples: args.samples };
     let out = &args.places.out;
     let count = with_progress(|progress| relight::write(&dataset, &args.pictures, out, &options, progress))?;
-    print(&format!("'{}': {count} scenes; open '{}'\n", out.display(), out.join("index.html").display()))?;
+    let scenes = counted(count, "scene");
+    print(&format!("'{}': {scenes}; open '{}'\n", out.display(), out.join("index.html").display()))?;
     Ok(Outcome::Good)
 }

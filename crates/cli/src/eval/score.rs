@@ -89,7 +89,7 @@ pub fn run(args: &ScoreArgs) -> anyhow::Result<Outcome> {
     let results = with_progress(|progress| score(&plan, progress)).context("cannot score")?;
     for (result, out) in results.iter().zip(&outs) {
         json::write(out, result)?;
-        say_findings(&result.method, &result.findings);
+        say_findings(&result.method, &result.findings, &out.display().to_string());
         print(&format!("{}\n", out.display()))?;
     }
     if args.cache.is_none() && cache.exists() {

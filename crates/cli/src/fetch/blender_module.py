@@ -100,15 +100,20 @@ def install(*, folder: Path, requirements: str) -> None:
     if folder.exists():
         shutil.rmtree(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    made = run_quietly(command=venv)
-    if made.returncode != 0:
-        raise FetchError(f"cannot make a virtual environment in '{folder}': {last_line(made)}; {BUILTIN}")
-    print(f"downloading Blender 4.5 (0.4 GB, 0.8 GB unpacked) into '{folder}'", file=sys.stderr, flush=True)
-    unmarked = folder / f"{MARK}.partial"
-    unmarked.write_text(requirements, encoding="utf-8")
-    command = [*pip, "install", "--quiet", "--disable-pip-version-check", "--requirement", str(unmarked)]
-    call_pip(command=command, what="Blender", instead=f"run this again, {BUILTIN}")
-    unmarked.rename(folder / MARK)
+    try:
+        made = run_quietly(command=venv)
+        if made.returncode != 0:
+            raise FetchError(f"cannot make a virtual environment in '{folder}': {last_line(made)}; {BUILTIN}")
+        print(f"downloading Blender 4.5 (0.4 GB, 0.8 GB unpacked) into '{folder}'", file=sys.stderr, flush=True)
+        unmarked = folder / f"{MARK}.partial"
+        unmarked.write_text(requirements, encoding="utf-8")
+        command = [*pip, "install", "--quiet", "--disable-pip-version-check", "--requirement", str(unmarked)]
+        call_pip(command=command, what="Blender", instead=f"run this again, {BUILTIN}")
+        unmarked.rename(folder / MARK)
+    except BaseException:
+        # `mateval` would take an incomplete environment for Blender.
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def is_installed(*, folder: Path, requirements: str) -> bool:

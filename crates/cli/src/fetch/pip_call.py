@@ -21,8 +21,9 @@ CAUSES = (
     ("no module named pip", NO_PIP),
     ("no space left on device", "the disk is full"),
     ("sslerror", "the package index was not reached: its certificate is not trusted here"),
-    ("connection broken", "the package index was not reached (check the network)"),
+    ("connection broken", "the package index was not reached; is the network reachable?"),
     ("timed out", "the connection to the package index was lost"),
+    ("no matching distribution found", "no matching distribution was found; is the network reachable?"),
 )
 
 

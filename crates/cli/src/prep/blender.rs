@@ -43,19 +43,29 @@ impl BlenderArgs {
         Ok(options)
     }
 
+    /// The program that the user names, and where.
+    fn given(&self) -> Option<(PathBuf, &'static str)> {
+        let from_environment = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty());
+        let from_option = self.blender.clone().map(|path| (path, "--blender"));
+        from_option.or_else(|| from_environment.map(|path| (path.into(), "MATEVAL_BLENDER")))
+    }
+
+    /// Whether the user names a program, which must then be usable.
+    pub fn is_given(&self) -> bool {
+        self.given().is_some()
+    }
+
     fn program(&self) -> anyhow::Result<PathBuf> {
-        let from_environment = std::env::var_os("MATEVAL_BLENDER").filter(|value| !value.is_empty()).map(PathBuf::from);
-        let installed = cache_folder().join("blender/bin/python");
-        let (program, origin) = match (&self.blender, from_environment) {
-            (Some(path), _) => (path.clone(), "--blender"),
-            (None, Some(path)) => (path, "MATEVAL_BLENDER"),
-            (None, None) if installed.exists() => return Ok(installed),
-            (None, None) => {
-                let place = installed.display();
-                bail!(
-                    "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{place}' does not exist; run: {FETCH_BLENDER}, or give --renderer builtin"
-                );
+        let Some((program, origin)) = self.given() else {
+            let installed = cache_folder().join("blender/bin/python");
+            if installed.exists() {
+                return Ok(installed);
             }
+            bail!(
+                "no Blender found: neither --blender nor MATEVAL_BLENDER is given, and '{}' does not exist; run: \
+                 {FETCH_BLENDER}, or give --renderer builtin",
+                installed.display()
+            );
         };
         // A name without a folder is searched for in PATH when it is run.
         if program.components().count() > 1 && !program.is_file() {

@@ -7,7 +7,7 @@ use mateval_prep::build::BuildOptions;
 use mateval_scene::SceneId;
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print, say, say_findings};
+use crate::outcome::{Outcome, counted, print, say, say_findings};
 use crate::tool::TOOL;
 use crate::weights::cache_folder;
 
@@ -46,9 +46,9 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
         say(&format!("scene '{scene}' was already made by an earlier run"));
     }
     for (scene, findings) in &report.findings {
-        say_findings(scene.as_str(), findings);
+        say_findings(scene.as_str(), findings, "scene.json");
     }
-    print(&format!("{}: {} scenes\n", args.out.display(), report.findings.len()))?;
+    print(&format!("{}: {}\n", args.out.display(), counted(report.findings.len(), "scene")))?;
     super::finish::say_if_apart(&args.scenes, &args.out);
     Ok(Outcome::Good)
 }

@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use mateval_audit::compare::{CompareOptions, compare, text};
 use mateval_scene::{SceneId, json};
 
+use super::render::samples_parser;
 use crate::bars::with_progress;
 use crate::format::Format;
 use crate::outcome::{Outcome, print, say};
@@ -21,7 +22,7 @@ pub struct CompareArgs {
     scenes: Vec<SceneId>,
     /// Samples per pixel of each half of the built-in tracer's pictures [default: as few as leave the
     /// decision to Blender's noise or to the bound, and at most as many as Blender's].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// How to print the comparison.
     #[arg(long, value_enum, default_value = "text")]

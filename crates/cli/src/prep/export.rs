@@ -7,7 +7,7 @@ use mateval_export::croissant::Publication;
 use mateval_export::{ExportOptions, Exported, Format, export};
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 
 /// Arguments of `prep export`.
 #[derive(clap::Args)]
@@ -67,12 +67,12 @@ pub fn run(args: &ExportArgs) -> anyhow::Result<Outcome> {
     };
     let Exported { scenes, views, without_picture } =
         with_progress(|progress| export(&options, progress)).context("cannot export the dataset")?;
-    let mut line = format!("{}: {scenes} scenes", args.out.display());
+    let mut line = format!("{}: {}", args.out.display(), counted(scenes, "scene"));
     if let Some(views) = views {
-        line.push_str(&format!(", {views} views"));
+        line.push_str(&format!(", {}", counted(views, "view")));
     }
     if without_picture > 0 {
-        line.push_str(&format!("; {without_picture} views have no picture, because theirs is withheld"));
+        line.push_str(&format!("; {} without a picture, because theirs is withheld", counted(without_picture, "view")));
     }
     print(&format!("{line}\n"))?;
     Ok(Outcome::Good)

@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use mateval_scene::SceneId;
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print, say};
+use crate::outcome::{Outcome, counted, print, say};
 use crate::tool::TOOL;
 
 /// Arguments of `prep finish`.
@@ -26,7 +26,7 @@ pub fn run(args: &FinishArgs) -> anyhow::Result<Outcome> {
     };
     let dataset = with_progress(finish).context("cannot finish the dataset")?;
     let scored = dataset.scored_renderer.map_or("without scored renders".to_owned(), |id| format!("scored by {id}"));
-    print(&format!("{}: {} scenes, {scored}\n", args.dataset.display(), dataset.scenes.len()))?;
+    print(&format!("{}: {}, {scored}\n", args.dataset.display(), counted(dataset.scenes.len(), "scene")))?;
     Ok(Outcome::Good)
 }
 

@@ -6,7 +6,8 @@ use anyhow::Context as _;
 use mateval_audit::mitsuba_export::{ExportOptions, export_view};
 use mateval_scene::{SceneId, Severity, ViewId};
 
-use crate::outcome::{Outcome, print, say_findings};
+use super::render::samples_parser;
+use crate::outcome::{Outcome, counted, print, say};
 
 /// Arguments of `prep mitsuba`.
 #[derive(clap::Args)]
@@ -23,7 +24,7 @@ pub struct MitsubaArgs {
     #[arg(long)]
     out: PathBuf,
     /// Samples per pixel [default: the recipe's].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// Replace a folder that already exists.
     #[arg(long)]
@@ -41,10 +42,12 @@ pub fn run(args: &MitsubaArgs) -> anyhow::Result<Outcome> {
         force: args.force,
     };
     let findings = export_view(&options).context("cannot export to Mitsuba")?;
-    say_findings(args.scene.as_str(), &findings);
+    for finding in &findings {
+        say(&format!("{}: {finding}", args.scene));
+    }
     let differences = findings.iter().filter(|finding| finding.severity != Severity::Note).count();
     let verdict = if differences == 0 { "means the same" } else { "does NOT mean the same" };
     let file = args.out.join("scene.xml");
-    print(&format!("{}: {verdict} in Mitsuba, {differences} differences\n", file.display()))?;
+    print(&format!("{}: {verdict} in Mitsuba, {}\n", file.display(), counted(differences, "difference")))?;
     Ok(if differences == 0 { Outcome::Good } else { Outcome::No })
 }

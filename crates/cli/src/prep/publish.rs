@@ -9,7 +9,7 @@ use mateval_release::{CheckedRelease, Publication, ReleaseFile, ReleaseOptions};
 use mateval_scene::work_folder::is_inside;
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print};
+use crate::outcome::{Outcome, counted, print};
 use crate::tool::TOOL;
 
 /// Arguments of `prep publish`.
@@ -135,11 +135,11 @@ fn split(args: &PublishArgs, public: &Path, private: &Path) -> anyhow::Result<()
     let found = with_progress(|progress| publish(&args.dataset, public, private, progress))
         .context("cannot publish the dataset")?;
     print(&format!(
-        "{}: {} files\n{}: {} files\ncommitment {}\n",
+        "{}: {}\n{}: {}\ncommitment {}\n",
         public.display(),
-        found.public_files,
+        counted(found.public_files, "file"),
         private.display(),
-        found.private_files,
+        counted(found.private_files, "file"),
         found.commitment_sha256
     ))
 }
@@ -154,5 +154,5 @@ fn summary(args: &PublishArgs, file: &ReleaseFile) -> String {
         0 => "no scene compared".to_owned(),
         _ => format!("renderers agree on {agree} of {given} compared scenes"),
     };
-    format!("{}: {all} scenes, {verdict}; {compared}\n", place.display())
+    format!("{}: {}, {verdict}; {compared}\n", place.display(), counted(all, "scene"))
 }

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{Context as _, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use mateval_prep::recipe::MOST_SAMPLES;
 use mateval_prep::render::{RenderOptions, Renderer, RendererKind};
 use mateval_scene::SceneId;
 
 use super::blender::BlenderArgs;
 use crate::bars::with_progress;
 use crate::fetch::check_blender;
-use crate::outcome::{Outcome, print, say};
+use crate::outcome::{Outcome, counted, print, say};
 
 /// Arguments of `prep render`.
 #[derive(clap::Args)]
@@ -23,7 +24,7 @@ pub struct RenderArgs {
     #[command(flatten)]
     blender: BlenderArgs,
     /// Samples per pixel of each of the two halves of a picture [default: the recipe's].
-    #[arg(long)]
+    #[arg(long, value_parser = samples_parser())]
     samples: Option<u32>,
     /// Render this scene only, and leave the manifest to `prep finish`; may be given several times.
     #[arg(long = "scene", value_name = "SCENE")]
@@ -37,6 +38,11 @@ pub struct RenderArgs {
 pub fn renderer_parser() -> impl TypedValueParser<Value = RendererKind> {
     let names = RendererKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.summary()));
     PossibleValuesParser::new(names).try_map(|name| name.parse::<RendererKind>())
+}
+
+/// Reads a number of samples, as large as a recipe's may be.
+pub fn samples_parser() -> impl TypedValueParser<Value = u32> {
+    clap::value_parser!(u32).range(1..=i64::from(MOST_SAMPLES))
 }
 
 /// The renderer with its options. For Blender, fails if it cannot be found, or is a module that cannot be imported.
@@ -65,10 +71,11 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<Outcome> {
     for failure in &report.failures {
         say(&failure.to_string());
     }
-    print(&format!("{}: {} views rendered, {} kept\n", args.dataset.display(), report.rendered, report.kept))?;
+    let rendered = counted(report.rendered, "view");
+    print(&format!("{}: {rendered} rendered, {} kept\n", args.dataset.display(), report.kept))?;
     super::finish::say_if_apart(&args.scenes, &args.dataset);
     if !report.failures.is_empty() {
-        bail!("{} scenes could not be rendered; all others were rendered", report.failures.len());
+        bail!("{} could not be rendered; all others were rendered", counted(report.failures.len(), "scene"));
     }
     Ok(Outcome::Good)
 }

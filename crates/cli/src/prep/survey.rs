@@ -10,7 +10,7 @@ use mateval_prep::survey::{Selection, SurveyFile, SurveyOptions, TargetedMean, s
 use mateval_sources::front3d::camera_rules::CameraRules;
 
 use crate::bars::with_progress;
-use crate::outcome::{Outcome, print, say};
+use crate::outcome::{Outcome, counted, print, say};
 use crate::tool::TOOL;
 
 /// Arguments of `prep survey`.
@@ -115,7 +115,7 @@ pub fn run(args: &SurveyArgs) -> anyhow::Result<Outcome> {
     match &surveyed.file {
         Some(file) => report(args, file, &surveyed.source),
         None => {
-            print(&format!("{}: {} houses searched\n", args.out.display(), surveyed.houses))?;
+            print(&format!("{}: {} searched\n", args.out.display(), counted(surveyed.houses, "house")))?;
             say("when all houses are done, run the command without --house");
             Ok(Outcome::Good)
         }

@@ -18,7 +18,7 @@ use mateval_scene::{Finding, Progress, Report, SceneError, SceneId, json};
 use crate::atlas::cache::AtlasCache;
 use crate::build_scene::{self, Built};
 use crate::error::PrepError;
-use crate::finish::finish;
+use crate::finish::finish_build;
 use crate::recipe::{self, Recipe, RecipeScene};
 pub use options::BuildOptions;
 use scene_mark::{SceneMark, finished_scene, label_files, settings_sha256};
@@ -64,7 +64,7 @@ pub fn build(options: &BuildOptions, tool: &str, progress: Progress<'_>) -> Resu
         report.findings.push((entry.id.clone(), file.findings));
     }
     if options.scenes.is_empty() {
-        finish(&options.out, &[], tool, progress)?;
+        finish_build(&options.out, tool, progress)?;
     }
     Ok(report)
 }

@@ -37,7 +37,7 @@ pub use wide::{DrawnViews, WideOffset, WideViews};
 pub const RECIPE: &str = "recipe.toml";
 
 /// The most samples a pixel.
-const MOST_SAMPLES: u32 = 1 << 16;
+pub const MOST_SAMPLES: u32 = 1 << 16;
 
 /// A recipe as written.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

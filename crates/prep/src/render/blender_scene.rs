@@ -246,13 +246,20 @@ impl BlenderScene<'_> {
     }
 
     fn finding(&self, failure: Failure) -> Finding {
+        let log = match failure.log.trim().is_empty() {
+            true => "(the log is empty)".to_owned(),
+            false => format!("the log ends with:\n{}", failure.log),
+        };
         Finding {
             severity: Severity::Error,
             code: "blender_failed".to_owned(),
             file: format!("scenes/{}", self.id),
             place: String::new(),
-            message: format!("Blender failed: {}; the log ends with:\n{}", failure.what, failure.log),
-            action: format!("to repeat the failure: {}; then run `prep render` again", failure.repeat),
+            message: format!("Blender failed: {}; {log}", failure.what),
+            action: format!(
+                "to repeat the failure: {}; to render the scene, run the same `mateval` command again",
+                failure.repeat
+            ),
         }
     }
 }

@@ -18,6 +18,7 @@ mod text;
 pub(crate) mod value;
 
 pub use grouping::Grouping;
+pub use text::wrapped;
 
 use crate::error::ReportError;
 use crate::mismatch::Mismatch;
@@ -75,7 +76,9 @@ fn filled(
     check_comparable(results, ceiling, protocol)?;
     let groups = rows::groups(results, ceiling, protocol, grouping);
     let tables = layouts.iter().filter_map(|layout| table::Table::fill(layout, grouping, &groups));
-    let text: String = tables
+    // The other formats end each table with a blank line.
+    let between = if matches!(format, TableFormat::Text { .. }) { "\n" } else { "" };
+    let texts: Vec<String> = tables
         .map(|table| match format {
             TableFormat::Markdown => markdown::text(&table),
             TableFormat::Latex => latex::text(&table),
@@ -83,10 +86,10 @@ fn filled(
             TableFormat::Text { bold } => text::text(&table, bold),
         })
         .collect();
-    if text.is_empty() {
+    if texts.is_empty() {
         return Err(ReportError::NothingToShow { protocol: protocol.to_owned(), output: "a table" });
     }
-    Ok(text)
+    Ok(texts.join(between))
 }
 
 /// Fails with every reason for which the results cannot stand side by side.

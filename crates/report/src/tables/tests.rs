@@ -119,6 +119,10 @@ c\"3      20.00   0.5000    50.000
     assert!(bold.contains("\x1b[1m40.00\x1b[0m"), "{bold}");
     assert_eq!(bold.replace("\x1b[1m", "").replace("\x1b[0m", ""), text);
 
+    let two = result("a", &[("albedo.input.mse", 0.01), ("rgb_true.input.mse", 0.01)]);
+    let text = shown(&[two], Grouping::Dataset, TableFormat::Text { bold: false });
+    assert_eq!(text.lines().filter(|line| line.is_empty()).count(), 3, "two below titles, one between tables: {text}");
+
     let scores =
         ["albedo", "rgb_true", "rgb_relit"].map(|kind| [format!("{kind}.input.psnr"), format!("{kind}.novel.psnr")]);
     let all: Vec<(&str, f64)> = scores.as_flattened().iter().map(|key| (key.as_str(), 12.345)).collect();

@@ -64,7 +64,10 @@ pub(super) fn text(table: &Table<'_>, bold: bool) -> String {
     }
     if !table.too_close.is_empty() {
         text.push_str("\nCloser than the noise of the truth's own pictures:\n");
-        table.too_close.iter().for_each(|sentence| push_wrapped(&mut text, &shown(sentence)));
+        for sentence in &table.too_close {
+            let lines = wrapped(shown(sentence).split(' '), "- ", "  ", WIDTH);
+            lines.iter().for_each(|line| text.push_str(&format!("{line}\n")));
+        }
     }
     text
 }
@@ -100,17 +103,35 @@ fn push_line(text: &mut String, cells: impl Iterator<Item = String>) {
     text.push('\n');
 }
 
-fn push_wrapped(text: &mut String, sentence: &str) {
-    let mut line = "-".to_owned();
-    for word in sentence.split(' ') {
-        if width(&line) + 1 + width(word) > WIDTH {
-            text.push_str(&line);
-            text.push('\n');
-            line = " ".to_owned();
+/// Lines of at most this many columns, broken between words; a word that is wider has a line of its own. `first` begins
+/// the first line and `next` the others.
+pub fn wrapped<'a>(words: impl IntoIterator<Item = &'a str>, first: &str, next: &str, columns: usize) -> Vec<String> {
+    let (mut lines, mut line, mut is_empty) = (Vec::new(), first.to_owned(), true);
+    for word in words {
+        if !is_empty && width(&line) + 1 + width(word) > columns {
+            lines.push(std::mem::replace(&mut line, next.to_owned()));
+            is_empty = true;
         }
-        line.push(' ');
+        if !is_empty {
+            line.push(' ');
+        }
         line.push_str(word);
+        is_empty = false;
     }
-    text.push_str(&line);
-    text.push('\n');
+    lines.push(line);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_break_between_words_and_nowhere_else() {
+        let lines = |words: &[&str]| wrapped(words.iter().copied(), "- ", "  ", 8);
+        assert_eq!(lines(&["one", "two", "three"]), ["- one", "  two", "  three"]);
+        assert_eq!(lines(&["a", "b", "c", "d"]), ["- a b c", "  d"]);
+        assert_eq!(lines(&["a b c d", "e"]), ["- a b c d", "  e"]);
+        assert_eq!(lines(&[]), ["- "]);
+    }
 }

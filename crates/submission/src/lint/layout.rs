@@ -11,6 +11,7 @@ use mateval_scene::{Finding, SceneId};
 use super::finding::{error, note, warning};
 use super::names::{distance, nearest, plain};
 use super::tree::{Kind, Tree, joined};
+use crate::default_map::default_value;
 
 /// Most unknown names in a folder that are compared with the missing ones.
 const MOST_GUESSED: usize = 200;
@@ -210,9 +211,10 @@ fn check_object(tree: &Tree, folder: &str, findings: &mut Vec<Finding>) {
                 findings.push(error("missing_map", &place, message, "write it; a missing one scores as linear 0.5"));
             }
             0 => {
+                // Each map has a code of its own, since the findings of one code become one line.
+                let code = format!("default_{}", map.stem());
                 let message = format!("{} is missing, which the format allows", map.stem());
-                let value = if map == Map::Roughness { "0.5" } else { "0" };
-                findings.push(note("default_map", &place, message, format!("scored as {value}")));
+                findings.push(note(&code, &place, message, format!("scored as {}", default_value(map))));
             }
             2 => {
                 let message = "found both a PNG and an EXR; expected one of them";

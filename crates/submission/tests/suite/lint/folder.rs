@@ -79,7 +79,8 @@ pub const FAULTS: &[Fault] = &[
         std::fs::remove_file(map(root, "base_color.png")).unwrap();
         std::fs::create_dir(map(root, "base_color.png")).unwrap();
     }),
-    ("default_map", NOTE, |root| std::fs::remove_file(map(root, "roughness.png")).unwrap()),
+    ("default_roughness", NOTE, |root| std::fs::remove_file(map(root, "roughness.png")).unwrap()),
+    ("default_metallic", NOTE, |root| std::fs::remove_file(map(root, "metallic.png")).unwrap()),
     ("extra_file", NOTE, |root| std::fs::write(root.join("README.md"), "mine").unwrap()),
     ("link_leads_out", ERROR, |root| {
         let outside = root.with_file_name("outside.png");
