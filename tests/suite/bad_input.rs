@@ -55,6 +55,15 @@ impl Source {
         run(&mut verify(&self.out())).ends_with(0);
     }
 
+    /// Expects that the scene is refused with this finding as the cause. From then on, the recipe allows it.
+    #[track_caller]
+    fn is_refused_until_allowed(&self, key: &str, code: &str) {
+        let refused = self.build().ends_with(2);
+        refused.says(&format!("`{key} = true`")).says(&format!("[{code}]"));
+        let text = std::fs::read_to_string(&self.recipe).unwrap();
+        std::fs::write(&self.recipe, format!("{text}\n{key} = true\n")).unwrap();
+    }
+
     /// Expects that nothing is made and that the error names the path.
     #[track_caller]
     fn gives_error(&self, parts: &[&str]) {
@@ -80,6 +89,7 @@ fn a_truncated_texture() {
     let path = source.file("textures/planks.png");
     let bytes = std::fs::read(&path).unwrap();
     std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    source.is_refused_until_allowed("allow_unstated", "unreadable_texture");
     source.gives_finding("unreadable_texture", "textures/planks.png", "planks.png");
 }
 
@@ -93,6 +103,7 @@ fn a_texture_of_a_hundred_thousand_squared() {
     let check = crc32(&bytes[12..29]);
     bytes[29..33].copy_from_slice(&check.to_be_bytes());
     std::fs::write(&path, bytes).unwrap();
+    source.is_refused_until_allowed("allow_unstated", "unreadable_texture");
     source.gives_finding("unreadable_texture", "textures/planks.png", "100000x100000");
 }
 
@@ -109,6 +120,7 @@ fn a_texture_that_holds_nan() {
     picture.set(3, 2, LinearRgb([0.5, f32::NAN, 0.5]));
     exr_io::write_linear(&source.file("textures/planks.exr"), &picture, Precision::Float).unwrap();
     source.edit("scene.xml", |text| text.replace("planks.png", "planks.exr"));
+    source.is_refused_until_allowed("allow_unstated", "unreadable_texture");
     source.gives_finding("unreadable_texture", "textures/planks.exr", "pixel (3, 2) is NaN or infinite");
 }
 
@@ -221,8 +233,11 @@ fn cameras_that_see_nothing() {
 fn a_camera_that_is_too_near() {
     let above =
         |height: f64| format!("{{ position = [2.0, {height}, 2.0], target = [1.0, {height}, 1.0], fov_y_deg = 60.0 }}");
-    let built = built_from(&above(0.000_2), "views = []").ends_with(0);
-    built.says("warning [camera_too_near] 'scene.xml' view 'input': a surface is ");
+    // There it stands inside the rug, which no light reaches.
+    let refused = built_from(&above(0.000_2), "views = []").ends_with(2);
+    refused
+        .says("its picture would be black")
+        .says("warning [camera_too_near] 'scene.xml' view 'input': a surface is ");
     // The twin.
     assert!(!built_from(&above(0.1), "views = []").ends_with(0).stderr.contains("camera_too_near"));
 }

@@ -293,6 +293,7 @@ fn build_dataset(places: &Places) -> anyhow::Result<String> {
         out: places.dataset.clone(),
         scenes: Vec::new(),
         force: false,
+        blender: None,
         atlas_cache: Some(weights::cache_folder().join("atlases")),
     };
     let report = with_progress(|progress| build(&options, TOOL, progress)).context("cannot build the dataset")?;

@@ -2,8 +2,8 @@
 //!
 //! Axes are converted: COLMAP's cameras look along +Z with +Y down (OpenCV), ours along -Z with +Y up, and COLMAP stores
 //! camera-from-world where we store world-from-camera. Pixels are not: both count from the picture's upper left corner, so
-//! that the centre of the first pixel is (0.5, 0.5) in both, and the principal point stays the same. The world stays ours:
-//! +Y up, metres.
+//! that the centre of the first pixel is (0.5, 0.5) in both, and the principal point stays the same. The world is that of
+//! the scene's source: +Y up, metres.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -13,7 +13,7 @@ use mateval_image::{Picture, exr_io, png_io};
 use mateval_scene::{Camera, Intrinsics};
 
 use crate::error::ExportError;
-use crate::shown_view::ShownView;
+use crate::shown_view::{ShownView, in_source};
 use crate::sound_dataset::SoundDataset;
 use crate::write_file::{copy_file, write_file};
 
@@ -40,7 +40,7 @@ pub fn write_scene(sound: &SoundDataset, views: &[ShownView<'_>], out: &Path) ->
         let folder = sound.dataset.folder(&shown.scene.id).view(&shown.view.id);
         depths.push(exr_io::read_scalar(&folder.join("depth.exr"))?);
     }
-    let cameras: Vec<&Camera> = views.iter().map(|shown| &shown.view.camera).collect();
+    let cameras: Vec<Camera> = views.iter().map(in_source).collect();
     let points = match views.first() {
         Some(first) => points(&cameras, &depths, &png_io::read_rgb_bytes(&sound.dataset.root.join(&first.picture))?),
         None => Vec::new(),
@@ -58,8 +58,8 @@ pub fn write_scene(sound: &SoundDataset, views: &[ShownView<'_>], out: &Path) ->
 }
 
 /// Points under pixels of the first view's picture, on a regular grid.
-fn points(cameras: &[&Camera], depths: &[Picture<f32>], colors: &Picture<[u8; 3]>) -> Vec<Point> {
-    let (first, depth) = (cameras[0], &depths[0]);
+fn points(cameras: &[Camera], depths: &[Picture<f32>], colors: &Picture<[u8; 3]>) -> Vec<Point> {
+    let (first, depth) = (&cameras[0], &depths[0]);
     let mut step = 1;
     while depth.width().div_ceil(step) * depth.height().div_ceil(step) > MOST_POINTS {
         step += 1;
@@ -68,7 +68,7 @@ fn points(cameras: &[&Camera], depths: &[Picture<f32>], colors: &Picture<[u8; 3]
     for y in (step / 2..depth.height()).step_by(step) {
         for x in (step / 2..depth.width()).step_by(step).filter(|&x| depth.get(x, y) > 0.0) {
             let world = first.unproject(DVec2::new(x as f64 + 0.5, y as f64 + 0.5), f64::from(depth.get(x, y)));
-            let seen = (0..cameras.len()).filter_map(|at| Some((at, place(cameras[at], &depths[at], world)?)));
+            let seen = (0..cameras.len()).filter_map(|at| Some((at, place(&cameras[at], &depths[at], world)?)));
             points.push(Point { world, color: colors.get(x, y), seen: seen.collect() });
         }
     }
@@ -108,8 +108,8 @@ fn cameras_text(lenses: &[Intrinsics]) -> String {
 fn images_text(views: &[ShownView<'_>], lenses: &[Intrinsics], points: &[Point]) -> String {
     let mut text = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# X Y POINT3D_ID of each point\n".to_owned();
     for (at, shown) in views.iter().enumerate() {
-        let camera = &shown.view.camera;
-        let (q, t) = camera_from_world(camera);
+        let camera = in_source(shown);
+        let (q, t) = camera_from_world(&camera);
         let lens = lenses.iter().position(|lens| *lens == camera.intrinsics).map_or(0, |place| place + 1);
         let _ = write!(text, "{} {} {} {} {} {} {} {}", at + 1, q.w, q.x, q.y, q.z, t.x, t.y, t.z);
         let _ = writeln!(text, " {lens} {}.png", shown.view.id);

@@ -1,7 +1,8 @@
 //! A scene as nerfstudio's `transforms.json`.
 //!
 //! Nothing is converted: our cameras have the axes of OpenGL, the convention of these files, and both count pixels from the
-//! picture's upper left corner, with centres at a half. The world stays ours: +Y up, metres.
+//! picture's upper left corner, with centres at a half. The world is that of
+//! the scene's source: +Y up, metres.
 
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use mateval_scene::{Intrinsics, json};
 use serde::Serialize;
 
 use crate::error::ExportError;
-use crate::shown_view::ShownView;
+use crate::shown_view::{ShownView, in_source};
 use crate::sound_dataset::SoundDataset;
 use crate::write_file::{copy_file, make_folder_of, write_file};
 
@@ -70,7 +71,7 @@ pub fn write_scene(sound: &SoundDataset, views: &[ShownView<'_>], out: &Path) ->
         frames.push(Frame {
             file_path,
             depth_file_path,
-            transform_matrix: shown.view.camera.world_from_camera,
+            transform_matrix: in_source(shown).world_from_camera,
             lens: (!same).then(|| Lens::new(&intrinsics(shown))),
         });
     }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+use mateval_scene::Camera;
 use mateval_scene::dataset::{SceneFile, View};
 use mateval_scene::layout::INPUT;
 use mateval_scene::open::Dataset;
@@ -40,4 +42,10 @@ pub fn slashed(path: &Path) -> String {
 pub fn of_scene<'a>(dataset: &Dataset, scene: &'a SceneFile) -> Vec<ShownView<'a>> {
     let shown = |view: &'a View| Some(ShownView { scene, view, picture: picture(dataset, scene, view)? });
     scene.views.iter().filter_map(shown).collect()
+}
+
+/// The view's camera in the space of the scene's source, from which a dataset may have subtracted whole metres.
+pub(crate) fn in_source(shown: &ShownView<'_>) -> Camera {
+    let shift = DVec3::from(shown.scene.source.shift_m);
+    if shift == DVec3::ZERO { shown.view.camera } else { shown.view.camera.moved(shift) }
 }

@@ -101,6 +101,7 @@ fn counts() -> Counts {
         architecture: 7,
         others: 0,
         instances_with_atlas: 20,
+        unstated: Default::default(),
         super_categories: Vec::new(),
         categories: Vec::new(),
         findings: Vec::new(),

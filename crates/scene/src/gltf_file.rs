@@ -13,7 +13,11 @@ use crate::material::StatedParameters;
 
 /// Length of a binary file's header, in bytes.
 const GLB_HEADER: u32 = 12;
+/// Extensions that are read here or by every reader, and that the gltf crate does not know.
+const READ_HERE: [&str; 3] = [WEBP, INSTANCING, "KHR_mesh_quantization"];
 const WEBP: &str = "EXT_texture_webp";
+/// Copies of a node's mesh. The reader of the nodes makes them.
+pub const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 const KTX2: &str = "KHR_texture_basisu";
 const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 
@@ -47,6 +51,7 @@ pub fn parse(bytes: &[u8]) -> Result<GltfFile, GltfError> {
     let mut file: Value =
         serde_json::from_slice(text).map_err(|reason| GltfError::NotJson { reason, hint: hint(bytes).into_owned() })?;
     use_webp(&mut file);
+    require_others_only(&mut file);
     let without_picture = take_textures_without_picture(&mut file)?;
     let stated = list(&file, "materials").iter().map(stated_parameters).collect();
     let root: gltf::json::Root =
@@ -77,10 +82,12 @@ fn use_webp(file: &mut Value) {
             texture.insert("source".to_owned(), source);
         }
     }
-    for key in ["extensionsRequired", "extensionsUsed"] {
-        if let Some(names) = file.get_mut(key).and_then(Value::as_array_mut) {
-            names.retain(|name| name != WEBP);
-        }
+}
+
+/// Takes the extensions that are read out of the list of those that are required, which the gltf crate checks.
+fn require_others_only(file: &mut Value) {
+    if let Some(names) = file.get_mut("extensionsRequired").and_then(Value::as_array_mut) {
+        names.retain(|name| !name.as_str().is_some_and(|name| READ_HERE.contains(&name)));
     }
 }
 

@@ -66,6 +66,8 @@ pub enum SourceKind {
     Front3d,
     /// A glTF file.
     Gltf,
+    /// A Blender file, which Blender baked.
+    Blend,
 }
 
 impl fmt::Display for SourceKind {
@@ -74,6 +76,7 @@ impl fmt::Display for SourceKind {
             Self::Bitterli => "bitterli",
             Self::Front3d => "front3d",
             Self::Gltf => "gltf",
+            Self::Blend => "blend",
         })
     }
 }
@@ -127,7 +130,7 @@ mod tests {
 
     #[test]
     fn kinds_print_as_they_are_written() {
-        for kind in [SourceKind::Bitterli, SourceKind::Front3d, SourceKind::Gltf] {
+        for kind in [SourceKind::Bitterli, SourceKind::Front3d, SourceKind::Gltf, SourceKind::Blend] {
             assert_eq!(serde_json::to_value(kind).unwrap(), kind.to_string());
         }
     }

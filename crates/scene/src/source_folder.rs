@@ -130,7 +130,9 @@ impl SourceFolder {
             }
         };
         if !path.starts_with(&self.root) {
-            let message = format!("'{short}' is a link that leads out of the scene's folder");
+            let message = format!(
+                "'{short}' is a link that leads out of the folder, which is not followed; link the whole folder"
+            );
             return Err(FileFault { code: "path_escapes", message });
         }
         match path.metadata() {

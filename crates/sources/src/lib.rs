@@ -15,6 +15,8 @@ pub mod bitterli;
 pub mod clearance;
 mod coincident;
 pub mod error;
+#[cfg(test)]
+mod fallbacks;
 pub mod front3d;
 pub mod gltf;
 mod json_size;

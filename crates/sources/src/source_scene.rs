@@ -4,7 +4,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::error::{InvalidSource, SourceError};
-use crate::licence::is_optional;
 
 use glam::DVec3;
 use mateval_scene::material::StatedParameters;
@@ -41,6 +40,14 @@ pub struct InstanceOrigin {
     /// The mesh before it was moved to its place, at its final size, where the source moves copies of a model: equal for all
     /// copies.
     pub shape: Option<Arc<TriangleMesh>>,
+}
+
+/// The names of a licence beside a scene.
+pub(crate) const LICENCES: [&str; 3] = ["LICENSE.txt", "LICENSE", "license.txt"];
+
+/// Whether a scene that lacks this file lacks nothing.
+pub(crate) fn is_optional(file: &str) -> bool {
+    LICENCES.contains(&file)
 }
 
 /// What a scene names and its folder does not hold.

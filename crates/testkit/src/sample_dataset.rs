@@ -50,8 +50,15 @@ fn build_in(name: &str, line: &str) -> PathBuf {
     let whole = std::fs::read_to_string(&recipe).unwrap();
     assert!(whole.contains(HEAD[0]), "{whole}");
     std::fs::write(&recipe, whole.replace(HEAD[0], &format!("{}{line}", HEAD[1]))).unwrap();
-    let options =
-        BuildOptions { recipe, source: None, out: out.clone(), scenes: Vec::new(), force: false, atlas_cache: None };
+    let options = BuildOptions {
+        recipe,
+        source: None,
+        out: out.clone(),
+        scenes: Vec::new(),
+        force: false,
+        blender: None,
+        atlas_cache: None,
+    };
     build(&options, "test", &|_| ()).unwrap();
     out
 }

@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mateval_scene::dataset::{Instance, SceneFile};
 use mateval_scene::layout::DATASET;
+use mateval_scene::material::MaterialParameter;
 use mateval_scene::open::Dataset;
 use mateval_scene::super_categories::SUPER_CATEGORIES;
 use mateval_scene::{Finding, FindingCount, Role, SceneError, SceneId, Severity, SourceKind};
@@ -119,12 +120,28 @@ pub struct Counts {
     pub others: usize,
     /// Number of instances with an atlas, for which a submission needs textures.
     pub instances_with_atlas: usize,
+    /// Number of those whose source does not state each parameter.
+    pub unstated: UnstatedCounts,
     /// The benchmark's eight super-categories in their order, with zero where no object has one; then all others, sorted.
     pub super_categories: Vec<SuperCategoryCount>,
     /// The categories found, in the order of their super-categories and within each by decreasing number.
     pub categories: Vec<CategoryCount>,
     /// Faults of the sources, counted by severity and code.
     pub findings: Vec<FindingCount>,
+}
+
+/// For each parameter, the number of instances with an atlas whose source does not state it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UnstatedCounts {
+    /// The base colour.
+    pub base_color: usize,
+    /// The roughness.
+    pub roughness: usize,
+    /// The metallic.
+    pub metallic: usize,
+    /// The emission.
+    pub emission: usize,
 }
 
 /// The number of objects in one super-category.
@@ -225,10 +242,22 @@ fn counts(scenes: &[SceneFile]) -> Counts {
         architecture: instances().filter(|instance| instance.role.is_architecture()).count(),
         others: instances().filter(|instance| matches!(instance.role, Role::Other {})).count(),
         instances_with_atlas: instances().filter(|instance| instance.atlas.is_some()).count(),
+        unstated: UnstatedCounts {
+            base_color: unstated(scenes, MaterialParameter::BaseColor),
+            roughness: unstated(scenes, MaterialParameter::Roughness),
+            metallic: unstated(scenes, MaterialParameter::Metallic),
+            emission: unstated(scenes, MaterialParameter::Emission),
+        },
         super_categories: super_categories(&objects),
         categories: categories(&objects),
         findings: FindingCount::of(findings),
     }
+}
+
+/// The number of instances with an atlas that do not state the parameter.
+fn unstated(scenes: &[SceneFile], parameter: MaterialParameter) -> usize {
+    let instances = scenes.iter().flat_map(|scene| &scene.instances).filter(|instance| instance.atlas.is_some());
+    instances.filter(|instance| instance.unstated.contains(&parameter)).count()
 }
 
 /// The position of a super-category in tables: the eight come first, then all others, then objects without one.

@@ -52,6 +52,14 @@ fn beside(stats: &StatsFile) -> Table {
     rows.extend(kinds.map(|kind| row([&format!("scenes of {}", kind.kind), &kind.scenes.to_string()])));
     rows.push(row(["instances", &total.instances.to_string()]));
     rows.push(row(["  with an atlas", &total.instances_with_atlas.to_string()]));
+    let unstated = [
+        ("base colour", total.unstated.base_color),
+        ("roughness", total.unstated.roughness),
+        ("metallic", total.unstated.metallic),
+    ];
+    for (name, count) in unstated.into_iter().filter(|(_, count)| *count > 0) {
+        rows.push(row([&format!("    that do not state {name}"), &count.to_string()]));
+    }
     rows.push(row(["  objects", &total.objects.to_string()]));
     rows.push(row(["  architecture", &total.architecture.to_string()]));
     rows.push(row(["  others", &total.others.to_string()]));

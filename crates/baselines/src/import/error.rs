@@ -161,6 +161,9 @@ pub enum Unsupported {
     /// Triangle strips and fans.
     #[error("strips and fans are not read; write triangles")]
     StripsAndFans,
+    /// Copies of a node's mesh by `EXT_mesh_gpu_instancing`.
+    #[error("EXT_mesh_gpu_instancing is not read here; write a node for each copy")]
+    Instancing,
     /// A sampler that wraps u and v in different ways.
     #[error("a sampler that wraps u and v in different ways is not read")]
     MixedWrap,

@@ -11,7 +11,7 @@ use gltf::mesh::Mode;
 use mateval_image::texture_io::{Encoding, texture_and_alpha_of_bytes, texture_of_bytes};
 use mateval_image::{Texture, Wrap};
 use mateval_scene::gltf_accessor::{first_numbers, indices, numbers, triangles, view_bytes};
-use mateval_scene::gltf_file::{GltfFile, parse};
+use mateval_scene::gltf_file::{GltfFile, INSTANCING, parse};
 use mateval_scene::source_folder::SourceFolder;
 use mateval_scene::specular_glossiness::{SpecularGlossiness, SpecularTextures, textures};
 
@@ -198,6 +198,9 @@ impl Reader<'_> {
         while let Some((node, world_from_parent, above)) = open.pop() {
             if !visited.insert(node.index()) {
                 return Err(ImportError::NotATree { node: node.index() });
+            }
+            if node.extension_value(INSTANCING).is_some() {
+                return Err(ImportError::Unsupported(Unsupported::Instancing));
             }
             if above.len() >= MAX_DEPTH {
                 return Err(ImportError::TooDeep { node: node.index() });

@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use anyhow::bail;
-use mateval_baselines::import::{self, ImportOptions, ImportReport, ImportedFrame, ImportedInstance};
+use mateval_baselines::import::{self, FlatMaterial, ImportOptions, ImportReport, ImportedFrame, ImportedInstance};
 use mateval_baselines::submission::Method;
+use mateval_scene::material::MaterialParameter;
 use mateval_scene::{PartSetId, json};
 
 use super::places::Places;
@@ -127,11 +128,35 @@ fn text(report: &ImportReport) -> String {
             millimetres(totals.mean_distance_m),
             millimetres(totals.max_distance_m),
         );
+        for instance in scene.instances.iter().filter(|instance| instance.has_maps()) {
+            text.extend(values(instance).map(|values| format!("  {}: {values}\n", instance.instance)));
+        }
         for instance in scene.instances.iter().filter(|instance| instance.texels_without > 0 || !instance.has_maps()) {
             let _ = writeln!(text, "  {}: {}", instance.instance, shortfall(instance));
         }
     }
     text
+}
+
+/// The mean of what was read for an instance, and what the file does not state.
+fn values(instance: &ImportedInstance) -> Option<String> {
+    let FlatMaterial { base_color: [red, green, blue], roughness, metallic } = instance.mean?;
+    let number = |value: Option<f32>, parameter| match value.filter(|_| !instance.unstated.contains(&parameter)) {
+        Some(value) => format!("{value:.2}"),
+        None => "not stated, not submitted".to_owned(),
+    };
+    let mut text = format!(
+        "mean base colour {red:.2} {green:.2} {blue:.2} (linear), roughness {}, metallic {}",
+        number(roughness, MaterialParameter::Roughness),
+        number(metallic, MaterialParameter::Metallic)
+    );
+    if instance.unstated.contains(&MaterialParameter::BaseColor) {
+        text.push_str("; some of its materials state no base colour and are the format's default");
+    }
+    if instance.faces_without_uv > 0 {
+        let _ = write!(text, "; {} faces of the file have no texture coordinates", instance.faces_without_uv);
+    }
+    Some(text)
 }
 
 /// What an instance lacks, and how it will be scored.

@@ -32,6 +32,16 @@ pub struct BlenderArgs {
     attempts: u32,
 }
 
+/// The Blender at this path, or else the usual one; none where no path is given and none is installed.
+pub fn found(path: Option<PathBuf>) -> anyhow::Result<Option<BlenderOptions>> {
+    let arguments = BlenderArgs { blender: path, jobs: 1, time_limit: 7200, memory_limit: 16, attempts: 1 };
+    match arguments.options() {
+        Ok(options) => Ok(Some(options)),
+        Err(error) if arguments.is_given() => Err(error),
+        Err(_) => Ok(None),
+    }
+}
+
 impl BlenderArgs {
     /// How Blender is run; fails where it cannot be found.
     pub fn options(&self) -> anyhow::Result<BlenderOptions> {

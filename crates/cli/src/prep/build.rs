@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use mateval_prep::build::BuildOptions;
 use mateval_scene::SceneId;
 
+use super::blender;
 use crate::bars::with_progress;
 use crate::outcome::{Outcome, counted, print, say, say_findings};
 use crate::tool::TOOL;
@@ -28,6 +29,10 @@ pub struct BuildArgs {
     /// Replace a dataset that already exists; with --scene, only these scenes.
     #[arg(long)]
     force: bool,
+    /// The Blender that reads `.blend` files: Blender 4.5, or a Python with that version's `bpy` module [default:
+    /// $MATEVAL_BLENDER, else the one that `mateval fetch blender` installed].
+    #[arg(long, value_name = "PATH")]
+    blender: Option<PathBuf>,
 }
 
 /// Builds the dataset and reports the findings of each scene.
@@ -38,6 +43,7 @@ pub fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
         out: args.out.clone(),
         scenes: args.scenes.clone(),
         force: args.force,
+        blender: blender::found(args.blender.clone())?,
         atlas_cache: Some(cache_folder().join("atlases")),
     };
     let report = with_progress(|progress| mateval_prep::build::build(&options, TOOL, progress))

@@ -14,6 +14,9 @@ pub const CHOSEN_SIZES: (u32, u32) = (256, 4096);
 /// The share of a square that charts never exceed in practice; it decides only where the search for a size begins.
 const MOST_COVERAGE: f64 = 0.9;
 
+/// The largest number of texels a metre, in medians of the surface, that a triangle may have.
+const MOST_STRETCH: f64 = 8.0;
+
 /// The wanted size of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SizeWish {
@@ -83,13 +86,72 @@ pub(super) fn packed(mesh: &TriangleMesh, wish: SizeWish) -> Result<AtlasLayout,
     }
 }
 
-/// The mesh in an atlas of this size, as finely as its charts fit.
+/// The mesh in an atlas of this size, as finely as its charts fit. Triangles that would take far more texels than their
+/// area calls for are cut out and placed on one point: nearly degenerate ones, one of which can fill an atlas.
+fn pack(mesh: &TriangleMesh, size: u32) -> Result<AtlasLayout, AtlasError> {
+    let layout = pack_kept(mesh, size, |_| true)?;
+    let stretched = stretched(mesh, &layout);
+    if !stretched.contains(&true) {
+        return Ok(layout);
+    }
+    let mut kept = pack_kept(mesh, size, |triangle| !stretched[triangle])?;
+    // The others return to their places in the list.
+    let point = kept.uvs.first().copied().unwrap_or([0.0, 1.0]);
+    let mut triangles = std::mem::take(&mut kept.triangles).into_iter();
+    for (triangle, is_cut) in mesh.triangles.iter().zip(&stretched) {
+        let placed = if *is_cut {
+            triangle.map(|vertex| {
+                kept.source_vertices.push(vertex);
+                kept.uvs.push(point);
+                kept.uvs.len() as u32 - 1
+            })
+        } else {
+            // As many were packed as were kept.
+            triangles.next().unwrap_or_default()
+        };
+        kept.triangles.push(placed);
+    }
+    kept.unmapped += stretched.iter().filter(|is_cut| **is_cut).count();
+    Ok(kept)
+}
+
+/// For each triangle, whether it takes more than a texel and over [`MOST_STRETCH`] times as many texels a metre as the
+/// median of the surface.
+fn stretched(mesh: &TriangleMesh, layout: &AtlasLayout) -> Vec<bool> {
+    let texels = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| layout.uvs[vertex as usize].map(f64::from));
+        let twice = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        twice.abs() / 2.0 * f64::from(layout.size) * f64::from(layout.size)
+    };
+    let area = |triangle: usize| {
+        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3());
+        (b - a).cross(c - a).length() / 2.0
+    };
+    let all: Vec<(f64, f64)> = layout.triangles.iter().enumerate().map(|(at, t)| (texels(t), area(at))).collect();
+    // Squares of texels a metre; the median by area, so that many tiny triangles do not count more than a large one.
+    let mut densities: Vec<(f64, f64)> =
+        all.iter().filter(|(_, area)| *area > 0.0).map(|(texels, area)| (texels / area, *area)).collect();
+    densities.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = densities.iter().map(|(_, area)| area).sum::<f64>() / 2.0;
+    let mut sum = 0.0;
+    let median = densities.iter().find(|(_, area)| {
+        sum += area;
+        sum >= half
+    });
+    let Some((median, _)) = median else { return vec![false; all.len()] };
+    let most = median * MOST_STRETCH * MOST_STRETCH;
+    all.iter().map(|(texels, area)| *texels > 1.0 && *texels > most * area).collect()
+}
+
+/// The triangles that `is_kept` accepts in an atlas of this size.
 ///
 /// Charts are folded into rows, which takes milliseconds for thousands of charts. Nesting them into each other's
 /// concavities makes texels a tenth shorter and takes up to half a minute.
-fn pack(mesh: &TriangleMesh, size: u32) -> Result<AtlasLayout, AtlasError> {
+fn pack_kept(mesh: &TriangleMesh, size: u32, is_kept: impl Fn(usize) -> bool) -> Result<AtlasLayout, AtlasError> {
     let positions: Vec<[f32; 3]> = mesh.positions.iter().map(|position| position.to_array()).collect();
-    let input = MeshInput::new(&positions, mesh.triangles.as_flattened());
+    let kept = mesh.triangles.iter().enumerate().filter(|(at, _)| is_kept(*at));
+    let triangles: Vec<[u32; 3]> = kept.map(|(_, triangle)| *triangle).collect();
+    let input = MeshInput::new(&positions, triangles.as_flattened());
     let options = Options {
         density: Density::Auto { page_size: size },
         // Kept free around every chart, so that two charts are twice as far apart.

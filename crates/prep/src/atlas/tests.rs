@@ -205,3 +205,37 @@ proptest! {
         }
     }
 }
+
+/// A curved patch with a triangle of edges of 3.6, 4.7 and 8.3 cm and an area of 2.5e-10 m2 at one of its corners.
+#[test]
+fn a_nearly_degenerate_triangle_takes_no_texels() {
+    const SIDE: u32 = 16;
+    let mut mesh = TriangleMesh::default();
+    for (row, column) in (0..SIDE).flat_map(|row| (0..SIDE).map(move |column| (row, column))) {
+        let [x, z] = [column, row].map(|at| 0.3 * (at as f32 / (SIDE - 1) as f32 - 0.5));
+        mesh.positions.push(Vec3::new(x, 0.2 * (1.0 - 8.0 * (x * x + z * z)), z));
+    }
+    for (row, column) in (0..SIDE - 1).flat_map(|row| (0..SIDE - 1).map(move |column| (row, column))) {
+        let corner = row * SIDE + column;
+        mesh.triangles.push([corner, corner + SIDE, corner + 1]);
+        mesh.triangles.push([corner + 1, corner + SIDE, corner + SIDE + 1]);
+    }
+    let sound = packed(&mesh, SizeWish::Fixed(256)).unwrap();
+    let (first, place) = (mesh.positions.len() as u32, mesh.positions[0]);
+    let along = Vec3::new(-0.6, 0.0, -0.8);
+    mesh.positions.extend([place + 0.083 * along, place + 0.036 * along + Vec3::new(0.0, 6e-9, 0.0)]);
+    mesh.triangles.push([0, first, first + 1]);
+    let layout = packed(&mesh, SizeWish::Fixed(256)).unwrap();
+    assert_eq!(layout.triangles.len(), mesh.triangles.len());
+    let texels = |triangle: &[u32; 3]| {
+        let [a, b, c] = triangle.map(|vertex| layout.uvs[vertex as usize]);
+        ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs() / 2.0 * 65536.0
+    };
+    assert!(texels(layout.triangles.last().unwrap()) < 2.0);
+    let area = mesh.area();
+    assert!((layout.texel_m(area) / sound.texel_m(area) - 1.0).abs() < 0.1);
+    // Every triangle names its own vertices.
+    for (placed, own) in layout.triangles.iter().zip(&mesh.triangles) {
+        assert_eq!(placed.map(|vertex| layout.source_vertices[vertex as usize]), *own);
+    }
+}

@@ -1,8 +1,9 @@
-//! Renders with Blender's Cycles.
+//! Renders with Blender's Cycles, and has Blender [`bake`] its own files.
 //!
 //! In: a scene of a dataset and its views. Out: [`BlenderView`]s. Between: `job` writes a folder with the scene, `scripts`
 //! copies `blender_scripts` into it, `process` runs Blender and enforces limits, `view_files` reads the pictures.
 
+pub mod bake;
 pub mod job;
 mod process;
 mod scripts;

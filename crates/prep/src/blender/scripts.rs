@@ -10,27 +10,43 @@ macro_rules! script {
     };
 }
 
-/// The files of `blender_scripts`. The first one is run.
-const SCRIPTS: [(&str, &str); 13] = [
+/// The files of `blender_scripts`. The first one renders.
+const SCRIPTS: [(&str, &str); 26] = [
     script!("render.py"),
+    script!("bake_blend.py"),
     script!("mateval/__init__.py"),
-    script!("mateval/job.py"),
+    script!("mateval/bake.py"),
+    script!("mateval/baking_job.py"),
+    script!("mateval/blend_file.py"),
+    script!("mateval/bodies.py"),
     script!("mateval/camera.py"),
-    script!("mateval/environment.py"),
-    script!("mateval/metal.py"),
-    script!("mateval/plastic.py"),
-    script!("mateval/nodes.py"),
-    script!("mateval/materials.py"),
-    script!("mateval/world.py"),
-    script!("mateval/scene.py"),
+    script!("mateval/channels.py"),
     script!("mateval/cycles.py"),
     script!("mateval/denoise.py"),
+    script!("mateval/environment.py"),
+    script!("mateval/evaluated.py"),
+    script!("mateval/gltf.py"),
+    script!("mateval/job.py"),
+    script!("mateval/lighting.py"),
+    script!("mateval/materials.py"),
+    script!("mateval/metal.py"),
+    script!("mateval/nodes.py"),
+    script!("mateval/osl.py"),
+    script!("mateval/pictures.py"),
+    script!("mateval/plastic.py"),
+    script!("mateval/scene.py"),
+    script!("mateval/unwrap.py"),
+    script!("mateval/uv_charts.py"),
+    script!("mateval/world.py"),
 ];
 
-/// The folder of all files but the first.
+/// The script that bakes a `.blend` file.
+pub const BAKE: &str = "bake_blend.py";
+
+/// The folder of the modules.
 const PACKAGE: &str = "mateval";
 
-/// Writes the scripts into `folder/scripts` and returns the path of the one to run.
+/// Writes the scripts into `folder/scripts` and returns the path of the one that renders.
 pub fn write(folder: &Path) -> Result<PathBuf, PrepError> {
     let scripts = folder.join("scripts");
     let package = scripts.join(PACKAGE);

@@ -101,7 +101,8 @@ fn make_scene(
     let labels = label_files(entry, source);
     let cache = options.atlas_cache.as_deref().map(AtlasCache::new);
     let at = SceneFolder::at(work.path().to_owned());
-    let Built { licence, absent } = build_scene::build(recipe, entry, source, &at, cache.as_ref(), progress)?;
+    let Built { licence, absent } =
+        build_scene::build(recipe, entry, source, options.blender.as_ref(), &at, cache.as_ref(), progress)?;
     let licence = licence.map(|licence| Licence { scene: entry.id.clone(), file: licence.file, text: licence.text });
     let made = SceneMark { settings_sha256, licence, absent, labels };
     work.finish()?;

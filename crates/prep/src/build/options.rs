@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use mateval_scene::SceneId;
 
+use crate::render::BlenderOptions;
+
 /// The inputs of a build.
 #[derive(Clone, Debug)]
 pub struct BuildOptions {
@@ -17,6 +19,8 @@ pub struct BuildOptions {
     pub scenes: Vec<SceneId>,
     /// Replace what exists: the scenes that are named, or the whole dataset where none is.
     pub force: bool,
+    /// The Blender that reads `.blend` files; none where none was found.
+    pub blender: Option<BlenderOptions>,
     /// The folder of atlases that earlier builds made; none to make all of them.
     pub atlas_cache: Option<PathBuf>,
 }

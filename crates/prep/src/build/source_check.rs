@@ -104,6 +104,7 @@ mod tests {
                 out: "out".into(),
                 scenes: Vec::new(),
                 force: false,
+                blender: None,
                 atlas_cache: None,
             })
         };

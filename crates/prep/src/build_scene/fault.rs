@@ -1,6 +1,6 @@
 //! The faults for which a scene of a recipe is refused while it is made.
 
-use mateval_scene::Finding;
+use mateval_scene::{Finding, Severity};
 use mateval_sources::front3d::camera_sampler::CameraError;
 
 pub use super::photo::PhotoFault;
@@ -35,6 +35,9 @@ pub enum SceneFault {
         /// Each file that does not fit.
         faults: Vec<LabelFault>,
     },
+    /// The Blender file cannot be read.
+    #[error(transparent)]
+    Bake(#[from] BakeFault),
     /// The photo cannot be the input picture.
     #[error("photo: {0}")]
     Photo(PhotoFault),
@@ -128,6 +131,27 @@ pub enum SceneFault {
     DrawnCamera(#[from] CameraError),
 }
 
+/// Why a `.blend` file was not baked.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeFault {
+    /// No Blender was found.
+    #[error(
+        "a .blend file is read by Blender, and none was found; install it with `mateval fetch blender`, or name it with --blender"
+    )]
+    NoBlender,
+    /// The file is refused.
+    #[error("the .blend file is refused:{}", Finding::list(.0))]
+    Refused(Vec<Finding>),
+    /// Blender failed.
+    #[error("Blender did not bake the file: {what}; its log ends with:\n{log}")]
+    Failed {
+        /// What happened.
+        what: String,
+        /// The end of its log.
+        log: String,
+    },
+}
+
 /// A file that differs from those that the recipe pins.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PinFault {
@@ -155,13 +179,25 @@ pub enum PinFault {
     },
 }
 
+/// The findings that may be the cause of a fault.
+pub(super) fn above_notes(findings: &[Finding]) -> Vec<Finding> {
+    let mut causes: Vec<Finding> = findings.iter().filter(|found| found.severity != Severity::Note).cloned().collect();
+    causes.sort();
+    causes
+}
+
 /// What was found before a fault, which may be its cause.
 fn causes(findings: &[Finding]) -> String {
-    if findings.is_empty() {
-        String::new()
-    } else {
-        format!("\nfound before, and perhaps the cause:{}", Finding::list(findings))
+    const MOST: usize = 8;
+    let shown = &findings[..findings.len().min(MOST)];
+    let more = match findings.len() - shown.len() {
+        0 => String::new(),
+        more => format!("\n  and {more} more"),
+    };
+    if shown.is_empty() {
+        return String::new();
     }
+    format!("\nfound before, and perhaps the cause:{}{more}", Finding::list(shown))
 }
 
 fn joined<T: std::fmt::Display>(faults: &[T]) -> String {

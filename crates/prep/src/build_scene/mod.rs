@@ -24,9 +24,11 @@ use mateval_sources::source_scene::LicenceText;
 use crate::atlas::cache::AtlasCache;
 use crate::error::PrepError;
 use crate::recipe::{Recipe, RecipeScene};
-use fault::{PinFault, SceneFault};
+use crate::render::BlenderOptions;
+use fault::{PinFault, SceneFault, above_notes};
 use materials::AtlasSizes;
 use plan::Plan;
+use source::Baking;
 
 /// The facts about a finished scene that its folder does not hold.
 #[derive(Clone, Debug)]
@@ -37,18 +39,19 @@ pub struct Built {
     pub absent: Vec<String>,
 }
 
-/// Makes the scene in `folder` from its source below `source`. Atlases are taken from the cache where it holds them.
+/// Makes the scene in `folder` from its source below `source`, which `blender` reads if it is a Blender file. Atlases are taken from the cache where it holds them.
 pub fn build(
     recipe: &Recipe,
     entry: &RecipeScene,
     source: &Path,
+    blender: Option<&BlenderOptions>,
     folder: &SceneFolder,
     cache: Option<&AtlasCache>,
     progress: Progress<'_>,
 ) -> Result<Built, PrepError> {
     // The source, with numbered instances and parts.
     progress(Report::step("read the source", 0, 1));
-    let read = source::read(recipe, entry, source)?;
+    let read = source::read(recipe, entry, source, &Baking { blender, folder: folder.path(), progress })?;
     let licence = read.licence.clone();
     let missing = plausible::missing(entry, &read.missing, &entry.root(source), &read.file, &read.findings);
     let missing = missing.map_err(PrepError::scene(&entry.id))?;
@@ -64,7 +67,7 @@ pub fn build(
     let unstated = plausible::unstated(entry, &plan, &seen).map_err(PrepError::scene(&entry.id))?;
     plan.findings.extend(unstated);
     if !plausible::is_lit(&plan)? {
-        let findings = plausible::above_notes(&plan.findings);
+        let findings = above_notes(&[plan.findings.as_slice(), &seen.findings].concat());
         return Err(PrepError::scene(&entry.id)(SceneFault::NoLight { lights: plan.scene.lights.len(), findings }));
     }
     let sizes = AtlasSizes { fixed: entry.atlas_size.or(recipe.atlas_size), nearest: &seen.nearest };

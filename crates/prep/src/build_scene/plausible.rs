@@ -9,7 +9,7 @@ use mateval_scene::{Finding, Severity};
 use mateval_sources::source_scene::Missing;
 use mateval_tracer::{LightGroups, RenderSettings, World, render_views};
 
-use super::fault::SceneFault;
+use super::fault::{SceneFault, above_notes};
 use super::plan::Plan;
 use super::view_pictures::Seen;
 use crate::error::PrepError;
@@ -146,13 +146,6 @@ fn coarse(camera: &Camera) -> Camera {
         cy: k.cy * scale,
     };
     Camera { intrinsics, ..*camera }
-}
-
-/// The findings that may be the cause of a fault.
-pub(super) fn above_notes(findings: &[Finding]) -> Vec<Finding> {
-    let mut causes: Vec<Finding> = findings.iter().filter(|found| found.severity != Severity::Note).cloned().collect();
-    causes.sort();
-    causes
 }
 
 #[cfg(test)]

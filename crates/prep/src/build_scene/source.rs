@@ -3,17 +3,22 @@
 use std::path::Path;
 
 use glam::DVec3;
+use mateval_image::Wrap;
+use mateval_image::texture_io::{Encoding, read_texture};
 use mateval_scene::camera::{Camera, Intrinsics};
-use mateval_scene::material::StatedParameters;
-use mateval_scene::reference::ReferenceScene;
-use mateval_scene::{SceneLights, SourceKind};
+use mateval_scene::material::{ColorInput, Material, MaterialModel, StatedParameters, TextureIndex};
+use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, ReferenceScene, SourceTexture, SurfaceIndex};
+use mateval_scene::source_folder::SourceFolder;
+use mateval_scene::{Progress, Report, Role, SceneLights, SourceKind};
 
-use super::fault::SceneFault;
+use super::fault::{BakeFault, SceneFault};
 use super::plausible::MOST_UNSTATED;
 use super::turned_views::views_of;
+use crate::blender::bake::{Baked, BakedWorld, bake};
 use crate::error::PrepError;
 use crate::recipe::fault::RecipeSceneFault;
 use crate::recipe::{Front3dRoom, GivenCamera, RESOLUTION, Recipe, RecipeCamera, RecipeScene, RecipeSource};
+use crate::render::BlenderOptions;
 use mateval_sources::bitterli;
 use mateval_sources::front3d::camera_sampler::RoomSampler;
 use mateval_sources::front3d::{self, FurnishedHouse, HouseFiles};
@@ -24,12 +29,30 @@ use mateval_tracer::World;
 /// Width and height in pixels where neither the recipe nor a glTF with a camera states them.
 const DEFAULT_SIZE: [u32; 2] = [480, 270];
 
+/// Texels of baked textures, in metres: half a pixel of 320 columns at 1.5 m.
+const BAKED_TEXEL_M: f64 = 0.002;
+
+/// How a Blender file is read.
+pub(super) struct Baking<'a> {
+    /// None where no Blender was found.
+    pub(super) blender: Option<&'a BlenderOptions>,
+    /// A folder for what is removed afterwards.
+    pub(super) folder: &'a Path,
+    pub(super) progress: Progress<'a>,
+}
+
 /// Reads the scene; paths are relative to `root`.
-pub(super) fn read(recipe: &Recipe, entry: &RecipeScene, root: &Path) -> Result<SourceScene, PrepError> {
+pub(super) fn read(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    root: &Path,
+    baking: &Baking<'_>,
+) -> Result<SourceScene, PrepError> {
     match entry.source().map_err(PrepError::scene(&entry.id))? {
         RecipeSource::Bitterli(xml) => bitterli_scene(recipe, entry, root, xml),
         RecipeSource::Front3d(room) => front3d_scene(recipe, entry, root, room),
-        RecipeSource::Gltf(file) => gltf_scene(recipe, entry, root, file),
+        RecipeSource::Gltf(file) => gltf_scene(recipe, entry, &root.join(file), file),
+        RecipeSource::Blend(file) => blend_scene(recipe, entry, root, file, baking),
     }
 }
 
@@ -69,7 +92,7 @@ fn bitterli_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, xml: &Path)
         camera: bitterli_camera(recipe, entry, &read.camera, read.shift_m).map_err(PrepError::scene(&entry.id))?,
         scene: read.scene,
         findings: read.findings,
-        missing: Missing::files(&read.source_files, &read.absent_files),
+        missing: read.missing,
         licence: read.licence,
         files: read.source_files,
         absent: read.absent_files,
@@ -110,8 +133,9 @@ fn picture_size(recipe: &Recipe, entry: &RecipeScene, own: [u32; 2]) -> Result<[
     Err(SceneFault::FilmSize { width, height, least, most })
 }
 
-fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, file: &Path) -> Result<SourceScene, PrepError> {
-    let read = gltf::read(&root.join(file), given_place(entry), &gltf::Limits::default())?;
+/// The scene of the glTF at `path`, which the recipe names as `file`.
+fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, path: &Path, file: &Path) -> Result<SourceScene, PrepError> {
+    let read = gltf::read(path, given_place(entry), &gltf::Limits::default())?;
     Ok(SourceScene {
         kind: SourceKind::Gltf,
         lights: read.lights,
@@ -129,6 +153,98 @@ fn gltf_scene(recipe: &Recipe, entry: &RecipeScene, root: &Path, file: &Path) ->
         files: read.source_files,
         absent: read.absent_files,
     })
+}
+
+/// The scene of a Blender file: baked to a glTF, with the light from outside that glTF does not have.
+fn blend_scene(
+    recipe: &Recipe,
+    entry: &RecipeScene,
+    root: &Path,
+    file: &Path,
+    baking: &Baking<'_>,
+) -> Result<SourceScene, PrepError> {
+    let fault = |fault: BakeFault| PrepError::scene(&entry.id)(fault);
+    let options = baking.blender.ok_or_else(|| fault(BakeFault::NoBlender))?;
+    let out = baking.folder.join("baking");
+    let mut show = |line: &str| {
+        if let Some(step) = line.strip_prefix("mateval:") {
+            (baking.progress)(Report::step(step.trim(), 0, 1));
+        }
+    };
+    let path = root.join(file);
+    let baked = bake(&options.program, &options.limits, &path, BAKED_TEXEL_M, &out, &mut show)?;
+    let (glb, baked) = baked.map_err(fault)?;
+    let mut read = gltf_scene(recipe, entry, &glb, file)?;
+    read.kind = SourceKind::Blend;
+    add_world(&mut read, &baked, &out)?;
+    hide_lamps(&mut read, &baked);
+    // What was not stated before it was baked.
+    let unstated: Vec<&str> =
+        baked.materials.iter().filter(|m| m.base_color == "unstated").map(|m| m.name.as_str()).collect();
+    for (surface, origin) in read.scene.surfaces.iter().zip(&mut read.origins) {
+        let name = read.scene.materials[surface.material.0].name.as_str();
+        origin.stated.base_color &= !unstated.contains(&name);
+    }
+    // The files are those of the .blend, not of the glTF.
+    read.findings.extend(baked.findings.iter().map(|finding| finding.of_file(&read.file)));
+    read.findings.sort();
+    let mut folder =
+        SourceFolder::new(path.parent().unwrap_or(root), u64::MAX - 1).map_err(PrepError::io("open", root))?;
+    for name in std::iter::once(&read.file).chain(&baked.files) {
+        folder.read(name).map_err(|fault| PrepError::io("read", name)(std::io::Error::other(fault)))?;
+    }
+    let files = folder.into_files();
+    (read.files, read.absent, read.missing) = (files.hashes, files.absent, Missing::default());
+    std::fs::remove_dir_all(&out).map_err(PrepError::io("remove", &out))?;
+    Ok(read)
+}
+
+/// Replaces the light of a glTF without lights by the file's own light from outside.
+fn add_world(read: &mut SourceScene, baked: &Baked, out: &Path) -> Result<(), PrepError> {
+    if read.lights == SceneLights::Stage {
+        read.scene.lights.clear();
+        read.findings.retain(|finding| finding.code != "no_light");
+        read.lights = SceneLights::Own;
+    }
+    let emission = match &baked.world {
+        None => return Ok(()),
+        Some(BakedWorld::Constant { radiance }) if radiance.iter().all(|v| *v <= 0.0) => return Ok(()),
+        Some(BakedWorld::Constant { radiance }) => Emission::Constant { radiance: radiance.map(|v| v.max(0.0)) },
+        Some(BakedWorld::Map { image, world_from_environment }) => {
+            let texture = read_texture(&out.join(image), Encoding::Linear, Wrap::Repeat)?;
+            read.scene.textures.push(SourceTexture { name: "world".to_owned(), sha256: None, texture });
+            let texture = TextureIndex(read.scene.textures.len() - 1);
+            Emission::Environment { texture, scale: 1.0, world_from_environment: *world_from_environment }
+        }
+    };
+    read.scene.lights.push(LightGroup { name: "world".to_owned(), emission, camera_visible: true });
+    Ok(())
+}
+
+/// Makes area lamps what they are in Blender: light that has no body.
+fn hide_lamps(read: &mut SourceScene, baked: &Baked) {
+    for lamp in &baked.lamps {
+        let Some(at) = read.scene.surfaces.iter().position(|surface| surface.name == lamp.node) else { continue };
+        let white = ColorInput::Constant([1.0; 3]);
+        let model =
+            MaterialModel::ThinDielectric { eta: 1.0, specular_reflectance: white, specular_transmittance: white };
+        read.scene.materials.push(Material {
+            name: "light".to_owned(),
+            model,
+            two_sided: true,
+            opacity: None,
+            bump: None,
+        });
+        read.scene.surfaces[at].material = MaterialIndex(read.scene.materials.len() - 1);
+        read.origins[at].role = Role::LightFixture {};
+        let is_its = |light: &&mut LightGroup| match &light.emission {
+            Emission::Area { surfaces, .. } => surfaces.contains(&SurfaceIndex(at)),
+            _ => false,
+        };
+        for light in read.scene.lights.iter_mut().filter(is_its) {
+            light.camera_visible = lamp.visible;
+        }
+    }
 }
 
 /// The recipe's or the file's camera at the recipe's resolution. The vertical field of view is kept.

@@ -8,9 +8,8 @@ use mateval_scene::layout::{INPUT, SceneFolder, part_picture};
 use mateval_scene::{Finding, Progress, Report, SceneId, Severity, ViewId};
 use mateval_tracer::World;
 
-use super::fault::SceneFault;
+use super::fault::{SceneFault, above_notes};
 use super::plan::Plan;
-use super::plausible::above_notes;
 use crate::error::PrepError;
 use crate::views::{GeometryPictures, SeenTriangle, TruthPictures, ViewScene};
 

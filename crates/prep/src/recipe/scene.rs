@@ -13,7 +13,7 @@ use super::fault::{RecipeFault, RecipeSceneFault};
 use super::sizes::check_sizes;
 
 /// The keys of a scene that name its source.
-const SOURCE_KEYS: [&str; 3] = ["bitterli", "front3d", "gltf"];
+const SOURCE_KEYS: [&str; 4] = ["bitterli", "front3d", "gltf", "blend"];
 
 /// One scene of a recipe.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -27,6 +27,8 @@ pub struct RecipeScene {
     pub front3d: Option<Front3dRoom>,
     /// A glTF file, .glb or .gltf.
     pub gltf: Option<PathBuf>,
+    /// A Blender file, whose materials Blender bakes.
+    pub blend: Option<PathBuf>,
     /// The house that the scene belongs to, for rankings; if absent, the name of the XML's folder, the house's uid, or
     /// the glTF's name.
     pub house: Option<String>,
@@ -110,6 +112,8 @@ pub enum RecipeSource<'a> {
     Front3d(&'a Front3dRoom),
     /// A glTF.
     Gltf(&'a Path),
+    /// A Blender file.
+    Blend(&'a Path),
 }
 
 /// A path that a scene's source needs.
@@ -132,14 +136,15 @@ impl RecipeScene {
         let bitterli = self.bitterli.as_deref().map(RecipeSource::Bitterli);
         let front3d = self.front3d.as_ref().map(RecipeSource::Front3d);
         let gltf = self.gltf.as_deref().map(RecipeSource::Gltf);
-        let mut named = [bitterli, front3d, gltf].into_iter().flatten();
+        let blend = self.blend.as_deref().map(RecipeSource::Blend);
+        let mut named = [bitterli, front3d, gltf, blend].into_iter().flatten();
         match (named.next(), named.next()) {
             (Some(source), None) => Ok(source),
             _ => Err(RecipeSceneFault::NotOneSource { keys: &SOURCE_KEYS }),
         }
     }
 
-    /// The folder that the paths of the scene's files are relative to: the folder of the XML or glTF, or else `source`,
+    /// The folder that the paths of the scene's files are relative to: the folder of the XML, glTF or .blend file, or else `source`,
     /// the folder that the recipe's paths are relative to.
     pub fn root(&self, source: &Path) -> PathBuf {
         match self.main_file() {
@@ -148,9 +153,9 @@ impl RecipeScene {
         }
     }
 
-    /// The XML or glTF, which names all other files of the scene.
+    /// The XML, glTF or .blend file, which names all other files of the scene.
     fn main_file(&self) -> Option<&Path> {
-        self.bitterli.as_deref().or(self.gltf.as_deref())
+        self.bitterli.as_deref().or(self.gltf.as_deref()).or(self.blend.as_deref())
     }
 
     /// The paths that the source needs, relative to the folder of the recipe's paths.
@@ -158,6 +163,7 @@ impl RecipeScene {
         let path = |key, path: &Path, is_folder| SourcePath { key, path: path.to_owned(), is_folder };
         let mut paths: Vec<SourcePath> = self.bitterli.iter().map(|xml| path("bitterli", xml, false)).collect();
         paths.extend(self.gltf.iter().map(|gltf| path("gltf", gltf, false)));
+        paths.extend(self.blend.iter().map(|blend| path("blend", blend, false)));
         if let Some(room) = &self.front3d {
             paths.push(path("house", &room.house, false));
             paths.push(path("models", &room.models, true));
@@ -205,7 +211,7 @@ impl RecipeScene {
         match (self.source()?, &self.camera) {
             (RecipeSource::Front3d(_), None) => Err(RecipeSceneFault::NoCamera),
             (
-                RecipeSource::Bitterli(_) | RecipeSource::Gltf(_),
+                RecipeSource::Bitterli(_) | RecipeSource::Gltf(_) | RecipeSource::Blend(_),
                 Some(RecipeCamera::Seed { .. } | RecipeCamera::Designer(_)),
             ) => Err(RecipeSceneFault::CameraOfRooms),
             _ => Ok(()),
@@ -214,10 +220,11 @@ impl RecipeScene {
 
     /// [`Self::root`], as messages name it.
     fn root_name(&self) -> &'static str {
-        match (&self.bitterli, &self.gltf) {
-            (Some(_), _) => "the XML's folder",
-            (None, Some(_)) => "the glTF's folder",
-            (None, None) => "the folder that the recipe's paths are relative to",
+        match (&self.bitterli, &self.gltf, &self.blend) {
+            (Some(_), ..) => "the XML's folder",
+            (_, Some(_), _) => "the glTF's folder",
+            (.., Some(_)) => "the .blend file's folder",
+            _ => "the folder that the recipe's paths are relative to",
         }
     }
 

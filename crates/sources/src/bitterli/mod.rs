@@ -26,7 +26,7 @@ mod shape;
 mod sun;
 mod sun_sky;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 #[cfg(test)]
 mod tests_real;
 mod texture;
@@ -46,7 +46,7 @@ use crate::error::{InvalidSource, SourceError};
 use crate::licence::read_licence;
 use crate::log::Log;
 use crate::shift::{self, shift_of};
-use crate::source_scene::{InstanceOrigin, LicenceText};
+use crate::source_scene::{InstanceOrigin, LicenceText, Missing, is_optional};
 use crate::unique_names::UniqueNames;
 use document::Document;
 pub use error::{BitterliError, ValueError};
@@ -77,6 +77,8 @@ pub struct BitterliScene {
     pub source_files: Vec<(String, String)>,
     /// Every file that was looked for but is missing; sorted.
     pub absent_files: Vec<String>,
+    /// Shapes and textures that are missing.
+    pub missing: Missing,
 }
 
 /// Reads the scene whose XML is at `xml_path`. `camera` is the place of the camera that will be used instead of the scene's
@@ -99,6 +101,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<B
         log,
         source,
         search: Vec::new(),
+        left_out: Vec::new(),
         shift_m: DVec3::ZERO,
         scene: ReferenceScene::default(),
         textures: BTreeMap::new(),
@@ -119,7 +122,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<B
     coincident::separate(&mut reader.scene.surfaces, &origins, &mut reader.log);
     // Its title, findings and files.
     let title = title(licence.as_ref(), xml_path);
-    let Reader { scene, log, source, shift_m, .. } = reader;
+    let Reader { scene, log, source, shift_m, left_out, .. } = reader;
     let files = source.into_files();
     Ok(BitterliScene {
         title,
@@ -129,9 +132,19 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<B
         shift_m,
         findings: log.into_findings(),
         licence,
+        missing: missing(&document, left_out, &files.absent),
         source_files: files.hashes,
         absent_files: files.absent,
     })
+}
+
+/// Of the scene's shapes and textures, those that are missing. The file of a shape counts as the shape.
+fn missing(document: &Document, left_out: Vec<String>, absent: &[String]) -> Missing {
+    let count = |tag: &str| document.root.children.iter().filter(|element| element.tag == tag).count();
+    let is_picture = |file: &&String| !is_optional(file) && !file.to_lowercase().ends_with(".obj");
+    let pictures: Vec<String> = absent.iter().filter(is_picture).cloned().collect();
+    let wanted = count("shape") + count("bsdf") + count("emitter");
+    Missing { what: "shapes and textures", wanted, files: [left_out, pictures].concat() }
 }
 
 fn read_xml_file(xml_path: &Path, limits: &Limits) -> Result<(SourceFolder, String, String), SourceError> {

@@ -25,6 +25,8 @@ pub(super) struct Reader<'a> {
     pub(super) source: SourceFolder,
     /// Folders in which files are looked for besides the scene's own, from `<path>`.
     pub(super) search: Vec<String>,
+    /// Shapes of which nothing could be read.
+    pub(super) left_out: Vec<String>,
     /// What is subtracted from all positions.
     pub(super) shift_m: DVec3,
     pub(super) scene: ReferenceScene,

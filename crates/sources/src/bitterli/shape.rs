@@ -30,8 +30,20 @@ impl<'a> Reader<'a> {
         // The material of a shape that is left out is read too, so that its faults are reported.
         let material = self.shape_material(&bsdfs, &name, &from);
         if let Some(mesh) = self.mesh(element, &mut from, world_from_object, flip) {
-            let material = material.unwrap_or_else(|| self.default_material(&name, !emitters.is_empty()));
+            let material = material.unwrap_or_else(|| {
+                if emitters.is_empty() {
+                    self.log.note(
+                        "no_bsdf",
+                        &from.place,
+                        "the shape has no bsdf",
+                        "used Mitsuba's default, diffuse grey 0.5",
+                    );
+                }
+                self.default_material(&name, !emitters.is_empty())
+            });
             self.add_surface(name, mesh, material, &emitters);
+        } else {
+            self.left_out.push(name);
         }
         from.finish(&mut self.log);
     }

@@ -26,17 +26,18 @@ fn folder_with(xml: &str) -> tempfile::TempDir {
     std::fs::write(folder.path().join("scene.xml"), xml).unwrap();
     std::fs::create_dir(folder.path().join("models")).unwrap();
     std::fs::write(folder.path().join("models/a b.obj"), TRIANGLE).unwrap();
+    std::fs::write(folder.path().join("plain.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     write_png(&folder.path().join("a b.png"));
     folder
 }
 
-/// Reads a scene from a folder with `models/a b.obj` and `a b.png`.
-pub(super) fn read_xml(xml: &str) -> Result<BitterliScene, SourceError> {
+/// Reads a scene from a folder with `models/a b.obj`, `plain.obj` and `a b.png`.
+pub(crate) fn read_xml(xml: &str) -> Result<BitterliScene, SourceError> {
     read(&folder_with(xml).path().join("scene.xml"), None, &Limits::default())
 }
 
 /// A scene of version 0.6 with a sensor and `inner`.
-fn read_inner(inner: &str) -> BitterliScene {
+pub(crate) fn read_inner(inner: &str) -> BitterliScene {
     read_xml(&format!("<scene version='0.6.0'>{SENSOR}{inner}</scene>")).unwrap()
 }
 

@@ -23,6 +23,8 @@ use mateval_scene::source_folder::FileFault;
 
 /// Linear mid-grey, which replaces a colour or texture that cannot be read.
 pub(super) const MISSING: [f32; 3] = [0.5; 3];
+/// The colour of a material that states none.
+const WHITE: [f64; 3] = [255.0; 3];
 /// Blender's default, which BlenderProc does not change. The data has no roughness.
 const ROUGHNESS: f32 = 0.5;
 const METALLIC: f32 = 0.0;
@@ -95,7 +97,8 @@ impl Appearances {
         log: &mut Log,
     ) -> (MaterialIndex, [f32; 3]) {
         let source = material.map(|material| &house.materials[material]);
-        let plain = source.map_or(MISSING, |source| source.color.map(|v| linear_from_srgb(v as f32 / 255.0)));
+        let plain =
+            source.map_or(MISSING, |source| source.color.unwrap_or(WHITE).map(|v| linear_from_srgb(v as f32 / 255.0)));
         if let Some(known) = self.of_architecture.get(&(material, class)) {
             return (*known, plain);
         }
@@ -109,6 +112,12 @@ impl Appearances {
         let index = self.add(name.to_owned(), color, numbers);
         self.of_architecture.insert((material, class), index);
         (index, plain)
+    }
+
+    /// Whether a material of the house states its base colour, by a texture that could be read or by a colour.
+    pub(super) fn states_color(&self, source: &HouseMaterial, index: MaterialIndex) -> bool {
+        let MaterialModel::Principled { base_color, .. } = self.materials[index.0].model else { return false };
+        matches!(base_color, ColorInput::Texture { .. }) || source.color.is_some()
     }
 
     fn architecture_texture(

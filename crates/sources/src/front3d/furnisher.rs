@@ -151,7 +151,8 @@ impl<'a> Furnisher<'a> {
                 role: Role::Architecture { kind: kind.to_owned() },
                 part_of_triangle: Some(parts),
                 class_of_part: finish.map(|finish| finish.of_parts),
-                stated: self.stated(material.is_some()),
+                stated: self
+                    .stated(material.is_some_and(|at| self.appearances.states_color(&house.materials[at], index))),
                 ..InstanceOrigin::default()
             };
             self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });

@@ -81,8 +81,8 @@ pub struct HouseMaterial {
     pub texture: Option<String>,
     /// The words of its content type, as in `material wallpaper`.
     pub content: Option<String>,
-    /// sRGB-encoded colour, 0 to 255.
-    pub color: [f64; 3],
+    /// sRGB-encoded colour, 0 to 255; none where the file states none.
+    pub color: Option<[f64; 3]>,
     /// The map from the mesh's uv to the texture's.
     pub uv: UvTransform,
     /// JSON pointer to the record.

@@ -130,15 +130,15 @@ fn content(record: &Value) -> Option<String> {
     }
 }
 
-fn color(record: &Value, place: &str, log: &mut Log) -> [f64; 3] {
-    let Some(found) = record.get("color") else { return [255.0; 3] };
+fn color(record: &Value, place: &str, log: &mut Log) -> Option<[f64; 3]> {
+    let found = record.get("color")?;
     let all: Vec<f64> = found.as_array().into_iter().flatten().map_while(number).collect();
     match all.first_chunk::<3>() {
-        Some(rgb) if rgb.iter().all(|v| (0.0..=255.0).contains(v)) => *rgb,
+        Some(rgb) if rgb.iter().all(|v| (0.0..=255.0).contains(v)) => Some(*rgb),
         _ => {
             let message = format!("expected 3 or 4 numbers of 0 to 255, found {}", kind(found));
             log.warn("bad_color", &format!("{place}/color"), message, "used white");
-            [255.0; 3]
+            None
         }
     }
 }

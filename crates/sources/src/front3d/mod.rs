@@ -49,6 +49,6 @@ pub use house_files::HouseFiles;
 pub use limits::Limits;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 #[cfg(test)]
 mod tests_real;

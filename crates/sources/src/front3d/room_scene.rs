@@ -51,24 +51,30 @@ pub fn room_scene(house: &FurnishedHouse, world: &World, room: usize, views: &[C
     }
 }
 
-/// The models and textures of the room's pieces that do not exist. Those that exist and cannot be read are findings.
+/// The models and textures of the room's pieces that are not there or cannot be read.
 fn missing(house: &FurnishedHouse, room: usize) -> Missing {
     let records = house.house.rooms[room].children.iter().filter_map(|child| match child.what {
         ChildKind::Furniture(record) => Some(&house.house.furniture[record]).filter(|record| record.valid),
         ChildKind::Mesh(_) => None,
     });
+    let placed: BTreeMap<&str, bool> = house
+        .placed
+        .iter()
+        .filter(|placed| placed.room == room)
+        .filter_map(|placed| placed.model.as_ref().map(|model| (model.jid.as_str(), model.complete)))
+        .collect();
     let mut missing = Missing { what: "models and textures of the room's furniture", ..Missing::default() };
     for record in records {
-        for file in ["raw_model.obj", "texture.png"] {
-            let end = format!("{}/{file}", record.jid);
-            let absent = house.absent.iter().find(|path| path.ends_with(&end));
-            missing.wanted += 1;
-            missing.files.extend(absent.cloned());
-            // A texture is looked for once the model has been read.
-            if absent.is_some() {
-                break;
-            }
-        }
+        let lost = match placed.get(record.jid.as_str()) {
+            None => Some("raw_model.obj"),
+            Some(false) => Some("texture.png"),
+            Some(true) => None,
+        };
+        missing.wanted += 1;
+        // The path as findings give it, where the file does not exist at all.
+        let end = lost.map(|file| format!("{}/{file}", record.jid));
+        let path = end.map(|end| house.absent.iter().find(|path| path.ends_with(&end)).cloned().unwrap_or(end));
+        missing.files.extend(path);
     }
     missing
 }

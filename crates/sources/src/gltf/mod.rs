@@ -25,7 +25,7 @@ mod read_material;
 mod reader;
 mod specular_glossiness;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod texture_key;
 mod textures;
 mod uri;

@@ -10,6 +10,7 @@ use mateval_scene::camera::Camera;
 use mateval_scene::findings::shortened;
 use mateval_scene::gltf_accessor::numbers;
 use mateval_scene::gltf_error::GltfError;
+use mateval_scene::gltf_file::INSTANCING;
 use mateval_scene::reference::{Emission, Surface, SurfaceIndex};
 use serde_json::Value;
 
@@ -24,7 +25,6 @@ use crate::shift;
 use crate::source_scene::InstanceOrigin;
 use crate::surface_mesh::to_world;
 
-const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 /// Longer names are shortened, since a name may be copied to many instances.
 const LONGEST_NAME: usize = 1024;
 

@@ -47,7 +47,7 @@ fn triangle() -> Value {
 }
 
 /// [`triangle`] with the value at a JSON pointer set. A missing key is added; `-` appends to a list.
-fn with(pointer: &str, value: Value) -> Value {
+pub(crate) fn with(pointer: &str, value: Value) -> Value {
     changed(triangle(), pointer, value)
 }
 
@@ -72,7 +72,7 @@ fn read_bytes(bytes: &[u8]) -> Result<GltfScene, SourceError> {
     read_bytes_in(tempfile::tempdir().unwrap().path(), bytes)
 }
 
-fn read_json(file: &Value) -> GltfScene {
+pub(crate) fn read_json(file: &Value) -> GltfScene {
     read_bytes(file.to_string().as_bytes()).unwrap()
 }
 

@@ -244,7 +244,7 @@ fn each_material_rule_alone() {
     let (material, _) = read(json!({"UVTransform": [2, 0, 0.25, 0, -3, 0.5, 0, 0, 1]}));
     assert_eq!(material.uv, UvTransform([[2.0, 0.0, 0.25], [0.0, -3.0, 0.5]]));
     let (material, _) = read(json!({"color": [10, 20, 30]}));
-    assert_eq!(material.color, [10.0, 20.0, 30.0]);
+    assert_eq!(material.color, Some([10.0, 20.0, 30.0]));
     for (bad, code) in [
         (json!({"UVTransform": [1, 2]}), "bad_uv_transform"),
         (json!({"UVTransform": [1e9, 0, 0, 0, 1, 0, 0, 0, 1]}), "bad_uv_transform"),
@@ -254,7 +254,7 @@ fn each_material_rule_alone() {
     ] {
         let (material, findings) = read(bad);
         assert_eq!((findings.len(), findings[0].code.as_str()), (1, code));
-        assert_eq!((material.uv, material.color), (UvTransform::default(), [255.0; 3]));
+        assert_eq!((material.uv, material.color), (UvTransform::default(), None));
     }
 }
 

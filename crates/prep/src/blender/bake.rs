@@ -1,0 +1,202 @@
+//! Has Blender bake a `.blend` scene to textures and write it as glTF, by `blender_scripts/bake_blend.py`.
+//!
+//! In: the file, which is untrusted, and its folder, outside of which nothing that it names may lie. Out: a GLB, the light
+//! from outside, and what could not be kept. No Python of the file is run.
+
+use std::path::{Path, PathBuf};
+
+use mateval_scene::{Finding, Severity, json};
+use serde::{Deserialize, Serialize};
+
+use super::process::{BlenderLimits, BlenderProgram, Ended, run, tail};
+use super::scripts;
+use crate::build_scene::fault::BakeFault;
+use crate::error::PrepError;
+
+const JOB_FORMAT: &str = "mateval-bake/1";
+const RESULT_FORMAT: &str = "mateval-baked/1";
+/// Bytes of the log that an error shows.
+const SHOWN_LOG: u64 = 2000;
+
+/// The job. Lengths are in metres.
+#[derive(Serialize)]
+struct Job<'a> {
+    format: &'static str,
+    blend: &'a Path,
+    folder: &'a Path,
+    out: &'a Path,
+    /// Edge of a texture where `texel_m` is null.
+    texels: u32,
+    texel_m: Option<f64>,
+    most_texels: u32,
+    samples: u32,
+    world_rows: u32,
+    threads: u32,
+    most_instances: u32,
+    most_triangles: u32,
+    most_baked_texels: u64,
+}
+
+/// What Blender has made of the file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baked {
+    #[serde(rename = "format")]
+    _format: String,
+    /// Blender's version.
+    pub blender: String,
+    /// The GLB in the output's folder; none where the file is refused.
+    pub glb: Option<String>,
+    /// The light from outside; none where the file has none.
+    pub world: Option<BakedWorld>,
+    /// Area lamps, which are emitting rectangles in the GLB.
+    pub lamps: Vec<BakedLamp>,
+    /// The materials of the GLB.
+    pub materials: Vec<BakedMaterial>,
+    /// Files that the scene needs besides its own, relative to its folder.
+    pub files: Vec<String>,
+    /// What was left out, replaced or approximated.
+    pub findings: Vec<BakedFinding>,
+    /// Why the file is refused.
+    pub faults: Vec<BakedFinding>,
+    /// Why baking failed.
+    pub error: Option<String>,
+}
+
+/// The light from outside, in the axes of glTF.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum BakedWorld {
+    /// The same radiance from everywhere.
+    Constant {
+        /// Linear Rec. 709.
+        radiance: [f32; 3],
+    },
+    /// A latitude-longitude map.
+    Map {
+        /// An EXR file in the output's folder.
+        image: String,
+        /// Rotation of the map into the world.
+        world_from_environment: [[f32; 3]; 3],
+    },
+}
+
+/// An area lamp.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BakedLamp {
+    /// The name of its node.
+    pub node: String,
+    /// Whether the camera sees it.
+    pub visible: bool,
+}
+
+/// A material of the GLB. What else the script states of it is for people.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+pub struct BakedMaterial {
+    /// Its name in the GLB.
+    pub name: String,
+    /// `constant`, `picture`, `baked` or `unstated`.
+    pub base_color: String,
+}
+
+/// A finding of the script.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BakedFinding {
+    /// Its code.
+    pub code: String,
+    /// The object or material.
+    pub place: String,
+    /// What was expected and what was found.
+    pub message: String,
+    /// What was done.
+    pub action: String,
+}
+
+impl BakedFinding {
+    /// The finding about the file `file`.
+    pub fn of_file(&self, file: &str) -> Finding {
+        let Self { code, place, message, action } = self.clone();
+        Finding { severity: Severity::Warning, code, file: file.to_owned(), place, message, action }
+    }
+}
+
+/// Bakes the file `blend` into `out`, which is created. Textures have texels of `texel_m`.
+pub fn bake(
+    program: &BlenderProgram,
+    limits: &BlenderLimits,
+    blend: &Path,
+    texel_m: f64,
+    out: &Path,
+    on_line: &mut dyn FnMut(&str),
+) -> Result<Result<(PathBuf, Baked), BakeFault>, PrepError> {
+    // Blender has another working folder.
+    let absolute = |path: &Path| std::path::absolute(path).map_err(PrepError::io("resolve", path));
+    let (blend, out) = (absolute(blend)?, absolute(out)?);
+    std::fs::create_dir_all(&out).map_err(PrepError::io("make", &out))?;
+    let script = scripts::write(&out)?.with_file_name(scripts::BAKE);
+    let file = blend.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let job = Job {
+        format: JOB_FORMAT,
+        blend: &blend,
+        folder: blend.parent().unwrap_or(&blend),
+        out: &out,
+        texels: 1024,
+        texel_m: Some(texel_m),
+        most_texels: 4096,
+        samples: 16,
+        world_rows: 512,
+        threads: rayon::current_num_threads() as u32,
+        most_instances: 20_000,
+        most_triangles: 20_000_000,
+        most_baked_texels: 512 << 20,
+    };
+    let (job_file, log, result) = (out.join("job.json"), out.join("blender.log"), out.join("result.json"));
+    json::write(&job_file, &job)?;
+    let ended = run(program.command(&script, &job_file), &log, limits, &mut |line| {
+        line.into_iter().for_each(&mut *on_line);
+        Ok(())
+    })?;
+    // The result says more than the exit code, as far as the script came.
+    let failed = |what: String| Ok(Err(BakeFault::Failed { what, log: tail(&log, SHOWN_LOG) }));
+    if !result.is_file() {
+        return failed(ended.to_string());
+    }
+    let baked: Baked = json::read_format(&result, RESULT_FORMAT)?;
+    if !baked.faults.is_empty() {
+        return Ok(Err(BakeFault::Refused(baked.faults.iter().map(|fault| fault.of_file(&file)).collect())));
+    }
+    let is_done = matches!(ended, Ended::Itself(status) if status.success());
+    match (&baked.error, &baked.glb) {
+        (None, Some(glb)) if is_done && !glb.contains(['/', '\\']) => Ok(Ok((out.join(glb), baked))),
+        (Some(error), _) => failed(error.clone()),
+        _ => failed(ended.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_are_read_and_others_refused() {
+        let text = r#"{"format": "mateval-baked/1", "blender": "4.5.15 LTS", "glb": "scene.glb",
+            "world": {"radiance": [0, 0, 0.5]}, "lamps": [{"node": "Lamp", "visible": false}],
+            "materials": [{"name": "a", "source": null, "base_color": "unstated", "roughness": "constant", "texels": 64}],
+            "files": [], "findings": [{"code": "omitted", "place": "a", "message": "b", "action": "c"}], "faults": [],
+            "error": null}"#;
+        let parse = |text: &str| json::parse_format::<Baked>(Path::new("result.json"), text.as_bytes(), RESULT_FORMAT);
+        let baked = parse(text).unwrap();
+        assert_eq!(baked.world, Some(BakedWorld::Constant { radiance: [0.0, 0.0, 0.5] }));
+        assert_eq!(
+            (baked.materials[0].base_color.as_str(), baked.findings[0].of_file("f").place.as_str()),
+            ("unstated", "a")
+        );
+        for bad in
+            [text.replace("baked/1", "baked/9"), text.replace("\"lamps\"", "\"lamp\""), text.replace("0.5]", "0.5")]
+        {
+            assert!(parse(&bad).is_err());
+        }
+    }
+}
