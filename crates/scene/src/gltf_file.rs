@@ -49,8 +49,9 @@ pub fn parse(bytes: &[u8]) -> Result<GltfFile, GltfError> {
     let text = without_mark(&json);
     let text = &text[..text.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1)];
     let mut file: Value =
-        serde_json::from_slice(text).map_err(|reason| GltfError::NotJson { reason, hint: hint(bytes).into_owned() })?;
+        serde_json::from_slice(text).map_err(|reason| GltfError::NotJson { reason, hint: hint(text).into_owned() })?;
     use_webp(&mut file);
+    give_scenes_nodes(&mut file);
     require_others_only(&mut file);
     let without_picture = take_textures_without_picture(&mut file)?;
     let stated = list(&file, "materials").iter().map(stated_parameters).collect();
@@ -80,6 +81,15 @@ fn use_webp(file: &mut Value) {
         let source = texture.pointer(&format!("/extensions/{WEBP}/source")).cloned();
         if let (Some(source), Some(texture)) = (source, texture.as_object_mut()) {
             texture.insert("source".to_owned(), source);
+        }
+    }
+}
+
+/// Gives a scene without nodes an empty list of them, for which the gltf crate asks.
+fn give_scenes_nodes(file: &mut Value) {
+    for scene in file.get_mut("scenes").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(scene) = scene.as_object_mut() {
+            scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
         }
     }
 }
@@ -257,6 +267,11 @@ mod tests {
         for (bytes, word) in [(b"version https://git-lfs.github.com".as_slice(), "LFS"), (b"PK\x03\x04", "ZIP")] {
             assert!(parse(bytes).unwrap_err().to_string().contains(word));
         }
+    }
+
+    #[test]
+    fn a_scene_may_have_no_nodes() {
+        assert_eq!(parsed(json!({ "scenes": [{}] })).unwrap().document.scenes().next().unwrap().nodes().len(), 0);
     }
 
     #[test]

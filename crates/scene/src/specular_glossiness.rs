@@ -2,6 +2,7 @@
 //!
 //! The formulas are those of the extension's own example, "convert-between-workflows" (Khronos, glTF repository, 2017).
 
+use gltf::material::PbrSpecularGlossiness;
 use mateval_image::{ImageError, Texels, Texture, Wrap};
 
 /// The reflectance of a dielectric at normal incidence.
@@ -32,6 +33,14 @@ pub struct MetallicRoughness {
 }
 
 impl SpecularGlossiness {
+    /// The factors of a glTF's material. The extension's default of the specular colour is white, which leaves nothing of
+    /// the diffuse colour; where the file states no specular colour, it is that of a dielectric.
+    pub fn of(material: &PbrSpecularGlossiness<'_>, states_specular: bool) -> Self {
+        let [red, green, blue, _] = material.diffuse_factor();
+        let specular = if states_specular { material.specular_factor() } else { [DIELECTRIC; 3] };
+        Self { diffuse: [red, green, blue], specular, glossiness: material.glossiness_factor() }
+    }
+
     /// The material in the other parameters.
     pub fn converted(&self) -> MetallicRoughness {
         let Self { diffuse, specular, glossiness } = *self;

@@ -20,6 +20,9 @@ use crate::world::World;
 /// The largest number of material variants that one path can serve.
 pub(crate) const MOST_VARIANTS: usize = 8;
 
+/// The least cosine between two directions that count as one.
+const STRAIGHT: f32 = 0.9999;
+
 /// Events counted along paths.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PathCounts {
@@ -220,7 +223,7 @@ impl<'w, M: MaterialSource<'w, K>, const K: usize> PathTracer<'w, M, K> {
                 self.shadow_rays.push(ray);
             }
             // Sample the direction in which the path continues.
-            let sampled = sample_continuation::<R, K>(self.world, &self.settings, path, &bsdf, &place, scatterings);
+            let sampled = sample_continuation::<R, K>(self.world, &self.settings, path, &bsdf, &place, wo, scatterings);
             if let Some((path, ray, slope)) = sampled {
                 slopes.onwards = slope;
                 self.paths.push(path);
@@ -287,6 +290,7 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     mut path: Path<K>,
     bsdf: &Bsdf<'_, K>,
     place: &SurfaceHit,
+    wo: Vec3,
     scatterings: u32,
 ) -> Option<(Path<K>, Ray, Vec3)> {
     // Play Russian roulette.
@@ -308,8 +312,19 @@ fn sample_continuation<R: PathRecorder, const K: usize>(
     if path.throughputs == [Vec3::ZERO; K] {
         return None;
     }
-    path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
+    // To the camera, what lies behind the clear front of a hidden lamp is what it would be without the lamp.
+    let is_behind_lamp =
+        path.scattered.is_none() && sample.delta && is_hidden_lamp(world, place) && -wo.dot(sample.wi) > STRAIGHT;
+    if !is_behind_lamp {
+        path.scattered = Some(Scattered { from: place.position, density: sample.density, delta: sample.delta });
+    }
     Some((path, place.spawn(sample.wi), slope))
+}
+
+/// Whether the camera sees the material of an emitter instead of its light.
+fn is_hidden_lamp(world: &World, place: &SurfaceHit) -> bool {
+    let emitters = world.emitters();
+    emitters.light_of(place.surface).is_some_and(|light| !emitters.is_camera_visible(light))
 }
 
 /// Collects the contributions of paths.

@@ -9,37 +9,25 @@ use super::schema;
 use mateval_prep::faults::Faults;
 use mateval_scene::render_file::RenderFile;
 
-/// Reports an input picture that is black where it is scored, and groups of light that no view shows.
-fn check_light(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
-    let is_black = |picture: &Picture<LinearRgb>| picture.pixels().iter().all(|LinearRgb(rgb)| *rgb == [0.0; 3]);
-    // Pictures that cannot be read have been reported.
-    let input = scene.view(INPUT).map(|view| folder.view(&view.id).join("rgb.exr"));
-    if input.and_then(|path| exr_io::read_linear(&path).ok()).is_some_and(|picture| is_black(&picture)) {
+/// Radiance times exposure below which every channel of an 8-bit sRGB picture is 0: half a step of the linear part of the
+/// transfer curve.
+const BLACK: f32 = 0.5 / 255.0 / 12.92;
+
+/// Reports an input picture that is black. A black group of lights is no fault: the sky of a closed room reaches nothing.
+fn check_light(folder: &SceneFolder, scene: &SceneFile, faults: &mut Faults) {
+    let Some(view) = scene.view(INPUT) else { return };
+    // A picture that cannot be read has been reported.
+    let Ok(picture) = exr_io::read_linear(&folder.view(&view.id).join("rgb.exr")) else { return };
+    let exposure = scene.exposure as f32;
+    if picture.pixels().iter().all(|LinearRgb(rgb)| rgb.iter().all(|value| value * exposure < BLACK)) {
         let message = "the photo is black: no light reaches it; build the scene again, which says why";
         faults.add("black_photo", &format!("views/{INPUT}/rgb.exr"), "", message);
-        return;
-    }
-    for group in 0.. {
-        let path = |view: &View| folder.render(renderer, &view.id).join(format!("group_{group:02}.exr"));
-        let mut pictures = scene.views.iter().map(path).filter(|path| path.is_file()).peekable();
-        if pictures.peek().is_none() {
-            break;
-        }
-        if pictures.all(|path| exr_io::read_linear(&path).is_ok_and(|picture| is_black(&picture))) {
-            let file = format!("ground_truth/renders/{renderer}");
-            faults.add(
-                "black_group",
-                &file,
-                "",
-                format!("group_{group:02} is black in every view: its light reaches none"),
-            );
-        }
     }
 }
 
 /// Reports every view whose renders are missing, unreadable or of another size than its camera's picture.
 pub(super) fn check(folder: &SceneFolder, scene: &SceneFile, renderer: &RendererId, faults: &mut Faults) {
-    check_light(folder, scene, renderer, faults);
+    check_light(folder, scene, faults);
     for view in &scene.views {
         if folder.truth().is_dir() {
             let file = format!("ground_truth/renders/{renderer}/{}/render.json", view.id);

@@ -88,7 +88,7 @@ impl Reader<'_> {
         let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
         let glows = material.emissive_texture().is_some();
         if let Some(extension) = material.pbr_specular_glossiness() {
-            let read = self.specular_glossiness(&extension)?;
+            let read = self.specular_glossiness(&extension, stated.metallic)?;
             let roughness = read.roughness.filter(|_| stated.roughness);
             let metallic = read.metallic.filter(|_| stated.metallic);
             return Ok(DonorMaterial {
@@ -119,13 +119,12 @@ impl Reader<'_> {
     }
 
     /// A material of `KHR_materials_pbrSpecularGlossiness`. Both textures are looked up where the diffuse one is.
-    fn specular_glossiness(&mut self, material: &PbrSpecularGlossiness<'_>) -> Result<DonorMaterial, ImportError> {
-        let [red, green, blue, _] = material.diffuse_factor();
-        let factors = SpecularGlossiness {
-            diffuse: [red, green, blue],
-            specular: material.specular_factor(),
-            glossiness: material.glossiness_factor(),
-        };
+    fn specular_glossiness(
+        &mut self,
+        material: &PbrSpecularGlossiness<'_>,
+        states_specular: bool,
+    ) -> Result<DonorMaterial, ImportError> {
+        let factors = SpecularGlossiness::of(material, states_specular);
         let constant = factors.converted();
         let scalar = |factor, texture| Some(Scalar { factor, texture });
         let mut donor = DonorMaterial {

@@ -15,7 +15,7 @@ pub enum SceneFault {
     #[error(transparent)]
     Recipe(#[from] RecipeSceneFault),
     /// The source has no usable surface.
-    #[error("the source has no surface that could be read:{}", Finding::list(findings))]
+    #[error("the source has no surface that could be read{}", causes(findings))]
     NoSurfaces {
         /// Everything that was wrong with the source.
         findings: Vec<Finding>,
@@ -65,8 +65,9 @@ pub enum SceneFault {
     },
     /// Base colours are defaults of the format.
     #[error(
-        "{message}; at most {:.0} % may be unstated. Give the materials a colour or a texture (bake procedural ones), or \
-         write `allow_unstated = true` for the scene in the recipe{}",
+        "{message}; at most {:.0} % may be unstated. Give the materials a colour or a texture (bake procedural ones); \
+         or, where the exporter leaves out a white that is meant, write `allow_unstated = true` for the scene in the \
+         recipe{}",
         100.0 * most, causes(findings)
     )]
     Unstated {

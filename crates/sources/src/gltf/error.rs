@@ -92,7 +92,11 @@ fn pointer(path: &str) -> String {
 }
 
 fn and_more(others: usize) -> String {
-    if others == 0 { String::new() } else { format!(", and {others} more faults") }
+    match others {
+        0 => String::new(),
+        1 => ", and 1 more fault".to_owned(),
+        _ => format!(", and {others} more faults"),
+    }
 }
 
 /// Why a primitive of a mesh is left out.

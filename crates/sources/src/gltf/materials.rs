@@ -71,19 +71,23 @@ impl Reader<'_> {
         let name = material.name().map(shortened).unwrap_or_else(own_name);
         self.scene.materials.push(Material { name, model, two_sided: true, opacity, bump: None });
         let index = MaterialIndex(self.scene.materials.len() - 1);
-        // A primitive without a material has the format's default, which states nothing.
-        let nothing = StatedParameters { base_color: false, roughness: false, metallic: false, emission: false };
-        let stated = material.index().and_then(|index| self.file.stated.get(index)).copied().unwrap_or(nothing);
-        let read = ReadMaterial { index, uv_set: lookups.set(), stated, glow };
+        let read = ReadMaterial { index, uv_set: lookups.set(), stated: self.stated(material), glow };
         self.materials.insert(material.index(), read);
         read
+    }
+
+    /// What the file states of a material. A primitive without a material has the format's default, which states nothing.
+    fn stated(&self, material: &gltf::Material<'_>) -> StatedParameters {
+        let nothing = StatedParameters { base_color: false, roughness: false, metallic: false, emission: false };
+        material.index().and_then(|index| self.file.stated.get(index)).copied().unwrap_or(nothing)
     }
 
     fn model(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> MaterialModel {
         let (base_color, [roughness, metallic]) = match material.pbr_specular_glossiness() {
             Some(extension) => {
                 let (diffuse, specular) = (lookups.base_color.as_ref(), lookups.metallic_roughness.as_ref());
-                self.specular_glossiness(&extension, diffuse, specular, pointer)
+                let states_specular = self.stated(material).metallic;
+                self.specular_glossiness(&extension, states_specular, diffuse, specular, pointer)
             }
             None => self.metallic_roughness(material, lookups, pointer),
         };

@@ -13,20 +13,16 @@ use super::reader::Reader;
 
 impl Reader<'_> {
     /// Base colour, roughness and metallic of the material at `pointer`, whose textures are looked up as `diffuse` and
-    /// `specular` state.
+    /// `specular` state. `states_specular` is whether the file has a specular colour.
     pub(super) fn specular_glossiness(
         &mut self,
         material: &PbrSpecularGlossiness<'_>,
+        states_specular: bool,
         diffuse: Option<&Lookup<'_>>,
         specular: Option<&Lookup<'_>>,
         pointer: &str,
     ) -> (ColorInput, [ScalarInput; 2]) {
-        let [red, green, blue, _] = material.diffuse_factor();
-        let factors = SpecularGlossiness {
-            diffuse: [red, green, blue],
-            specular: material.specular_factor(),
-            glossiness: material.glossiness_factor(),
-        };
+        let factors = SpecularGlossiness::of(material, states_specular);
         self.omit(
             Omission::Slight,
             "specular-glossiness (KHR_materials_pbrSpecularGlossiness)",
