@@ -1,8 +1,8 @@
 //! Checks the scored renders: that every view has them, at its size, and that the input view shows one of them.
 
-use mateval_image::{LinearRgb, Picture, exr_io};
+use mateval_image::{LinearRgb, exr_io};
 use mateval_scene::RendererId;
-use mateval_scene::dataset::{SceneFile, View};
+use mateval_scene::dataset::SceneFile;
 use mateval_scene::layout::{INPUT, SceneFolder};
 
 use super::schema;
