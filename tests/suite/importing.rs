@@ -334,7 +334,7 @@ fn what_cannot_be_imported_is_refused_with_the_reason() {
     std::fs::write(folder.path().join("outside.mtl"), "newmtl it\nKd 1 1 1\n").unwrap();
     let cases: [(&str, String, &str); 8] = [
         ("red.obj", format!("mtllib ../../outside.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "leads out"),
-        ("red.obj", format!("{triangle}f 1 2 3\n"), "which no mtllib of the file defines"),
+        ("red.obj", format!("{triangle}f 1 2 3\n"), "faces without `usemtl`"),
         ("red.obj", format!("mtllib map.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "the faces have no vt"),
         ("red.obj", format!("mtllib none.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "does not exist"),
         ("red.obj", format!("{triangle}f 1 2 9\n"), "line 5"),

@@ -2,7 +2,7 @@
 //!
 //! `adapters/` holds those of known methods. Support for another method needs another file, and no code.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use mateval_image::LinearRgb;
@@ -33,7 +33,7 @@ const BUILT_IN: [(&str, &str); 13] = [
 ];
 
 /// The endings of files that may hold a map.
-const PICTURES: [&str; 7] = ["png", "jpg", "jpeg", "webp", "exr", "hdr", "npy"];
+const PICTURES: [&str; 9] = ["png", "jpg", "jpeg", "webp", "exr", "hdr", "npy", "tif", "tiff"];
 
 /// The pictures of a method.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -124,22 +124,32 @@ impl Adapter {
         words.collect::<Vec<_>>().join(", ")
     }
 
-    /// Pictures and arrays below `folder`, or in the folders of the scenes, that the adapter does not read; sorted.
+    /// Pictures and arrays that the adapter does not read: those in `folder`, in the folders of the scenes, and in the
+    /// folders directly below these; sorted.
     pub fn unread(&self, folder: &Path, scenes: &[&str]) -> Vec<String> {
-        let read: Vec<PathBuf> = self
+        let read: BTreeSet<PathBuf> = self
             .maps()
             .flat_map(|(_, file, _)| {
                 scenes.iter().filter_map(|scene| file.path(folder, scene).ok()).collect::<Vec<_>>()
             })
             .collect();
         let beside = scenes.iter().map(|scene| folder.join(scene)).chain([folder.to_owned()]);
-        let entries = beside.flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten().flatten());
+        let is_hidden = |path: &Path| path.file_name().is_some_and(|name| name.as_encoded_bytes()[0] == b'.');
+        let entries = |folder: &Path| {
+            let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            entries.map(|entry| entry.path()).filter(|path| !is_hidden(path)).collect::<Vec<_>>()
+        };
+        let mut folders = BTreeSet::new();
+        for beside in beside {
+            folders.extend(entries(&beside).into_iter().filter(|path| path.is_dir()));
+            folders.insert(beside);
+        }
         let is_picture = |path: &PathBuf| {
             let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or("").to_lowercase();
             PICTURES.contains(&ending.as_str())
-                && !path.file_name().is_some_and(|name| name.as_encoded_bytes()[0] == b'.')
         };
-        let unread = entries.map(|entry| entry.path()).filter(is_picture).filter(|path| !read.contains(path));
+        let files = folders.iter().flat_map(|folder| entries(folder)).filter(is_picture);
+        let unread = files.filter(|path| !read.contains(path));
         let mut names: Vec<String> =
             unread.map(|path| path.strip_prefix(folder).unwrap_or(&path).display().to_string()).collect();
         names.sort();
@@ -193,12 +203,18 @@ mod tests {
     #[test]
     fn files_that_are_not_read_are_listed() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("s")).unwrap();
+        for below in ["s/run/deep", "other"] {
+            std::fs::create_dir_all(folder.path().join(below)).unwrap();
+        }
         for name in ["rgb_albedo.png", "rgb_material.png", "rgb_normals.png", "notes.txt", "._rgb_albedo.png"] {
             std::fs::write(folder.path().join("s").join(name), "").unwrap();
         }
+        for name in ["s/run/albedo.tif", "s/run/deep/albedo.png", "other/albedo.tiff", "other/notes.txt"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
         let adapter = Adapter::find("marigold").unwrap();
-        assert_eq!(adapter.unread(folder.path(), &["s"]), ["s/rgb_normals.png"]);
+        let unread = ["other/albedo.tiff", "s/rgb_normals.png", "s/run/albedo.tif"];
+        assert_eq!(adapter.unread(folder.path(), &["s"]), unread);
         assert_eq!(
             adapter.inventory(folder.path(), &["s"]),
             "base_color of 1 scene, roughness of 1 scene, metallic of 1 scene"

@@ -26,6 +26,8 @@ const FEWEST_INSTANCES: usize = 5;
 const LEAST_SPREAD: f64 = 0.1;
 /// If no encoding has at least this correlation, the verdict is [`Verdict::Unrelated`].
 const LEAST_CORRELATION: f64 = 0.5;
+/// Slopes below this one are taken for 0.
+const LEAST_SLOPE: f64 = 1e-6;
 /// An encoding is worse than another if its mean error is larger by more than this number of standard errors of the
 /// difference, over the instances.
 const STANDARD_ERRORS: f64 = 3.0;
@@ -188,9 +190,14 @@ impl Line {
         let (xx, xy, yy) = (sum(x, x), sum(x, &y), sum(&y, &y));
         let slope = if xx > 0.0 { xy / xx } else { 0.0 };
         let correlation = if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 };
-        // A slope of 0 or below explains nothing, however small the deviations are.
-        let unit = slope.max(1e-6);
-        let bends: Vec<f64> = y.iter().zip(x).map(|(y, x)| ((y - slope * x) / unit).abs()).collect();
+        // A slope of 0 or below explains nothing, however small the deviations are: numbers that decoding clips to one
+        // value, such as negative logarithms, leave all that the truth varies.
+        let unit = slope.max(LEAST_SLOPE);
+        let bend = |(y, x): (&f64, &f64)| {
+            let bend = ((y - slope * x) / unit).abs();
+            if slope > LEAST_SLOPE { bend } else { bend.max(x.abs()) }
+        };
+        let bends: Vec<f64> = y.iter().zip(x).map(bend).collect();
         let deviations = match encoding {
             FittedEncoding::Log => bends.clone(),
             _ => y.iter().zip(x).map(|(y, x)| (y - x).abs()).collect(),
@@ -329,6 +336,13 @@ mod tests {
                 assert_eq!((found.verdict, found.fits), (Verdict::Fits, vec![encoding]), "{:?}", found.candidates);
             }
         }
+    }
+
+    /// Every other encoding clips negative numbers to one value.
+    #[test]
+    fn negative_logarithms_are_found() {
+        let found = fit(&samples(0.01, |linear| libm::log(linear + 0.001).min(-1e-3)));
+        assert_eq!((found.verdict, found.fits), (Verdict::Fits, vec![FittedEncoding::Log]), "{:?}", found.candidates);
     }
 
     /// The slope of a power of 1/2.2 that is read as linear is 1/2.2.

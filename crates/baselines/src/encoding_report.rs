@@ -223,12 +223,14 @@ fn is_stated(scene: &SceneFile, map: Map) -> bool {
 
 /// The result of the best reading: the stated one, unless another is clearly better.
 fn map_encoding(map: Map, file: &AdaptedFile, readings: &[Reading], samples: &[Samples]) -> MapEncoding {
-    // The error of a reading by its best encoding; infinite where the numbers do not follow the truth.
+    // The error of a reading by its best encoding; infinite where the numbers do not follow the truth. The line of a
+    // logarithm has a free slope, so its error counts only where nothing else fits.
     let error = |found: &EncodingFit| {
         let best = |error: f64, candidate: &Candidate| {
             if candidate.correlation > 0.5 { error.min(candidate.error) } else { error }
         };
-        found.candidates.iter().filter(|c| c.encoding.stored().is_some()).fold(f64::INFINITY, best)
+        let is_log = found.fits == [FittedEncoding::Log];
+        found.candidates.iter().filter(|c| is_log || c.encoding.stored().is_some()).fold(f64::INFINITY, best)
     };
     let fitted: Vec<EncodingFit> = samples.iter().map(|samples| fit(&samples.all)).collect();
     let is_comparable = |at: &usize| 2 * samples[*at].all.len() >= samples[0].all.len() && samples[*at].scenes > 0;

@@ -136,6 +136,28 @@ pub enum BaselineError {
         /// The largest value that is accepted.
         largest: f32,
     },
+    /// Many values are above what a material can have.
+    #[error("'{}' holds values up to {value} after decoding, and {:.0} % of its pixels are above {bright}; expected linear values from 0 to 1; write range = [0, MAX] below the map in the adapter, where MAX is the stored number that stands for 1, or scale = \"free\" if nobody knows it", path.display(), 100.0 * share)]
+    ManyTooLarge {
+        /// The picture.
+        path: PathBuf,
+        /// The largest value, linear.
+        value: f32,
+        /// The value above which the pixels are counted.
+        bright: f32,
+        /// The share of such pixels.
+        share: f64,
+    },
+    /// Numbers of bytes, saved as 16-bit integers.
+    #[error("'{}' holds 16-bit integers that reach only {largest} of 65535; expected 65535 for 1; save them as 8-bit integers, or write range = [0.0, {high}] (255 of 65535) below the map in the adapter", path.display())]
+    BytesInWords {
+        /// The picture.
+        path: PathBuf,
+        /// The largest number.
+        largest: u8,
+        /// The share of 65535 that stands for 1.
+        high: f32,
+    },
     /// Many values are far below 0.
     #[error("'{}' holds {value}, and {:.0} % of its pixels are below 0, in the adapter's `range`; expected 0 to 1; if the numbers run from -1 to 1, write range = [-1.0, 1.0] below the map in the adapter", path.display(), 100.0 * share)]
     TooSmall {

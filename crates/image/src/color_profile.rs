@@ -1,7 +1,7 @@
 //! The colour space that a photo's file states: an ICC profile, or the chunks gAMA, cHRM and cICP of a PNG.
 //!
-//! Telephones store photos in Display P3. A profile of three primaries and three curves is applied; any other is refused by
-//! its name, since taking it for sRGB would change every colour.
+//! Telephones store photos in Display P3. A profile of three primaries and three curves, or of one curve for grey, is applied;
+//! any other is refused by its name, since taking it for sRGB would change every colour. So is one that is damaged.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -10,6 +10,7 @@ use image::{ImageDecoder as _, ImageReader};
 use moxcms::{ColorProfile, DataColorSpace, LocalizableString, ProfileText, ToneReprCurve, Xyzd};
 
 use crate::ImageError;
+use crate::png_header::PngHeader;
 
 /// Linear Rec. 709 from XYZ under D50, as ICC profiles have it: the inverse of the columns of the sRGB profile (ICC,
 /// "sRGB.icc", Bradford-adapted).
@@ -22,6 +23,14 @@ const REC709_FROM_D50: [[f64; 3]; 3] = [
 const REC709: [f64; 8] = [0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290];
 /// Profiles within this of sRGB are sRGB: the difference of a third of a byte.
 const SAME: f64 = 1.5e-3;
+const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+/// The white of a profile is adapted to that of the space in between, so it is that of Rec. 709 up to rounding.
+const MOST_OFF_WHITE: f32 = 0.05;
+/// The widest spaces in use have entries of up to 2.6 (ACES 2065-1) from Rec. 709; that of XYZ itself has 3.02.
+const LARGEST_ENTRY: f64 = 4.0;
+/// Below it the primaries lie on a line, nearly.
+const LEAST_DETERMINANT: f64 = 0.01;
+const UNREADABLE: &str = "cannot be read; remove it from the file or save the photo as sRGB";
 
 /// The curves and primaries of a profile, unless they are those of sRGB.
 pub(crate) struct Profile {
@@ -35,40 +44,70 @@ impl Profile {
     /// taken for sRGB.
     pub(crate) fn of(path: &Path, bytes: &[u8]) -> Result<Option<Self>, ImageError> {
         let unsupported = |what: String| ImageError::Unsupported { path: path.to_owned(), what };
+        let unreadable = || unsupported(format!("its colour profile {UNREADABLE}"));
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok();
-        let profile = reader.and_then(|reader| reader.into_decoder().ok()?.icc_profile().ok().flatten());
-        if let Some(icc) = profile {
-            let refused = |name: &str| {
-                let what = format!("its colour profile is '{name}', which is not read; convert the photo to sRGB");
-                unsupported(what)
-            };
-            let parsed = ColorProfile::new_from_slice(&icc).map_err(|_| refused("(damaged)"))?;
-            let name = name_of(&parsed);
-            return Self::of_icc(&parsed).ok_or_else(|| refused(&name)).map(|found| found.filter(|p| !p.is_srgb()));
+        let Some(mut decoder) = reader.and_then(|reader| reader.into_decoder().ok()) else {
+            // Whoever reads the pixels reports what cannot be decoded.
+            return Ok(None);
+        };
+        let png = png_info(bytes);
+        // cICP goes before iCCP, and that before sRGB, gAMA and cHRM (PNG, third edition, section 4.3).
+        if let Some(info) = &png
+            && is_srgb_by_cicp(bytes, info).map_err(unsupported)?
+        {
+            return Ok(None);
         }
-        check_png(bytes).map_err(unsupported).map(|()| None)
+        let Some(icc) = decoder.icc_profile().map_err(|_| unreadable())? else {
+            // The decoders skip a profile that is damaged.
+            if states_icc(bytes) {
+                return Err(unreadable());
+            }
+            return png.map_or(Ok(()), |info| check_png(&info)).map_err(unsupported).map(|()| None);
+        };
+        let parsed = ColorProfile::new_from_slice(&icc).map_err(|_| unreadable())?;
+        let refused = || {
+            let name = name_of(&parsed);
+            unsupported(format!("its colour profile is '{name}', which is not read; convert the photo to sRGB"))
+        };
+        Self::of_icc(&parsed).ok_or_else(refused).map(|found| Some(found).filter(|profile| !profile.is_srgb()))
     }
 
-    /// None where the profile is not of primaries and curves; inside, none where it has the identity.
-    fn of_icc(profile: &ColorProfile) -> Option<Option<Self>> {
-        if profile.color_space == DataColorSpace::Gray {
-            // The curve of a grey photo is nearly always that of sRGB or a power of 2.2, and its colour is grey.
-            return Some(None);
-        }
-        let curves = [profile.red_trc.clone()?, profile.green_trc.clone()?, profile.blue_trc.clone()?];
-        let columns = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
-        if profile.color_space != DataColorSpace::Rgb || profile.pcs != DataColorSpace::Xyz {
+    /// None where the profile is not of primaries and curves, or of impossible ones.
+    fn of_icc(profile: &ColorProfile) -> Option<Self> {
+        if profile.pcs != DataColorSpace::Xyz {
             return None;
         }
-        let row = |row: [f64; 3]| columns.map(|Xyzd { x, y, z }| row[0] * x + row[1] * y + row[2] * z);
-        let matrix = REC709_FROM_D50.map(row);
-        matrix.iter().flatten().all(|v| v.is_finite()).then_some(Some(Self { curves, rec709_from_linear: matrix }))
+        let found = match profile.color_space {
+            DataColorSpace::Gray => {
+                let curve = profile.gray_trc.clone()?;
+                Self { curves: [curve.clone(), curve.clone(), curve], rec709_from_linear: IDENTITY }
+            }
+            DataColorSpace::Rgb => {
+                let curves = [profile.red_trc.clone()?, profile.green_trc.clone()?, profile.blue_trc.clone()?];
+                let columns = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
+                let row = |row: [f64; 3]| columns.map(|Xyzd { x, y, z }| row[0] * x + row[1] * y + row[2] * z);
+                Self { curves, rec709_from_linear: REC709_FROM_D50.map(row) }
+            }
+            _ => return None,
+        };
+        found.is_plausible().then_some(found)
+    }
+
+    /// Whether white is white, colours differ, and no number is beyond those of real profiles.
+    fn is_plausible(&self) -> bool {
+        let is_white = self.linear([1.0; 3]).iter().all(|v| (v - 1.0).abs() < MOST_OFF_WHITE);
+        let is_finite = |curve: &ToneReprCurve| (0..=32).all(|at| evaluated(curve, f64::from(at) / 32.0).is_finite());
+        let [[a, b, c], [d, e, f], [g, h, i]] = self.rec709_from_linear;
+        let determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+        is_white
+            && self.curves.iter().all(is_finite)
+            && self.rec709_from_linear.iter().flatten().all(|v| v.abs() <= LARGEST_ENTRY)
+            && determinant.abs() >= LEAST_DETERMINANT
     }
 
     /// Whether every colour stays as sRGB has it, within [`SAME`].
     fn is_srgb(&self) -> bool {
-        let identity = |r: usize, c: usize| if r == c { 1.0 } else { 0.0 };
-        let is_identity = |(r, c): (usize, usize)| (self.rec709_from_linear[r][c] - identity(r, c)).abs() < SAME;
+        let is_identity = |(r, c): (usize, usize)| (self.rec709_from_linear[r][c] - IDENTITY[r][c]).abs() < SAME;
         let srgb = |stored: f64| f64::from(crate::transfer::linear_from_srgb(stored as f32));
         let is_curve = |curve: &ToneReprCurve| {
             (0..=32).map(|at| f64::from(at) / 32.0).all(|stored| (evaluated(curve, stored) - srgb(stored)).abs() < SAME)
@@ -147,26 +186,60 @@ fn name_of(profile: &ColorProfile) -> String {
     if text.is_empty() { "(without a name)".to_owned() } else { text }
 }
 
-/// Fails where a PNG states other colours than sRGB. Other files pass.
-fn check_png(bytes: &[u8]) -> Result<(), String> {
+/// What a PNG states before its pixels; none for other files.
+fn png_info(bytes: &[u8]) -> Option<png::Info<'static>> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_ignore_text_chunk(true);
-    let Ok(info) = decoder.read_header_info() else { return Ok(()) };
-    // Those chunks follow the header.
-    let _ = info;
-    let Ok(reader) = decoder.read_info() else { return Ok(()) };
-    let info = reader.info();
-    if let Some(code) = info.coding_independent_code_points {
-        let (primaries, transfer) = (code.color_primaries, code.transfer_function);
-        // ITU-T H.273: primaries 1 are Rec. 709, transfer 13 is sRGB's.
-        return if (primaries, transfer) == (1, 13) {
-            Ok(())
-        } else {
-            Err(format!(
-                "its chunk cICP states primaries {primaries} and transfer {transfer}; convert the photo to sRGB"
-            ))
-        };
+    Some(decoder.read_info().ok()?.info().clone())
+}
+
+/// Whether the chunk cICP of a PNG states sRGB; false without it. Fails where it states other colours or cannot be read.
+fn is_srgb_by_cicp(bytes: &[u8], info: &png::Info) -> Result<bool, String> {
+    let Some(code) = info.coding_independent_code_points else {
+        let is_damaged = PngHeader::of(bytes).is_ok_and(|header| header.has(b"cICP"));
+        return if is_damaged { Err(format!("its chunk cICP {UNREADABLE}")) } else { Ok(false) };
+    };
+    let (primaries, transfer) = (code.color_primaries, code.transfer_function);
+    let range = if code.is_video_full_range_image { "full" } else { "narrow" };
+    // ITU-T H.273: primaries 1 are Rec. 709, transfer 13 is sRGB's. The matrix is always 0.
+    match (primaries, transfer, range) {
+        (1, 13, "full") => Ok(true),
+        _ => Err(format!(
+            "its chunk cICP states primaries {primaries}, transfer {transfer} and {range} range; convert the photo to sRGB"
+        )),
     }
+}
+
+/// Whether a PNG or JPEG holds a colour profile, readable or not. False for other files.
+fn states_icc(bytes: &[u8]) -> bool {
+    PngHeader::of(bytes).is_ok_and(|header| header.has(b"iCCP")) || jpeg_states_icc(bytes)
+}
+
+/// Whether a JPEG holds a part of a colour profile: a segment APP2 of that name (ICC.1:2022, annex B.4).
+fn jpeg_states_icc(bytes: &[u8]) -> bool {
+    let mut rest = bytes.strip_prefix(b"\xff\xd8").unwrap_or_default();
+    while let [0xff, marker, after @ ..] = rest {
+        match marker {
+            // A byte that fills.
+            0xff => rest = &rest[1..],
+            // The pixels, or the end.
+            0xda | 0xd9 => return false,
+            _ => {
+                let Some((length, _)) = after.split_first_chunk::<2>() else { return false };
+                let length = usize::from(u16::from_be_bytes(*length));
+                let Some(data) = after.get(2..length) else { return false };
+                if *marker == 0xe2 && data.starts_with(b"ICC_PROFILE\0") {
+                    return true;
+                }
+                rest = &after[length..];
+            }
+        }
+    }
+    false
+}
+
+/// Fails where a PNG states other colours than sRGB by its chunks gAMA and cHRM.
+fn check_png(info: &png::Info) -> Result<(), String> {
     if info.srgb.is_some() {
         return Ok(());
     }
@@ -193,7 +266,137 @@ mod tests {
 
     fn profile(profile: &ColorProfile) -> Option<Profile> {
         let bytes = profile.encode().unwrap();
-        Profile::of_icc(&ColorProfile::new_from_slice(&bytes).unwrap()).unwrap()
+        Profile::of_icc(&ColorProfile::new_from_slice(&bytes).unwrap())
+    }
+
+    /// A PNG of two black pixels with a profile and further chunks before its pixels.
+    fn png_with(profile: Option<&ColorProfile>, color: png::ColorType, chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
+        let mut info = png::Info::with_size(2, 1);
+        (info.color_type, info.bit_depth) = (color, png::BitDepth::Eight);
+        info.icc_profile = profile.map(|profile| profile.encode().unwrap().into());
+        let mut bytes = Vec::new();
+        let mut writer = png::Encoder::with_info(&mut bytes, info).unwrap().write_header().unwrap();
+        for (name, data) in chunks {
+            writer.write_chunk(png::chunk::ChunkType(**name), data).unwrap();
+        }
+        writer.write_image_data(&vec![0; 2 * color.samples()]).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    fn read(bytes: &[u8]) -> Result<Option<Profile>, String> {
+        Profile::of(Path::new("a"), bytes).map_err(|error| error.to_string())
+    }
+
+    fn refusal(bytes: &[u8]) -> String {
+        read(bytes).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn a_damaged_profile_is_refused() {
+        let p3 = ColorProfile::new_display_p3();
+        let sound = png_with(Some(&p3), png::ColorType::Rgb, &[]);
+        assert!(read(&sound).unwrap().is_some());
+        // Another byte in the compressed profile, which its checksum reveals.
+        let mut changed = sound.clone();
+        let at = sound.windows(4).position(|name| name == b"iCCP").unwrap();
+        changed[at + 12] ^= 1;
+        let mut files = vec![changed];
+        // No zlib data, a start of such data, and a profile that is none: one stored block of no bytes.
+        for data in
+            [b"mine\0\0not even packed".as_slice(), b"mine\0\0\x78\x01", b"mine\0\0\x78\x01\x01\0\0\xff\xff\0\0\0\x01"]
+        {
+            files.push(png_with(None, png::ColorType::Rgb, &[(b"iCCP", data)]));
+        }
+        for file in files {
+            let error = refusal(&file);
+            assert!(error.contains("colour profile cannot be read") && error.contains("remove it"), "{error}");
+        }
+        // Its twin, without a profile.
+        assert!(read(&png_with(None, png::ColorType::Rgb, &[])).unwrap().is_none());
+    }
+
+    #[test]
+    fn a_jpeg_that_lacks_a_part_of_its_profile_is_refused() {
+        let mut jpeg = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+        let icc = ColorProfile::new_display_p3().encode().unwrap();
+        image::ImageEncoder::set_icc_profile(&mut encoder, icc).unwrap();
+        image::ImageEncoder::write_image(encoder, &[90; 8 * 8 * 3], 8, 8, image::ExtendedColorType::Rgb8).unwrap();
+        assert!(read(&jpeg).unwrap().is_some());
+        // The part's number and how many there are follow its name.
+        let name = b"ICC_PROFILE\0";
+        let at = jpeg.windows(name.len()).position(|part| part == name).unwrap() + name.len();
+        assert_eq!(jpeg[at..at + 2], [1, 1]);
+        jpeg[at + 1] = 2;
+        assert!(refusal(&jpeg).contains("colour profile cannot be read"), "{}", refusal(&jpeg));
+    }
+
+    /// Gamma 1.0, the curve of sRGB, and one whose white is dark.
+    #[test]
+    fn the_curve_of_a_grey_profile_is_applied() {
+        let grey = |curve: ToneReprCurve| {
+            let mut grey = ColorProfile::new_gray_with_gamma(1.0);
+            grey.gray_trc = Some(curve);
+            png_with(Some(&grey), png::ColorType::Grayscale, &[])
+        };
+        let linear = read(&grey(ToneReprCurve::Lut(vec![256]))).unwrap().unwrap();
+        assert!(linear.linear([0.25; 3]).iter().all(|v| (v - 0.25).abs() < 1e-6));
+        let srgb = ToneReprCurve::Parametric(vec![2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045]);
+        assert!(read(&grey(srgb)).unwrap().is_none());
+        let error = refusal(&grey(ToneReprCurve::Lut(vec![0, 9000])));
+        assert!(error.contains("'(without a name)', which is not read"), "{error}");
+        // A curve of lightness.
+        let mut lab = ColorProfile::new_gray_with_gamma(1.0);
+        lab.pcs = DataColorSpace::Lab;
+        assert!(Profile::of_icc(&lab).is_none());
+    }
+
+    #[test]
+    fn the_chunk_cicp_goes_before_a_profile() {
+        let (srgb, p3) = (ColorProfile::new_srgb(), ColorProfile::new_display_p3());
+        let with =
+            |profile: &ColorProfile, code: &[u8]| png_with(Some(profile), png::ColorType::Rgb, &[(b"cICP", code)]);
+        assert!(read(&with(&p3, &[1, 13, 0, 1])).unwrap().is_none());
+        // Rec. 2100 PQ, and sRGB in narrow range.
+        for (code, words) in [([9, 16, 0, 1], "primaries 9"), ([1, 13, 0, 0], "narrow")] {
+            let error = refusal(&with(&srgb, &code));
+            assert!(error.contains(words), "{error}");
+        }
+        // Another byte, which the chunk's checksum reveals.
+        let mut damaged = with(&srgb, &[1, 13, 0, 1]);
+        let at = damaged.windows(4).position(|name| name == b"cICP").unwrap();
+        damaged[at + 4] = 9;
+        assert!(refusal(&damaged).contains("cICP cannot be read"), "{}", refusal(&damaged));
+    }
+
+    #[test]
+    fn impossible_primaries_are_refused() {
+        let scaled = |factors: [f64; 3]| {
+            let mut p3 = ColorProfile::new_display_p3();
+            let columns = [&mut p3.red_colorant, &mut p3.green_colorant, &mut p3.blue_colorant];
+            for (column, factor) in columns.into_iter().zip(factors) {
+                *column = Xyzd { x: column.x * factor, y: column.y * factor, z: column.z * factor };
+            }
+            profile(&p3)
+        };
+        assert!(scaled([1.0; 3]).is_some());
+        for factors in [[1e-9; 3], [1000.0; 3], [1000.0, -1000.0, 1.0], [0.8; 3]] {
+            assert!(scaled(factors).is_none(), "{factors:?}");
+        }
+        // White is white, but each primary is grey.
+        let mut grey = ColorProfile::new_srgb();
+        let third = Xyzd { x: 0.9642 / 3.0, y: 1.0 / 3.0, z: 0.8249 / 3.0 };
+        (grey.red_colorant, grey.green_colorant, grey.blue_colorant) = (third, third, third);
+        assert!(profile(&grey).is_none());
+    }
+
+    /// The spaces that photos are stored in.
+    #[test]
+    fn wide_spaces_are_read() {
+        for wide in [ColorProfile::new_adobe_rgb(), ColorProfile::new_pro_photo_rgb(), ColorProfile::new_bt2020()] {
+            assert!(!profile(&wide).unwrap().is_srgb());
+        }
     }
 
     /// The primaries of Display P3 (SMPTE EG 432-1) under the curve of sRGB: its red is (1.2249, -0.0420, -0.0196) in Rec.

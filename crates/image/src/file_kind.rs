@@ -6,7 +6,7 @@ use std::borrow::Cow;
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Kinds of files that are found in place of others, by their first bytes. The first that matches counts.
-const KINDS: [(&[u8], &str); 27] = [
+const KINDS: [(&[u8], &str); 25] = [
     (b"version https://git-lfs.", "a Git LFS pointer in place of the file; run `git lfs pull` where it was cloned"),
     (b"\xff\xfe\0\0", "UTF-32 text; save it as UTF-8"),
     (b"\0\0\xfe\xff", "UTF-32 text; save it as UTF-8"),
@@ -32,9 +32,22 @@ const KINDS: [(&[u8], &str); 27] = [
     (b"DDS ", "a DDS texture; convert it to PNG"),
     (b"\x93NUMPY", "a NumPy array"),
     (b"%PDF", "a PDF"),
-    (b"<!DOCTYPE html", "a web page; a download probably asked to sign in"),
-    (b"<html", "a web page; a download probably asked to sign in"),
 ];
+
+/// Kinds that begin with a length, by what follows it (ISO/IEC 14496-12).
+const KINDS_BEHIND_LENGTH: [(&[u8], &str); 7] = [
+    (b"ftypavif", "an AVIF picture; save it as PNG or JPEG"),
+    (b"ftypavis", "an AVIF picture; save it as PNG or JPEG"),
+    (b"ftypheic", HEIC),
+    (b"ftypheix", HEIC),
+    (b"ftypheim", HEIC),
+    (b"ftypmif1", HEIC),
+    (b"ftypmsf1", HEIC),
+];
+const HEIC: &str = "a HEIC picture, as telephones write it; save it as PNG or JPEG";
+
+/// How a web page begins, in lower case.
+const WEB_PAGE: [&[u8]; 2] = [b"<!doctype html", b"<html"];
 
 /// The kind of a file that cannot be read as what was expected, and what to do; `None` where its first bytes are those
 /// of no kind that is often mistaken for another.
@@ -42,10 +55,21 @@ pub fn mistaken_for(bytes: &[u8]) -> Option<&'static str> {
     if bytes.is_empty() {
         return Some("an empty file");
     }
-    let known = KINDS.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind);
+    let among = |kinds: &[(&[u8], &'static str)], bytes: &[u8]| {
+        kinds.iter().find(|(start, _)| bytes.starts_with(start)).map(|(_, kind)| *kind)
+    };
+    let known = among(&KINDS, bytes).or_else(|| among(&KINDS_BEHIND_LENGTH, bytes.get(4..)?));
+    let known = known.or_else(|| {
+        is_web_page(bytes).then_some("a web page in place of the file; a download probably asked to sign in")
+    });
     // ASCII characters as UTF-16 without a mark: every second byte is 0.
     let is_utf16 = || bytes.len() >= 4 && (bytes[..2].contains(&0) && bytes[2..4].contains(&0) && bytes[..4] != [0; 4]);
     known.or_else(|| is_utf16().then_some("UTF-16 text; save it as UTF-8"))
+}
+
+fn is_web_page(bytes: &[u8]) -> bool {
+    let bytes = without_mark(bytes).trim_ascii_start();
+    WEB_PAGE.iter().any(|start| bytes.get(..start.len()).is_some_and(|found| found.eq_ignore_ascii_case(start)))
 }
 
 /// Whether the file is a Git LFS pointer, which no format of ours begins like.
@@ -78,11 +102,18 @@ mod tests {
             (b"PK\x03\x04...", "ZIP"),
             (b"#usda 1.0", "USD"),
             (b"", "empty"),
+            (b"<!DOCTYPE html>", "web page"),
+            (b"\n<HTML lang='en'>", "web page"),
+            (b"\0\0\0\x18ftypheic\0\0\0\0mif1heic", "HEIC"),
+            (b"\0\0\0\x18ftypmif1", "HEIC"),
+            (b"\0\0\0\x1cftypavif", "AVIF"),
         ] {
             assert!(mistaken_for(bytes).is_some_and(|kind| kind.contains(word)), "{word}");
         }
         // Twins: what the readers expect.
-        for bytes in [b"{}".as_slice(), b"<scene version='3'/>", b"v 0 0 0\n", b"\xef\xbb\xbf{}", b"{", b"\0\0\0\0"] {
+        for bytes in
+            [b"{}".as_slice(), b"<scene version='3'/>", b"v 0 0 0\n", b"\xef\xbb\xbf{}", b"{", b"\0\0\0\0", b"<htm"]
+        {
             assert_eq!(mistaken_for(bytes), None);
         }
         assert_eq!((without_mark(b"\xef\xbb\xbf{}"), without_mark(b"{}")), (b"{}".as_slice(), b"{}".as_slice()));

@@ -8,7 +8,7 @@ use image::{ColorType, DynamicImage, ImageDecoder as _, ImageReader};
 pub use crate::encoding::Encoding;
 use crate::limits::{check_size, read_file};
 use crate::npy_header::NPY_SIGNATURE;
-use crate::{ImageError, Texels, Texture, Wrap, exr_io, npy_io};
+use crate::{ImageError, Texels, Texture, Wrap, exr_io, file_kind, npy_io};
 
 /// Reads a texture; alpha is dropped. Every value must be finite. The first bytes decide the format, not the name.
 pub fn read_texture(path: &Path, encoding: Encoding, wrap: Wrap) -> Result<Texture, ImageError> {
@@ -66,6 +66,7 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
         path: path.to_owned(),
         what: format!("not a valid picture: {error}"),
     };
+    let hint = file_kind::hint(&bytes);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|source| ImageError::Io {
         action: "read",
         path: path.to_owned(),
@@ -73,7 +74,7 @@ fn decode(path: &Path, bytes: Vec<u8>) -> Result<DynamicImage, ImageError> {
     })?;
     if reader.format().is_none() {
         let what =
-            "not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy".to_owned();
+            format!("not a known picture format; expected PNG, JPEG, WebP, BMP, Radiance HDR, OpenEXR or NumPy{hint}");
         return Err(ImageError::Unsupported { path: path.to_owned(), what });
     }
     let decoder = reader.into_decoder().map_err(invalid)?;
@@ -142,6 +143,22 @@ mod tests {
             std::fs::write(&path, bytes).unwrap();
             let error = read_texture(&path, Encoding::Srgb, Wrap::Repeat).unwrap_err();
             assert!(error.to_string().contains("rubbish.png"), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_stands_in_place_of_a_picture_is_named() {
+        let refused = |bytes: &[u8]| {
+            let path = Path::new("a.png");
+            texture_of_bytes(path, bytes.to_vec(), Encoding::Srgb, Wrap::Clamp).unwrap_err().to_string()
+        };
+        for (bytes, word) in [
+            (b"version https://git-lfs.github.com/spec/v1\n".as_slice(), "git lfs pull"),
+            (b"<!doctype html><html>", "web page"),
+            (b"\0\0\0\x18ftypheic\0\0\0\0", "HEIC"),
+        ] {
+            let error = refused(bytes);
+            assert!(error.contains("not a known picture format") && error.contains(word), "{error}");
         }
     }
 

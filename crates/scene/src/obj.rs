@@ -219,12 +219,19 @@ fn relative_to(text: &str, base: DVec3) -> String {
     out
 }
 
-/// The text without a byte order mark. Fails where the file is of another kind.
+/// The text without a byte order mark, whose lines end in LF or CRLF. Fails where the file is of another kind.
 fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ObjError> {
     match mistaken_for(bytes) {
         Some(_) if !bytes.is_empty() => Err(ObjFault::OtherKind { hint: hint(bytes).into_owned() }.into()),
-        _ => Ok(String::from_utf8_lossy(without_mark(bytes))),
+        _ => Ok(with_line_ends(String::from_utf8_lossy(without_mark(bytes)))),
     }
+}
+
+/// The text with LF for every CR that ends a line alone, as old Mac OS writes them: `str::lines` and tobj would read one
+/// line.
+fn with_line_ends(text: Cow<'_, str>) -> Cow<'_, str> {
+    let has_bare_cr = text.ends_with('\r') || text.as_bytes().windows(2).any(|two| two[0] == b'\r' && two[1] != b'\n');
+    if has_bare_cr { Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n")) } else { text }
 }
 
 fn check(text: &str, limits: ObjLimits) -> Result<Census, ObjError> {
@@ -320,7 +327,7 @@ fn with_all_indices(text: &str, add_uvs: bool, add_normals: bool) -> String {
 
 /// The names of the material files that an OBJ file refers to.
 pub fn material_files(bytes: &[u8]) -> Vec<String> {
-    let text = String::from_utf8_lossy(without_mark(bytes));
+    let text = with_line_ends(String::from_utf8_lossy(without_mark(bytes)));
     let names: BTreeSet<&str> = text.lines().filter_map(|line| named_after("mtllib", line)).collect();
     names.into_iter().map(str::to_owned).collect()
 }
@@ -516,6 +523,27 @@ mod tests {
         assert_eq!(read_materials("\u{feff}newmtl a\nKd 1 0 0\n".as_bytes()).unwrap()[0].name, "a");
         let other = read(b"\xff\xfev\0", LIMITS, Materials::Ignored).unwrap_err();
         assert!(other.to_string().contains("UTF-16"), "{other}");
+    }
+
+    #[test]
+    fn all_line_ends_are_read() {
+        let text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n";
+        for end in ["\n", "\r\n", "\r"] {
+            let bytes = text.replace('\n', end).into_bytes();
+            let read = read(&bytes, LIMITS, Materials::Split).unwrap();
+            assert_eq!((read.mesh.triangles.len(), read.groups[0].material.as_deref()), (1, Some("x")), "{end:?}");
+            assert_eq!(material_files(&bytes), ["a.mtl"], "{end:?}");
+            let materials = read_materials(format!("newmtl x{end}Kd 1 0 0{end}newmtl y{end}").as_bytes()).unwrap();
+            assert_eq!((materials.len(), materials[0].diffuse), (2, Some([1.0, 0.0, 0.0])), "{end:?}");
+            let fault = read_bad(end);
+            assert_eq!(fault.line, Some(3), "{end:?}");
+        }
+    }
+
+    /// The fault of an index in line 3.
+    fn read_bad(end: &str) -> ObjError {
+        let text = format!("v 0 0 0{end}v 1 0 0{end}f 1 2 9{end}");
+        read(text.as_bytes(), LIMITS, Materials::Ignored).unwrap_err()
     }
 
     #[test]

@@ -71,7 +71,7 @@ fn layered(faces: &[Face], place: &str, log: &mut Log, shifts: &mut Shifts) -> O
         return None;
     }
     let sheets = Sheets::new(faces, &pairs);
-    let layers = sheets.layers(MOST_LAYERS);
+    let (layers, unfit) = layers_within_reach(&sheets);
     for (face, &sheet) in faces.iter().zip(&sheets.of_face) {
         if layers[sheet] > 0 {
             let by = sheets.all[sheet].normal * (layers[sheet] as f64 * LAYER_M);
@@ -85,7 +85,23 @@ fn layered(faces: &[Face], place: &str, log: &mut Log, shifts: &mut Shifts) -> O
         let action = "moved each by 0.1 mm, or more in a stack, to the side it faces";
         log.note("coincident_sheets", place, message, action);
     }
+    report_unfit(unfit, place, log);
     Some(sheets.of_face.iter().map(|&sheet| layers[sheet]).collect())
+}
+
+/// The layer of each sheet, at most [`MOST_LAYERS`], and how many sheets still coincide with another of the last layer.
+fn layers_within_reach(sheets: &Sheets) -> (Vec<usize>, usize) {
+    let layers = sheets.layers(MOST_LAYERS + 1);
+    let unfit = layers.iter().filter(|layer| **layer > MOST_LAYERS).count();
+    (layers.into_iter().map(|layer| layer.min(MOST_LAYERS)).collect(), unfit)
+}
+
+fn report_unfit(unfit: usize, place: &str, log: &mut Log) {
+    if unfit > 0 {
+        let message = format!("{unfit} sheets lie in stacks of more than {} coincident sheets", MOST_LAYERS + 1);
+        let action = format!("moved them to layer {MOST_LAYERS}, where they still coincide with another sheet");
+        log.warn("coincident_sheets", place, message, action);
+    }
 }
 
 /// Moves the sheets of furniture. Returns false where there are too many pairs.
@@ -115,7 +131,8 @@ fn raise(
     for (shift, &sheet) in wanted.values().zip(&sheets.of_face) {
         shift_of_sheet[sheet] = longer(*shift, shift_of_sheet[sheet]);
     }
-    for (shift, layer) in shift_of_sheet.iter_mut().zip(sheets.layers(MOST_LAYERS)) {
+    let (layers, unfit) = layers_within_reach(&sheets);
+    for (shift, layer) in shift_of_sheet.iter_mut().zip(layers) {
         *shift += shift.normalize_or_zero() * (layer as f64 * LAYER_M);
     }
     for (face, &sheet) in touching.iter().zip(&sheets.of_face) {
@@ -129,6 +146,7 @@ fn raise(
         message,
         "moved each 0.1 mm in front of it, or more in a stack",
     );
+    report_unfit(unfit, "/furniture", log);
     is_whole
 }
 
@@ -269,6 +287,18 @@ mod tests {
         let (meshes, _) = separated(meshes, &architecture());
         let found: Vec<i32> = meshes.iter().map(|mesh| (heights(mesh).0 * 1e4).round() as i32).collect();
         assert_eq!(found, [2, 0, 1, 3]);
+    }
+
+    /// Nine sheets find a layer each; the others share the last one, which is reported.
+    #[test]
+    fn sheets_beyond_the_last_layer_are_reported() {
+        for (count, expected) in [(9, vec!["coincident_sheets"]), (12, vec!["coincident_sheets"; 2])] {
+            let (meshes, codes) = separated(vec![square(0.0, 2.0, true); count], &architecture());
+            let mut found: Vec<i32> = meshes.iter().map(|mesh| (heights(mesh).0 * 1e4).round() as i32).collect();
+            found.sort_unstable();
+            let layers: Vec<i32> = (0..count as i32).map(|at| at.min(8)).collect();
+            assert_eq!((found, codes), (layers, expected.into_iter().map(str::to_owned).collect()));
+        }
     }
 
     /// Neighbours in one plane, sheets at a distance, crossing sheets, and furniture stay.

@@ -40,9 +40,19 @@ fn of_mitsuba() -> Vec<Fallback<&'static str>> {
             "bad_value",
         ),
         fallback(
-            "the nearest colour in range",
+            "the plugin's default colour, for one out of range",
             "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectance' value='3'/></bsdf></shape>",
             "out_of_range",
+        ),
+        fallback(
+            "the plugin's default colour, for one of an unknown name",
+            "<shape type='cube'><bsdf type='diffuse'><rgb name='reflectence' value='0.2'/></bsdf></shape>",
+            "unknown_parameter",
+        ),
+        fallback(
+            "the colour of the first of two",
+            "<shape type='cube'><bsdf type='blendbsdf'><bsdf type='diffuse'/><bsdf type='plastic'/></bsdf></shape>",
+            "unsupported",
         ),
         fallback(
             "beckmann",
@@ -50,12 +60,12 @@ fn of_mitsuba() -> Vec<Fallback<&'static str>> {
             "unsupported",
         ),
         fallback(
-            "the default metal",
+            "the default metal's colour",
             "<shape type='cube'><bsdf type='conductor'><string name='material' value='Unobtainium'/></bsdf></shape>",
             "unknown_material",
         ),
         fallback(
-            "the identity",
+            "no shape",
             "<shape type='cube'><transform name='to_world'><matrix value='1'/></transform></shape>",
             "bad_transform",
         ),
@@ -78,8 +88,8 @@ fn each_of_mitsuba_is_a_finding() {
     for Fallback { value, input, code } in of_mitsuba() {
         let scene = read_inner(input);
         assert!(scene.findings.iter().any(|finding| finding.code == code), "{value}: {input}: {:?}", scene.findings);
-        // Grey that nobody states must not count as stated.
-        if value.contains("grey") {
+        // A colour that nobody states must not count as stated.
+        if value.contains("grey") || value.contains("colour") {
             assert!(scene.origins.iter().any(|origin| !origin.stated.base_color), "{input}");
         }
     }

@@ -1,5 +1,6 @@
 //! The one error of this crate.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use mateval_scene::Finding;
@@ -20,10 +21,12 @@ pub enum SubmissionError {
         source: std::io::Error,
     },
     /// Neither a folder nor an archive of a known kind.
-    #[error("cannot open '{}' as a submission: expected a folder, a .zip or a .tar.gz", path.display())]
+    #[error("cannot open '{}' as a submission: expected a folder, a .zip or a .tar.gz{hint}", path.display())]
     UnknownKind {
         /// What was named.
         path: PathBuf,
+        /// What it is instead, as a sentence's end; empty where that is unknown.
+        hint: Cow<'static, str>,
     },
     /// An archive that is refused.
     #[error("cannot unpack '{}':{}", path.display(), Finding::list(findings))]

@@ -112,6 +112,7 @@ mod tests {
             corners: *corners,
             uvs: Default::default(),
             colors: [Vec3::ONE; 3],
+            is_painted: false,
             material: 0,
         };
         Donor { triangles: triangles.iter().map(triangle).collect(), ..Donor::default() }

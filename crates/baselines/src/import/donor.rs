@@ -77,6 +77,8 @@ pub struct DonorTriangle {
     pub uvs: [[Vec2; 3]; 2],
     /// Linear factor of base_color at each corner.
     pub colors: [Vec3; 3],
+    /// Whether the file states these colours, and not only white for all vertices.
+    pub is_painted: bool,
     /// Index in [`Donor::materials`].
     pub material: usize,
 }
@@ -109,23 +111,33 @@ pub struct Scalar {
 }
 
 impl Donor {
+    /// Whether the file states the triangle's base colour, by its material or at its corners.
+    fn states_base_color(&self, triangle: &DonorTriangle) -> bool {
+        let material = &self.materials[triangle.material];
+        // Black or white under an emissive texture is how tools write a baked colour that viewers show without light.
+        let is_baked = match material.base_color {
+            _ if !material.glows => false,
+            ([0.0, 0.0, 0.0], _) => true,
+            ([1.0, 1.0, 1.0], None) => !triangle.is_painted,
+            _ => false,
+        };
+        (material.states_base_color || triangle.is_painted) && !is_baked
+    }
+
     /// What the materials of its triangles do not state; sorted.
     pub fn unstated(&self) -> Vec<MaterialParameter> {
         let any = |lacks: fn(&DonorMaterial) -> bool| self.triangles.iter().any(|t| lacks(&self.materials[t.material]));
         let all = [
-            (any(|m| !m.states_base_color), MaterialParameter::BaseColor),
+            (self.triangles.iter().any(|t| !self.states_base_color(t)), MaterialParameter::BaseColor),
             (any(|m| m.roughness.is_none()), MaterialParameter::Roughness),
             (any(|m| m.metallic.is_none()), MaterialParameter::Metallic),
         ];
         all.into_iter().filter(|(lacks, _)| *lacks).map(|(_, parameter)| parameter).collect()
     }
 
-    /// Fails where no material of its triangles states a base colour: the whole donor would have the format's default.
+    /// Fails where the base colour of none of its triangles is stated: the whole donor would have the format's default.
     pub(super) fn check_base_color(&self) -> Result<(), ImportError> {
-        // Black under an emissive texture is how tools write a baked colour that viewers show without light.
-        let is_black = |material: &DonorMaterial| material.base_color.0 == [0.0; 3] && material.glows;
-        let mut used = self.triangles.iter().map(|triangle| &self.materials[triangle.material]);
-        if self.triangles.is_empty() || used.any(|material| material.states_base_color && !is_black(material)) {
+        if self.triangles.is_empty() || self.triangles.iter().any(|triangle| self.states_base_color(triangle)) {
             return Ok(());
         }
         let glowing = self.triangles.iter().map(|triangle| &self.materials[triangle.material]).find(|m| m.glows);
@@ -221,5 +233,39 @@ impl Donor {
         let texel = texture.as_ref().map_or(Vec3::ONE, |texture| Vec3::from(texture.sample(uv(0))));
         let [r, g, b] = (tint * texel).to_array();
         [r, g, b, scalar(&material.roughness, DEFAULT[3]), scalar(&material.metallic, DEFAULT[4])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle with one material.
+    fn donor(base_color: [f32; 3], glows: bool, is_painted: bool) -> Donor {
+        let material = DonorMaterial {
+            name: "m".to_owned(),
+            states_base_color: true,
+            glows,
+            base_color: (base_color, None),
+            roughness: None,
+            metallic: None,
+        };
+        let (corners, uvs) = ([Vec3::ZERO, Vec3::X, Vec3::Y], [[Vec2::ZERO; 3]; 2]);
+        let triangle = DonorTriangle { corners, uvs, colors: [Vec3::ONE; 3], is_painted, material: 0 };
+        Donor { triangles: vec![triangle], materials: vec![material], ..Donor::default() }
+    }
+
+    #[test]
+    fn a_colour_that_lies_in_the_emission_is_refused() {
+        for constant in [0.0, 1.0] {
+            let refused = donor([constant; 3], true, false).check_base_color();
+            assert!(matches!(refused, Err(ImportError::NoBaseColor { glows: true, .. })), "{constant}");
+        }
+        // Twins: without an emissive texture, with another colour, and with colours of the vertices.
+        for (constant, glows, is_painted) in [(1.0, false, false), (0.5, true, false), (1.0, true, true)] {
+            assert!(donor([constant; 3], glows, is_painted).check_base_color().is_ok(), "{constant}");
+        }
+        assert!(donor([1.0; 3], true, false).unstated().contains(&MaterialParameter::BaseColor));
+        assert!(!donor([0.5; 3], true, false).unstated().contains(&MaterialParameter::BaseColor));
     }
 }

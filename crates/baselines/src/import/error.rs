@@ -97,8 +97,8 @@ pub enum ImportError {
     /// No material states a base colour.
     #[error(
         "no material states a base colour, such as '{}'{}", shortened(.material), if *.glows {
-            ", which has an emissive texture: baked colours belong into baseColorTexture"
-        } else { ": bake it to a texture, or state baseColorFactor" }
+            ", which has an emissive texture over black or white: baked colours belong into baseColorTexture"
+        } else { ": bake it to a texture, or state baseColorFactor or COLOR_0" }
     )]
     NoBaseColor {
         /// A material of the file.
@@ -109,15 +109,15 @@ pub enum ImportError {
     /// A colour that is out of range.
     #[error("{key} of '{}': expected 0 to 1, found {found:?}{}", shortened(.material), range_hint(.found))]
     OutOfRange {
-        /// As in `Kd`.
-        key: &'static str,
+        /// Such as `Kd`, or the JSON pointer of a glTF.
+        key: String,
         /// The material's name.
         material: String,
         /// The values.
         found: Vec<f32>,
     },
     /// A group has a material that no MTL file defines.
-    #[error("group '{}' has the material '{}', which no mtllib of the file defines", shortened(.group), shortened(.material))]
+    #[error("{}", undefined(.group, .material))]
     UndefinedMaterial {
         /// The group's name.
         group: String,
@@ -204,9 +204,22 @@ fn file_prefix(file: &Option<String>) -> String {
     file.as_ref().map_or_else(String::new, |file| format!("'{}': ", shortened(file)))
 }
 
-/// What the range of a colour may be.
+/// A group whose material no MTL file defines, or that has none.
+fn undefined(group: &str, material: &str) -> String {
+    let group = shortened(group);
+    if material.is_empty() {
+        format!(
+            "group '{group}' has faces without `usemtl`; expected `usemtl` before them, with a material that an mtllib of \
+             the file defines, or a colour of every vertex (v x y z r g b)"
+        )
+    } else {
+        format!("group '{group}' has the material '{}', which no mtllib of the file defines", shortened(material))
+    }
+}
+
+/// What the range of a colour may be. Numbers that end little above 1 are not those of bytes.
 fn range_hint(found: &[f32]) -> &'static str {
-    if found.iter().any(|v| *v > 1.0) && found.iter().all(|v| (0.0..=255.0).contains(v)) {
+    if found.iter().any(|v| *v > 2.0) && found.iter().all(|v| (0.0..=255.0).contains(v)) {
         "; divide by 255"
     } else {
         ""
@@ -215,4 +228,29 @@ fn range_hint(found: &[f32]) -> &'static str {
 
 fn listed(faults: &[MaterialFault]) -> String {
     faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_numbers_of_bytes_are_to_be_divided() {
+        let text = |found: &[f32]| {
+            let (key, material) = ("Kd".to_owned(), "m".to_owned());
+            ImportError::OutOfRange { key, material, found: found.to_vec() }.to_string()
+        };
+        assert!(text(&[255.0, 128.0, 0.0]).ends_with("found [255.0, 128.0, 0.0]; divide by 255"));
+        assert!(text(&[1.5, 1.0, 1.0]).ends_with("expected 0 to 1, found [1.5, 1.0, 1.0]"));
+        assert!(text(&[-1.0, 3.0, 0.0]).ends_with("found [-1.0, 3.0, 0.0]"));
+    }
+
+    #[test]
+    fn a_missing_usemtl_is_named() {
+        let text = |material: &str| {
+            ImportError::UndefinedMaterial { group: "g".to_owned(), material: material.to_owned() }.to_string()
+        };
+        assert!(text("").contains("group 'g' has faces without `usemtl`"));
+        assert!(text("red").contains("the material 'red', which no mtllib"));
+    }
 }

@@ -19,6 +19,9 @@ use super::donor::{Donor, DonorGroup, DonorMaterial, DonorTriangle, Scalar, shif
 use super::error::{ImportError, Limited, Place, Unsupported};
 use super::limits::{MAX_DEPTH, MAX_FILE_BYTES, MAX_TEXELS, MAX_TRIANGLES, MAX_VERTICES};
 
+/// Numbers this far outside 0 to 1 are rounding, and are clamped.
+const ROUNDING: f32 = 0.001;
+
 /// Reads the file `name` of the folder. `shift` is subtracted from positions that lie near it.
 pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor, ImportError> {
     let bytes = folder.read(name)?;
@@ -87,7 +90,12 @@ impl Reader<'_> {
         let stated = material.index().and_then(|index| file.stated.get(index)).copied().unwrap_or_default();
         let name = material.name().map_or_else(|| format!("material {}", material.index().unwrap_or(0)), str::to_owned);
         let glows = material.emissive_texture().is_some();
+        let pointer = format!("/materials/{}", material.index().unwrap_or(0));
         if let Some(extension) = material.pbr_specular_glossiness() {
+            let pointer = format!("{pointer}/extensions/KHR_materials_pbrSpecularGlossiness");
+            in_range(&format!("{pointer}/diffuseFactor"), &name, extension.diffuse_factor())?;
+            in_range(&format!("{pointer}/specularFactor"), &name, extension.specular_factor())?;
+            in_range(&format!("{pointer}/glossinessFactor"), &name, [extension.glossiness_factor()])?;
             let read = self.specular_glossiness(&extension, stated.metallic)?;
             let roughness = read.roughness.filter(|_| stated.roughness);
             let metallic = read.metallic.filter(|_| stated.metallic);
@@ -105,7 +113,10 @@ impl Reader<'_> {
             pbr.base_color_texture().map(|info| self.texture(&info.texture(), Encoding::Srgb)).transpose()?;
         let both = pbr.metallic_roughness_texture();
         let both = both.map(|info| self.texture(&info.texture(), Encoding::Linear)).transpose()?;
-        let [r, g, b, _] = pbr.base_color_factor();
+        let pointer = format!("{pointer}/pbrMetallicRoughness");
+        let [r, g, b, _] = in_range(&format!("{pointer}/baseColorFactor"), &name, pbr.base_color_factor())?;
+        let [roughness] = in_range(&format!("{pointer}/roughnessFactor"), &name, [pbr.roughness_factor()])?;
+        let [metallic] = in_range(&format!("{pointer}/metallicFactor"), &name, [pbr.metallic_factor()])?;
         let scalar = |factor, channel| Some(Scalar { factor, texture: both.clone().map(|texture| (texture, channel)) });
         // A metallic of 1 that nobody states is the default of most writers' plain meshes, and no metal.
         Ok(DonorMaterial {
@@ -113,8 +124,8 @@ impl Reader<'_> {
             states_base_color: stated.base_color,
             glows,
             base_color: ([r, g, b], base_color),
-            roughness: scalar(pbr.roughness_factor(), 1).filter(|_| stated.roughness),
-            metallic: scalar(pbr.metallic_factor(), 2).filter(|_| stated.metallic),
+            roughness: scalar(roughness, 1).filter(|_| stated.roughness),
+            metallic: scalar(metallic, 2).filter(|_| stated.metallic),
         })
     }
 
@@ -275,6 +286,9 @@ impl Reader<'_> {
         };
         same_count(colors.len(), "COLOR_0".to_owned())?;
         let material = primitive.material();
+        let colors = colors_in_range(colors, primitive.index(), material.name().unwrap_or("default"))?;
+        // Many tools write white for every vertex of a mesh that nobody painted.
+        let is_painted = colors.iter().any(|rgb| *rgb != [1.0; 3]);
         let pbr = material.pbr_metallic_roughness();
         let infos = match material.pbr_specular_glossiness() {
             Some(extension) => {
@@ -305,10 +319,38 @@ impl Reader<'_> {
                 corners: corners.map(|vertex| positions[vertex]),
                 uvs: [0, 1].map(|set: usize| corners.map(|vertex| uvs[set][vertex])),
                 colors: corners.map(|vertex| Vec3::from(colors[vertex])),
+                is_painted,
                 material,
             })?;
         }
         Ok(())
+    }
+}
+
+/// The numbers, clamped to 0 to 1. Fails where one is further outside than by rounding; `pointer` is its place in the
+/// file.
+fn in_range<const N: usize>(pointer: &str, material: &str, found: [f32; N]) -> Result<[f32; N], ImportError> {
+    if found.iter().all(is_unit) {
+        return Ok(found.map(|value| value.clamp(0.0, 1.0)));
+    }
+    Err(ImportError::OutOfRange { key: pointer.to_owned(), material: material.to_owned(), found: found.to_vec() })
+}
+
+/// Whether the number lies within 0 to 1, but for rounding; NaN does not.
+fn is_unit(value: &f32) -> bool {
+    (-ROUNDING..=1.0 + ROUNDING).contains(value)
+}
+
+/// The colours of a primitive's vertices, clamped to 0 to 1. The error shows the largest of those that are out of range,
+/// which shows best whether they are bytes.
+fn colors_in_range(colors: Vec<[f32; 3]>, primitive: usize, material: &str) -> Result<Vec<[f32; 3]>, ImportError> {
+    let largest = |rgb: &[f32; 3]| rgb.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let outside = colors.iter().filter(|rgb| !rgb.iter().all(is_unit));
+    match outside.max_by(|a, b| largest(a).total_cmp(&largest(b))) {
+        Some(found) => {
+            in_range(&format!("primitives/{primitive}/attributes/COLOR_0"), material, *found).map(|_| colors)
+        }
+        None => Ok(colors.into_iter().map(|rgb| rgb.map(|value| value.clamp(0.0, 1.0))).collect()),
     }
 }
 
@@ -337,6 +379,7 @@ fn wrap(sampler: &gltf::texture::Sampler<'_>) -> Result<Wrap, ImportError> {
 
 #[cfg(test)]
 mod tests {
+    use mateval_scene::material::MaterialParameter;
     use mateval_scene::{TriangleMesh, glb};
 
     use super::*;
@@ -370,6 +413,71 @@ mod tests {
         let donor = read_bytes(&sound()).unwrap();
         assert_eq!((donor.triangles.len(), donor.groups[0].names.as_slice()), (1, &["a".to_owned()][..]));
         assert_eq!(donor.unstated(), []);
+    }
+
+    /// A `.gltf` with one triangle, whose three vertices have this colour if there is one, and whose primitive has the
+    /// material with this JSON if there is one.
+    fn read_triangle(material: Option<&str>, color: Option<[f32; 3]>) -> Result<Donor, ImportError> {
+        let folder = tempfile::tempdir().unwrap();
+        let places = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let numbers = places.into_iter().chain([color.unwrap_or_default(); 3].into_iter().flatten());
+        std::fs::write(folder.path().join("a.bin"), numbers.flat_map(f32::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+        let materials = material.map_or(String::new(), |text| format!(r#""materials":[{text}],"#));
+        let used = material.map_or("", |_| r#","material":0"#);
+        let colors = color.map_or("", |_| r#","COLOR_0":1"#);
+        let text = format!(
+            r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{{"name":"n","mesh":0}}],{materials}
+            "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0{colors}}}{used}}}]}}],
+            "accessors":[{{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]}},
+            {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3"}}],
+            "bufferViews":[{{"buffer":0,"byteOffset":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":36}}],
+            "buffers":[{{"uri":"a.bin","byteLength":72}}]}}"#
+        );
+        std::fs::write(folder.path().join("a.gltf"), text).unwrap();
+        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.gltf", DVec3::ZERO)
+    }
+
+    #[test]
+    fn factors_outside_0_to_1_are_refused() {
+        let read = |factor: &str| {
+            let material =
+                format!(r#"{{"name":"m","pbrMetallicRoughness":{{"baseColorFactor":[0.5,0.5,0.5,1],{factor}}}}}"#);
+            read_triangle(Some(&material), None)
+        };
+        let refused = |factor: &str| read(factor).err().unwrap().to_string();
+        let metallic = refused(r#""metallicFactor":5"#);
+        assert!(metallic.contains("/materials/0/pbrMetallicRoughness/metallicFactor of 'm'"), "{metallic}");
+        assert!(metallic.contains("expected 0 to 1, found [5.0]"), "{metallic}");
+        assert!(refused(r#""roughnessFactor":-1"#).contains("found [-1.0]"));
+        let base_color = r#"{"pbrMetallicRoughness":{"baseColorFactor":[2,1,1,1]}}"#;
+        let base_color = read_triangle(Some(base_color), None).err().unwrap().to_string();
+        assert!(base_color.contains("/baseColorFactor") && !base_color.contains("255"), "{base_color}");
+        // Twin: rounding is clamped.
+        let donor = read(r#""roughnessFactor":1.0005"#).unwrap();
+        assert_eq!(donor.materials[0].roughness.as_ref().map(|scalar| scalar.factor), Some(1.0));
+    }
+
+    #[test]
+    fn colours_of_vertices_outside_0_to_1_are_refused() {
+        let refused = |color| read_triangle(None, Some(color)).err().unwrap().to_string();
+        let bytes = refused([255.0, 128.0, 0.0]);
+        assert!(
+            bytes.contains("node 0 'n': primitives/0/attributes/COLOR_0") && bytes.contains("divide by 255"),
+            "{bytes}"
+        );
+        assert!(refused([f32::NAN, 0.5, 0.5]).contains("COLOR_0"));
+    }
+
+    #[test]
+    fn colours_of_vertices_are_a_stated_base_colour() {
+        for material in [None, Some(r#"{"pbrMetallicRoughness":{"metallicFactor":0}}"#)] {
+            let donor = read_triangle(material, Some([0.5, 0.25, 1.0])).unwrap();
+            assert!(!donor.unstated().contains(&MaterialParameter::BaseColor));
+            let [r, g, b, ..] = donor.values(0, DVec3::splat(1.0 / 3.0));
+            assert!(Vec3::new(r, g, b).abs_diff_eq(Vec3::new(0.5, 0.25, 1.0), 1e-5), "{r} {g} {b}");
+            // Twin: white at every vertex states nothing.
+            assert!(matches!(read_triangle(material, Some([1.0; 3])), Err(ImportError::NoBaseColor { .. })));
+        }
     }
 
     /// Damaged bytes cause no panic.

@@ -1,6 +1,6 @@
 //! Reads an OBJ with its MTL as a donor: base colour from `map_Kd` (sRGB) or else `Kd` (linear), roughness from
-//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`. Groups without a material take the colours of their vertices (sRGB,
-//! as trimesh and MeshLab write them).
+//! `map_Pr` or `Pr`, metallic from `map_Pm` or `Pm`. Groups without a material, or with a `Kd` of 1 1 1 and no `map_Kd`,
+//! take the colours of their vertices (sRGB, as trimesh and MeshLab write them).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,7 +33,9 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
     let (mut donor, mut numbers, mut first) = (Donor::default(), BTreeMap::new(), 0);
     for group in &read.groups {
         let described = group.material.as_ref().and_then(|material| known.get(material));
-        let is_painted = described.is_none() && !read.colors.is_empty();
+        // Tools that write colours of the vertices often add a plain white material.
+        let is_white = |material: &ObjMaterial| material.diffuse_map.is_none() && material.diffuse == Some([1.0; 3]);
+        let is_painted = described.is_none_or(is_white) && !read.colors.is_empty();
         let key = described.map(|described| described.name.clone());
         let material = match (numbers.get(&key), described) {
             (Some(number), _) => *number,
@@ -57,13 +59,13 @@ pub fn read(folder: &mut SourceFolder, name: &str, shift: DVec3) -> Result<Donor
             let uvs = read.mesh.triangles[triangle].map(uv);
             let color = |vertex: u32| Vec3::from(read.colors[vertex as usize].map(linear_from_srgb));
             let colors = if is_painted { read.mesh.triangles[triangle].map(color) } else { [Vec3::ONE; 3] };
-            donor.push(DonorTriangle { corners, uvs: [uvs; 2], colors, material })?;
+            donor.push(DonorTriangle { corners, uvs: [uvs; 2], colors, is_painted, material })?;
         }
         donor.groups.push(DonorGroup { names: vec![group.name.clone()], triangles: first..first + group.triangles });
         first += group.triangles;
     }
     if let Some(bad) = read.colors.iter().find(|rgb| !rgb.iter().all(|v| (0.0..=1.0).contains(v))) {
-        let (key, material) = ("a vertex colour", "vertex colours".to_owned());
+        let (key, material) = ("a vertex colour".to_owned(), "vertex colours".to_owned());
         return Err(ImportError::OutOfRange { key, material, found: bad.to_vec() });
     }
     donor.use_means();
@@ -135,7 +137,7 @@ impl Reader<'_> {
         for ((key, color), scalar) in ranges.into_iter().zip(scalars) {
             let found: Vec<f32> = color.map(Vec::from).or(scalar.map(|v| vec![v[0]])).unwrap_or_default();
             if !found.iter().all(|v| (0.0..=1.0).contains(v)) {
-                return Err(ImportError::OutOfRange { key, material: name.clone(), found });
+                return Err(ImportError::OutOfRange { key: key.to_owned(), material: name.clone(), found });
             }
         }
         let name = name.clone();
@@ -154,5 +156,30 @@ impl Reader<'_> {
             return Err(ImportError::TooLarge { what: Limited::Texels, limit: MAX_TEXELS as u64 });
         }
         Ok(read)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle whose vertices are red, with this MTL text behind its `newmtl` line.
+    fn red(material: &str) -> Donor {
+        let folder = tempfile::tempdir().unwrap();
+        let vertices = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 1 0 0\n";
+        std::fs::write(folder.path().join("a.obj"), format!("mtllib a.mtl\n{vertices}usemtl m\nf 1 2 3\n")).unwrap();
+        std::fs::write(folder.path().join("a.mtl"), format!("newmtl m\n{material}\n")).unwrap();
+        read(&mut SourceFolder::new(folder.path(), 1 << 20).unwrap(), "a.obj", DVec3::ZERO).unwrap()
+    }
+
+    #[test]
+    fn colours_of_vertices_show_under_a_white_material() {
+        let color = |material: &str| {
+            let [r, g, b, ..] = red(material).values(0, DVec3::splat(1.0 / 3.0));
+            Vec3::new(r, g, b)
+        };
+        assert!(color("Kd 1 1 1").abs_diff_eq(Vec3::X, 1e-5), "{}", color("Kd 1 1 1"));
+        // Twin: another colour of the material is used alone.
+        assert!(color("Kd 0.5 0.25 1").abs_diff_eq(Vec3::new(0.5, 0.25, 1.0), 1e-5), "{}", color("Kd 0.5 0.25 1"));
     }
 }

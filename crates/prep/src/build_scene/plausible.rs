@@ -41,7 +41,8 @@ pub(super) fn missing(
     let Some(example) = missing.files.first() else { return Ok(None) };
     let (count, wanted) = (missing.files.len(), missing.wanted.max(1));
     let share = count as f64 / wanted as f64;
-    let elsewhere = folder_of(root, example)
+    let models = entry.front3d.as_ref().map(|room| room.models.as_path());
+    let elsewhere = folder_of(root, example, models)
         .map_or(String::new(), |folder| format!("; '{}' holds such files: name that folder", folder.display()));
     let message = format!("{count} of {wanted} {} are missing, such as '{example}'{elsewhere}", missing.what);
     if share > MOST_MISSING && !entry.allow_missing {
@@ -57,10 +58,30 @@ pub(super) fn missing(
     }))
 }
 
-/// A folder below `root`, or beside it, in which the end of a path exists: the piece's own folder and file, or else the file.
-fn folder_of(root: &Path, missing: &str) -> Option<PathBuf> {
-    let parts: Vec<&str> = missing.split('/').collect();
-    // Three levels down from the folder of the scene, in a fixed order.
+/// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own folder
+/// and name. A path of at most two parts is also found by its name, unless several folders hold such a name. `models` is
+/// the folder of a 3D-FRONT room's models, which all have the same names in folders of their own. None where the file is
+/// where it was looked for.
+fn folder_of(root: &Path, missing: &str, models: Option<&Path>) -> Option<PathBuf> {
+    let parts: Vec<&str> = missing.split('/').filter(|part| !matches!(*part, "" | "." | "..")).collect();
+    if parts.is_empty() || root.join(missing).is_file() {
+        return None;
+    }
+    let folders = folders_below(root);
+    let holds = |folder: &Path, count: usize| folder.join(parts[parts.len() - count..].join("/")).is_file();
+    let whole = [parts.len(), 2].into_iter().filter(|count| (2..=parts.len()).contains(count));
+    let found = whole.into_iter().find_map(|count| folders.iter().find(|folder| holds(folder, count)).cloned());
+    if found.is_some() || models.is_some() || parts.len() > 2 {
+        // Files that exist in the folder that the recipe names are damaged.
+        return found.filter(|folder| models.is_none_or(|models| *folder != root.join(models)));
+    }
+    let mut by_name = folders.iter().filter(|folder| holds(folder, 1));
+    let only = by_name.next().filter(|_| by_name.next().is_none());
+    only.cloned()
+}
+
+/// The folder and those up to three levels down, in a fixed order.
+fn folders_below(root: &Path) -> Vec<PathBuf> {
     let mut folders = vec![root.to_owned()];
     let mut at = 0;
     while at < folders.len() && folders.len() < MOST_FOLDERS {
@@ -74,9 +95,7 @@ fn folder_of(root: &Path, missing: &str) -> Option<PathBuf> {
         }
         at += 1;
     }
-    let ends =
-        [2, 1].into_iter().filter(|count| *count < parts.len()).map(|count| parts[parts.len() - count..].join("/"));
-    ends.into_iter().find_map(|end| folders.iter().find(|folder| folder.join(&end).is_file()).cloned())
+    folders
 }
 
 /// The finding about base colours that are not stated, if any are. Fails where they cover too much of the picture.
@@ -152,14 +171,53 @@ fn coarse(camera: &Camera) -> Camera {
 mod tests {
     use super::*;
 
+    /// A folder with these files.
+    fn folder_with(files: &[&str]) -> tempfile::TempDir {
+        let root = tempfile::tempdir().unwrap();
+        for file in files {
+            let path = root.path().join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+        }
+        root
+    }
+
     #[test]
     fn the_folder_that_holds_a_missing_file_is_found() {
-        let root = tempfile::tempdir().unwrap();
-        let models = root.path().join("models/3D-FUTURE-model/chair-a");
-        std::fs::create_dir_all(&models).unwrap();
-        std::fs::write(models.join("raw_model.obj"), "").unwrap();
-        let found = folder_of(root.path(), "models/chair-a/raw_model.obj");
-        assert_eq!(found, Some(root.path().join("models/3D-FUTURE-model")));
-        assert_eq!(folder_of(root.path(), "models/chair-a/texture.png"), None);
+        let root = folder_with(&["models/3D-FUTURE-model/chair-a/raw_model.obj"]);
+        let models = Some(Path::new("models"));
+        let found = |missing: &str| folder_of(root.path(), missing, models);
+        let deep = Some(root.path().join("models/3D-FUTURE-model"));
+        assert_eq!(found("models/chair-a/raw_model.obj"), deep);
+        assert_eq!(found("chair-a/raw_model.obj"), deep);
+        assert_eq!(found("models/chair-a/texture.png"), None);
+        // Another model, whose files have the same names.
+        assert_eq!(found("models/chair-b/raw_model.obj"), None);
+        assert_eq!(found("chair-b/raw_model.obj"), None);
+        // It is in the folder that the recipe names, so it is damaged.
+        let named = Path::new("models/3D-FUTURE-model");
+        assert_eq!(folder_of(root.path(), "chair-a/raw_model.obj", Some(named)), None);
+    }
+
+    #[test]
+    fn a_file_is_found_by_its_name_in_one_folder() {
+        let root = folder_with(&[
+            "textures/t0.png",
+            "m0.obj",
+            "a/both.png",
+            "b/both.png",
+            "meshes/models/m1.obj",
+            "old/m1.obj",
+        ]);
+        let found = |missing: &str| folder_of(root.path(), missing, None);
+        assert_eq!(found("t0.png"), Some(root.path().join("textures")));
+        assert_eq!(found("models/m0.obj"), Some(root.path().to_owned()));
+        assert_eq!(found("../models/m1.obj"), Some(root.path().join("meshes")));
+        assert_eq!(found("both.png"), None);
+        assert_eq!(found("deep/models/m0.obj"), None);
+        // It was looked for where it is.
+        assert_eq!(found("textures/t0.png"), None);
+        assert_eq!(found("m0.obj"), None);
+        assert_eq!(found(""), None);
     }
 }

@@ -4,7 +4,7 @@ use mateval_scene::material::{BumpMap, Material, MaterialModel, ScalarInput, Sta
 use mateval_scene::reference::MaterialIndex;
 
 use super::document::Element;
-use super::parameters::Parameters;
+use super::parameters::{COLORS, Parameters};
 use super::reader::Reader;
 use mateval_scene::findings::shortened;
 
@@ -15,10 +15,27 @@ const MOST_WRAPPERS: usize = 16;
 const UNSTATED: StatedParameters =
     StatedParameters { base_color: false, roughness: false, metallic: false, emission: true };
 
+/// Parameters that the base colour follows from, over all models. The empty name is that of a reference without a name.
+const BASE_COLOR: [&str; 9] = [
+    "",
+    "reflectance",
+    "diffuse_reflectance",
+    "base_color",
+    "specular_reflectance",
+    "specular_transmittance",
+    "eta",
+    "k",
+    "material",
+];
+/// Parameters that the roughness follows from.
+const ROUGHNESS: [&str; 4] = ["alpha", "alpha_u", "alpha_v", "roughness"];
+
 /// A material and which of its parameters the scene states.
 struct ReadMaterial {
     material: Material,
     stated: StatedParameters,
+    /// Whether a wrapper holds several BSDFs, or weighs them, of which one alone is used.
+    is_one_of_several: bool,
 }
 
 impl<'a> Reader<'a> {
@@ -46,7 +63,18 @@ impl<'a> Reader<'a> {
         };
         // A lamp without a BSDF reflects nothing.
         let stated = if emits { StatedParameters::default() } else { UNSTATED };
-        self.add_material(ReadMaterial { material, stated })
+        self.add_material(ReadMaterial { material, stated, is_one_of_several: false })
+    }
+
+    /// A copy of a material of which the scene states only what `states` returns of that.
+    pub(super) fn stating_less(
+        &mut self,
+        MaterialIndex(of): MaterialIndex,
+        states: impl Fn(StatedParameters) -> StatedParameters,
+    ) -> MaterialIndex {
+        let material = self.scene.materials[of].clone();
+        let stated = states(self.stated[of]);
+        self.add_material(ReadMaterial { material, stated, is_one_of_several: false })
     }
 
     fn add_material(&mut self, read: ReadMaterial) -> MaterialIndex {
@@ -58,7 +86,7 @@ impl<'a> Reader<'a> {
     fn flat_material(&mut self, outer: &'a Element, owner: &str) -> ReadMaterial {
         let material =
             Material { name: owner.to_owned(), model: diffuse(0.5), two_sided: false, opacity: None, bump: None };
-        let mut read = ReadMaterial { material, stated: UNSTATED };
+        let mut read = ReadMaterial { material, stated: UNSTATED, is_one_of_several: false };
         let mut named = false;
         let mut element = outer;
         for _ in 0..MOST_WRAPPERS {
@@ -74,7 +102,10 @@ impl<'a> Reader<'a> {
             from.finish(&mut self.log);
             match inner {
                 Some(inner) => element = inner,
-                None => return read,
+                None => {
+                    read.stated.base_color &= !read.is_one_of_several;
+                    return read;
+                }
             }
         }
         let message = format!("more than {MOST_WRAPPERS} nested BSDFs");
@@ -103,19 +134,28 @@ impl<'a> Reader<'a> {
                 return None;
             }
             "normalmap" | "blendbsdf" | "mixturebsdf" | "coating" | "roughcoating" => {
+                // The base colour of a blend is that of neither.
+                read.is_one_of_several |= matches!(element.kind(), "blendbsdf" | "mixturebsdf");
                 self.report_unsupported_wrapper(element, from);
             }
             kind => {
-                read.stated = stated(kind);
-                // A texture that could not be read states nothing.
-                let is_texture =
-                    base_color_of(kind).and_then(|name| from.find(name)).is_some_and(|e| e.tag == "texture");
+                let names = base_color_of(kind);
+                let is_default = !names.is_empty() && !names.iter().any(|name| from.contains(name));
                 material.model = self.model(element, from);
-                read.stated.base_color &= !is_texture || !material.lookups().is_empty();
+                read.stated = stated(kind);
+                // What could not be read states nothing.
+                read.stated.base_color &= !from.is_replaced(&BASE_COLOR);
+                read.stated.roughness &= !from.is_replaced(&ROUGHNESS);
+                read.stated.metallic &= !from.is_replaced(&["metallic"]);
+                // Nor does a colour of an unknown name, which may be misspelt.
+                let is_misspelt = from.has_untaken(&COLORS) || (is_default && from.has_untaken(&["float", "string"]));
+                read.stated.base_color &= !is_misspelt;
                 return None;
             }
         }
-        self.only_child(from)
+        let (child, count) = self.only_child(from);
+        read.is_one_of_several |= count > 1;
+        child
     }
 
     fn set_opacity(&mut self, material: &mut Material, opacity: Option<ScalarInput>, place: &str) {
@@ -149,7 +189,8 @@ impl<'a> Reader<'a> {
         from.ignore(&["weight", "weights", "sigma_a", "thickness", "alpha", "int_ior", "ext_ior", "distribution"]);
     }
 
-    fn only_child(&mut self, from: &mut Parameters<'a>) -> Option<&'a Element> {
+    /// The first BSDF in a wrapper, and their count.
+    fn only_child(&mut self, from: &mut Parameters<'a>) -> (Option<&'a Element>, usize) {
         let children = from.objects("bsdf");
         match children.len() {
             0 => self.log.warn(
@@ -164,7 +205,7 @@ impl<'a> Reader<'a> {
                 self.log.warn("unsupported", &from.place, message, "used the first one everywhere");
             }
         }
-        children.first().copied()
+        (children.first().copied(), children.len())
     }
 
     /// Reports an unknown model, which becomes diffuse grey.
@@ -176,13 +217,14 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The parameter of a model that is its base colour; none of metals and glass.
-fn base_color_of(kind: &str) -> Option<&'static str> {
+/// The parameters of a model of which one suffices to state its base colour; none for glass.
+fn base_color_of(kind: &str) -> &'static [&'static str] {
     match kind {
-        "diffuse" | "roughdiffuse" => Some("reflectance"),
-        "plastic" | "roughplastic" => Some("diffuse_reflectance"),
-        "principled" => Some("base_color"),
-        _ => None,
+        "diffuse" | "roughdiffuse" => &["reflectance"],
+        "plastic" | "roughplastic" => &["diffuse_reflectance"],
+        "principled" => &["base_color"],
+        "conductor" | "roughconductor" => &["material", "eta", "k"],
+        _ => &[],
     }
 }
 

@@ -64,7 +64,11 @@ impl<'a> Reader<'a> {
         let outside = self.index(from, "ext_eta").unwrap_or(1.0) as f32;
         let mut constant = |name: &str| {
             let element = from.take(&[name])?;
-            self.constant(element, &from.place, ColorUse::Index)
+            let constant = self.constant(element, &from.place, ColorUse::Index);
+            if constant.is_none() {
+                from.mark_replaced(name);
+            }
+            constant
         };
         let (eta, k) = (constant("eta"), constant("k"));
         let material = from.string("material");
@@ -80,11 +84,12 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn named_conductor(&mut self, from: &Parameters<'a>, name: Option<&str>) -> ConductorIor {
+    fn named_conductor(&mut self, from: &mut Parameters<'a>, name: Option<&str>) -> ConductorIor {
         let name = name.unwrap_or(if self.major_version == 0 { "Cu" } else { "none" });
         ior::conductor(name).unwrap_or_else(|| {
             let message = format!("the conductor '{}' is not known", shortened(name));
             self.log.warn("unknown_material", &from.place, message, "used a perfect mirror");
+            from.mark_replaced("material");
             ConductorIor::PerfectMirror
         })
     }

@@ -4,6 +4,7 @@
 //! Spectra become linear Rec. 709 as in Mitsuba 3.9.1's RGB mode: the CIE 1931 observer sees a reflectance under D65, and
 //! an emission as it is.
 
+use mateval_image::file_kind::without_mark;
 use mateval_scene::findings::shortened;
 use mateval_scene::source_folder::SourceFolder;
 
@@ -31,6 +32,8 @@ const STEP_NM: f64 = 5.0;
 const SAMPLES: usize = 95;
 /// Mitsuba's number of places at which it sums a spectrum.
 const STEPS: usize = 1000;
+/// The largest reflectance that counts as 1 with noise.
+pub(super) const MOST_REFLECTANCE: f64 = 1.001;
 /// Most pairs of a spectrum.
 const MOST_PAIRS: usize = 4096;
 
@@ -161,6 +164,7 @@ pub(super) fn constant_color(
         "rgb" => value::triple(text),
         "srgb" if text.starts_with('#') => hex(text),
         "srgb" => Ok(value::triple(text)?.map(linear)),
+        "blackbody" if usage == ColorUse::Reflectance => Err(ValueError::NotAReflectance),
         "blackbody" => {
             let kelvin = element.attribute("temperature").unwrap_or("").trim().trim_end_matches(['k', 'K']);
             let scale = element.attribute("scale").map_or(Ok(1.0), value::number)?;
@@ -191,16 +195,17 @@ fn spectrum(
     major_version: u32,
     folder: &mut SourceFolder,
 ) -> Result<[f64; 3], ValueError> {
-    // By plugin, as in Mitsuba 2 and 3.
+    // By plugin, as in Mitsuba 2 and 3: by children, or by attributes of the same names.
     let child = |name: &str| {
         let found = element.children.iter().find(|child| child.name() == name);
-        found.and_then(|child| child.attribute("value"))
+        found.map_or_else(|| element.attribute(name), |child| child.attribute("value"))
     };
     let needed = |name: &'static str| child(name).ok_or(ValueError::Missing { name });
     match element.kind() {
         "" => {}
         "uniform" => return Ok([value::number(needed("value")?)?; 3]),
         "d65" => return Ok([child("scale").map_or(Ok(1.0), value::number)?; 3]),
+        "blackbody" if usage == ColorUse::Reflectance => return Err(ValueError::NotAReflectance),
         "blackbody" => return Ok(of_black_body(value::number_within(needed("temperature")?, 1.0, 1e6)?)),
         "irregular" => {
             let (wavelengths, values) = (many(needed("wavelengths")?)?, many(needed("values")?)?);
@@ -222,14 +227,19 @@ fn spectrum(
     if let Some(name) = element.attribute("filename") {
         let read = SourceFolder::relative(name).and_then(|name| folder.read(&name));
         let bytes = read.map_err(|fault| ValueError::File { reason: fault.message })?;
-        let text = String::from_utf8_lossy(&bytes);
+        let text = String::from_utf8_lossy(without_mark(&bytes));
         let lines = text.lines().map(|line| line.split('#').next().unwrap_or("").trim());
         let pair = |line: &str| match many(line)?[..] {
             [wavelength, value] => Ok((wavelength, value)),
             ref other => Err(ValueError::Count { expected: "2", found: other.len() }),
         };
-        let pairs = lines.filter(|line| !line.is_empty()).take(MOST_PAIRS).map(pair).collect::<Result<Vec<_>, _>>()?;
-        return integrated(&pairs, usage);
+        let lines = lines.filter(|line| !line.is_empty()).take(MOST_PAIRS + 1);
+        let pairs = lines.map(pair).collect::<Result<Vec<_>, _>>()?;
+        return if pairs.len() > MOST_PAIRS {
+            Err(ValueError::TooManyNumbers { most: MOST_PAIRS })
+        } else {
+            integrated(&pairs, usage)
+        };
     }
     if text.contains(':') {
         let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
@@ -263,6 +273,11 @@ fn many(text: &str) -> Result<Vec<f64>, ValueError> {
 fn integrated(pairs: &[(f64, f64)], usage: ColorUse) -> Result<[f64; 3], ValueError> {
     if pairs.len() < 2 || pairs.windows(2).any(|two| two[0].0 >= two[1].0) {
         return Err(ValueError::NotASpectrum);
+    }
+    // A reflectance in percent, say, would be clamped to white below.
+    let outside = pairs.iter().find(|(_, value)| !(0.0..=MOST_REFLECTANCE).contains(value));
+    if let (ColorUse::Reflectance, Some((_, found))) = (usage, outside) {
+        return Err(ValueError::OutOfRange { least: 0.0, most: 1.0, found: *found });
     }
     let range = STEP_NM * (SAMPLES - 1) as f64;
     let mut xyz = [0.0; 3];
@@ -317,7 +332,9 @@ mod tests {
 
     fn color(element: &str, usage: ColorUse) -> Result<[f64; 3], ValueError> {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("a.spd"), "# nm value\n400 0.05\n500 0.05\n600 0.7\n700 0.7\n").unwrap();
+        let spectrum = "# nm value\n400 0.05\n500 0.05\n600 0.7\n700 0.7\n";
+        std::fs::write(folder.path().join("a.spd"), spectrum).unwrap();
+        std::fs::write(folder.path().join("marked.spd"), format!("\u{feff}{}", &spectrum[11..])).unwrap();
         let mut folder = SourceFolder::new(folder.path(), 1 << 20).unwrap();
         let mut log = Log::new("scene.xml".into(), 100);
         let document = Document::parse_text(&format!("<scene version='3.0.0'>{element}</scene>"), &mut log);
@@ -336,6 +353,13 @@ mod tests {
             (format!("<spectrum value='{pairs}'/>"), [0.853051, 0.314464, 0.004774]),
             (format!("<spectrum value='{}'/>", pairs.replace(',', "")), [0.853051, 0.314464, 0.004774]),
             ("<spectrum filename='a.spd'/>".to_owned(), [0.853051, 0.314464, 0.004774]),
+            // The same after a byte order mark, and by plugin.
+            ("<spectrum filename='marked.spd'/>".to_owned(), [0.853051, 0.314464, 0.004774]),
+            (
+                "<spectrum type='irregular' wavelengths='400, 500, 600, 700' values='0.05, 0.05, 0.7, 0.7'/>"
+                    .to_owned(),
+                [0.853051, 0.314464, 0.004774],
+            ),
             ("<spectrum value='0.3'/>".to_owned(), [0.3; 3]),
             ("<spectrum value='450:1 451:1'/>".to_owned(), [0.001468, 0.0, 0.019584]),
             ("<spectrum value='360:0.5 830:0.5'/>".to_owned(), [0.499493, 0.499437, 0.499401]),
@@ -376,6 +400,14 @@ mod tests {
         }
         for bad in [
             "<srgb value='#80c0'/>",
+            "<rgb value='#8c2'/>",
+            "<rgb value='#80c020ff'/>",
+            "<rgb value='0.4;0.1;0.2'/>",
+            "<rgb/>",
+            "<spectrum value='400:30 700:60'/>",
+            "<spectrum value='400:-0.1 700:0.5'/>",
+            "<blackbody temperature='6500'/>",
+            "<spectrum type='blackbody'><float name='temperature' value='6500'/></spectrum>",
             "<srgb value='#+0c020'/>",
             "<spectrum value='400:1 500'/>",
             "<spectrum value='400:1'/>",

@@ -7,19 +7,22 @@ use mateval_scene::reference::{Emission, EmissionMap, LightGroup, SurfaceIndex};
 
 use super::color::ColorUse;
 use super::document::Element;
-use super::parameters::Parameters;
+use super::parameters::{COLORS, Parameters};
 use super::reader::Reader;
 use super::texture::all_texels;
 use crate::mean_color::mean_color;
 use mateval_scene::findings::shortened;
 
 impl<'a> Reader<'a> {
-    /// Adds the emitter of a shape, which emits on its front side.
-    pub(super) fn area_light(&mut self, element: &'a Element, surface: SurfaceIndex, owner: &str) {
+    /// Adds the emitter of a shape, which emits on its front side. Returns whether its radiance could be read.
+    pub(super) fn area_light(&mut self, element: &'a Element, surface: SurfaceIndex, owner: &str) -> bool {
         let mut from = self.parameters(element, format!("emitter of '{}'", shortened(owner)));
-        if element.kind() == "area" {
+        let is_area = element.kind() == "area";
+        let mut is_stated = is_area;
+        if is_area {
             from.ignore(&["sampling_weight"]);
             let (radiance, map) = self.area_radiance(&mut from);
+            is_stated &= !from.is_replaced(&["radiance"]) && !from.has_untaken(&COLORS);
             let emission = Emission::Area { surfaces: vec![surface], radiance, map, two_sided: false };
             self.add_light(LightGroup { name: owner.to_owned(), emission, camera_visible: true });
         } else {
@@ -28,6 +31,7 @@ impl<'a> Reader<'a> {
             from.take_all();
         }
         from.finish(&mut self.log);
+        is_stated
     }
 
     /// Adds an emitter that belongs to the scene and not to a shape.
@@ -65,9 +69,13 @@ impl<'a> Reader<'a> {
     fn area_radiance(&mut self, from: &mut Parameters<'a>) -> ([f32; 3], Option<EmissionMap>) {
         let Some(element) = from.take(&["radiance"]) else { return ([1.0; 3], None) };
         if element.tag != "texture" {
-            return (self.constant(element, &from.place, ColorUse::Emission).unwrap_or([1.0; 3]), None);
+            let radiance = self.constant(element, &from.place, ColorUse::Emission);
+            if radiance.is_none() {
+                from.mark_replaced("radiance");
+            }
+            return (radiance.unwrap_or([1.0; 3]), None);
         }
-        match self.color_bitmap(element, &from.place) {
+        match self.color_bitmap(element, from, "radiance") {
             ColorInput::Constant(rgb) => (rgb, None),
             ColorInput::Texture { texture, uv } if self.is_not_negative(texture) => {
                 ([1.0; 3], Some(EmissionMap { texture, uv }))
@@ -75,6 +83,7 @@ impl<'a> Reader<'a> {
             ColorInput::Texture { texture, .. } => {
                 let message = format!("line {}: a texture with values below 0 as radiance", element.line);
                 self.log.warn("out_of_range", &from.place, message, "used its mean colour, clamped at 0");
+                from.mark_replaced("radiance");
                 (self.mean_of(texture).map(|v| v.max(0.0)), None)
             }
         }
@@ -96,7 +105,7 @@ impl<'a> Reader<'a> {
         }
         let message = format!("line {}: a texture as radiance", element.line);
         self.log.warn("unsupported", &from.place, message, "used its mean colour");
-        match self.color_bitmap(element, &from.place) {
+        match self.color_bitmap(element, from, name) {
             ColorInput::Constant(rgb) => rgb,
             ColorInput::Texture { texture, .. } => self.mean_of(texture).map(|v| v.max(0.0)),
         }

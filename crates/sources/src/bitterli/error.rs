@@ -56,6 +56,12 @@ pub enum BitterliError {
         /// What was expected and what was found.
         reason: ValueError,
     },
+    /// The sensor's transform cannot be read.
+    #[error("line {line}: expected a readable to_world of the sensor, found one with a faulty step")]
+    SensorTransform {
+        /// The sensor's line.
+        line: usize,
+    },
     /// The sensor's transform is singular.
     #[error("line {line}: expected an invertible to_world of the sensor, found a singular one")]
     SingularSensor {
@@ -136,6 +142,9 @@ pub enum ValueError {
         /// Why not.
         reason: String,
     },
+    /// The element is the emission of a black body, where a reflectance is wanted.
+    #[error("expected a reflectance, found the emission of a black body")]
+    NotAReflectance,
     /// The element does not describe a colour.
     #[error("expected a colour, found <{found}>")]
     NotAColor {

@@ -14,6 +14,8 @@ pub(super) struct Parameters<'a> {
     pub(super) place: String,
     kind: String,
     children: Vec<Child<'a>>,
+    /// Names of parameters that are given but cannot be used as they are, so that a default stands in for them.
+    replaced: Vec<String>,
 }
 
 struct Child<'a> {
@@ -26,15 +28,21 @@ struct Child<'a> {
 const VALUES: [&str; 11] =
     ["float", "integer", "boolean", "string", "rgb", "srgb", "spectrum", "vector", "point", "transform", "blackbody"];
 
+/// Tags of colours and textures.
+pub(super) const COLORS: [&str; 5] = ["rgb", "srgb", "spectrum", "blackbody", "texture"];
+
 impl<'a> Parameters<'a> {
     /// The children of `element`. An unresolved reference is a finding.
     pub(super) fn new(element: &'a Element, place: String, ids: &Ids<'a>, log: &mut Log) -> Self {
-        let mut children = Vec::new();
+        let (mut children, mut replaced) = (Vec::new(), Vec::new());
         for child in &element.children {
             let target = if child.tag == "ref" { resolve(child, &place, ids, log) } else { Some(child) };
+            if target.is_none() {
+                replaced.push(child.name().to_owned());
+            }
             children.extend(target.map(|target| Child { name: child.name(), element: target, taken: false }));
         }
-        Self { place, kind: format!("{} '{}'", element.tag, shortened(element.kind())), children }
+        Self { place, kind: format!("{} '{}'", element.tag, shortened(element.kind())), children, replaced }
     }
 
     /// The first child with one of these names that has not been taken yet. A child that is never taken is reported.
@@ -44,9 +52,29 @@ impl<'a> Parameters<'a> {
         Some(child.element)
     }
 
-    /// The first child with this name, which is not taken.
-    pub(super) fn find(&self, name: &str) -> Option<&'a Element> {
-        self.children.iter().find(|child| child.name == name).map(|child| child.element)
+    /// Whether a child has this name.
+    pub(super) fn contains(&self, name: &str) -> bool {
+        self.children.iter().any(|child| child.name == name)
+    }
+
+    /// Whether a child with one of these tags has not been taken.
+    pub(super) fn has_untaken(&self, tags: &[&str]) -> bool {
+        self.children.iter().any(|child| !child.taken && tags.contains(&child.element.tag.as_str()))
+    }
+
+    /// Records that the parameter `name` is given but cannot be used as it is.
+    pub(super) fn mark_replaced(&mut self, name: &str) {
+        self.replaced.push(name.to_owned());
+    }
+
+    /// Whether one of the parameters of these names is given but cannot be used as it is.
+    pub(super) fn is_replaced(&self, names: &[&str]) -> bool {
+        self.replaced.iter().any(|name| names.contains(&name.as_str()))
+    }
+
+    /// Whether any parameter that has been taken cannot be used as it is.
+    pub(super) fn is_any_replaced(&self) -> bool {
+        !self.replaced.is_empty()
     }
 
     /// Takes every object with this tag, in order.
@@ -80,7 +108,7 @@ impl<'a> Parameters<'a> {
     }
 
     fn value_or_finding<T>(
-        &self,
+        &mut self,
         name: &str,
         element: &Element,
         value: Result<T, ValueError>,
@@ -89,6 +117,7 @@ impl<'a> Parameters<'a> {
         let report = |error| {
             let message = format!("line {}: '{name}': {error}", element.line);
             log.warn("bad_value", &self.place, message, "used the default");
+            self.mark_replaced(name);
         };
         value.map_err(report).ok()
     }
@@ -119,9 +148,21 @@ impl<'a> Parameters<'a> {
         self.value_or_finding(name, element, value::vector(element, 0.0), log)
     }
 
-    /// Takes a transform. The default is the identity.
+    /// Takes a transform. The default is the identity, also for a faulty one.
     pub(super) fn transform(&mut self, name: &str, log: &mut Log) -> DMat4 {
-        self.take(&[name]).map_or(DMat4::IDENTITY, |element| transform::read(element, &self.place, log))
+        self.sound_transform(name, "used the identity", log).unwrap_or_else(|| {
+            self.mark_replaced(name);
+            DMat4::IDENTITY
+        })
+    }
+
+    /// Takes a transform. The default is the identity. A faulty one gives none and is a finding with this `action`.
+    pub(super) fn sound_transform(&mut self, name: &str, action: &str, log: &mut Log) -> Option<DMat4> {
+        match self.take(&[name]) {
+            Some(element) => transform::read(element, &self.place, action, log),
+            // A reference that leads nowhere has been reported.
+            None => (!self.is_replaced(&[name])).then_some(DMat4::IDENTITY),
+        }
     }
 
     /// Reports parameters that were not taken.

@@ -25,7 +25,7 @@ struct Film {
 }
 
 impl<'a> Reader<'a> {
-    /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is singular.
+    /// The camera of the sensor `element`. Fails where it is no perspective camera or its `to_world` is faulty or singular.
     pub(super) fn sensor(&mut self, element: &'a Element) -> Result<Camera, BitterliError> {
         let mut from = self.parameters(element, element.place());
         match element.kind() {
@@ -41,7 +41,9 @@ impl<'a> Reader<'a> {
             }
             other => return Err(BitterliError::OtherSensor { line: element.line, kind: shortened(other) }),
         }
-        let world_from_sensor = from.transform("to_world", &mut self.log);
+        let world_from_sensor = from
+            .sound_transform("to_world", "there is no camera", &mut self.log)
+            .ok_or(BitterliError::SensorTransform { line: element.line })?;
         let films = from.objects("film");
         let film = match films.first() {
             Some(film) => self.film(film),
@@ -251,6 +253,8 @@ mod tests {
             "",
             "<sensor type='perspective'><float name='fov' value='50'/>\
              <transform name='toWorld'><scale value='0'/></transform></sensor>",
+            "<sensor type='perspective'><float name='fov' value='50'/>\
+             <transform name='toWorld'><translate x='nan'/></transform></sensor>",
         ] {
             assert!(read_xml(&format!("<scene version='0.6.0'>{sensor}</scene>")).is_err());
         }

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DMat4, DVec3, Vec2};
 use mateval_scene::TriangleMesh;
+use mateval_scene::material::StatedParameters;
 use mateval_scene::reference::{Emission, LightGroup, MaterialIndex, Surface, SurfaceIndex};
 
 use super::document::Element;
@@ -24,12 +25,20 @@ impl<'a> Reader<'a> {
         let place = format!("shape '{}'", shortened(&name));
         let mut from = self.parameters(element, place);
         self.report_medium(element, &mut from);
-        let world_from_object = shift::transform(self.shift_m) * from.transform("to_world", &mut self.log);
+        let world_from_object = from
+            .sound_transform("to_world", LEFT_OUT, &mut self.log)
+            .map(|world_from_object| shift::transform(self.shift_m) * world_from_object);
         let flip = from.boolean("flip_normals", false, &mut self.log);
         let (bsdfs, emitters) = (from.objects("bsdf"), from.objects("emitter"));
         // The material of a shape that is left out is read too, so that its faults are reported.
         let material = self.shape_material(&bsdfs, &name, &from);
-        if let Some(mesh) = self.mesh(element, &mut from, world_from_object, flip) {
+        let mesh = world_from_object.and_then(|matrix| self.mesh(element, &mut from, matrix, flip));
+        // A primitive with a faulty parameter would be drawn elsewhere or in another size.
+        let is_misplaced = mesh.is_some() && from.is_replaced(&["center", "radius", "p0", "p1"]);
+        if is_misplaced {
+            self.log.warn("bad_value", &from.place, "the place or size of the shape cannot be read", LEFT_OUT);
+        }
+        if let Some(mesh) = mesh.filter(|_| !is_misplaced) {
             let material = material.unwrap_or_else(|| {
                 if emitters.is_empty() {
                     self.log.note(
@@ -39,20 +48,29 @@ impl<'a> Reader<'a> {
                         "used Mitsuba's default, diffuse grey 0.5",
                     );
                 }
-                self.default_material(&name, !emitters.is_empty())
+                let default = self.default_material(&name, !emitters.is_empty());
+                // A reference that leads nowhere may be to the BSDF, so that even a lamp is not known to be black.
+                if from.is_any_replaced() { self.stating_less(default, without_color) } else { default }
             });
             self.add_surface(name, mesh, material, &emitters);
         } else {
             self.left_out.push(name);
+            // The other parameters of a shape without transform have not been read.
+            if world_from_object.is_none() {
+                from.take_all();
+            }
         }
         from.finish(&mut self.log);
     }
 
     fn add_surface(&mut self, name: String, mut mesh: TriangleMesh, material: MaterialIndex, emitters: &[&'a Element]) {
         let surface = SurfaceIndex(self.scene.surfaces.len());
+        let mut states_emission = true;
         for emitter in emitters {
-            self.area_light(emitter, surface, &name);
+            states_emission &= self.area_light(emitter, surface, &name);
         }
+        let without_emission = |stated| StatedParameters { emission: false, ..stated };
+        let material = if states_emission { material } else { self.stating_less(material, without_emission) };
         // Texture coordinates matter where there is a texture.
         let has_map = |light: &LightGroup| match &light.emission {
             Emission::Area { surfaces, map: Some(_), .. } => surfaces.contains(&surface),
@@ -80,7 +98,9 @@ impl<'a> Reader<'a> {
             let message = format!("{} bsdfs on one shape", bsdfs.len());
             self.log.warn("unsupported", &from.place, message, "used the first one");
         }
-        bsdfs.first().map(|bsdf| self.material(bsdf, name))
+        let material = bsdfs.first().map(|bsdf| self.material(bsdf, name));
+        let is_one_of_several = bsdfs.len() > 1;
+        material.map(|index| if is_one_of_several { self.stating_less(index, without_color) } else { index })
     }
 
     fn report_medium(&mut self, element: &Element, from: &mut Parameters<'a>) {
@@ -214,6 +234,10 @@ impl<'a> Reader<'a> {
             FileFault { code: if matches!(error.fault, ObjFault::TooLarge(_)) { "limit" } else { "bad_mesh" }, message }
         })
     }
+}
+
+fn without_color(stated: StatedParameters) -> StatedParameters {
+    StatedParameters { base_color: false, ..stated }
 }
 
 /// The shape's id, or else its file's name without folder and extension, or else its type.

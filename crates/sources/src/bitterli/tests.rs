@@ -283,6 +283,104 @@ fn each_fault_is_a_finding_and_the_rest_is_read() {
     assert_eq!(codes(&read_inner("<shape type='cube'/>")), [""; 0]);
 }
 
+/// Whether the scene states the base colour of a rectangle with this BSDF.
+fn states_base_color(bsdf: &str) -> bool {
+    read_inner(&format!("<shape type='rectangle'>{bsdf}</shape>")).origins[0].stated.base_color
+}
+
+#[test]
+fn a_colour_that_cannot_be_read_is_not_stated() {
+    let states = |inner: &str| states_base_color(&format!("<bsdf type='diffuse'>{inner}</bsdf>"));
+    for inner in [
+        "<rgb name='reflectance' value='0.4;0.1;0.2'/>",
+        "<rgb name='reflectance' value='#8c2'/>",
+        "<rgb name='reflectance' value='#80c020ff'/>",
+        "<rgb name='reflectance'/>",
+        "<spectrum name='reflectance' value='500:0.2 400:0.1'/>",
+        "<spectrum name='reflectance' type='irregular'/>",
+        "<ref name='reflectance' id='nothing'/>",
+        "<texture name='reflectance' type='checkerboard'/>",
+        // Out of range.
+        "<rgb name='reflectance' value='200 100 50'/>",
+        "<rgb name='reflectance' value='0.5 -0.2 0.5'/>",
+        "<rgb name='reflectance' value='1.01'/>",
+        "<blackbody name='reflectance' temperature='3000'/>",
+        // Of an unknown name.
+        "<rgb name='reflectence' value='0.4'/>",
+        "<float name='reflectence' value='0.4'/>",
+        "<texture type='bitmap'><string name='filename' value='a b.png'/></texture>",
+        // A texture in another place.
+        "<texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/>\
+         <transform name='to_uv'><scale x='nan'/></transform></texture>",
+    ] {
+        assert!(!states(inner), "{inner}");
+    }
+    // Twins, among them noise above 1 and Mitsuba's own default.
+    for inner in [
+        "",
+        "<rgb name='reflectance' value='0.4 0.1 0.2'/>",
+        "<rgb name='reflectance' value='#80c020'/>",
+        "<rgb name='reflectance' value='1.0005'/>",
+        "<spectrum name='reflectance' type='irregular' wavelengths='400 700' values='0.2 0.4'/>",
+        "<texture name='reflectance' type='bitmap'><string name='filename' value='a b.png'/></texture>",
+    ] {
+        assert!(states(inner), "{inner}");
+    }
+    assert!(!states_base_color("<bsdf type='conductor'><string name='materail' value='Au'/></bsdf>"));
+    assert!(states_base_color("<bsdf type='conductor'><string name='material' value='Au'/></bsdf>"));
+}
+
+#[test]
+fn one_of_several_bsdfs_states_no_base_colour() {
+    let one = "<bsdf type='diffuse'><rgb name='reflectance' value='0.4'/></bsdf>";
+    let two = format!("{one}<bsdf type='plastic'/>");
+    for several in [
+        format!("<bsdf type='blendbsdf'><float name='weight' value='0.5'/>{two}</bsdf>"),
+        format!("<bsdf type='mixturebsdf'><string name='weights' value='0.5, 0.5'/>{two}</bsdf>"),
+        format!("<bsdf type='twosided'>{two}</bsdf>"),
+        format!("<bsdf type='twosided'><bsdf type='blendbsdf'>{two}</bsdf></bsdf>"),
+        two.clone(),
+    ] {
+        assert!(!states_base_color(&several), "{several}");
+    }
+    let lamp = "<emitter type='area'/>";
+    assert!(!states_base_color(&format!("<ref id='nothing'/>{lamp}")) && states_base_color(lamp));
+    for single in [one.to_owned(), format!("<bsdf type='twosided'>{one}</bsdf>")] {
+        assert!(states_base_color(&single), "{single}");
+    }
+}
+
+#[test]
+fn an_emission_that_cannot_be_read_is_not_stated() {
+    let states = |radiance: &str| {
+        let scene = read_inner(&format!("<shape type='rectangle'><emitter type='area'>{radiance}</emitter></shape>"));
+        scene.origins[0].stated.emission
+    };
+    assert!(states("<rgb name='radiance' value='200 100 50'/>"));
+    assert!(states("<blackbody name='radiance' temperature='3000'/>"));
+    assert!(!states("<rgb name='radiance' value='bright'/>"));
+    assert!(!states("<rgb name='radience' value='5'/>"));
+}
+
+#[test]
+fn a_shape_whose_place_cannot_be_read_is_missing() {
+    let cube =
+        |step: &str| format!("<shape type='cube' id='Lost'><transform name='to_world'>{step}</transform></shape>");
+    for lost in [
+        cube("<translate x='nan'/>"),
+        cube("<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2'/>"),
+        cube("<skew/>"),
+        "<shape type='cube' id='Lost'><string name='to_world' value='2'/></shape>".to_owned(),
+        "<shape type='sphere' id='Lost'><float name='radius' value='nan'/></shape>".to_owned(),
+    ] {
+        let scene = read_inner(&format!("{lost}<shape type='cube'/>"));
+        let names: Vec<&str> = scene.scene.surfaces.iter().map(|surface| surface.name.as_str()).collect();
+        assert_eq!((names, scene.missing.files), (vec!["cube"], vec!["Lost".to_owned()]), "{lost}");
+    }
+    // Twin.
+    assert_eq!(read_inner(&cube("<translate x='1'/>")).missing.files, [""; 0]);
+}
+
 #[test]
 fn findings_name_file_and_element() {
     let scene = read_inner("\n<shape type='obj'><string name='filename' value='models/Mesh7.obj'/></shape>");

@@ -5,7 +5,7 @@ use mateval_image::{ImageError, Texels, Texture, Wrap};
 use mateval_scene::material::{ColorInput, ScalarInput, TextureIndex, UvTransform};
 use mateval_scene::reference::SourceTexture;
 
-use super::color::{ColorUse, constant_color};
+use super::color::{ColorUse, MOST_REFLECTANCE, constant_color};
 use super::document::Element;
 use super::parameters::Parameters;
 use super::reader::Reader;
@@ -23,6 +23,8 @@ struct Bitmap {
     wrap: Wrap,
     uv: UvTransform,
     channel: Option<char>,
+    /// Whether all its parameters could be used as they are.
+    is_exact: bool,
     place: String,
     line: usize,
 }
@@ -33,22 +35,31 @@ impl<'a> Reader<'a> {
         let Some(element) = from.take(&[name]) else { return ColorInput::Constant([default; 3]) };
         if element.tag != "texture" {
             let constant = self.constant(element, &from.place, ColorUse::Reflectance);
+            if constant.is_none() {
+                from.mark_replaced(name);
+            }
             return ColorInput::Constant(constant.unwrap_or([default; 3]));
         }
-        self.color_bitmap(element, &from.place)
+        self.color_bitmap(element, from, name)
     }
 
-    /// The bitmap `element` as a colour. One that cannot be read is reported and becomes mid-grey.
-    pub(super) fn color_bitmap(&mut self, element: &'a Element, place: &str) -> ColorInput {
-        let Some(bitmap) = self.bitmap(element, place) else { return ColorInput::Constant(MISSING) };
-        if bitmap.channel.is_some() {
-            let message = format!("line {}: one channel of a bitmap as a colour", element.line);
-            self.log.warn("unsupported", place, message, "used all its channels");
+    /// The bitmap `element`, which is the parameter `name`, as a colour. One that cannot be read is reported and becomes
+    /// mid-grey.
+    pub(super) fn color_bitmap(&mut self, element: &'a Element, from: &mut Parameters<'a>, name: &str) -> ColorInput {
+        let read = self.bitmap(element, &from.place).and_then(|bitmap| {
+            if bitmap.channel.is_some() {
+                let message = format!("line {}: one channel of a bitmap as a colour", element.line);
+                self.log.warn("unsupported", &from.place, message, "used all its channels");
+            }
+            let texture = self.texture(&bitmap, Aspect::Color)?;
+            let is_exact = bitmap.is_exact && bitmap.channel.is_none();
+            Some((ColorInput::Texture { texture, uv: bitmap.uv }, is_exact))
+        });
+        let (color, is_exact) = read.unwrap_or((ColorInput::Constant(MISSING), false));
+        if !is_exact {
+            from.mark_replaced(name);
         }
-        match self.texture(&bitmap, Aspect::Color) {
-            Some(texture) => ColorInput::Texture { texture, uv: bitmap.uv },
-            None => ColorInput::Constant(MISSING),
-        }
+        color
     }
 
     /// Takes the number `name` from 0 to 1. As in Mitsuba, the luminance of a colour counts.
@@ -56,9 +67,15 @@ impl<'a> Reader<'a> {
         let Some(element) = from.take(&[name]) else { return ScalarInput::Constant(default) };
         if element.tag != "texture" {
             let constant = self.constant(element, &from.place, ColorUse::Reflectance);
+            if constant.is_none() {
+                from.mark_replaced(name);
+            }
             return ScalarInput::Constant(constant.map_or(default, luminance));
         }
-        self.scalar_texture(element, &from.place, false).unwrap_or(ScalarInput::Constant(default))
+        self.scalar_texture(element, &from.place, false).unwrap_or_else(|| {
+            from.mark_replaced(name);
+            ScalarInput::Constant(default)
+        })
     }
 
     /// Takes the opacity `name`: the alpha channel of a picture whose alpha is not 1 everywhere, else its luminance.
@@ -99,7 +116,7 @@ impl<'a> Reader<'a> {
     /// The constant colour of an element ([`constant_color`]). Anything else is reported and gives none.
     pub(super) fn constant(&mut self, element: &Element, place: &str, usage: ColorUse) -> Option<[f32; 3]> {
         match constant_color(element, usage, self.major_version, &mut self.source) {
-            Ok(rgb) => Some(self.bounded(rgb, element, place, usage)),
+            Ok(rgb) => self.bounded(rgb, element, place, usage),
             Err(error) => {
                 let message = format!("line {}: '{}': {error}", element.line, shortened(element.name()));
                 self.log.warn("bad_value", place, message, "used the default");
@@ -108,13 +125,17 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, usage: ColorUse) -> [f32; 3] {
-        let most = if usage == ColorUse::Reflectance { 1.0 } else { 1e9 };
+    /// The colour in its range. As in Mitsuba, a reflectance outside of it is refused, save for noise.
+    fn bounded(&mut self, rgb: [f64; 3], element: &Element, place: &str, usage: ColorUse) -> Option<[f32; 3]> {
+        let is_reflectance = usage == ColorUse::Reflectance;
+        let most = if is_reflectance { 1.0 } else { 1e9 };
+        let is_refused = is_reflectance && rgb.iter().any(|v| *v < 0.0 || *v > MOST_REFLECTANCE);
         if rgb.iter().any(|v| *v < 0.0 || *v > most) {
             let message = format!("line {}: '{}': expected 0 to {most}, found {rgb:?}", element.line, element.name());
-            self.log.warn("out_of_range", place, message, "clamped");
+            let action = if is_refused { "used the default" } else { "clamped" };
+            self.log.warn("out_of_range", place, message, action);
         }
-        rgb.map(|v| v.clamp(0.0, most) as f32)
+        (!is_refused).then(|| rgb.map(|v| v.clamp(0.0, most) as f32))
     }
 
     fn bitmap(&mut self, element: &'a Element, place: &str) -> Option<Bitmap> {
@@ -138,8 +159,9 @@ impl<'a> Reader<'a> {
         let uv = self.uv_transform(&mut from);
         let channel = from.string("channel").and_then(|text| text.trim().to_ascii_lowercase().chars().next());
         from.ignore(&["cache", "max_anisotropy", "format", "accel"]);
+        let is_exact = !from.is_any_replaced();
         from.finish(&mut self.log);
-        Some(Bitmap { file, linear, wrap, uv, channel, place: place.to_owned(), line: element.line })
+        Some(Bitmap { file, linear, wrap, uv, channel, is_exact, place: place.to_owned(), line: element.line })
     }
 
     /// Whether a file of integers is decoded as linear (`raw`, or a gamma of 1) instead of as sRGB. Files of floats are
@@ -161,6 +183,7 @@ impl<'a> Reader<'a> {
         if u != v {
             let message = format!("line {}: a bitmap wraps differently along u and v", element.line);
             self.log.warn("unsupported", &from.place, message, "used the mode of u for both");
+            from.mark_replaced("wrap_mode_v");
         }
         match u.or(v).unwrap_or("repeat") {
             "repeat" => Wrap::Repeat,
@@ -169,6 +192,7 @@ impl<'a> Reader<'a> {
             other => {
                 let message = format!("line {}: wrap mode '{}' is not known", element.line, shortened(other));
                 self.log.warn("bad_value", &from.place, message, "used repeat");
+                from.mark_replaced("wrap_mode");
                 Wrap::Repeat
             }
         }

@@ -33,8 +33,16 @@ enum StepError {
     UpAlongView,
 }
 
-/// The product of a transform's steps. A faulty step is a finding and counts as the identity.
-pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
+/// The product of a transform's steps. A transform with a faulty step gives none and is a finding with this `action`: without
+/// that step, it would put its object elsewhere.
+pub(super) fn read(transform: &Element, place: &str, action: &str, log: &mut Log) -> Option<DMat4> {
+    if transform.tag != "transform" {
+        let tag = mateval_scene::findings::shortened(&transform.tag);
+        let message = format!("line {}: expected a <transform>, found <{tag}>", transform.line);
+        log.warn("bad_transform", place, message, action);
+        return None;
+    }
+    let mut is_sound = true;
     let mut product = DMat4::IDENTITY;
     for element in &transform.children {
         match step(element) {
@@ -42,16 +50,16 @@ pub(super) fn read(transform: &Element, place: &str, log: &mut Log) -> DMat4 {
             Err(error) => {
                 let tag = mateval_scene::findings::shortened(&element.tag);
                 let message = format!("line {}: <{tag}>: {error}", element.line);
-                log.warn("bad_transform", place, message, "left this step out");
+                log.warn("bad_transform", place, message, action);
+                is_sound = false;
             }
         }
     }
     if product.to_cols_array().iter().all(|v| v.is_finite()) {
-        product
-    } else {
-        log.warn("bad_transform", place, "the product of the transform's steps overflows", "used the identity");
-        DMat4::IDENTITY
+        return is_sound.then_some(product);
     }
+    log.warn("bad_transform", place, "the product of the transform's steps overflows", action);
+    None
 }
 
 fn step(element: &Element) -> Result<DMat4, StepError> {
@@ -124,10 +132,15 @@ mod tests {
     use super::*;
 
     fn read_text(steps: &str) -> (DMat4, usize) {
+        let (matrix, findings) = read_faulty(steps);
+        (matrix.unwrap(), findings)
+    }
+
+    fn read_faulty(steps: &str) -> (Option<DMat4>, usize) {
         let mut log = Log::new("scene.xml".into(), 100);
         let text = format!("<scene version='3.0.0'><transform>{steps}</transform></scene>");
         let document = Document::parse_text(&text, &mut log).unwrap();
-        let matrix = read(&document.root.children[0], "shape", &mut log);
+        let matrix = read(&document.root.children[0], "shape", "left it out", &mut log);
         (matrix, log.into_findings().len())
     }
 
@@ -161,18 +174,20 @@ mod tests {
     }
 
     #[test]
-    fn faulty_steps_are_findings() {
+    fn faulty_steps_are_findings_and_give_no_transform() {
         for bad in [
             "<matrix value='1 2 3'/>",
             "<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 1 1'/>",
             "<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 2e-6 1'/>",
+            "<matrix value='2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 2'/>",
+            "<translate x='nan'/>",
             "<rotate angle='3'/>",
             "<rotate x='1' angle='nan'/>",
             "<skew/>",
             "<lookat origin='0 0 0' target='0 0 0'/>",
             "<scale value='1e308'/><scale value='1e308'/>",
         ] {
-            assert_eq!(read_text(bad), (DMat4::IDENTITY, 1), "{bad}");
+            assert_eq!(read_faulty(bad), (None, 1), "{bad}");
         }
     }
 }

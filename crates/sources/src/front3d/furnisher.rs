@@ -147,12 +147,14 @@ impl<'a> Furnisher<'a> {
             let class = finish.as_ref().map(|finish| finish.classes[0]);
             let textures = self.textures.as_mut();
             let (index, color) = self.appearances.of_architecture(house, material, class, textures, &mut self.log);
+            let has_textures = self.textures.is_some();
+            let states_color =
+                material.is_some_and(|at| self.appearances.states_color(&house.materials[at], index, has_textures));
             let origin = InstanceOrigin {
                 role: Role::Architecture { kind: kind.to_owned() },
                 part_of_triangle: Some(parts),
                 class_of_part: finish.map(|finish| finish.of_parts),
-                stated: self
-                    .stated(material.is_some_and(|at| self.appearances.states_color(&house.materials[at], index))),
+                stated: self.stated(states_color),
                 ..InstanceOrigin::default()
             };
             self.surfaces.push(Surface { name: kind.to_owned(), mesh: merged.mesh, material: index });

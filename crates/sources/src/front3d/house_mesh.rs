@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use mateval_scene::TriangleMesh;
+use mateval_scene::findings::shortened;
 use serde_json::Value;
 
 use super::document::{kind, list, number};
@@ -17,9 +18,7 @@ const UNIT_TOLERANCE: f64 = 0.01;
 /// Reads `xyz`, `uv` and `faces` of the mesh at `place`, and what has been subtracted from its positions. None, with a
 /// finding, where no triangle is usable.
 pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(TriangleMesh, DVec3)> {
-    // Anything that is not a number is read as NaN and then handled with the numbers that are not finite.
-    let floats = |key: &str| list(from, key).iter().map(|v| number(v).unwrap_or(f64::NAN)).collect::<Vec<f64>>();
-    let (xyz, uv) = (floats("xyz"), floats("uv"));
+    let [xyz, uv] = ["xyz", "uv"].map(|key| numbers(from, key, place, log));
     let base = base(&xyz);
     let positions = positions(&xyz, base);
     let mut mesh = TriangleMesh { positions, normals: None, uvs: None, triangles: faces(from, place, log) };
@@ -33,6 +32,23 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(Triangle
     }
     // Unused vertices may have positions that are not finite, so they are dropped.
     Some((mesh.picked(|_| true), base))
+}
+
+/// The numbers at `key`. Anything else is read as NaN, which is handled with the numbers that are not finite; the first such
+/// entry is reported.
+fn numbers(from: &Value, key: &str, place: &str, log: &mut Log) -> Vec<f64> {
+    let all = list(from, key);
+    let is_other = |value: &&Value| number(value).is_none();
+    if let Some(at) = all.iter().position(|value| is_other(&value)) {
+        let count = all.iter().filter(is_other).count();
+        let found = match &all[at] {
+            Value::String(text) => format!("'{}'", shortened(text)),
+            other => kind(other).to_owned(),
+        };
+        let message = format!("expected a number, found {found}; {count} of {} entries are none", all.len());
+        log.warn("bad_number", &format!("{place}/{key}/{at}"), message, "read them as not finite");
+    }
+    all.iter().map(|value| number(value).unwrap_or(f64::NAN)).collect()
 }
 
 /// The first sound position in whole metres, where it lies far from the origin, else zero.
@@ -177,9 +193,7 @@ mod tests {
             ("faces", json!([0, 1, 2, 0, 2, 2.5]), 1, "bad_faces /mesh/0/faces"),
             ("faces", json!([0, 1, 2, 0]), 1, "bad_faces /mesh/0/faces"),
             ("faces", json!([0, 1, 2, 3, 3, 2]), 1, "zero_area /mesh/0/faces"),
-            ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, null, 0]), 1, "bad_faces /mesh/0/faces"),
             ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1e30, 0]), 1, "bad_faces /mesh/0/faces"),
-            ("uv", json!([0, 0, 1, null, 1, 1, 0, 1]), 2, "bad_uv /mesh/0/uv"),
             ("uv", json!([0, 0, 1, 0, 1, 1]), 2, "bad_uv /mesh/0/uv"),
             ("normal", json!([0, 0, 1, 3, 0, 1, 0, 0, 1, 0, 0, 1]), 2, "bad_normals /mesh/0/normal"),
             ("normal", json!([0, 0, 1]), 2, "bad_normals /mesh/0/normal"),
@@ -190,6 +204,20 @@ mod tests {
             assert_eq!((mesh.triangles.len(), findings), (triangles, vec![finding.to_owned()]), "{key} {value}");
             assert!(mesh.positions.iter().all(|p| p.is_finite()));
             assert_eq!(mesh.uvs.map(|uvs| uvs.len()), Some(mesh.positions.len()));
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_named() {
+        for (key, value, triangles, other) in [
+            ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, null, "1,5"]), 1, "bad_faces /mesh/0/faces"),
+            ("uv", json!([0, 0, 1, 0, 1, 1, 0, "nan"]), 2, "bad_uv /mesh/0/uv"),
+        ] {
+            let (mesh, findings) = read_one(with(key, value));
+            let at = if key == "xyz" { 10 } else { 7 };
+            assert!(findings.contains(&format!("bad_number /mesh/0/{key}/{at}")), "{findings:?}");
+            assert!(findings.contains(&other.to_owned()) && findings.len() == 2, "{findings:?}");
+            assert_eq!(mesh.unwrap().triangles.len(), triangles);
         }
     }
 

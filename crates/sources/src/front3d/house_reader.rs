@@ -133,14 +133,17 @@ fn content(record: &Value) -> Option<String> {
 fn color(record: &Value, place: &str, log: &mut Log) -> Option<[f64; 3]> {
     let found = record.get("color")?;
     let all: Vec<f64> = found.as_array().into_iter().flatten().map_while(number).collect();
-    match all.first_chunk::<3>() {
-        Some(rgb) if rgb.iter().all(|v| (0.0..=255.0).contains(v)) => Some(*rgb),
-        _ => {
-            let message = format!("expected 3 or 4 numbers of 0 to 255, found {}", kind(found));
-            log.warn("bad_color", &format!("{place}/color"), message, "used white");
-            None
-        }
-    }
+    // Fractions below 1 are colours of 0 to 1, as other formats have them.
+    let is_of_255 = |rgb: &[f64; 3]| rgb.iter().any(|v| *v > 1.0) || rgb.iter().all(|v| v.fract() == 0.0);
+    let found = match all.first_chunk::<3>() {
+        Some(rgb) if !rgb.iter().all(|v| (0.0..=255.0).contains(v)) => format!("{rgb:?}"),
+        Some(rgb) if is_of_255(rgb) => return Some(*rgb),
+        Some(rgb) => format!("fractions of 1: {rgb:?}"),
+        None => kind(found).to_owned(),
+    };
+    let message = format!("expected 3 or 4 numbers of 0 to 255, found {found}");
+    log.warn("bad_color", &format!("{place}/color"), message, "used white, which the file does not state");
+    None
 }
 
 /// The first two rows of a row-major 3x3 matrix.

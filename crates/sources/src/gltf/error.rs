@@ -35,6 +35,16 @@ pub enum GltfSceneError {
         /// What to do.
         way_out: &'static str,
     },
+    /// A mesh or a buffer view exists in a compressed form alone, which is not supported.
+    #[error("{pointer}: its data are compressed ('{name}'), which is not supported; {way_out}")]
+    OnlyCompressed {
+        /// The primitive or buffer view.
+        pointer: String,
+        /// The extension's name.
+        name: &'static str,
+        /// What to do.
+        way_out: &'static str,
+    },
     /// The file breaks the rules of glTF.
     #[error("{pointer}: {reason}{}", and_more(*others))]
     NotValid {

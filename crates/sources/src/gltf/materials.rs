@@ -71,7 +71,8 @@ impl Reader<'_> {
         let name = material.name().map(shortened).unwrap_or_else(own_name);
         self.scene.materials.push(Material { name, model, two_sided: true, opacity, bump: None });
         let index = MaterialIndex(self.scene.materials.len() - 1);
-        let read = ReadMaterial { index, uv_set: lookups.set(), stated: self.stated(material), glow };
+        let stated = self.known(self.stated(material), material, &lookups, &pointer);
+        let read = ReadMaterial { index, uv_set: lookups.set(), stated, glow };
         self.materials.insert(material.index(), read);
         read
     }
@@ -80,6 +81,47 @@ impl Reader<'_> {
     fn stated(&self, material: &gltf::Material<'_>) -> StatedParameters {
         let nothing = StatedParameters { base_color: false, roughness: false, metallic: false, emission: false };
         material.index().and_then(|index| self.file.stated.get(index)).copied().unwrap_or(nothing)
+    }
+
+    /// What the file states of a material, without the parameters whose texture was not read: the value that stands for
+    /// the texture is not the file's. Follows the reading of all textures of the material.
+    fn known(
+        &self,
+        stated: StatedParameters,
+        material: &gltf::Material<'_>,
+        lookups: &Lookups<'_>,
+        pointer: &str,
+    ) -> StatedParameters {
+        let is_unread = |lookup: &Option<Lookup<'_>>, keys: &[&str]| {
+            let is_faulty = |lookup: &Lookup<'_>| self.faulty_images.contains(&lookup.texture.source().index());
+            let names_no_picture = |key: &&str| self.without_picture.contains(format!("{pointer}/{key}").as_str());
+            lookup.as_ref().is_some_and(is_faulty) || keys.iter().any(names_no_picture)
+        };
+        let emissive = is_unread(&lookups.emissive, &["emissiveTexture"]) && material.emissive_factor() != [0.0; 3];
+        let emission = stated.emission && !emissive;
+        if material.pbr_specular_glossiness().is_some() {
+            let extension = "extensions/KHR_materials_pbrSpecularGlossiness";
+            let key = |name: &str| format!("{extension}/{name}");
+            let diffuse = is_unread(&lookups.base_color, &[&key("diffuseTexture")]);
+            let specular = is_unread(&lookups.metallic_roughness, &[&key("specularGlossinessTexture")]);
+            // The conversion makes base colour and metallic of both colours, and roughness of the glossiness alone.
+            return StatedParameters {
+                base_color: stated.base_color && !diffuse && !specular,
+                roughness: stated.roughness && !specular,
+                metallic: stated.metallic && !diffuse && !specular,
+                emission,
+            };
+        }
+        let pbr = material.pbr_metallic_roughness();
+        let base_color = is_unread(&lookups.base_color, &["pbrMetallicRoughness/baseColorTexture"]);
+        let numbers = is_unread(&lookups.metallic_roughness, &["pbrMetallicRoughness/metallicRoughnessTexture"]);
+        // A factor of 0 is the value, whatever the texture holds.
+        StatedParameters {
+            base_color: stated.base_color && !base_color,
+            roughness: stated.roughness && !(numbers && pbr.roughness_factor() != 0.0),
+            metallic: stated.metallic && !(numbers && pbr.metallic_factor() != 0.0),
+            emission,
+        }
     }
 
     fn model(&mut self, material: &gltf::Material<'_>, lookups: &Lookups<'_>, pointer: &str) -> MaterialModel {

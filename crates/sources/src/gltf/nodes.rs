@@ -108,7 +108,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The transforms of `EXT_mesh_gpu_instancing`. Absent attributes have the format's defaults: no motion.
+    /// The transforms of `EXT_mesh_gpu_instancing`, at least one. Absent attributes have the format's defaults: no motion.
     fn instances(&self, extension: &Value) -> Result<Vec<DMat4>, GltfError> {
         let attribute = |key: &str| {
             let index = extension.pointer(&format!("/attributes/{key}")).and_then(Value::as_u64);
@@ -116,6 +116,9 @@ impl Reader<'_> {
         };
         let all = ["TRANSLATION", "ROTATION", "SCALE"].map(attribute);
         let count = all.iter().flatten().map(gltf::Accessor::count).max().unwrap_or(0);
+        if count == 0 {
+            return Err(GltfError::Missing { attribute: "TRANSLATION, ROTATION or SCALE of one instance or more" });
+        }
         if all.iter().flatten().any(|accessor| accessor.count() != count) {
             return Err(GltfError::CountsDiffer);
         }

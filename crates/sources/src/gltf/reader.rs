@@ -31,6 +31,8 @@ pub(super) struct Reader<'a> {
     pub(super) textures: BTreeMap<TextureKey, Option<TextureIndex>>,
     /// Images that could not be used.
     pub(super) faulty_images: BTreeSet<usize>,
+    /// JSON pointers to references to textures without a picture.
+    pub(super) without_picture: BTreeSet<&'a str>,
     /// Texels of all textures.
     pub(super) texels: usize,
     /// By index in the file; none for the material of primitives without one.
@@ -64,6 +66,7 @@ impl<'a> Reader<'a> {
             origins: Vec::new(),
             textures: BTreeMap::new(),
             faulty_images: BTreeSet::new(),
+            without_picture: file.without_picture.iter().map(String::as_str).collect(),
             texels: 0,
             materials: BTreeMap::new(),
             primitives: 0,

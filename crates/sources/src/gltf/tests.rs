@@ -377,6 +377,90 @@ fn missing_files_have_a_pointer() {
     }
 }
 
+/// What a texture that was not read would state is unstated; a factor of 0 is a value whatever the texture holds.
+#[test]
+fn parameters_of_unread_textures_are_unstated() {
+    let stated = |material: Value, texture: Value, uri: &str| {
+        let file = changed(with("/materials/0", material), "/images", json!([{ "uri": uri }]));
+        let scene = read_json(&changed(file, "/textures", json!([texture])));
+        let stated = scene.origins[0].stated;
+        [stated.base_color, stated.roughness, stated.metallic, stated.emission]
+    };
+    let info = json!({ "index": 0 });
+    let base = json!({ "pbrMetallicRoughness": {
+        "baseColorTexture": info, "baseColorFactor": [1, 1, 1, 1], "roughnessFactor": 0.5, "metallicFactor": 0,
+    } });
+    let numbers = json!({
+        "pbrMetallicRoughness": { "baseColorFactor": [1, 1, 1, 1], "metallicRoughnessTexture": info, "metallicFactor": 0 },
+    });
+    let emissive = json!({ "emissiveFactor": [1, 1, 1], "emissiveTexture": info });
+    let specular = |key: &str| {
+        let factors = json!({
+            key: info, "diffuseFactor": [1, 1, 1, 1], "specularFactor": [0, 0, 0], "glossinessFactor": 0.5,
+        });
+        json!({ "extensions": { "KHR_materials_pbrSpecularGlossiness": factors } })
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.png");
+    write_png(&path);
+    let png = std::fs::read(&path).unwrap();
+    let pointer = b"version https://git-lfs.github.com/spec/v1\n".as_slice();
+    let faulty = [pointer, b"garbage", &png[..png.len() / 2], b"\xabKTX 20\xbb\r\n\x1a\n"].map(data_uri);
+    let (named, unnamed) = (json!({ "source": 0 }), json!({}));
+    let mut read: Vec<(Value, &str)> = faulty.iter().map(|uri| (named.clone(), uri.as_str())).collect();
+    read.push((unnamed, "a.png"));
+    for (texture, uri) in read {
+        let of = |material: &Value| stated(material.clone(), texture.clone(), uri);
+        assert_eq!(of(&base), [false, true, true, false], "{uri}");
+        assert_eq!(of(&numbers), [true, false, true, false], "{uri}");
+        assert_eq!(of(&emissive), [false; 4], "{uri}");
+        assert_eq!(of(&specular("diffuseTexture")), [false, true, false, false], "{uri}");
+        assert_eq!(of(&specular("specularGlossinessTexture")), [false; 4], "{uri}");
+    }
+    let sound = data_uri(&png);
+    let of = |material: &Value| stated(material.clone(), named.clone(), &sound);
+    assert_eq!(of(&base), [true, true, true, false]);
+    assert_eq!(of(&emissive), [false, false, false, true]);
+    assert_eq!(of(&specular("specularGlossinessTexture")), [true, true, true, false]);
+}
+
+/// Meshes that exist in a compressed form alone are refused, though the file does not require the extension.
+#[test]
+fn compressed_meshes_are_refused_by_name() {
+    let draco = json!({ "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 0 } } });
+    let mut file = with("/meshes/0/primitives/0/extensions", draco);
+    // With uncompressed data beside it, it is read.
+    assert_eq!(read_json(&file).scene.surfaces.len(), 1);
+    for accessor in file["accessors"].as_array_mut().unwrap() {
+        let accessor = accessor.as_object_mut().unwrap();
+        accessor.remove("bufferView");
+        accessor.remove("byteOffset");
+    }
+    let error = error_of(&file);
+    assert!(error.contains("/meshes/0/primitives/0: ") && error.contains("KHR_draco_mesh_compression"), "{error}");
+    assert!(error.contains("without compression"), "{error}");
+    let meshopt = json!({ "EXT_meshopt_compression": { "buffer": 0, "byteLength": 60, "byteStride": 12, "count": 5 } });
+    let file = with("/bufferViews/0/extensions", meshopt);
+    assert_eq!(read_json(&file).scene.surfaces.len(), 1);
+    let file = changed(file, "/buffers/-", json!({ "byteLength": 60 }));
+    let error = error_of(&changed(file, "/bufferViews/0/buffer", json!(1)));
+    assert!(error.contains("/bufferViews/0: ") && error.contains("EXT_meshopt_compression"), "{error}");
+}
+
+/// Instances without a place are a finding, and those that name no accessor an error: the mesh does not just vanish.
+#[test]
+fn instances_do_not_vanish() {
+    let file = |attributes: Value| {
+        with("/nodes/0/extensions", json!({ "EXT_mesh_gpu_instancing": { "attributes": attributes } }))
+    };
+    for index in [json!(99), json!(-1), json!("a")] {
+        let error = error_of(&file(json!({ "TRANSLATION": index })));
+        assert!(error.contains("/nodes/0/extensions/EXT_mesh_gpu_instancing/attributes/TRANSLATION: "), "{error}");
+    }
+    assert_eq!(findings(&read_json(&file(json!({})))), [("bad_instances", "/nodes/0")]);
+    assert_eq!(read_json(&file(json!({ "TRANSLATION": 0 }))).scene.surfaces.len(), 3);
+}
+
 /// Faults of a primitive leave the rest of the scene whole.
 #[test]
 fn faulty_primitives_are_left_out() {

@@ -156,7 +156,8 @@ impl Reader<'_> {
         self.faulty_images.insert(image.index());
         let file = self.log.file().to_owned();
         let pointer = format!("/images/{}", image.index());
-        let action = "used linear mid-grey as colour, the factor as number, and no opacity";
+        let action =
+            "used linear mid-grey as colour, the factor as number, and no opacity; none of them counts as stated";
         self.log.push(Severity::Warning, fault.code, &file, &pointer, fault.message, action);
     }
 

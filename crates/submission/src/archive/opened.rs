@@ -1,8 +1,10 @@
 //! A submission that is ready to be read: a folder as it is, or an archive unpacked to a folder for the time being.
 
+use std::borrow::Cow;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use mateval_image::file_kind::hint;
 use mateval_scene::submission::SUBMISSION;
 
 use super::fault::Fault;
@@ -41,6 +43,10 @@ pub fn open(path: &Path, work: &Path) -> Result<Opened, SubmissionError> {
     Ok(Opened { root: root_of(folder.path()), _unpacked: Some(folder) })
 }
 
+/// The first block of a tar, whose magic is `ustar` at [`TAR_MAGIC_AT`] (POSIX.1-2017, pax, "ustar Interchange Format").
+const START_BYTES: u64 = 512;
+const TAR_MAGIC_AT: usize = 257;
+
 type Unpack = fn(std::fs::File, &Path) -> Result<(), Fault>;
 
 /// The kind of an archive by its first bytes; its name proves nothing.
@@ -49,12 +55,19 @@ fn kind_of(path: &Path, data: &std::fs::Metadata) -> Result<Unpack, SubmissionEr
     // Something that may be endless, such as a pipe, is not opened.
     if data.is_file() {
         let file = std::fs::File::open(path).map_err(SubmissionError::io("read", path))?;
-        file.take(4).read_to_end(&mut start).map_err(SubmissionError::io("read", path))?;
+        file.take(START_BYTES).read_to_end(&mut start).map_err(SubmissionError::io("read", path))?;
     }
     match start.as_slice() {
-        [b'P', b'K', 3, 4] | [b'P', b'K', 5, 6] => Ok(unpack_zip),
+        [b'P', b'K', 3, 4, ..] | [b'P', b'K', 5, 6, ..] => Ok(unpack_zip),
         [0x1f, 0x8b, ..] => Ok(unpack_tar_gz),
-        _ => Err(SubmissionError::UnknownKind { path: path.to_owned() }),
+        _ => {
+            let hint = match start.get(TAR_MAGIC_AT..) {
+                _ if !data.is_file() => Cow::Borrowed(""),
+                Some(magic) if magic.starts_with(b"ustar") => Cow::Borrowed("; it is a .tar; compress it with `gzip`"),
+                _ => hint(&start),
+            };
+            Err(SubmissionError::UnknownKind { path: path.to_owned(), hint })
+        }
     }
 }
 

@@ -201,6 +201,24 @@ fn truncated_and_changed_archives_are_errors_with_a_reason() {
     assert!(matches!(opened("a.zip", b"").1, Err(SubmissionError::UnknownKind { .. })));
 }
 
+#[test]
+fn what_stands_in_place_of_an_archive_is_named() {
+    let tar = [tar_header("a", b'0', 0), vec![0; 1024]].concat();
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n";
+    let page = b"<!DOCTYPE html><html>";
+    let kinds: [(&[u8], &str); 5] = [
+        (pointer, "git lfs pull"),
+        (page, "a web page"),
+        (b"", "an empty file"),
+        (&tar, "a .tar;"),
+        (b"Rar!", "a RAR"),
+    ];
+    for (bytes, words) in kinds {
+        let error = opened("a.zip", bytes).1.unwrap_err().to_string();
+        assert!(error.contains("expected a folder, a .zip or a .tar.gz; it is ") && error.contains(words), "{error}");
+    }
+}
+
 proptest! {
     /// Any change is unpacked inside the folder or refused.
     #[test]

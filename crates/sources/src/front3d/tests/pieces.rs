@@ -250,11 +250,12 @@ fn each_material_rule_alone() {
         (json!({"UVTransform": [1e9, 0, 0, 0, 1, 0, 0, 0, 1]}), "bad_uv_transform"),
         (json!({"color": [1, 2]}), "bad_color"),
         (json!({"color": [0, 0, 256]}), "bad_color"),
+        (json!({"color": [0.5, 0.4, 0.3, 1]}), "bad_color"),
         (json!({"color": "red"}), "bad_color"),
     ] {
         let (material, findings) = read(bad);
         assert_eq!((findings.len(), findings[0].code.as_str()), (1, code));
-        assert_eq!((material.uv, material.color), (UvTransform::default(), None));
+        assert_eq!((material.uv, material.color.is_none()), (UvTransform::default(), code == "bad_color"));
     }
 }
 
@@ -279,4 +280,19 @@ fn textures_may_be_missing_altogether() {
     // The twin: with the folder there is no such finding.
     let house = furnish(&disk.files(), &Limits::default()).unwrap();
     assert!(house.findings.iter().all(|finding| finding.code != "no_textures"));
+}
+
+/// The white of a material whose texture is lost is no statement, unless the maker has no textures at all.
+#[test]
+fn a_lost_texture_leaves_the_color_unstated() {
+    let disk = Disk::new();
+    let unstated = |textures: Option<&str>| {
+        let files = HouseFiles { textures: textures.map(Into::into), ..disk.files() };
+        let house = furnish(&files, &Limits::default()).unwrap();
+        house.placed.iter().filter(|placed| placed.model.is_none() && !placed.origin.stated.base_color).count()
+    };
+    let sound = unstated(disk.files().textures.as_deref().and_then(std::path::Path::to_str));
+    assert_eq!(unstated(None), sound);
+    std::fs::create_dir(disk.files().root.join("house/empty")).unwrap();
+    assert!(unstated(Some("house/empty")) > sound);
 }
