@@ -22,6 +22,8 @@ views = []
 
 [[scene]]
 id = "library"
+allow_missing = true
+allow_unstated = true
 camera = { position = [4.6, 1.5, 7.6], target = [1.5, 0.2, 6.2], fov_y_deg = 60.0 }
 
 [scene.front3d]

@@ -301,7 +301,8 @@ fn what_cannot_be_built_is_one_clear_error() {
         std::fs::write(folder.path().join("a.gltf"), text).unwrap();
         run(&mut build(&recipe, &folder.path().join(out)))
     };
-    let camera = "camera = { position = [0.3, 0.3, 2.0], target = [0.3, 0.3, 0.0], fov_y_deg = 40.0 }";
+    let camera = "allow_unstated = true\n\
+        camera = { position = [0.3, 0.3, 2.0], target = [0.3, 0.3, 0.0], fov_y_deg = 40.0 }";
     let one = built(&small(), "", "none");
     assert!(one.stderr.contains("no perspective camera"), "{}", one.stderr);
     one.ends_with(2);

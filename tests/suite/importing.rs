@@ -335,7 +335,7 @@ fn what_cannot_be_imported_is_refused_with_the_reason() {
     let cases: [(&str, String, &str); 8] = [
         ("red.obj", format!("mtllib ../../outside.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "leads out"),
         ("red.obj", format!("{triangle}f 1 2 3\n"), "faces without `usemtl`"),
-        ("red.obj", format!("mtllib map.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "the faces have no vt"),
+        ("red.obj", format!("mtllib map.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "'room/a.png' does not exist"),
         ("red.obj", format!("mtllib none.mtl\nusemtl it\n{triangle}f 1 2 3\n"), "does not exist"),
         ("red.obj", format!("{triangle}f 1 2 9\n"), "line 5"),
         ("red.gltf", "{}".to_owned(), "not valid glTF"),
