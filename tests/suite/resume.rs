@@ -107,7 +107,7 @@ fn files_that_were_missing_before_are_used() {
     let folder = tempfile::tempdir().unwrap();
     let (source, out) = (folder.path().join("source"), folder.path().join("dataset"));
     let recipe = write_source(&source, SMALL, &["first", "second"]);
-    let [texture, aside] = ["room/textures/planks.png", "planks.png"].map(|name| source.join(name));
+    let [texture, aside] = ["room/textures/outside.png", "outside.png"].map(|name| source.join(name));
     std::fs::rename(&texture, &aside).unwrap();
     kill_when(&mut build(&recipe, &out), || out.join(".build/scenes/first.json").is_file());
     // The twin: while the file is still missing, the scene is the same.

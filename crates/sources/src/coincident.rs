@@ -13,6 +13,7 @@ use mateval_scene::TriangleMesh;
 use mateval_scene::reference::Surface;
 
 use crate::log::Log;
+use crate::parts::connected_parts;
 use crate::sheets::{Face, MOST_PAIRS, Sheets, faces, for_each_near};
 use crate::source_scene::InstanceOrigin;
 
@@ -37,7 +38,9 @@ type Shifts = BTreeMap<usize, BTreeMap<usize, DVec3>>;
 ///
 /// Of two sheets of architecture, the smaller is moved, since a decoration is smaller than its wall; of two of equal area,
 /// the later. Without architecture, all sheets are compared in this way.
-pub(crate) fn separate(surfaces: &mut [Surface], origins: &[InstanceOrigin], log: &mut Log) {
+///
+/// A sheet that moves leaves its neighbours, so the parts of a surface that has none yet are found before.
+pub(crate) fn separate(surfaces: &mut [Surface], origins: &mut [InstanceOrigin], log: &mut Log) {
     let has_architecture = origins.iter().any(|origin| origin.role.is_architecture());
     let is_fixed = |origin: &InstanceOrigin| !has_architecture || origin.role.is_architecture();
     let fixed = faces(surfaces, origins, is_fixed);
@@ -55,7 +58,9 @@ pub(crate) fn separate(surfaces: &mut [Surface], origins: &[InstanceOrigin], log
         log.warn("coincident_sheets", place, message, "did not move all sheets that coincide with others");
     }
     for (surface, shift_of) in shifts {
-        shift(&mut surfaces[surface].mesh, &shift_of);
+        let mesh = &mut surfaces[surface].mesh;
+        origins[surface].part_of_triangle.get_or_insert_with(|| connected_parts(mesh));
+        shift(mesh, &shift_of);
     }
 }
 
@@ -244,7 +249,7 @@ mod tests {
 
     fn separated_in_roles(meshes: Vec<(TriangleMesh, Role)>) -> (Vec<TriangleMesh>, Vec<String>) {
         let (meshes, roles): (Vec<TriangleMesh>, Vec<Role>) = meshes.into_iter().unzip();
-        let origins: Vec<InstanceOrigin> = meshes
+        let mut origins: Vec<InstanceOrigin> = meshes
             .iter()
             .zip(roles)
             .map(|(mesh, role)| {
@@ -255,13 +260,29 @@ mod tests {
         let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
         let mut surfaces: Vec<Surface> = meshes.into_iter().map(surface).collect();
         let mut log = Log::new("house.json".to_owned(), 10);
-        separate(&mut surfaces, &origins, &mut log);
+        separate(&mut surfaces, &mut origins, &mut log);
         let codes = log.into_findings().into_iter().map(|finding| finding.code).collect();
         (surfaces.into_iter().map(|surface| surface.mesh).collect(), codes)
     }
 
     fn heights(mesh: &TriangleMesh) -> (f32, f32) {
         mesh.positions.iter().fold((f32::MAX, f32::MIN), |(low, high), p| (low.min(p.z), high.max(p.z)))
+    }
+
+    /// A corner of two squares stands on a floor. Its lower square moves and stays in one part with the other.
+    #[test]
+    fn a_moved_sheet_stays_in_its_part() {
+        let mut corner = square(1.0, 1.0, true);
+        corner.positions.extend([Vec3::new(1.0, 0.0, 1.0), Vec3::new(2.0, 0.0, 1.0)]);
+        corner.triangles.extend([[0, 1, 5], [0, 5, 4]]);
+        corner.uvs = None;
+        let surface = |mesh| Surface { name: String::new(), mesh, material: MaterialIndex(0) };
+        let mut surfaces = [surface(corner), surface(square(0.0, 3.0, true))];
+        let mut origins = vec![InstanceOrigin::default(); 2];
+        separate(&mut surfaces, &mut origins, &mut Log::new("a.gltf".to_owned(), 10));
+        assert_eq!(origins[0].part_of_triangle, Some(vec![0; 4]));
+        assert_eq!(connected_parts(&surfaces[0].mesh), [0, 0, 1, 1]);
+        assert_eq!(origins[1].part_of_triangle, None);
     }
 
     #[test]

@@ -119,7 +119,7 @@ pub fn read(xml_path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<B
     for (origin, surface) in origins.iter_mut().zip(&reader.scene.surfaces) {
         origin.stated = reader.stated[surface.material.0];
     }
-    coincident::separate(&mut reader.scene.surfaces, &origins, &mut reader.log);
+    coincident::separate(&mut reader.scene.surfaces, &mut origins, &mut reader.log);
     // Its title, findings and files.
     let title = title(licence.as_ref(), xml_path);
     let Reader { scene, log, source, shift_m, left_out, .. } = reader;

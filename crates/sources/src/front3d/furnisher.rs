@@ -95,8 +95,8 @@ impl<'a> Furnisher<'a> {
         for split in missing_uv::resolve(&mut scene, &mut origins, &mut self.log) {
             self.placed.push(self.placed[split].clone());
         }
-        self.placed.iter_mut().zip(&origins).for_each(|(placed, origin)| placed.origin.clone_from(origin));
-        coincident::separate(&mut scene.surfaces, &origins, &mut self.log);
+        coincident::separate(&mut scene.surfaces, &mut origins, &mut self.log);
+        self.placed.iter_mut().zip(origins).for_each(|(placed, origin)| placed.origin = origin);
         let libraries = [Some(self.models), self.textures].into_iter().flatten().collect();
         Furnished { scene, placed: self.placed, log: self.log, libraries }
     }

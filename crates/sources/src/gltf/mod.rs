@@ -100,7 +100,7 @@ pub fn read(path: &Path, camera: Option<DVec3>, limits: &Limits) -> Result<GltfS
     // Repairs that concern all of it.
     let Reader { mut scene, mut origins, mut log, omitted, source, .. } = reader;
     missing_uv::resolve(&mut scene, &mut origins, &mut log);
-    coincident::separate(&mut scene.surfaces, &origins, &mut log);
+    coincident::separate(&mut scene.surfaces, &mut origins, &mut log);
     omitted.report(&mut log);
     let files = source.into_files();
     Ok(GltfScene {
