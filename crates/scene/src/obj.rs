@@ -117,7 +117,7 @@ pub struct ObjGroup {
 pub struct ObjMesh {
     /// The triangles of all groups, group by group, relative to `base`.
     pub mesh: TriangleMesh,
-    /// What has been subtracted from the positions: whole units where the first of them is more than [`NEAR`] from the
+    /// What has been subtracted from the positions: whole units where the first of them is more than 1000 from the
     /// origin, else nothing.
     pub base: DVec3,
     /// Its objects and groups in their order.
