@@ -164,14 +164,15 @@ class Bake(unittest.TestCase):
     def cube(self, *, material: bpy.types.Material, name: str = "cube", **place: object) -> bpy.types.Object:
         """A cube from -1 to 1, whose uv is a cross."""
         bpy.ops.mesh.primitive_cube_add(size=2.0, **place)
-        made = bpy.context.object
-        made.name = name
-        made.data.materials.append(material)
-        return made
+        return self._added(material=material, name=name)
 
     def plane(self, *, material: bpy.types.Material, name: str = "plane", **place: object) -> bpy.types.Object:
         """A plane from -1 to 1, whose uv is the whole square."""
         bpy.ops.mesh.primitive_plane_add(size=2.0, **place)
+        return self._added(material=material, name=name)
+
+    def _added(self, *, material: bpy.types.Material, name: str) -> bpy.types.Object:
+        """Names the object that was added last and gives it the material."""
         made = bpy.context.object
         made.name = name
         made.data.materials.append(material)

@@ -109,7 +109,7 @@ def fault(*, step: Step) -> str:
 
 
 def judge(*, steps: list[Step], picture: bytes | None) -> tuple[Outcome, str]:
-    """The outcome of the commands that were run, the last of which may have ended early."""
+    """The outcome of the commands that were run. The last may have ended early."""
     last = steps[-1]
     if found := fault(step=last):
         return Outcome.FAILED, f"{last_word(step=last)}: {found}"

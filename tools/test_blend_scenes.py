@@ -287,7 +287,7 @@ class Untrusted(Bake):
         (self.folder / "missing.png").unlink()
         self.cube(material=made)
         unused = bpy.data.images.load(str(self.root / "outside.png"), check_existing=False)
-        unused.filepath, unused.use_fake_user = "/nowhere/unused.png", True
+        unused.filepath, unused.use_fake_user = str(self.root / "nowhere" / "unused.png"), True
         result = self.bake(is_good=False)
         found = {(fault["code"], Path(fault["place"]).name) for fault in result["faults"]}
         self.assertEqual(

@@ -2,7 +2,7 @@
 """Builds, renders and verifies every scene file below a folder, and writes a page of the outcomes.
 
 Scene files are `.glb`, `.gltf` and `.blend` files, `.xml` files whose root is `<scene>` (Mitsuba), and `.json` files
-that hold an object with `mesh` and `scene` (houses of 3D-FRONT, of which the rooms with the most children are built).
+that hold an object with `mesh` and `scene` (houses of 3D-FRONT; the rooms with the most children are built).
 Each gets a small recipe and the three commands `prep build`, `prep render` and `prep verify`. A scene is
 
 - failed, after a signal, a panic, a traceback, an exit code other than 0, 1 and 2, more time or memory than allowed, a

@@ -101,7 +101,7 @@ class Slot:
     look: Look | None
     kept: Kept | None = None
     uv: str | None = None
-    """The uv that is baked to; none where nothing is baked."""
+    """The uv that is baked to; absent if nothing is baked."""
     edge: int = 0
 
     @property

@@ -216,7 +216,7 @@ class MaterialGraph:
         )
 
     def diffuse(self, *, node: bpy.types.Node) -> Channels:
-        """Diffuse BSDF, and shaders of which only the colour is kept."""
+        """Diffuse BSDF, and shaders that keep only their colour."""
         if node.bl_idname != "ShaderNodeBsdfDiffuse":
             action = "used its colour as that of a rough surface"
             self._note(code="approximated", node=node, message="light that passes through the surface", action=action)

@@ -26,7 +26,7 @@ class MaterialWriter:
         self._known: dict[tuple, bpy.types.Material] = {}
 
     def assign(self, *, body: Body, results: list[Result | None]) -> None:
-        """Gives a body the materials of the result; none where a face had none."""
+        """Gives a body the materials of the result. A slot without a material stays empty."""
         is_solid = is_closed(mesh=body.mesh)
         for index, (slot, result) in enumerate(zip(body.slots, results, strict=True)):
             made = None

@@ -76,7 +76,7 @@ def add_area(
     """
     source = light.original.data
     if source.spread < math.pi - 1e-3:
-        action = "let it shine in all directions of its front"
+        action = "let it shine in every direction of its front"
         findings.note(code="spread", place=light.name, message="an area lamp with a spread", action=action)
     is_round = source.shape in ("DISK", "ELLIPSE")
     width = source.size

@@ -151,7 +151,7 @@ def texels_of(*, image: bpy.types.Image, size: Sequence[int]) -> np.ndarray:
 
 
 def packed_data(*, kept: Kept, channels: Channels) -> np.ndarray | None:
-    """Returns roughness as green and metallic as blue, as glTF has them; none where both are constant."""
+    """Returns roughness as green and metallic as blue, as glTF has them, or None if both are constant."""
     used = [kept.pictures[name].image for name in ("roughness", "metallic") if name in kept.pictures]
     if not used:
         return None

@@ -131,7 +131,7 @@ impl AdaptedFile {
         Ok(Some(picture))
     }
 
-    /// The stored numbers. None where an optional file is missing. Fails where 16-bit integers are those of bytes and the
+    /// The stored numbers; absent if an optional file is missing. Fails where 16-bit integers are those of bytes and the
     /// adapter does not say so, since all values would be near 0.
     pub(crate) fn stored(
         &self,

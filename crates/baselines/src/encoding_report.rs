@@ -266,7 +266,7 @@ struct ScenePicture {
 }
 
 impl ScenePicture {
-    /// None where an optional file is missing.
+    /// The file's picture and the view that it shows; absent if an optional file is missing.
     fn read(
         dataset: &Dataset,
         scene: &SceneFile,

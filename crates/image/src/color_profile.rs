@@ -72,7 +72,7 @@ impl Profile {
         Self::of_icc(&parsed).ok_or_else(refused).map(|found| Some(found).filter(|profile| !profile.is_srgb()))
     }
 
-    /// None where the profile is not of primaries and curves, or of impossible ones.
+    /// The profile's primaries and curves; absent if it has others, or impossible ones.
     fn of_icc(profile: &ColorProfile) -> Option<Self> {
         if profile.pcs != DataColorSpace::Xyz {
             return None;

@@ -232,7 +232,7 @@ fn read_mesh(mesh: &gltf::Mesh<'_>, buffers: &[&[u8]]) -> Result<TriangleMesh, G
     })
 }
 
-/// The entries of an accessor, all of which must be finite.
+/// The entries of an accessor, which must be finite.
 fn finite<const N: usize>(accessor: &gltf::Accessor<'_>, buffers: &[&[u8]]) -> Result<Vec<[f32; N]>, GltfError> {
     let values = numbers::<N>(accessor, buffers)?;
     match values.iter().position(|value| !value.iter().all(|v| v.is_finite())) {

@@ -22,7 +22,7 @@ pub fn numbers<const N: usize>(
     first_numbers(accessor, buffers)
 }
 
-/// As [`numbers`], of accessors that may have more than `N` numbers an entry, of which the first count.
+/// As [`numbers`], of accessors that may have more than `N` numbers per entry; the first `N` count.
 pub fn first_numbers<const N: usize>(
     accessor: &gltf::Accessor<'_>,
     buffers: &[impl AsRef<[u8]>],

@@ -32,7 +32,7 @@ pub struct BlenderArgs {
     attempts: u32,
 }
 
-/// The Blender at this path, or else the usual one; none where no path is given and none is installed.
+/// The Blender at this path, or else the usual one; absent if no path is given and none is installed.
 pub fn found(path: Option<PathBuf>) -> anyhow::Result<Option<BlenderOptions>> {
     let arguments = BlenderArgs { blender: path, jobs: 1, time_limit: 7200, memory_limit: 16, attempts: 1 };
     match arguments.options() {

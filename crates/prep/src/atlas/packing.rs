@@ -87,7 +87,7 @@ pub(super) fn packed(mesh: &TriangleMesh, wish: SizeWish) -> Result<AtlasLayout,
 }
 
 /// The mesh in an atlas of this size, as finely as its charts fit. Triangles that would take far more texels than their
-/// area calls for are cut out and placed on one point: nearly degenerate ones, one of which can fill an atlas.
+/// area calls for are cut out and placed on one point: a single degenerate one can fill an atlas.
 fn pack(mesh: &TriangleMesh, size: u32) -> Result<AtlasLayout, AtlasError> {
     let layout = pack_kept(mesh, size, |_| true)?;
     let stretched = stretched(mesh, &layout);

@@ -1,6 +1,6 @@
 //! Has Blender bake a `.blend` scene to textures and write it as glTF, by `blender_scripts/bake_blend.py`.
 //!
-//! In: the file, which is untrusted, and its folder, outside of which nothing that it names may lie. Out: a GLB, the light
+//! In: the file, which is untrusted, and its folder, which holds everything that it may name. Out: a GLB, the light
 //! from outside, and what could not be kept. No Python of the file is run.
 
 use std::path::{Path, PathBuf};
@@ -45,9 +45,9 @@ pub struct Baked {
     _format: String,
     /// Blender's version.
     pub blender: String,
-    /// The GLB in the output's folder; none where the file is refused.
+    /// The GLB in the output's folder; absent if the file is refused.
     pub glb: Option<String>,
-    /// The light from outside; none where the file has none.
+    /// The light from outside; absent if the file has none.
     pub world: Option<BakedWorld>,
     /// Area lamps, which are emitting rectangles in the GLB.
     pub lamps: Vec<BakedLamp>,

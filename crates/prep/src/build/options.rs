@@ -19,7 +19,7 @@ pub struct BuildOptions {
     pub scenes: Vec<SceneId>,
     /// Replace what exists: the scenes that are named, or the whole dataset where none is.
     pub force: bool,
-    /// The Blender that reads `.blend` files; none where none was found.
+    /// The Blender that reads `.blend` files; absent if none was found.
     pub blender: Option<BlenderOptions>,
     /// The folder of atlases that earlier builds made; none to make all of them.
     pub atlas_cache: Option<PathBuf>,

@@ -60,7 +60,7 @@ pub(super) fn missing(
 
 /// A folder below `root`, or `root` itself, in which the missing file exists: by its whole path, or else by its own folder
 /// and name. A path of at most two parts is also found by its name, unless several folders hold such a name. `models` is
-/// the folder of a 3D-FRONT room's models, which all have the same names in folders of their own. None where the file is
+/// the folder of a 3D-FRONT room's models, which all have the same names in folders of their own. Absent if the file is
 /// where it was looked for.
 fn folder_of(root: &Path, missing: &str, models: Option<&Path>) -> Option<PathBuf> {
     let parts: Vec<&str> = missing.split('/').filter(|part| !matches!(*part, "" | "." | "..")).collect();

@@ -34,7 +34,7 @@ const BAKED_TEXEL_M: f64 = 0.002;
 
 /// How a Blender file is read.
 pub(super) struct Baking<'a> {
-    /// None where no Blender was found.
+    /// Absent if no Blender was found.
     pub(super) blender: Option<&'a BlenderOptions>,
     /// A folder for what is removed afterwards.
     pub(super) folder: &'a Path,

@@ -43,10 +43,10 @@ pub struct RecipeScene {
     /// byte is read, the scene is refused. Not checked if empty.
     #[serde(default)]
     pub inputs: BTreeMap<String, String>,
-    /// Accept a scene of which more than a fifth of the models, meshes or textures is missing.
+    /// Accept a scene that lacks more than a fifth of its models, meshes or textures.
     #[serde(default)]
     pub allow_missing: bool,
-    /// Accept a scene of which more than 5 % of the scored pixels have a base colour that the source does not state.
+    /// Accept a scene whose source does not state the base colour of more than 5 % of the scored pixels.
     #[serde(default)]
     pub allow_unstated: bool,
     /// Overrides the recipe's.

@@ -34,7 +34,7 @@ const ROUGHNESS: [&str; 4] = ["alpha", "alpha_u", "alpha_v", "roughness"];
 struct ReadMaterial {
     material: Material,
     stated: StatedParameters,
-    /// Whether a wrapper holds several BSDFs, or weighs them, of which one alone is used.
+    /// Whether only one BSDF is used of a wrapper that holds or weighs several.
     is_one_of_several: bool,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Reader<'a> {
         self.add_material(ReadMaterial { material, stated, is_one_of_several: false })
     }
 
-    /// A copy of a material of which the scene states only what `states` returns of that.
+    /// A copy of a material whose stated parameters are those that `states` returns for the original's.
     pub(super) fn stating_less(
         &mut self,
         MaterialIndex(of): MaterialIndex,
@@ -217,7 +217,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The parameters of a model of which one suffices to state its base colour; none for glass.
+/// The parameters that each suffice to state a model's base colour; empty for glass.
 fn base_color_of(kind: &str) -> &'static [&'static str] {
     match kind {
         "diffuse" | "roughdiffuse" => &["reflectance"],

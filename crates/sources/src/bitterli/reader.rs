@@ -25,7 +25,7 @@ pub(super) struct Reader<'a> {
     pub(super) source: SourceFolder,
     /// Folders in which files are looked for besides the scene's own, from `<path>`.
     pub(super) search: Vec<String>,
-    /// Shapes of which nothing could be read.
+    /// Shapes that could not be read at all.
     pub(super) left_out: Vec<String>,
     /// What is subtracted from all positions.
     pub(super) shift_m: DVec3,

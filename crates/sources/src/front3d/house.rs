@@ -81,7 +81,7 @@ pub struct HouseMaterial {
     pub texture: Option<String>,
     /// The words of its content type, as in `material wallpaper`.
     pub content: Option<String>,
-    /// sRGB-encoded colour, 0 to 255; none where the file states none.
+    /// sRGB-encoded colour, 0 to 255; absent if the file states none.
     pub color: Option<[f64; 3]>,
     /// The map from the mesh's uv to the texture's.
     pub uv: UvTransform,

@@ -102,7 +102,7 @@ fn drop_without_area(mesh: &mut TriangleMesh, place: &str, log: &mut Log) {
     }
 }
 
-/// One pair of numbers for each vertex, or none where the list is empty. Missing and impossible pairs become NaN.
+/// One pair of numbers for each vertex; absent if the list is empty. Missing and impossible pairs become NaN.
 fn uvs(uv: &[f64], mesh: &TriangleMesh, place: &str, log: &mut Log) -> Option<Vec<Vec2>> {
     let (pairs, count) = (uv.as_chunks::<2>().0, mesh.positions.len());
     let place = format!("{place}/uv");

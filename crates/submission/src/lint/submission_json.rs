@@ -75,7 +75,7 @@ fn read(submission: &Path) -> Result<Map<String, Value>, Box<Finding>> {
     }
 }
 
-/// The folder below a submission that holds its `submission.json`, or an archive that may; none where neither exists. The
+/// The folder below a submission that holds its `submission.json`, or an archive that may; absent if neither exists. The
 /// first in the order of names, at most four folders down.
 fn elsewhere(submission: &Path) -> Option<String> {
     const MOST: usize = 1000;
